@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Triangle meshes: the one shape that everything else (hulls, trees, renderings) is made from.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "prescene/core/status.h"
+#include "prescene/geometry/pose.h"
+
+namespace prescene::geometry {
+
+/// Vertices in metres in the mesh's own frame; triangles are counter-clockwise seen from outside.
+struct TriangleMesh {
+  std::vector<Vector3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+
+  friend bool operator==(const TriangleMesh&, const TriangleMesh&) = default;
+  bool empty() const { return triangles.empty(); }
+};
+
+/// What repair_mesh found and changed.
+struct MeshRepairReport {
+  int non_finite_vertices = 0;      ///< Triangles using one were dropped.
+  int out_of_range_triangles = 0;   ///< Index beyond the vertices; dropped.
+  int degenerate_triangles = 0;     ///< Two equal corners or (almost) no area; dropped.
+  int duplicate_vertices = 0;       ///< Bit-equal positions made one.
+  int unused_vertices = 0;
+  bool changed() const;
+  std::string text() const;         ///< One line for a person; empty when nothing changed.
+};
+
+/// A mesh without NaN, dangling indices, zero-area triangles, duplicate or unused vertices, with a report.
+/// Fails with kInvalidInput when no triangle is left.
+core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* report);
+
+/// How the edges of a mesh (vertices welded by position) fit together.
+struct MeshTopology {
+  int open_edges = 0;           ///< Edges with one triangle.
+  int non_manifold_edges = 0;   ///< Edges with more than two.
+  int inconsistent_edges = 0;   ///< Edges that both triangles run in the same direction.
+  int components = 0;           ///< Connected over shared vertices.
+  bool watertight() const { return open_edges == 0 && non_manifold_edges == 0; }
+  bool oriented() const { return inconsistent_edges == 0; }
+};
+MeshTopology mesh_topology(const TriangleMesh& mesh);
+
+using Box = Eigen::AlignedBox3d;
+Box bounding_box(const TriangleMesh& mesh);
+/// Largest distance of a vertex from `p_MQ` (mesh frame).
+double radius_about(const TriangleMesh& mesh, const Vector3d& p_MQ);
+double surface_area(const TriangleMesh& mesh);
+
+TriangleMesh transformed(const TriangleMesh& mesh, const Pose& X_NM);
+TriangleMesh scaled(const TriangleMesh& mesh, double factor);
+/// One mesh holding both.
+TriangleMesh joined(const TriangleMesh& a, const TriangleMesh& b);
+/// Connected components, in the order of their first triangle.
+std::vector<TriangleMesh> connected_components(const TriangleMesh& mesh);
+/// A coarser mesh of at most `max_triangles` (edge collapse by quadric error [Garland & Heckbert 1997], deterministic);
+/// the same mesh when it is small enough already. max_triangles >= 4.
+TriangleMesh simplified(const TriangleMesh& mesh, int max_triangles);
+/// The convex hull, outward triangles (Fails with kInvalidInput when all points lie in a plane).
+core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points);
+
+/// Uniform points on the surface from a stream of numbers; each with its triangle's normal.
+struct SurfacePoint {
+  Vector3d position;
+  Vector3d normal;
+};
+std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, int count, std::uint64_t seed);
+
+/// Stable identity of the content, for caches.
+std::uint64_t content_hash(const TriangleMesh& mesh);
+
+}  // namespace prescene::geometry
