@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+# One folder a module, one library a module. A module's public headers are reached as "prescene/<folder>/<header>" through
+# an include root of its own, a folder of links in the build tree; whoever does not name the module in USES, directly or
+# through a module that does, cannot include them.
+
+# Adds the folders that have a CMakeLists.txt.
+function(prescene_add_folders)
+  foreach(folder IN LISTS ARGN)
+    if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/CMakeLists.txt")
+      add_subdirectory(${folder})
+    endif()
+  endforeach()
+endfunction()
+
+# Links every header of `headers` into `root`/prescene/<folder>, leaving nothing else there.
+function(prescene_link_headers root folder headers)
+  file(REMOVE_RECURSE "${root}")
+  foreach(header IN LISTS headers)
+    if(NOT EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${header}")
+      message(FATAL_ERROR "${CMAKE_CURRENT_LIST_FILE}: the header ${header} is listed but does not exist.")
+    endif()
+    get_filename_component(subfolder "${header}" DIRECTORY)
+    file(MAKE_DIRECTORY "${root}/prescene/${folder}/${subfolder}")
+    file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}/${header}" "${root}/prescene/${folder}/${header}" SYMBOLIC)
+  endforeach()
+endfunction()
+
+# prescene_module(<name>
+#   FOLDER <folder>           of the sources, below the project's root; default: the current folder
+#   HEADERS <h>...            public, included as "prescene/<folder>/<h>"
+#   PRIVATE_HEADERS <h>...    for this module's own sources only, included as "<h>"
+#   SOURCES <cc>...           none: a module of headers only
+#   USES <module>...          our modules that public headers may include
+#   PRIVATE_USES <module>...  our modules that only the sources include
+#   LINKS <target>...         outside libraries that public headers include
+#   PRIVATE_LINKS <target>... outside libraries that only the sources include
+#   NO_INSTALL)               for libraries of tests
+# makes the library prescene_<name>, alias and installed name prescene::<name>.
+function(prescene_module name)
+  cmake_parse_arguments(PARSE_ARGV 1 M "NO_INSTALL" "FOLDER"
+                        "HEADERS;PRIVATE_HEADERS;SOURCES;USES;PRIVATE_USES;LINKS;PRIVATE_LINKS")
+  if(M_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "prescene_module(${name}): unknown arguments ${M_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT M_FOLDER)
+    file(RELATIVE_PATH M_FOLDER "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
+  endif()
+  set(target prescene_${name})
+  list(TRANSFORM M_USES PREPEND prescene::)
+  list(TRANSFORM M_PRIVATE_USES PREPEND prescene::)
+
+  if(M_SOURCES)
+    add_library(${target} STATIC ${M_SOURCES} ${M_PRIVATE_HEADERS})
+    target_link_libraries(${target} PUBLIC ${M_USES} ${M_LINKS} PRIVATE ${M_PRIVATE_USES} ${M_PRIVATE_LINKS})
+    set(scope PUBLIC)
+  else()
+    add_library(${target} INTERFACE)
+    target_link_libraries(${target} INTERFACE ${M_USES} ${M_LINKS})
+    set(scope INTERFACE)
+  endif()
+  add_library(prescene::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(${target} ${scope} cxx_std_20)
+
+  set(root "${PROJECT_BINARY_DIR}/roots/${target}")
+  prescene_link_headers("${root}" "${M_FOLDER}" "${M_HEADERS}")
+  target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${root}>"
+                                                "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
+
+  if(NOT M_NO_INSTALL)
+    set_property(GLOBAL PROPERTY PRESCENE_INSTALLED_MODULES TRUE)
+    install(TARGETS ${target} EXPORT prescene-targets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+    foreach(header IN LISTS M_HEADERS)
+      get_filename_component(subfolder "${header}" DIRECTORY)
+      install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/prescene/${M_FOLDER}/${subfolder}")
+    endforeach()
+  endif()
+endfunction()
+
+# prescene_benchmark(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...) makes the program bench_<name> at
+# the top of the build folder, a Google Benchmark program that `./dev bench <name>` runs.
+function(prescene_benchmark name)
+  cmake_parse_arguments(PARSE_ARGV 1 B "" "" "SOURCES;USES;PRIVATE_LINKS")
+  list(TRANSFORM B_USES PREPEND prescene::)
+  add_executable(bench_${name} ${B_SOURCES})
+  target_link_libraries(bench_${name} PRIVATE ${B_USES} ${B_PRIVATE_LINKS} benchmark::benchmark)
+  set_target_properties(bench_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}")
+endfunction()

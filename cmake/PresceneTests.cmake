@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+# Test executables and fuzz targets. Each GoogleTest case becomes a CTest test; its label is the kind of the file that it
+# is written in: *_laws_test.cc law, *_contract_test.cc and *_contract.h contract, *_reference_test.cc reference,
+# *_equivalence_test.cc equivalence, *_statistics_test.cc statistical, tests/system system, tests/real_data real_data,
+# tests/scenarios scenario, everything else unit.
+
+set(PRESCENE_TEST_ENVIRONMENT "PRESCENE_SOURCE_DIR=${PROJECT_SOURCE_DIR}" "PRESCENE_BUILD_DIR=${PROJECT_BINARY_DIR}")
+set(PRESCENE_FUZZERS OFF CACHE BOOL "Build fuzz targets as libFuzzer programs (clang) instead of replays of their corpus")
+
+# prescene_tests(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...
+#   TIMEOUT <seconds>         of each case, default 300
+#   RESOURCE_LOCK <names>)    cases that share one of these names never run at the same time
+# makes the executable <name>_tests.
+function(prescene_tests name)
+  cmake_parse_arguments(PARSE_ARGV 1 T "" "TIMEOUT" "SOURCES;USES;PRIVATE_LINKS;RESOURCE_LOCK")
+  if(T_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "prescene_tests(${name}): unknown arguments ${T_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT T_TIMEOUT)
+    set(T_TIMEOUT 300)
+  endif()
+  set(target ${name}_tests)
+  list(TRANSFORM T_USES PREPEND prescene::)
+  add_executable(${target} ${T_SOURCES})
+  target_link_libraries(${target} PRIVATE ${T_USES} ${T_PRIVATE_LINKS} GTest::gmock GTest::gtest_main)
+  set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
+
+  # Discovery runs when CTest starts, so that building needs to run nothing.
+  set(list_file "${CMAKE_CURRENT_BINARY_DIR}/${target}_list.cmake")
+  set(include_file "${CMAKE_CURRENT_BINARY_DIR}/${target}_include.cmake")
+  file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
+  file(GENERATE OUTPUT "${include_file}" CONTENT "
+set(prescene_test_executable \"$<TARGET_FILE:${target}>\")
+set(prescene_test_list \"${list_file}\")
+set(prescene_test_target \"${target}\")
+set(prescene_test_folder \"${folder}\")
+set(prescene_test_timeout \"${T_TIMEOUT}\")
+set(prescene_test_environment \"${PRESCENE_TEST_ENVIRONMENT}\")
+set(prescene_test_resource_lock \"${T_RESOURCE_LOCK}\")
+include(\"${PROJECT_SOURCE_DIR}/cmake/discover_tests.cmake\")
+")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${include_file}")
+endfunction()
+
+# prescene_fuzz_target(<name> SOURCES <name>_fuzz.cc USES <module>... PRIVATE_LINKS <target>...)
+# With PRESCENE_FUZZERS the libFuzzer program fuzz_<name>; otherwise fuzz_<name> feeds each file of
+# tests/fuzz/corpus/<name> through the same entry point once, as a CTest test with the label fuzz.
+function(prescene_fuzz_target name)
+  cmake_parse_arguments(PARSE_ARGV 1 F "" "" "SOURCES;USES;PRIVATE_LINKS")
+  list(TRANSFORM F_USES PREPEND prescene::)
+  add_executable(fuzz_${name} ${F_SOURCES})
+  target_link_libraries(fuzz_${name} PRIVATE ${F_USES} ${F_PRIVATE_LINKS})
+  set_target_properties(fuzz_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/fuzz")
+  if(PRESCENE_FUZZERS)
+    target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+  else()
+    target_sources(fuzz_${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cc")
+    add_test(NAME fuzz.${name} COMMAND fuzz_${name} "${PROJECT_SOURCE_DIR}/tests/fuzz/corpus/${name}")
+    set_tests_properties(fuzz.${name} PROPERTIES LABELS fuzz TIMEOUT 300 ENVIRONMENT "${PRESCENE_TEST_ENVIRONMENT}")
+  endif()
+endfunction()
