@@ -4,7 +4,8 @@
 # *_equivalence_test.cc equivalence, *_statistics_test.cc statistical, tests/system system, tests/real_data real_data,
 # tests/scenarios scenario, everything else unit.
 
-set(PRESCENE_TEST_ENVIRONMENT "PRESCENE_SOURCE_DIR=${PROJECT_SOURCE_DIR}" "PRESCENE_BUILD_DIR=${PROJECT_BINARY_DIR}")
+# RapidCheck would otherwise draw another seed in every run.
+set(PRESCENE_TEST_ENVIRONMENT "RC_PARAMS=seed=20220" "PRESCENE_SOURCE_DIR=${PROJECT_SOURCE_DIR}" "PRESCENE_BUILD_DIR=${PROJECT_BINARY_DIR}")
 set(PRESCENE_FUZZERS OFF CACHE BOOL "Build fuzz targets as libFuzzer programs (clang) instead of replays of their corpus")
 
 # prescene_tests(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...

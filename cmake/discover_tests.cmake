@@ -62,13 +62,13 @@ macro(prescene_add_case target case kind)
   if("${case}" MATCHES "(^|[./])DISABLED_")
     set(_disabled TRUE)
   endif()
-  add_test([==[${target}:${case}]==] "${prescene_test_executable}" "--gtest_filter=${case}"
+  add_test("${target}:${case}" "${prescene_test_executable}" "--gtest_filter=${case}"
            --gtest_also_run_disabled_tests)
-  set_tests_properties([==[${target}:${case}]==] PROPERTIES LABELS ${kind} TIMEOUT ${prescene_test_timeout}
+  set_tests_properties("${target}:${case}" PROPERTIES LABELS ${kind} TIMEOUT ${prescene_test_timeout}
                        ENVIRONMENT "${prescene_test_environment}" DISABLED ${_disabled}
                        SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
   if(prescene_test_resource_lock)
-    set_tests_properties([==[${target}:${case}]==] PROPERTIES RESOURCE_LOCK "${prescene_test_resource_lock}")
+    set_tests_properties("${target}:${case}" PROPERTIES RESOURCE_LOCK "${prescene_test_resource_lock}")
   endif()
 endmacro()
 
