@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h, as ROS 2 Humble and Jazzy know them.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace prescene::interfaces {
+
+/// What ROS 2 calls one message type.
+struct RosType {
+  std::string_view name;       ///< "sensor_msgs/msg/Image"
+  std::string_view dds_name;   ///< "sensor_msgs::msg::dds_::Image_"
+  std::string_view type_hash;  ///< "RIHS01_" and 64 hexadecimal digits
+  std::string_view text;       ///< The .msg text without comments and constants; nested types not included.
+};
+
+/// All types of messages.h, ordered by name. Lives as long as the program.
+std::span<const RosType> ros_types();
+/// The type with this name ("pkg/msg/Name", also "pkg/Name"), or nullptr.
+const RosType* find_ros_type(std::string_view name);
+
+/// The schema text as rosbag2 writes it into recordings: the .msg text, then for each nested type (depth first, each
+/// once) a line of 80 '=', a line "MSG: pkg/Name" and its text.
+std::string ros2msg_schema(const RosType& type);
+
+/// The type of a struct of messages.h; defined for each of them.
+template <class Message>
+const RosType& ros_type();
+
+}  // namespace prescene::interfaces
