@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON forms of the belief's values: poses as {"position": [x,y,z], "rotation": [w,x,y,z]}, enums as lower-case words,
+// field names as in the structs. Reading is strict: unknown keys and wrong types fail with the path of the place.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+#include "prescene/belief/query.h"
+#include "prescene/core/status.h"
+
+namespace prescene::belief {
+
+nlohmann::ordered_json to_json(const Pose& pose);
+nlohmann::ordered_json to_json(const Twist& twist);
+nlohmann::ordered_json to_json(const Action& action);
+nlohmann::ordered_json to_json(const Outcome& outcome);
+nlohmann::ordered_json to_json(const WorldState& state);
+nlohmann::ordered_json to_json(const Timeline& timeline);
+nlohmann::ordered_json to_json(const Trajectory& trajectory);
+nlohmann::ordered_json to_json(const ObjectBelief& object);
+/// Without the scene (which a scene file holds).
+nlohmann::ordered_json to_json(const Belief& belief);
+nlohmann::ordered_json to_json(const Query& query);
+nlohmann::ordered_json to_json(const Answer& answer);
+
+/// {"id": "...", "where": {...}} or "predict", "stability", "view".
+core::Result<Query> query_from_json(std::string_view text);
+core::Result<Action> action_from_json(const nlohmann::ordered_json& value);
+core::Result<Outcome> outcome_from_json(const nlohmann::ordered_json& value);
+/// A belief written by to_json, given its scene.
+core::Result<Belief> belief_from_json(const nlohmann::ordered_json& value, std::shared_ptr<const Scene> scene);
+
+}  // namespace prescene::belief

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Outcomes: named predicates over a trajectory, and their evaluation (pure functions).
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "prescene/belief/distribution.h"
+
+namespace prescene::belief {
+
+struct Trajectory;
+struct Scene;
+
+/// When a predicate has to hold.
+enum class When { kAtEnd, kEver, kAlways };
+
+/// The object's frame origin (or its whole bounding box, if `whole`) is inside a box fixed in W.
+struct InsideVolume {
+  Pose X_WV;                 ///< Centre of the box.
+  Vector3d size;             ///< Full edges, m.
+  bool whole = false;
+  friend bool operator==(const InsideVolume&, const InsideVolume&) = default;
+};
+/// In contact with the named support, from above, and not moving.
+struct RestingOn {
+  std::string support;
+  friend bool operator==(const RestingOn&, const RestingOn&) = default;
+};
+/// The body axis is within `max_angle` of W's up.
+struct UprightWithin {
+  Vector3d axis_O = Vector3d::UnitZ();
+  double max_angle = 0.26;   ///< rad
+  friend bool operator==(const UprightWithin&, const UprightWithin&) = default;
+};
+/// The face or axis of the body (unit vector in O) is the one of +-x, +-y, +-z that points most upwards.
+struct FaceUp {
+  Vector3d axis_O = Vector3d::UnitZ();
+  friend bool operator==(const FaceUp&, const FaceUp&) = default;
+};
+struct BelowHeight {
+  double height = 0.0;       ///< The origin's z in W, m.
+  friend bool operator==(const BelowHeight&, const BelowHeight&) = default;
+};
+struct MovedMoreThan {
+  double distance = 0.0;     ///< m from the start
+  friend bool operator==(const MovedMoreThan&, const MovedMoreThan&) = default;
+};
+struct TurnedMoreThan {
+  double angle = 0.0;        ///< rad from the start
+  friend bool operator==(const TurnedMoreThan&, const TurnedMoreThan&) = default;
+};
+struct Touched {
+  std::string other;         ///< Object, support or robot body; at any time.
+  friend bool operator==(const Touched&, const Touched&) = default;
+};
+struct StillMoving {
+  friend bool operator==(const StillMoving&, const StillMoving&) = default;
+};
+
+using Predicate = std::variant<InsideVolume, RestingOn, UprightWithin, FaceUp, BelowHeight, MovedMoreThan, TurnedMoreThan,
+                               Touched, StillMoving>;
+
+/// All predicates hold (each negated if its flag says so).
+struct Condition {
+  Predicate predicate;
+  When when = When::kAtEnd;
+  bool negated = false;
+  friend bool operator==(const Condition&, const Condition&) = default;
+};
+struct Outcome {
+  std::string name;
+  std::string object;                 ///< Whose trajectory is judged.
+  std::vector<Condition> all_of;      ///< At least one.
+  friend bool operator==(const Outcome&, const Outcome&) = default;
+};
+
+/// Outcomes of which the first that holds counts; "other" is added for the rest, so their probabilities sum to one.
+struct ExclusiveOutcomes {
+  std::string name;
+  std::vector<Outcome> outcomes;
+  friend bool operator==(const ExclusiveOutcomes&, const ExclusiveOutcomes&) = default;
+};
+/// Which of the body's six faces (+x, -x, +y, -y, +z, -z in O) is up at the end, as exclusive outcomes.
+ExclusiveOutcomes which_face_up(const std::string& name, const std::string& object);
+
+bool holds(const Scene& scene, const Trajectory& trajectory, const Outcome& outcome);
+/// Index of the first outcome that holds, or outcomes.size() for "other".
+int classify(const Scene& scene, const Trajectory& trajectory, const ExclusiveOutcomes& exclusive);
+
+}  // namespace prescene::belief

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scene: what is fixed, what may move, who acts, and what is asked about it. The context C of the estimation problem.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/action.h"
+#include "prescene/belief/object_model.h"
+#include "prescene/belief/outcome.h"
+#include "prescene/belief/world_state.h"
+#include "prescene/geometry/camera.h"
+
+namespace prescene::belief {
+
+/// A fixed thing that supports or bounds: table, bin, floor.
+struct Support {
+  std::string name;
+  std::vector<CollisionShape> collision;
+  MeshPtr visual;
+  Pose X_WS;
+  ContactProperties contact;
+  Color color;
+  friend bool operator==(const Support& a, const Support& b);
+};
+
+/// A kinematic body that follows a timeline of poses: fingers, hands, robot links. Seen and felt, never moved by contacts.
+struct KinematicBody {
+  std::string name;
+  std::vector<CollisionShape> collision;
+  MeshPtr visual;
+  ContactProperties contact;
+  Color color;
+  /// Poses over time, times ascending; held before the first and after the last. One entry = fixed.
+  struct Waypoint {
+    double time;   ///< s since the scene's start
+    Pose X_WG;
+    friend bool operator==(const Waypoint&, const Waypoint&) = default;
+  };
+  std::vector<Waypoint> timeline;
+  friend bool operator==(const KinematicBody& a, const KinematicBody& b);
+};
+/// Interpolated pose at a time.
+Pose pose_at(const KinematicBody& body, double time);
+
+/// An object of the scene: which model, and what is known of its start.
+struct SceneObject {
+  std::string name;
+  int model = 0;                              ///< Index into Scene::models.
+  PoseDistribution pose = FixedPose{};
+  TwistDistribution twist;
+  /// Held by this kinematic body at the start (it moves rigidly with it until released); empty = free.
+  std::optional<std::string> held_by;
+  friend bool operator==(const SceneObject&, const SceneObject&) = default;
+};
+
+/// A camera of the scene.
+struct SceneCamera {
+  std::string name = "camera";
+  geometry::PinholeCamera intrinsics;
+  Pose X_WC;
+  friend bool operator==(const SceneCamera&, const SceneCamera&) = default;
+};
+
+struct Scene {
+  std::string name;
+  std::vector<ObjectModel> models;
+  std::vector<Support> supports;
+  std::vector<KinematicBody> robot;
+  std::vector<SceneObject> objects;
+  std::optional<SceneCamera> camera;
+  Vector3d gravity_W = Vector3d(0.0, 0.0, -9.81);  ///< m/s^2
+  std::vector<Action> actions;
+  double duration = 5.0;                            ///< Longest simulated time, s.
+  bool stop_at_rest = true;                         ///< Else instances run for the whole duration.
+  std::vector<Outcome> outcomes;
+  std::vector<ExclusiveOutcomes> exclusive_outcomes;
+
+  const ObjectModel& model_of(const SceneObject& object) const { return models[static_cast<std::size_t>(object.model)]; }
+  friend bool operator==(const Scene&, const Scene&) = default;
+};
+
+/// Index of the object, support or robot body of that name.
+std::optional<int> find_object(const Scene& scene, const std::string& name);
+std::optional<int> find_support(const Scene& scene, const std::string& name);
+std::optional<int> find_robot_body(const Scene& scene, const std::string& name);
+
+/// Names unique, indices and names in actions and outcomes resolve, times ordered, every model valid.
+core::Status validate(const Scene& scene);
+
+/// How many uniform numbers one start of the scene takes (poses, twists, physical parameters, action errors).
+int start_dimensions(const Scene& scene);
+/// One start from a point of the unit cube; the order of coordinates puts the widest uncertainties first (positions,
+/// rotations, velocities, then friction, restitution, mass, centre of mass), as Sobol nets prefer.
+WorldState draw_start(const Scene& scene, std::span<const double> uniforms);
+/// The start with every distribution at its mean.
+WorldState mean_start(const Scene& scene);
+
+}  // namespace prescene::belief

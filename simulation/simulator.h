@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// The contract of a forward simulator: many independent instances of one scene, each from its own world state.
+//
+//   auto simulator = simulation::make_bullet_simulator(scene, shapes, options);     // prescene/simulation/bullet/...
+//   std::vector<belief::Trajectory> runs(starts.size());
+//   simulator->run(starts, request, stream, pool, runs);
+//
+// The same scene, starts, request and stream give the same bits, for any number of threads and any split into calls.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "prescene/belief/scene.h"
+#include "prescene/belief/trajectory.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/progress.h"
+#include "prescene/core/random.h"
+
+namespace prescene::simulation {
+
+/// When an instance stops.
+struct StopRule {
+  double duration = 5.0;          ///< s, at most
+  bool stop_at_rest = true;       ///< Stop when everything is at rest: see RestRule.
+  double world_radius = 20.0;     ///< m from the origin: beyond it an object has left the world and is frozen.
+};
+
+/// At rest = kinetic energy per mass below `energy` for `time`, and no object in an unstable equilibrium (a nudge of its
+/// pose that lowers its centre of mass against its contacts is looked for).
+struct RestRule {
+  double energy = 2e-4;           ///< J/kg
+  double time = 0.2;              ///< s
+};
+
+struct RunRequest {
+  std::vector<belief::Action> actions;   ///< Instead of the scene's; times from the start of the run.
+  StopRule stop;
+  /// States are kept every so many seconds (first and last always); 0 = first and last only.
+  double sample_interval = 0.0;
+};
+
+/// Everything that the next step depends on, contact caches and warm starts included. Opaque, of one simulator type.
+struct Snapshot {
+  std::vector<std::uint8_t> bytes;
+};
+
+/// One instance that can be stepped, saved and restored: for filters and interactive use.
+class Instance {
+ public:
+  virtual ~Instance() = default;
+  virtual void set_state(const belief::WorldState& state) = 0;
+  virtual belief::WorldState state() const = 0;
+  /// One fixed step of the simulator.
+  virtual void step() = 0;
+  virtual double step_size() const = 0;
+  virtual bool at_rest() const = 0;
+  virtual Snapshot save() const = 0;
+  /// A restored instance goes on with the same bits as the saved one.
+  virtual core::Status restore(const Snapshot& snapshot) = 0;
+};
+
+class Simulator {
+ public:
+  virtual ~Simulator() = default;
+
+  /// Runs starts.size() instances; trajectories.size() == starts.size(). Instance i uses stream.at(step, first_instance + i)
+  /// for what is random in its actions. A cancelled run ends its instances with TrajectoryEnd::kCancelled.
+  virtual void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
+                   std::uint32_t first_instance, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+                   const core::Cancellation* cancellation = nullptr) const = 0;
+
+  virtual std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
+                                                  const core::RandomStream& stream) const = 0;
+};
+
+}  // namespace prescene::simulation
