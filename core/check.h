@@ -12,17 +12,17 @@ namespace prescene::core {
 }  // namespace prescene::core
 
 /// Always armed: aborts when `condition` is false, which means that our own code has a bug.
-#define PRESCENE_CHECK(condition)                                                   \
-  do {                                                                              \
-    if (!(condition)) [[unlikely]]                                                  \
-      ::prescene::core::check_failed(__FILE__, __LINE__, #condition, {});           \
+#define PRESCENE_CHECK(condition)                                         \
+  do {                                                                    \
+    if (!(condition)) [[unlikely]]                                        \
+      ::prescene::core::check_failed(__FILE__, __LINE__, #condition, {}); \
   } while (false)
 
 /// The same with a text that helps to find the bug.
-#define PRESCENE_CHECK_MSG(condition, message)                                      \
-  do {                                                                              \
-    if (!(condition)) [[unlikely]]                                                  \
-      ::prescene::core::check_failed(__FILE__, __LINE__, #condition, (message));    \
+#define PRESCENE_CHECK_MSG(condition, message)                                   \
+  do {                                                                           \
+    if (!(condition)) [[unlikely]]                                               \
+      ::prescene::core::check_failed(__FILE__, __LINE__, #condition, (message)); \
   } while (false)
 
 /// Armed in the checked, dev and sanitizer presets only (PRESCENE_DCHECKS=1), for checks on hot paths.

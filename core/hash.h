@@ -20,8 +20,7 @@ class Hasher {
   Hasher& text(std::string_view value);  ///< Length and content.
   /// The value's bits; -0.0 and 0.0 differ, as the promise is about bits.
   template <class T>
-    requires(std::integral<T> || std::floating_point<T> || std::is_enum_v<T>)
-  Hasher& value(T v) {
+  requires(std::integral<T> || std::floating_point<T> || std::is_enum_v<T>) Hasher& value(T v) {
     return bytes(&v, sizeof v);
   }
   std::uint64_t digest() const;

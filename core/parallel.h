@@ -23,8 +23,8 @@ class ThreadPool {
 
   int threads() const;
 
-  /// Calls body(begin, end) for consecutive blocks of `block` indices of [0, count) (the last may be shorter), each once,
-  /// from any thread, and returns when all are done. body must not throw. Nested calls run in the same arena.
+  /// Calls body(begin, end) for consecutive blocks of `block` indices of [0, count) (the last may be shorter), each
+  /// once, from any thread, and returns when all are done. body must not throw. Nested calls run in the same arena.
   void for_blocks(std::size_t count, std::size_t block, const std::function<void(std::size_t, std::size_t)>& body);
 
   /// Calls body(i) for each i in [0, count), one index a block.

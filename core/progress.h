@@ -11,9 +11,9 @@ namespace prescene::core {
 
 /// How far a piece of work is.
 struct Progress {
-  double fraction = 0.0;                     ///< In [0, 1].
-  std::optional<double> seconds_left;        ///< Estimate; empty while there is none.
-  std::string text;                          ///< What is being done, for a person.
+  double fraction = 0.0;               ///< In [0, 1].
+  std::optional<double> seconds_left;  ///< Estimate; empty while there is none.
+  std::string text;                    ///< What is being done, for a person.
 };
 
 /// Called from the thread that does the work, at most some times a second by convention of the caller.

@@ -48,7 +48,7 @@ class RandomStream {
 
   std::uint32_t next_u32();
   std::uint64_t next_u64();
-  /// Uniform in the open interval (0, 1), 53 bits.
+  /// Uniform in the open interval (0, 1): one of the 2^52 odd multiples of 2^-53.
   double uniform();
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   /// Uniform integer in [0, bound), unbiased; bound > 0.
@@ -65,7 +65,7 @@ class RandomStream {
 
  private:
   std::uint64_t seed_;
-  Purpose purpose_;
+  std::array<std::uint32_t, 2> key_;
   std::uint64_t step_;
   std::uint32_t particle_;
   std::uint32_t block_ = 0;
@@ -73,7 +73,8 @@ class RandomStream {
   std::array<std::uint32_t, 4> words_{};
 };
 
-/// Inverse of the standard normal distribution function; p in (0, 1), relative error below 1e-15 [Wichura 1988, AS 241].
+/// Inverse of the standard normal distribution function, relative error below 1e-15 [Wichura 1988, AS 241]; infinite at
+/// 0 and 1, NaN outside of [0, 1].
 double inverse_normal_cdf(double p);
 /// Standard normal distribution function.
 double normal_cdf(double x);

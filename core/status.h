@@ -66,9 +66,10 @@ inline Status cancelled(std::string message) { return Status(StatusCode::kCancel
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : expected_(std::move(value)) {}                            // NOLINT(google-explicit-constructor)
+  Result(T value) : expected_(std::move(value)) {}                             // NOLINT(google-explicit-constructor)
   Result(Status status) : expected_(tl::make_unexpected(std::move(status))) {  // NOLINT(google-explicit-constructor)
-    if (expected_.error().ok()) expected_.error() = Status(StatusCode::kUnavailable, "a Result was made from an ok Status");
+    if (expected_.error().ok())
+      expected_.error() = Status(StatusCode::kUnavailable, "a Result was made from an ok Status");
   }
 
   bool ok() const { return expected_.has_value(); }
@@ -90,14 +91,13 @@ class [[nodiscard]] Result {
 #define PRESCENE_CONCAT_INNER(a, b) a##b
 #define PRESCENE_CONCAT(a, b) PRESCENE_CONCAT_INNER(a, b)
 /// Returns the status from the calling function unless it is ok.
-#define PRESCENE_RETURN_IF_ERROR(expression)                                    \
-  do {                                                                          \
-    ::prescene::core::Status prescene_status = (expression);                    \
-    if (!prescene_status.ok()) return prescene_status;                          \
+#define PRESCENE_RETURN_IF_ERROR(expression)                 \
+  do {                                                       \
+    ::prescene::core::Status prescene_status = (expression); \
+    if (!prescene_status.ok()) return prescene_status;       \
   } while (false)
 /// `PRESCENE_TRY(auto mesh, read_mesh(path));` declares `mesh`, or returns the status from the calling function.
-#define PRESCENE_TRY(declaration, expression)                                          \
-  auto PRESCENE_CONCAT(prescene_result_, __LINE__) = (expression);                     \
-  if (!PRESCENE_CONCAT(prescene_result_, __LINE__).ok())                               \
-    return PRESCENE_CONCAT(prescene_result_, __LINE__).status();                       \
+#define PRESCENE_TRY(declaration, expression)                                                                         \
+  auto PRESCENE_CONCAT(prescene_result_, __LINE__) = (expression);                                                    \
+  if (!PRESCENE_CONCAT(prescene_result_, __LINE__).ok()) return PRESCENE_CONCAT(prescene_result_, __LINE__).status(); \
   declaration = *std::move(PRESCENE_CONCAT(prescene_result_, __LINE__))

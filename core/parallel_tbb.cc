@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "prescene/core/check.h"
+#include "prescene/core/parallel.h"
+
+namespace prescene::core {
+
+struct ThreadPool::Impl {
+  explicit Impl(int count) : threads(count), arena(count) {}
+  int threads;
+  tbb::task_arena arena;
+};
+
+ThreadPool::ThreadPool(int threads) {
+  PRESCENE_CHECK(threads >= 0);
+  if (threads == 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  impl_ = std::make_unique<Impl>(threads);
+}
+
+ThreadPool::~ThreadPool() = default;
+
+int ThreadPool::threads() const { return impl_->threads; }
+
+void ThreadPool::for_blocks(std::size_t count, std::size_t block,
+                            const std::function<void(std::size_t, std::size_t)>& body) {
+  PRESCENE_CHECK(block > 0);
+  const std::size_t blocks = count / block + (count % block != 0);
+  if (blocks <= 1) {
+    if (blocks == 1) body(0, count);
+    return;
+  }
+  const auto run_blocks = [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t b = range.begin(); b != range.end(); ++b) body(b * block, std::min(count, (b + 1) * block));
+  };
+  // Isolated, so that a thread that waits for a nested loop does not start another block of the outer one: a body may
+  // hold a workspace of its thread while it runs a loop.
+  impl_->arena.execute([&] {
+    tbb::this_task_arena::isolate([&] {
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, 1), run_blocks, tbb::simple_partitioner());
+    });
+  });
+}
+
+void ThreadPool::for_each_index(std::size_t count, const std::function<void(std::size_t)>& body) {
+  for_blocks(count, 1, [&](std::size_t begin, std::size_t) { body(begin); });
+}
+
+}  // namespace prescene::core
