@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// OpenGL without a window, through EGL's device or surfaceless platform; Mesa's software rasteriser will do.
+#pragma once
+
+#include <memory>
+
+#include "prescene/core/status.h"
+#include "prescene/rendering/renderer.h"
+
+namespace prescene::rendering {
+
+/// Whether this build holds the backend.
+bool egl_compiled_in();
+
+/// A renderer with a context of its own. Fails with kUnavailable when no driver gives an OpenGL 3.3 context without a
+/// display (the message names the Debian package to install), or when the build left EGL out. Images are reproducible
+/// within tolerance only. Calls from several threads take turns.
+core::Result<std::unique_ptr<Renderer>> make_egl_renderer();
+
+}  // namespace prescene::rendering

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is rendered: meshes with poses in a world frame W and the look of their surfaces. Knows nothing of beliefs.
+//
+//   MeshHandle mesh = make_render_mesh(triangle_mesh);
+//   RenderScene scene;
+//   scene.instances.push_back({mesh, X_WM, SurfaceMaterial::opaque({200, 40, 40})});
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "prescene/geometry/image.h"
+#include "prescene/geometry/pose.h"
+#include "prescene/geometry/triangle_mesh.h"
+
+namespace prescene::rendering {
+
+using Eigen::Vector3f;
+
+/// A triangle mesh in single precision as renderers want it; immutable once made, shared by handle.
+struct RenderMesh {
+  std::vector<Vector3f> vertices;                       ///< Metres, mesh frame M.
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
+  std::vector<Vector3f> normals;                        ///< One outward unit normal a triangle, mesh frame.
+  Vector3f centre = Vector3f::Zero();                   ///< Of a bounding sphere, mesh frame.
+  float radius = 0.0f;                                  ///< Of that sphere, metres.
+  bool closed =
+      false;  ///< Watertight and consistently oriented: faces seen from behind are never visible from outside.
+};
+using MeshHandle = std::shared_ptr<const RenderMesh>;
+
+/// Triangles without area are left out; indices out of range are a bug (checked). An empty mesh renders nothing.
+MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh);
+
+/// How depth cameras see a surface: shares of what a pixel on it returns, of the pixels that return anything.
+/// hit + occluder + behind + outlier = 1.
+struct SurfaceMaterial {
+  double hit = 0.90;       ///< Depth of the surface itself.
+  double occluder = 0.06;  ///< Of something unmodelled in front of it.
+  double behind = 0.0;     ///< Of what stands behind the surface, seen through it.
+  double outlier = 0.04;   ///< Anything in range.
+  /// Probability that a frontal pixel far from the outline returns nothing.
+  double missing = 0.03;
+  geometry::Rgb color = {180, 180, 180};  ///< Diffuse, for the simulated colour camera.
+
+  friend bool operator==(const SurfaceMaterial&, const SurfaceMaterial&) = default;
+
+  /// Shares measured on opaque household objects (docs/sensor_model.md).
+  static SurfaceMaterial opaque(const geometry::Rgb& color = {180, 180, 180});
+  /// Glass and clear plastic: mostly the depth behind it or none.
+  static SurfaceMaterial transparent(const geometry::Rgb& color = {210, 225, 230});
+  /// Polished metal: often no return, else outliers.
+  static SurfaceMaterial mirror(const geometry::Rgb& color = {190, 190, 195});
+};
+
+/// One thing to draw.
+struct RenderInstance {
+  MeshHandle mesh;
+  geometry::Pose X_WM;
+  SurfaceMaterial material;
+  bool known_occluder =
+      false;  ///< Its pose is known from elsewhere (a robot's link), so that it explains what it hides.
+};
+
+/// Instances in the order of their labels: the label image of a view holds 1 + index, 0 where nothing is.
+/// At most 65535 instances.
+struct RenderScene {
+  std::vector<RenderInstance> instances;
+};
+
+}  // namespace prescene::rendering

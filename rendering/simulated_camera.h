@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// A simulated RGB-D camera: the sensor model's sampling face over a whole image, with what only shows between pixels:
+// correlated noise, flying pixels at edges, quantisation.
+//
+//   SimulatedCamera simulated(SensorModel(), options);
+//   simulated.sample(scene, view, camera, X_WC, stream.at(frame), &depth, &color);
+#pragma once
+
+#include "prescene/core/random.h"
+#include "prescene/geometry/camera.h"
+#include "prescene/geometry/image.h"
+#include "prescene/rendering/renderer.h"
+#include "prescene/rendering/sensor_model.h"
+
+namespace prescene::rendering {
+
+struct SimulatedCameraOptions {
+  /// Shares of the hit's variance: a pattern that stays from frame to frame (calibration), noise correlated over
+  /// neighbours but new in each frame; the rest is white. Both in [0, 1], sum at most 1.
+  double fixed_pattern_share = 0.25;
+  double correlated_share = 0.5;
+  double correlation_px = 12.0;  ///< Cell of the correlated noise; half of its correlation is gone there.
+  double quantisation_per_depth_squared = 0.0013;  ///< Step of the returned depth, 1/m: 1.3 mm at 1 m.
+  double depth_edge = 0.02;   ///< m; a jump that counts as an edge even between pixels of one object.
+  bool flying_pixels = true;  ///< At edges, outliers lie between the two surfaces.
+  bool missing = true;
+  double color_noise = 2.0;                         ///< Standard deviation of each channel, of 255.
+  geometry::Rgb background_low = {70, 74, 82};      ///< Colour of empty pixels at the bottom of the image ...
+  geometry::Rgb background_high = {150, 158, 170};  ///< ... and at its top.
+
+  friend bool operator==(const SimulatedCameraOptions&, const SimulatedCameraOptions&) = default;
+};
+
+/// Immutable; any number of threads.
+class SimulatedCamera {
+ public:
+  SimulatedCamera(const SensorModel& model, const SimulatedCameraOptions& options) : model_(model), options_(options) {}
+  const SensorModel& model() const { return model_; }
+  const SimulatedCameraOptions& options() const { return options_; }
+
+  /// What the camera returns of a view rendered with normals. `view.labels` index scene.instances' materials; the
+  /// stream's step is the frame's number. Unmodelled occluders are not invented: what stands in front must be in the
+  /// scene. A transparent surface shows `behind` of the scene rendered without transparent things: pass that view, or
+  /// null.
+  void sample(const RenderScene& scene, const RenderedView& view, const RenderedView* behind,
+              const geometry::PinholeCamera& camera, const geometry::Pose& X_WC, const core::RandomStream& stream,
+              geometry::DepthImage* depth, geometry::ColorImage* color) const;
+
+ private:
+  SensorModel model_;
+  SimulatedCameraOptions options_;
+};
+
+/// Diffuse shading without noise, for reports and overlays: two fixed lights, materials' colours, a grey gradient
+/// behind.
+void shade(const RenderScene& scene, const RenderedView& view, const geometry::Pose& X_WC,
+           const SimulatedCameraOptions& options, geometry::ColorImage* color);
+
+}  // namespace prescene::rendering
