@@ -31,6 +31,7 @@ enum class Purpose : std::uint32_t {
   kAction = 10,
   kEvaluation = 11,
   kParameters = 12,
+  kSurface = 13,
 };
 
 /// A stream of Philox4x32-10 draws [Salmon et al. 2011], keyed by (seed, purpose), counted by (step, particle, draw).

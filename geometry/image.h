@@ -11,8 +11,8 @@
 
 namespace prescene::geometry {
 
-/// A view of row-major pixels; `stride` is in elements from one row to the next (>= width). Does not own: the memory must
-/// outlive it.
+/// A view of row-major pixels; `stride` is in elements from one row to the next (>= width). Does not own: the memory
+/// must outlive it.
 template <class Pixel>
 class ImageView {
  public:
@@ -20,7 +20,9 @@ class ImageView {
   ImageView(Pixel* data, int width, int height, std::ptrdiff_t stride)
       : data_(data), width_(width), height_(height), stride_(stride) {}
   /// A view of const pixels from one of mutable pixels.
-  operator ImageView<const Pixel>() const { return {data_, width_, height_, stride_}; }  // NOLINT(google-explicit-constructor)
+  operator ImageView<const Pixel>() const {
+    return {data_, width_, height_, stride_};
+  }  // NOLINT(google-explicit-constructor)
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -45,7 +47,9 @@ class Image {
  public:
   Image() = default;
   Image(int width, int height, Pixel value = Pixel{})
-      : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value) {}
+      : width_(width),
+        height_(height),
+        pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value) {}
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -67,8 +71,8 @@ class Image {
 };
 
 using Rgb = std::array<std::uint8_t, 3>;
-using DepthImage = Image<float>;           ///< z in the camera frame, metres; 0 = no measurement or nothing there.
+using DepthImage = Image<float>;  ///< z in the camera frame, metres; 0 = no measurement or nothing there.
 using ColorImage = Image<Rgb>;
-using LabelImage = Image<std::uint16_t>;   ///< 0 = background, otherwise 1 + index of the instance.
+using LabelImage = Image<std::uint16_t>;  ///< 0 = background, otherwise 1 + index of the instance.
 
 }  // namespace prescene::geometry

@@ -7,7 +7,8 @@
 
 namespace prescene::geometry {
 
-/// Mass (kg), centre of mass in the body frame B (m), rotational inertia about the centre of mass expressed in B (kg m^2).
+/// Mass (kg), centre of mass in the body frame B (m), rotational inertia about the centre of mass expressed in B (kg
+/// m^2).
 struct MassProperties {
   double mass = 0.0;
   Vector3d p_BoBcm = Vector3d::Zero();

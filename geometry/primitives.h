@@ -40,11 +40,11 @@ using Primitive = std::variant<Sphere, BoxShape, Cylinder, Capsule, Cone>;
 /// A closed, outward oriented mesh; curved faces get `segments` (>= 8) around the axis.
 TriangleMesh make_mesh(const Primitive& primitive, int segments = 32);
 
-/// An open-topped box: inner size (x, y, z of the hollow), wall thickness, floor included; closed surface with real walls;
-/// the origin is the centre of the outer bottom face, z up.
+/// An open-topped box: inner size (x, y, z of the hollow), wall thickness, floor included; closed surface with real
+/// walls; the origin is the centre of the outer bottom face, z up.
 TriangleMesh make_open_bin(const Vector3d& inner_size, double wall);
-/// A milk carton: a box of the given base (x, y) and shoulder height with a gable roof and a fin, origin at the centre of
-/// its bounding box, z up. total_height > shoulder_height.
+/// A milk carton: a box of the given base (x, y) and shoulder height with a gable roof and a fin, origin at the centre
+/// of its bounding box, z up. total_height > shoulder_height.
 TriangleMesh make_gable_carton(double size_x, double size_y, double shoulder_height, double total_height);
 /// A surface of revolution about z of a profile of (radius, z) points from bottom to top, closed on the axis.
 TriangleMesh make_lathe(const std::vector<Eigen::Vector2d>& profile, int segments = 32);

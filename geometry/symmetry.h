@@ -13,9 +13,9 @@ namespace prescene::geometry {
 /// A group of rotations about the point p_BoC of the body: a finite list, and/or a continuous axis.
 /// No symmetry: `rotations` empty and no axis.
 struct SymmetryGroup {
-  std::vector<Quaterniond> rotations;     ///< Besides the identity; closed under products together with it and the axis.
-  std::optional<Vector3d> axis;           ///< Unit vector in B: every turn about it is a symmetry.
-  Vector3d p_BoC = Vector3d::Zero();      ///< The point that all symmetries keep.
+  std::vector<Quaterniond> rotations;  ///< Besides the identity; closed under products together with it and the axis.
+  std::optional<Vector3d> axis;        ///< Unit vector in B: every turn about it is a symmetry.
+  Vector3d p_BoC = Vector3d::Zero();   ///< The point that all symmetries keep.
 
   static SymmetryGroup none() { return {}; }
   /// n turns of 360/n degrees about an axis through p_BoC.
@@ -39,7 +39,8 @@ SymmetryGroup suggest_symmetry(const TriangleMesh& mesh, double tolerance);
 
 /// Mean distance of model points under two poses [Hinterstoisser et al. 2012], m.
 double add_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth);
-/// Mean over points of the true pose of the distance to the nearest point of the estimate (ADD-S) [Xiang et al. 2018], m.
+/// Mean over points of the true pose of the distance to the nearest point of the estimate (ADD-S) [Xiang et al. 2018],
+/// m.
 double adds_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth);
 
 }  // namespace prescene::geometry

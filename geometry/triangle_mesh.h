@@ -25,13 +25,13 @@ struct TriangleMesh {
 
 /// What repair_mesh found and changed.
 struct MeshRepairReport {
-  int non_finite_vertices = 0;      ///< Triangles using one were dropped.
-  int out_of_range_triangles = 0;   ///< Index beyond the vertices; dropped.
-  int degenerate_triangles = 0;     ///< Two equal corners or (almost) no area; dropped.
-  int duplicate_vertices = 0;       ///< Bit-equal positions made one.
+  int non_finite_vertices = 0;     ///< Triangles using one were dropped.
+  int out_of_range_triangles = 0;  ///< Index beyond the vertices; dropped.
+  int degenerate_triangles = 0;    ///< Two equal corners or (almost) no area; dropped.
+  int duplicate_vertices = 0;      ///< Bit-equal positions made one.
   int unused_vertices = 0;
   bool changed() const;
-  std::string text() const;         ///< One line for a person; empty when nothing changed.
+  std::string text() const;  ///< One line for a person; empty when nothing changed.
 };
 
 /// A mesh without NaN, dangling indices, zero-area triangles, duplicate or unused vertices, with a report.
@@ -40,10 +40,10 @@ core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* repo
 
 /// How the edges of a mesh (vertices welded by position) fit together.
 struct MeshTopology {
-  int open_edges = 0;           ///< Edges with one triangle.
-  int non_manifold_edges = 0;   ///< Edges with more than two.
-  int inconsistent_edges = 0;   ///< Edges that both triangles run in the same direction.
-  int components = 0;           ///< Connected over shared vertices.
+  int open_edges = 0;          ///< Edges with one triangle.
+  int non_manifold_edges = 0;  ///< Edges with more than two.
+  int inconsistent_edges = 0;  ///< Edges that both triangles run in the same direction.
+  int components = 0;          ///< Connected over shared vertices.
   bool watertight() const { return open_edges == 0 && non_manifold_edges == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
 };
