@@ -1,0 +1,42 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# Plants wrong arrows in a copy of the sources and sees tools/check_layers name each of them.
+#   check_layers_test.sh <root of the checkout>
+set -eu
+root=$1
+copy=$(mktemp -d)
+trap 'rm -rf "$copy"' EXIT
+(cd "$root" && find . \( -path ./build -o -path './.*' \) -prune -o -type f \
+  \( -name '*.h' -o -name '*.cc' -o -path './tools/*' \) -print | tar -cf - -T -) | tar -xf - -C "$copy"
+
+"$copy/tools/check_layers" "$copy" > "$copy/output" || { cat "$copy/output"; echo "the sources themselves fail"; exit 1; }
+
+# plant <file> <line> <what the complaint must say>
+plants=0
+plant() {
+  plants=$((plants + 1))
+  cp "$copy/$1" "$copy/kept" 2>/dev/null || : > "$copy/kept"
+  mkdir -p "$(dirname "$copy/$1")"
+  printf '%s\n' "$2" >> "$copy/$1"
+  if "$copy/tools/check_layers" "$copy" > "$copy/output"; then
+    echo "not seen: $2 in $1"
+    exit 1
+  fi
+  grep -q "$1:.*error: .*$3\|$1: error: .*$3" "$copy/output" || { cat "$copy/output"; echo "seen, but not as '$3': $2 in $1"; exit 1; }
+  [ "$(grep -c error: "$copy/output")" = 1 ] || { cat "$copy/output"; echo "more than the planted arrow is named"; exit 1; }
+  if [ -s "$copy/kept" ]; then mv "$copy/kept" "$copy/$1"; else rm -f "$copy/$1" "$copy/kept"; fi
+}
+
+plant core/check.h '#include "prescene/geometry/pose.h"' 'core may not use geometry'
+plant geometry/planted.cc '#include "prescene/belief/scene.h"' 'geometry may not use belief'
+plant filter/planted.cc '#include "prescene/rendering/egl/egl_renderer.h"' 'filter may not use rendering/egl'
+plant tests/geometry/planted_test.cc '#include "prescene/simulation/simulator.h"' 'tests/geometry may not use simulation'
+plant belief/planted.cc '#include <btBulletDynamicsCommon.h>' 'is not for belief'
+plant filter/planted.cc '#include <dds/dds.h>' 'is not for filter'
+plant rendering/reference/planted.cc '#include <EGL/egl.h>' 'is not for rendering/reference'
+plant core/planted.cc '#include <Eigen/Core>' 'is not for core'
+plant geometry/planted.cc '#include <boost/any.hpp>' 'belongs to no library'
+plant geometry/planted.cc '#include "../core/check.h"' 'climbs out'
+plant geometry/planted.cc '#include "no_such_file.h"' 'is not a file beside this one'
+plant novelty/planted.cc '#include <vector>' 'lies in no folder'
+echo "$plants planted arrows are seen"
