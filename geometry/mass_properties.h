@@ -20,8 +20,8 @@ struct MassProperties {
 };
 
 /// Of the solid inside a closed, oriented mesh, by integrals over its faces [Mirtich 1996; Eberly 2002]. Fails with
-/// kInvalidInput when the mesh is not watertight, not consistently oriented, or its signed volume is not positive
-/// (the message says which).
+/// kInvalidInput when the mesh does not bound a volume (holes, triangles of mixed orientation) or its signed volume is
+/// not positive (the message says which).
 core::Result<MassProperties> mass_properties(const TriangleMesh& mesh, double density);
 /// Signed volume by the divergence theorem, m^3; without meaning for open meshes.
 double signed_volume(const TriangleMesh& mesh);

@@ -28,24 +28,33 @@ struct MeshRepairReport {
   int non_finite_vertices = 0;     ///< Triangles using one were dropped.
   int out_of_range_triangles = 0;  ///< Index beyond the vertices; dropped.
   int degenerate_triangles = 0;    ///< Two equal corners or (almost) no area; dropped.
-  int duplicate_vertices = 0;      ///< Bit-equal positions made one.
+  int flipped_edges = 0;       ///< Of triangles with three corners in a line, put right without opening the surface.
+  int duplicate_vertices = 0;  ///< Bit-equal positions made one.
   int unused_vertices = 0;
   bool changed() const;
   std::string text() const;  ///< One line for a person; empty when nothing changed.
+
+  friend bool operator==(const MeshRepairReport&, const MeshRepairReport&) = default;
 };
 
-/// A mesh without NaN, dangling indices, zero-area triangles, duplicate or unused vertices, with a report.
-/// Fails with kInvalidInput when no triangle is left.
+/// A mesh without NaN, dangling indices, zero-area triangles, duplicate or unused vertices, with a report (may be
+/// null). A surface that is closed stays closed: where welding or dropping would open it (thin scans that touch
+/// themselves in a point), the duplicate vertices and zero-area triangles there are kept. Fails with kInvalidInput when
+/// no triangle is left.
 core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* report);
 
-/// How the edges of a mesh (vertices welded by position) fit together.
+/// How the edges of a mesh fit together: by the triangles' own indices where these make it watertight, otherwise with
+/// vertices welded by position. Triangles with two equal corners don't count.
 struct MeshTopology {
   int open_edges = 0;          ///< Edges with one triangle.
   int non_manifold_edges = 0;  ///< Edges with more than two.
   int inconsistent_edges = 0;  ///< Edges that both triangles run in the same direction.
-  int components = 0;          ///< Connected over shared vertices.
+  int unbalanced_edges = 0;    ///< Edges that triangles run more often in one direction than in the other.
+  int components = 0;          ///< Connected over shared vertices (welded by position).
   bool watertight() const { return open_edges == 0 && non_manifold_edges == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
+  /// The triangles enclose a volume, also where surfaces touch along an edge; watertight() && oriented() implies it.
+  bool bounds_volume() const { return unbalanced_edges == 0; }
 };
 MeshTopology mesh_topology(const TriangleMesh& mesh);
 
