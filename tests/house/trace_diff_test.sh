@@ -26,5 +26,5 @@ expect 0 'equal: 3 entries' a
 expect 1 'after 1 equal entries: step 0, stage predict, particle 1: bb, bd' other_hash
 expect 1 'shorter ends after 2 entries; the other goes on with step 0, stage weight, particle 0' shorter
 expect 1 'the order of work differs after 1 equal' other_order
-expect 2 'not "step stage particle hash"' broken
+expect 2 'broken: not "step stage particle hash"' broken
 expect 2 'cannot read' absent
