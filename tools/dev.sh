@@ -1,0 +1,237 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The verbs of ./dev. Runs in the root of the checkout.
+set -euo pipefail
+
+usage() {
+  cat << 'END'
+usage: ./dev VERB
+
+  setup [run|develop]...       install the missing Debian packages (default: run)
+  build [PRESET] [TARGET]...   build (default preset: release)
+  test [--preset P] [FILTER]   build, then run all tests, or those whose name matches FILTER (a regular expression)
+  demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
+  bench [NAME]                 run the benchmark NAME (default: all); results in build/bench/NAME.json
+  lint [FILE]...               format, layer and clang-tidy checks
+  format [FILE]...             format the sources in place
+  fuzz [TARGET] [SECONDS]      run libFuzzer on one target or all, 60 s each
+  docs                         check the links and file names in README.md and docs/
+  bless REASON                 accept the current scenario results as the new pinned ones
+  trace-diff A B               name the first difference of two step traces
+
+Presets: dev, release, checked, asan, tsan, coverage. Each verb does what it needs first and says how long it took.
+PRESCENE_JOBS sets the number of parallel jobs (default: the number of processors).
+END
+}
+
+jobs=${PRESCENE_JOBS:-$(nproc)}
+
+say() { printf '%s\n' "== $*" >&2; }
+fail() { printf '%s\n' "./dev: $*" >&2; exit 1; }
+
+# timed <what> <command>...: says what is done, does it, says how long it took.
+timed() {
+  local what=$1 start=$SECONDS code=0
+  shift
+  say "$what"
+  "$@" || code=$?
+  if [ "$code" = 0 ]; then say "$what: done in $((SECONDS - start)) s"; else say "$what: FAILED ($code) after $((SECONDS - start)) s"; fi
+  return "$code"
+}
+
+# ---------------------------------------------------------------------------------------------------- setup
+
+installed() { [ "$(dpkg-query -W -f='${db:Status-Abbrev}' "$1" 2> /dev/null)" = "ii " ]; }
+
+packages_missing() {
+  local set package
+  while read -r set package _; do
+    case $set in '' | '#'*) continue ;; esac
+    case " $* " in *" $set "*) installed "$package" || echo "$package" ;; esac
+  done < tools/packages.txt
+}
+
+as_root() {
+  if [ "$(id -u)" = 0 ]; then
+    "$@"
+  elif command -v sudo > /dev/null; then
+    sudo "$@"
+  else
+    fail "installing packages needs root: run as root or install sudo"
+  fi
+}
+
+apt_install() { as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$@"; }
+apt_update() { as_root apt-get update -q; }
+
+# Prints apt's own estimate, e.g. "186 MB to download, 798 MB on disk"; fails when apt does not know a package.
+apt_estimate() {
+  local plan
+  plan=$(LC_ALL=C apt-get install --assume-no --no-install-recommends "$@" 2>&1) || true
+  if grep -q '^E: \(Unable to locate\|Package .* has no\)' <<< "$plan"; then return 1; fi
+  sed -n -e 's/^Need to get \(.*\) of archives\.$/\1 to download/p' \
+    -e 's/^After this operation, \(.*\) of additional disk space will be used\.$/\1 on disk/p' <<< "$plan" |
+    sed 's|^\(.*\)/\(.*\) to|\1 of \2 to|' | paste -sd, - | sed 's/,/, /'
+}
+
+verb_setup() {
+  [ $# -gt 0 ] || set -- run
+  local missing estimate
+  mapfile -t missing < <(packages_missing "$@")
+  [ ${#missing[@]} -gt 0 ] || return 0
+  command -v apt-get > /dev/null || fail "this is not Debian; install by your system's means: ${missing[*]}"
+  if ! estimate=$(apt_estimate "${missing[@]}"); then
+    timed "read Debian's package lists" apt_update
+    estimate=$(apt_estimate "${missing[@]}") || fail "Debian 12 has all of these, this system's apt does not: ${missing[*]}"
+  fi
+  say "packages missing for $*: ${missing[*]}"
+  say "with what they depend on: $estimate"
+  if ! timed "install ${#missing[@]} packages" apt_install "${missing[@]}"; then
+    # Lists older than the mirror's files name versions that are gone.
+    timed "read Debian's package lists again" apt_update
+    timed "install ${#missing[@]} packages" apt_install "${missing[@]}"
+  fi
+}
+
+# ---------------------------------------------------------------------------------------------------- build
+
+verb_build() {
+  local preset=${1:-release}
+  [ $# = 0 ] || shift
+  grep -q "\"name\": \"$preset\"" CMakePresets.json || fail "no preset '$preset'; there are dev, release, checked, asan, tsan, coverage"
+  verb_setup run
+  # Configure afresh each time: links of headers follow the lists of the modules. It takes about two seconds.
+  timed "configure $preset" cmake --preset "$preset" --log-level=WARNING
+  if [ $# -gt 0 ]; then set -- --target "$@"; fi
+  timed "build $preset" cmake --build "build/$preset" -j "$jobs" "$@"
+}
+
+# ---------------------------------------------------------------------------------------------------- test
+
+verb_test() {
+  local preset=release filter=()
+  while [ $# -gt 0 ]; do
+    case $1 in
+      --preset) preset=${2:?--preset needs a name}; shift 2 ;;
+      *) filter+=(-R "$1"); shift ;;
+    esac
+  done
+  verb_build "$preset"
+  if [ ${#filter[@]} -gt 0 ]; then
+    timed "tests that match ${filter[1]}" run_tests "$preset" "${filter[@]}"
+  else
+    timed "tests" run_tests "$preset"
+  fi
+}
+
+run_tests() {
+  local preset=$1
+  shift
+  sanitizer_environment "$preset"
+  ctest --test-dir "build/$preset" -j "$jobs" --output-on-failure --no-tests=error --progress "$@"
+}
+
+# Whole libraries outside of our code are the only suppressions; see tools/tsan.supp.
+sanitizer_environment() {
+  export ASAN_OPTIONS=${ASAN_OPTIONS:-detect_stack_use_after_return=1:strict_init_order=1:detect_leaks=1}
+  export LSAN_OPTIONS=${LSAN_OPTIONS:-suppressions=$PWD/tools/lsan.supp:print_suppressions=0}
+  export UBSAN_OPTIONS=${UBSAN_OPTIONS:-print_stacktrace=1}
+  export TSAN_OPTIONS=${TSAN_OPTIONS:-suppressions=$PWD/tools/tsan.supp:halt_on_error=1:second_deadlock_stack=1}
+}
+
+# ---------------------------------------------------------------------------------------------------- demo, bench
+
+verb_demo() {
+  verb_build release prescene
+  timed "demo" tools/demo build/release/prescene build/demo
+}
+
+verb_bench() {
+  local names=() name
+  verb_build release
+  if [ $# -gt 0 ]; then
+    names=("$1")
+    [ -x "build/release/bench_$1" ] || fail "no benchmark '$1'; there are: $(list_benchmarks)"
+  else
+    read -r -a names <<< "$(list_benchmarks)"
+    [ ${#names[@]} -gt 0 ] || fail "there are no benchmarks"
+  fi
+  mkdir -p build/bench
+  for name in "${names[@]}"; do
+    timed "benchmark $name" "build/release/bench_$name" "--benchmark_out=build/bench/$name.json" --benchmark_out_format=json
+    say "results in build/bench/$name.json"
+  done
+}
+
+list_benchmarks() { find build/release -maxdepth 1 -name 'bench_*' -type f -executable -printf '%f\n' | sed 's/^bench_//' | LC_ALL=C sort | paste -sd' ' -; }
+
+# ---------------------------------------------------------------------------------------------------- lint, format
+
+sources() {
+  if [ $# -gt 0 ]; then printf '%s\n' "$@"; return; fi
+  find ./* \( -path ./build -o -path './.*' \) -prune -o -type f \( -name '*.h' -o -name '*.cc' \) -print | sed 's|^\./||' | LC_ALL=C sort
+}
+
+format_check() { sources "$@" | xargs -r -P "$jobs" -n 20 clang-format-14 --dry-run --Werror; }
+format_write() { sources "$@" | xargs -r -P "$jobs" -n 20 clang-format-14 -i; }
+
+verb_format() {
+  verb_setup develop
+  timed "format" format_write "$@"
+}
+
+verb_lint() {
+  verb_setup run develop
+  timed "layer check" tools/check_layers
+  timed "format check" format_check "$@"
+  timed "configure tidy" cmake --preset tidy --log-level=WARNING
+  timed "generate headers" cmake --build build/tidy -j "$jobs" --target prescene_generated
+  timed "clang-tidy" tools/run_tidy build/tidy "$jobs" "$@"
+}
+
+# ---------------------------------------------------------------------------------------------------- fuzz
+
+verb_fuzz() {
+  local target=${1:-all} seconds=${2:-60} targets=() name
+  verb_setup run develop
+  timed "configure fuzz" cmake --preset fuzz --log-level=WARNING
+  timed "build fuzz targets" cmake --build build/fuzz -j "$jobs" --target prescene_fuzzers
+  if [ "$target" = all ]; then
+    mapfile -t targets < <(find build/fuzz/fuzz -maxdepth 1 -name 'fuzz_*' -type f -executable -printf '%f\n' | sed 's/^fuzz_//' | LC_ALL=C sort)
+  else
+    [ -x "build/fuzz/fuzz/fuzz_$target" ] || fail "no fuzz target '$target' in tests/fuzz"
+    targets=("$target")
+  fi
+  for name in "${targets[@]}"; do timed "fuzz $name for $seconds s" fuzz_one "$name" "$seconds"; done
+}
+
+# New inputs stay in build/fuzz/corpus; a crash is kept in build/fuzz/crashes and belongs into tests/fuzz/corpus/<name> with
+# the fix, where every test run replays it.
+fuzz_one() {
+  local name=$1 seconds=$2
+  mkdir -p "build/fuzz/corpus/$name" build/fuzz/crashes
+  sanitizer_environment fuzz
+  "build/fuzz/fuzz/fuzz_$name" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 -verbosity=0 \
+    "-artifact_prefix=build/fuzz/crashes/$name-" "build/fuzz/corpus/$name" "tests/fuzz/corpus/$name"
+}
+
+# ---------------------------------------------------------------------------------------------------- docs, bless
+
+verb_docs() { timed "check the documents" tools/check_docs; }
+
+verb_bless() {
+  local reason="$*"
+  if [ -z "$reason" ] && [ -t 0 ]; then read -r -p "Why may the pinned results change? " reason; fi
+  [ -n "$reason" ] || fail "blessing needs a reason: ./dev bless 'contacts are solved with 20 iterations instead of 10'"
+  verb_build release
+  timed "bless" tools/bless build/release "$reason"
+}
+
+verb=${1:-help}
+[ $# = 0 ] || shift
+case $verb in
+  setup | build | test | demo | bench | lint | format | fuzz | docs | bless) "verb_$verb" "$@" ;;
+  trace-diff) exec tools/trace-diff "$@" ;;
+  help | -h | --help) usage ;;
+  *) usage >&2; exit 2 ;;
+esac
