@@ -11,8 +11,8 @@
 
 namespace prescene::belief {
 
-/// The hand opens: the object is free from `time` on, with the velocity of the body that held it, and that body backs off
-/// along `retreat` (m, W) within `retreat_duration` so that it does not hold by accident.
+/// The hand opens: the object is free from `time` on, with the velocity of the body that held it, and that body backs
+/// off along `retreat` (m, W) within `retreat_duration` so that it does not hold by accident.
 struct Release {
   std::string object;
   Vector3d retreat = Vector3d::Zero();

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The belief: weighted hypotheses of where each object is and how it moves, and the estimates read off it.
 //
-// Each object has its own particle set (objects that touch share an island and are sampled one given the other). A particle
-// carries a Gaussian over pose and twist about its mean: what is sampled and what is integrated is the Rao-Blackwell split.
+// Each object has its own particle set (objects that touch share an island and are sampled one given the other). A
+// particle carries a Gaussian over pose and twist about its mean: what is sampled and what is integrated is the
+// Rao-Blackwell split.
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,7 +23,7 @@ using Matrix12d = Eigen::Matrix<double, 12, 12>;
 /// One hypothesis of one object: mean pose and twist in W and the covariance about them. Order of the 12 error
 /// coordinates: pose as geometry::box_plus (rotation, translation), then twist (angular, linear).
 struct Particle {
-  double log_weight = 0.0;   ///< Normalised: the weights of a set sum to one.
+  double log_weight = 0.0;  ///< Normalised: the weights of a set sum to one.
   Pose X_WO;
   Twist V_WO;
   Matrix12d covariance = Matrix12d::Zero();
@@ -29,26 +33,26 @@ struct Particle {
 };
 
 enum class TrackState {
-  kTracked,    ///< Seen, and the evidence supports the pose.
-  kDoubtful,   ///< Seen, but the evidence is weak.
-  kUnseen,     ///< Hidden, out of view or without depth: predicted only.
-  kLost,       ///< The evidence speaks against the pose, or it was unseen for too long.
+  kTracked,   ///< Seen, and the evidence supports the pose.
+  kDoubtful,  ///< Seen, but the evidence is weak.
+  kUnseen,    ///< Hidden, out of view or without depth: predicted only.
+  kLost,      ///< The evidence speaks against the pose, or it was unseen for too long.
 };
 std::string to_string(TrackState state);
 std::string to_string(MotionMode mode);
 
 struct ObjectBelief {
-  std::string name;                 ///< Unique within a belief.
-  int model = 0;                    ///< Index into the context's models.
+  std::string name;  ///< Unique within a belief.
+  int model = 0;     ///< Index into the context's models.
   std::vector<Particle> particles;
-  double existence = 1.0;           ///< Probability that there is such an object at all.
+  double existence = 1.0;  ///< Probability that there is such an object at all.
   TrackState state = TrackState::kTracked;
   /// Evidence of the last frame: nats per visible pixel in favour of the pose against the object's absence.
   double evidence_per_pixel = 0.0;
-  double visible_share = 0.0;       ///< Share of its pixels that were neither hidden by known occluders nor missing.
+  double visible_share = 0.0;  ///< Share of its pixels that were neither hidden by known occluders nor missing.
   int frames_unseen = 0;
   core::TimeNs last_seen_ns = 0;
-  int island = 0;                   ///< Objects of equal number touch each other.
+  int island = 0;  ///< Objects of equal number touch each other.
   friend bool operator==(const ObjectBelief&, const ObjectBelief&) = default;
 };
 
@@ -68,12 +72,14 @@ bool operator==(const Belief& a, const Belief& b);
 
 /// What a user wants to know of one object.
 struct ObjectEstimate {
-  Pose mean;                         ///< Weighted mean about the heaviest particle.
-  Matrix6d covariance = Matrix6d::Zero();  ///< Of the whole mixture, order (rotation, translation) as geometry::box_plus.
+  Pose mean;  ///< Weighted mean about the heaviest particle.
+  Matrix6d covariance =
+      Matrix6d::Zero();  ///< Of the whole mixture, order (rotation, translation) as geometry::box_plus.
   Twist twist;
-  Pose mode;                         ///< The heaviest particle's pose.
+  Pose mode;  ///< The heaviest particle's pose.
   MotionMode motion = MotionMode::kMoving;
-  double confidence = 0.0;           ///< Probability that the object exists and is where the mean says (within 2 cm).
+  /// Probability that the object exists and is where the mean says (within 2 cm); 0 when the track is lost.
+  double confidence = 0.0;
   double effective_sample_size = 0.0;
 };
 ObjectEstimate estimate(const ObjectBelief& object);
@@ -83,8 +89,10 @@ double effective_sample_size(const std::vector<Particle>& particles);
 bool normalize(std::vector<Particle>& particles);
 /// The world state of the heaviest particle of each object.
 WorldState most_likely_state(const Belief& belief);
-/// One world state drawn from the belief; takes start_dimensions(belief) uniforms.
+/// How many uniform numbers a draw takes: one an object for the choice of its particle, and the rank of its covariance.
 int start_dimensions(const Belief& belief);
+/// One world state drawn from the belief, objects in its order; takes start_dimensions(belief) uniforms. Objects are
+/// drawn as if each existed.
 WorldState draw_start(const Belief& belief, std::span<const double> uniforms);
 /// A hash over all bits, for determinism checks.
 std::uint64_t content_hash(const Belief& belief);

@@ -5,6 +5,7 @@
 // streams and Sobol points; dimensions() says how many it takes. Coordinates that can't vary take none.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <variant>
 #include <vector>
@@ -27,14 +28,14 @@ struct FixedScalar {
 /// Normal, cut to [low, high] (draws are mapped through the truncated distribution function, nothing is clamped).
 struct NormalScalar {
   double mean = 0.0;
-  double standard_deviation = 0.0;  ///< > 0
-  double low;
-  double high;
+  double standard_deviation = 0.0;  ///< >= 0
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
   friend bool operator==(const NormalScalar&, const NormalScalar&) = default;
 };
 struct UniformScalar {
   double low = 0.0;
-  double high = 0.0;  ///< > low
+  double high = 0.0;  ///< >= low
   friend bool operator==(const UniformScalar&, const UniformScalar&) = default;
 };
 struct SampledScalar {
@@ -47,6 +48,9 @@ int dimensions(const ScalarDistribution& distribution);
 double draw(const ScalarDistribution& distribution, std::span<const double> uniforms);
 double mean(const ScalarDistribution& distribution);
 double variance(const ScalarDistribution& distribution);
+/// The ends of what can be drawn; infinite for a normal that is not cut.
+double lowest(const ScalarDistribution& distribution);
+double highest(const ScalarDistribution& distribution);
 
 /// Three independent coordinates.
 struct Vector3Distribution {
@@ -57,6 +61,8 @@ struct Vector3Distribution {
 int dimensions(const Vector3Distribution& distribution);
 Vector3d draw(const Vector3Distribution& distribution, std::span<const double> uniforms);
 Vector3d mean(const Vector3Distribution& distribution);
+/// Of each coordinate.
+Vector3d variance(const Vector3Distribution& distribution);
 
 /// Exactly this pose.
 struct FixedPose {
@@ -86,8 +92,13 @@ using PoseDistribution = std::variant<FixedPose, NormalPose, BoxPose, SampledPos
 
 int dimensions(const PoseDistribution& distribution);
 Pose draw(const PoseDistribution& distribution, std::span<const double> uniforms);
+/// A column of the square root of a covariance for each dimension of `covariance`'s rank, widest first: the columns
+/// that a normal distribution is drawn with, L L^T = covariance. Symmetric, positive semidefinite within rounding.
+Eigen::MatrixXd covariance_square_root(const Eigen::MatrixXd& covariance);
 /// The mean pose; of samples the one that minimises the sum of squared rotation angles, with the mean position.
 Pose mean(const PoseDistribution& distribution);
+/// Covariance about mean(distribution), in the coordinates of geometry::box_plus.
+Matrix6d covariance(const PoseDistribution& distribution);
 
 struct TwistDistribution {
   Vector3Distribution angular = Vector3Distribution::fixed(Vector3d::Zero());  ///< rad/s, in W
@@ -97,5 +108,7 @@ struct TwistDistribution {
 int dimensions(const TwistDistribution& distribution);
 Twist draw(const TwistDistribution& distribution, std::span<const double> uniforms);
 Twist mean(const TwistDistribution& distribution);
+/// Covariance about the mean, order (angular, linear).
+Matrix6d covariance(const TwistDistribution& distribution);
 
 }  // namespace prescene::belief

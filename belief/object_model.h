@@ -25,10 +25,10 @@ struct PrimitiveShape {
   Pose X_OS;  ///< Where the primitive's own frame sits in O.
 };
 enum class MeshUse {
-  kConvexHull,    ///< The hull of the mesh.
-  kConvexParts,   ///< Each connected component is (about) convex: the hull of each.
-  kDecompose,     ///< Approximate convex decomposition.
-  kSurface,       ///< The triangles themselves: fixed things only.
+  kConvexHull,   ///< The hull of the mesh.
+  kConvexParts,  ///< Each connected component is (about) convex: the hull of each.
+  kDecompose,    ///< Approximate convex decomposition.
+  kSurface,      ///< The triangles themselves: fixed things only.
 };
 struct MeshShape {
   MeshPtr mesh;
@@ -50,20 +50,27 @@ struct Color {
 
 /// Contact behaviour that an object brings; combined between two objects by product for friction and restitution.
 struct ContactProperties {
-  ScalarDistribution friction = FixedScalar{0.5};           ///< Coulomb coefficient while contacts slide; >= 0.
+  ScalarDistribution friction = FixedScalar{0.5};  ///< Coulomb coefficient while contacts slide; >= 0.
   /// Coefficient while a contact closes fast (an impact); empty = like `friction`.
   std::optional<ScalarDistribution> impact_friction;
-  ScalarDistribution restitution = FixedScalar{0.1};        ///< Newton's coefficient of one contact, in [0, 1].
-  double rolling_friction = 0.0;                            ///< Lever arm, m; >= 0.
-  double edge_radius = 0.0;                                 ///< Rounding of edges and corners, m; >= 0.
+  ScalarDistribution restitution = FixedScalar{0.1};  ///< Newton's coefficient of one contact, in [0, 1].
+  double rolling_friction = 0.0;                      ///< Lever arm, m; >= 0.
+  double edge_radius = 0.0;                           ///< Rounding of edges and corners, m; >= 0.
   friend bool operator==(const ContactProperties&, const ContactProperties&) = default;
 };
 
+/// The hollow of an open container as a box: what is in it is "inside".
+struct Hollow {
+  Pose X_OV;                         ///< Centre of the box in the container's frame.
+  Vector3d size = Vector3d::Zero();  ///< Full edges, m.
+  friend bool operator==(const Hollow&, const Hollow&) = default;
+};
+
 struct ObjectModel {
-  std::string name;                          ///< Unique within a scene: letters, digits, '_', '-', '.'.
-  std::vector<CollisionShape> collision;     ///< At least one.
-  MeshPtr visual;                            ///< In O; what the camera sees. Made from the collision shapes if none is given.
-  ScalarDistribution mass = FixedScalar{1.0};                                      ///< kg, > 0
+  std::string name;                       ///< Unique within a scene: letters, digits, '_', '-', '.'.
+  std::vector<CollisionShape> collision;  ///< At least one.
+  MeshPtr visual;  ///< In O; what the camera sees. Made from the collision shapes if none is given.
+  ScalarDistribution mass = FixedScalar{1.0};                                         ///< kg, > 0
   Vector3Distribution center_of_mass = Vector3Distribution::fixed(Vector3d::Zero());  ///< p_OoOcm, m
   /// Inertia about the centre of mass in O for a mass of 1 kg (m^2).
   geometry::Matrix3d unit_inertia = geometry::Matrix3d::Identity();
@@ -71,13 +78,20 @@ struct ObjectModel {
   geometry::SymmetryGroup symmetry;
   SurfaceKind surface = SurfaceKind::kOpaque;
   Color color;
+  std::optional<Hollow> hollow;  ///< Of containers.
 
   friend bool operator==(const ObjectModel& a, const ObjectModel& b);
 };
 
 /// All shapes of a model as one mesh in O.
 geometry::TriangleMesh collision_mesh(const ObjectModel& model);
-/// A copy whose visual mesh, centre of mass and unit inertia are filled in from its shapes at uniform density.
+/// The same for any list of shapes.
+geometry::TriangleMesh collision_mesh(const std::vector<CollisionShape>& shapes);
+/// The solid that a shape stands for at a density (kg/m^3): the primitive; the hull or hulls; else what the mesh
+/// encloses, which fails with kInvalidInput where the mesh is not closed.
+core::Result<geometry::MassProperties> mass_properties(const CollisionShape& shape, double density);
+/// A copy whose centre of mass and unit inertia are those of its shapes at uniform density (overlaps count twice), and
+/// whose visual mesh, if it had none, is made from them.
 core::Result<ObjectModel> with_derived_properties(ObjectModel model);
 /// Names, positive masses, friction >= 0, restitution in [0, 1], unit inertia physical: the message names the field.
 core::Status validate(const ObjectModel& model);

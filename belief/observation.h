@@ -16,8 +16,8 @@ namespace prescene::belief {
 
 /// A registered colour and depth image (same size, same camera). Images are shared and never changed.
 struct RgbdFrame {
-  std::shared_ptr<const geometry::DepthImage> depth;   ///< m, 0 = no measurement
-  std::shared_ptr<const geometry::ColorImage> color;   ///< Null when there is none.
+  std::shared_ptr<const geometry::DepthImage> depth;  ///< m, 0 = no measurement
+  std::shared_ptr<const geometry::ColorImage> color;  ///< Null when there is none.
   geometry::PinholeCamera camera;
 };
 

@@ -20,12 +20,12 @@ enum class When { kAtEnd, kEver, kAlways };
 
 /// The object's frame origin (or its whole bounding box, if `whole`) is inside a box fixed in W.
 struct InsideVolume {
-  Pose X_WV;                 ///< Centre of the box.
-  Vector3d size;             ///< Full edges, m.
+  Pose X_WV;      ///< Centre of the box.
+  Vector3d size;  ///< Full edges, m.
   bool whole = false;
   friend bool operator==(const InsideVolume&, const InsideVolume&) = default;
 };
-/// In contact with the named support, from above, and not moving.
+/// In contact with the named support (or object, or robot body), from above, and not moving.
 struct RestingOn {
   std::string support;
   friend bool operator==(const RestingOn&, const RestingOn&) = default;
@@ -33,7 +33,7 @@ struct RestingOn {
 /// The body axis is within `max_angle` of W's up.
 struct UprightWithin {
   Vector3d axis_O = Vector3d::UnitZ();
-  double max_angle = 0.26;   ///< rad
+  double max_angle = 0.26;  ///< rad
   friend bool operator==(const UprightWithin&, const UprightWithin&) = default;
 };
 /// The face or axis of the body (unit vector in O) is the one of +-x, +-y, +-z that points most upwards.
@@ -42,29 +42,29 @@ struct FaceUp {
   friend bool operator==(const FaceUp&, const FaceUp&) = default;
 };
 struct BelowHeight {
-  double height = 0.0;       ///< The origin's z in W, m.
+  double height = 0.0;  ///< The origin's z in W, m.
   friend bool operator==(const BelowHeight&, const BelowHeight&) = default;
 };
 struct MovedMoreThan {
-  double distance = 0.0;     ///< m from the start
+  double distance = 0.0;  ///< m from the start
   friend bool operator==(const MovedMoreThan&, const MovedMoreThan&) = default;
 };
 struct TurnedMoreThan {
-  double angle = 0.0;        ///< rad from the start
+  double angle = 0.0;  ///< rad from the start
   friend bool operator==(const TurnedMoreThan&, const TurnedMoreThan&) = default;
 };
 struct Touched {
-  std::string other;         ///< Object, support or robot body; at any time.
+  std::string other;  ///< Object, support or robot body; at any time, whatever Condition::when says.
   friend bool operator==(const Touched&, const Touched&) = default;
 };
 struct StillMoving {
   friend bool operator==(const StillMoving&, const StillMoving&) = default;
 };
 
-using Predicate = std::variant<InsideVolume, RestingOn, UprightWithin, FaceUp, BelowHeight, MovedMoreThan, TurnedMoreThan,
-                               Touched, StillMoving>;
+using Predicate = std::variant<InsideVolume, RestingOn, UprightWithin, FaceUp, BelowHeight, MovedMoreThan,
+                               TurnedMoreThan, Touched, StillMoving>;
 
-/// All predicates hold (each negated if its flag says so).
+/// A predicate, when it has to hold, and whether it is turned round: negated = not (predicate at/ever/always).
 struct Condition {
   Predicate predicate;
   When when = When::kAtEnd;
@@ -73,8 +73,8 @@ struct Condition {
 };
 struct Outcome {
   std::string name;
-  std::string object;                 ///< Whose trajectory is judged.
-  std::vector<Condition> all_of;      ///< At least one.
+  std::string object;             ///< Whose trajectory is judged.
+  std::vector<Condition> all_of;  ///< At least one.
   friend bool operator==(const Outcome&, const Outcome&) = default;
 };
 
@@ -87,6 +87,12 @@ struct ExclusiveOutcomes {
 /// Which of the body's six faces (+x, -x, +y, -y, +z, -z in O) is up at the end, as exclusive outcomes.
 ExclusiveOutcomes which_face_up(const std::string& name, const std::string& object);
 
+/// Slower than this (m/s of the origin, rad/s) is not moving: what creep and the last rocking of a resting body reach.
+inline constexpr double kMovingSpeed = 0.02;
+inline constexpr double kMovingTurn = 0.2;
+
+/// Whether judging needs states between the first and the last: simulators keep these only when asked to.
+bool needs_states_along_the_way(const Outcome& outcome);
 bool holds(const Scene& scene, const Trajectory& trajectory, const Outcome& outcome);
 /// Index of the first outcome that holds, or outcomes.size() for "other".
 int classify(const Scene& scene, const Trajectory& trajectory, const ExclusiveOutcomes& exclusive);

@@ -2,8 +2,8 @@
 // A scene: what is fixed, what may move, who acts, and what is asked about it. The context C of the estimation problem.
 #pragma once
 
-#include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,10 +23,12 @@ struct Support {
   Pose X_WS;
   ContactProperties contact;
   Color color;
+  std::optional<Hollow> hollow;  ///< Of containers, in S.
   friend bool operator==(const Support& a, const Support& b);
 };
 
-/// A kinematic body that follows a timeline of poses: fingers, hands, robot links. Seen and felt, never moved by contacts.
+/// A kinematic body that follows a timeline of poses: fingers, hands, robot links. Seen and felt, never moved by
+/// contacts.
 struct KinematicBody {
   std::string name;
   std::vector<CollisionShape> collision;
@@ -35,7 +37,7 @@ struct KinematicBody {
   Color color;
   /// Poses over time, times ascending; held before the first and after the last. One entry = fixed.
   struct Waypoint {
-    double time;   ///< s since the scene's start
+    double time;  ///< s since the scene's start
     Pose X_WG;
     friend bool operator==(const Waypoint&, const Waypoint&) = default;
   };
@@ -48,7 +50,7 @@ Pose pose_at(const KinematicBody& body, double time);
 /// An object of the scene: which model, and what is known of its start.
 struct SceneObject {
   std::string name;
-  int model = 0;                              ///< Index into Scene::models.
+  int model = 0;  ///< Index into Scene::models.
   PoseDistribution pose = FixedPose{};
   TwistDistribution twist;
   /// Held by this kinematic body at the start (it moves rigidly with it until released); empty = free.
@@ -73,12 +75,14 @@ struct Scene {
   std::optional<SceneCamera> camera;
   Vector3d gravity_W = Vector3d(0.0, 0.0, -9.81);  ///< m/s^2
   std::vector<Action> actions;
-  double duration = 5.0;                            ///< Longest simulated time, s.
-  bool stop_at_rest = true;                         ///< Else instances run for the whole duration.
+  double duration = 5.0;     ///< Longest simulated time, s.
+  bool stop_at_rest = true;  ///< Else instances run for the whole duration.
   std::vector<Outcome> outcomes;
   std::vector<ExclusiveOutcomes> exclusive_outcomes;
 
-  const ObjectModel& model_of(const SceneObject& object) const { return models[static_cast<std::size_t>(object.model)]; }
+  const ObjectModel& model_of(const SceneObject& object) const {
+    return models[static_cast<std::size_t>(object.model)];
+  }
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 
@@ -90,10 +94,12 @@ std::optional<int> find_robot_body(const Scene& scene, const std::string& name);
 /// Names unique, indices and names in actions and outcomes resolve, times ordered, every model valid.
 core::Status validate(const Scene& scene);
 
-/// How many uniform numbers one start of the scene takes (poses, twists, physical parameters, action errors).
+/// How many uniform numbers one start of the scene takes (poses, twists, physical parameters). What is random in
+/// actions is drawn by whoever executes them.
 int start_dimensions(const Scene& scene);
-/// One start from a point of the unit cube; the order of coordinates puts the widest uncertainties first (positions,
-/// rotations, velocities, then friction, restitution, mass, centre of mass), as Sobol nets prefer.
+/// One start from a point of the unit cube (uniforms.size() == start_dimensions(scene)); the order of coordinates puts
+/// the widest uncertainties first (poses, that of the most uncertain object first, velocities, then friction,
+/// restitution, mass, centre of mass), as Sobol nets prefer. Held objects are kHeld, all others kMoving.
 WorldState draw_start(const Scene& scene, std::span<const double> uniforms);
 /// The start with every distribution at its mean.
 WorldState mean_start(const Scene& scene);

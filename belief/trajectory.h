@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "prescene/belief/scene.h"
@@ -21,13 +22,16 @@ struct ContactInterval {
   double begin = 0.0;
   double end = 0.0;
   double largest_impulse = 0.0;  ///< N s within one step
+  /// z in W of the mean unit normal at the interval's last step, from `second` towards `first`: 1 = first lies flat on
+  /// second, -1 = second lies on first, 0 = side by side. A contact supports when it is beyond +-0.5.
+  double normal_z = 0.0;
   friend bool operator==(const ContactInterval&, const ContactInterval&) = default;
 };
 
 /// Sampled states (the first is the start, the last the end), contacts, and how it ended.
 struct Trajectory {
   std::vector<WorldState> states;
-  std::vector<ContactInterval> contacts;   ///< Ordered by (begin, first, second).
+  std::vector<ContactInterval> contacts;  ///< Ordered by (begin, first, second).
   /// Pairs (object, body) in contact at the end.
   std::vector<std::pair<int, int>> final_contacts;
   TrajectoryEnd end = TrajectoryEnd::kDuration;

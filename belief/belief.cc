@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/belief/belief.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "prescene/core/check.h"
+#include "prescene/core/hash.h"
+#include "prescene/core/random.h"
+
+namespace prescene::belief {
+namespace {
+
+using geometry::Matrix3d;
+
+constexpr double kHereDistance = 0.02;  // m: what "is where the mean says" means in ObjectEstimate::confidence
+
+const Particle& heaviest(const std::vector<Particle>& particles) {
+  PRESCENE_CHECK(!particles.empty());
+  return *std::max_element(particles.begin(), particles.end(),
+                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
+}
+
+Matrix3d cross_matrix(const Vector3d& v) {
+  Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+// Inverse of the right Jacobian of the rotation exponential: log(exp(phi) exp(e)) = phi + J e for small e.
+Matrix3d inverse_right_jacobian(const Vector3d& phi) {
+  const double angle = phi.norm();
+  const Matrix3d cross = cross_matrix(phi);
+  // The second is (1 + cos t) / (2 t sin t), written so that half a turn is no quotient of zeros; 1/12 for small t.
+  const double c = angle < 1e-4 ? 1.0 / 12.0 : 1.0 / (angle * angle) - 1.0 / (2.0 * angle * std::tan(0.5 * angle));
+  return Matrix3d::Identity() + 0.5 * cross + c * cross * cross;
+}
+
+Pose weighted_mean(const std::vector<Particle>& particles, const Pose& X_start) {
+  Pose X_mean = X_start;
+  // The rotation's mean is a fixed point; a few rounds settle it to rounding for spreads below a radian.
+  for (int round = 0; round < 8; ++round) {
+    Vector6d sum = Vector6d::Zero();
+    for (const Particle& particle : particles)
+      sum += std::exp(particle.log_weight) * geometry::box_minus(particle.X_WO, X_mean);
+    X_mean = geometry::normalized(geometry::box_plus(X_mean, sum));
+    if (sum.norm() < 1e-12) break;
+  }
+  return X_mean;
+}
+
+Matrix6d mixture_covariance(const std::vector<Particle>& particles, const Pose& X_mean) {
+  Matrix6d sum = Matrix6d::Zero();
+  for (const Particle& particle : particles) {
+    const Vector6d d = geometry::box_minus(particle.X_WO, X_mean);
+    Matrix6d to_mean = Matrix6d::Identity();
+    to_mean.topLeftCorner<3, 3>() = inverse_right_jacobian(d.head<3>());
+    const Matrix6d own = to_mean * particle.covariance.topLeftCorner<6, 6>() * to_mean.transpose();
+    sum += std::exp(particle.log_weight) * (own + d * d.transpose());
+  }
+  return 0.5 * (sum + sum.transpose());
+}
+
+// Probability that a point with the normal distribution N(m, S) lies within `radius` of the origin, from the first
+// three cumulants of its squared distance (Wilson-Hilferty for a shifted chi-square; error below 0.03).
+double probability_within(const Vector3d& m, const Matrix3d& S, double radius) {
+  const Matrix3d S2 = S * S;
+  const double c1 = S.trace() + m.squaredNorm();
+  const double c2 = 2.0 * S2.trace() + 4.0 * m.dot(S * m);
+  const double c3 = 8.0 * (S2 * S).trace() + 24.0 * m.dot(S2 * m);
+  if (!(c2 > 1e-24)) return m.norm() <= radius ? 1.0 : 0.0;
+  const double h = 8.0 * c2 * c2 * c2 / (c3 * c3);
+  const double y = (radius * radius - c1) * std::sqrt(2.0 * h / c2) + h;
+  if (y <= 0.0) return 0.0;
+  return core::normal_cdf((std::cbrt(y / h) - 1.0 + 2.0 / (9.0 * h)) / std::sqrt(2.0 / (9.0 * h)));
+}
+
+MotionMode likeliest_motion(const std::vector<Particle>& particles) {
+  std::array<double, 3> mass{};
+  for (const Particle& particle : particles)
+    mass[static_cast<std::size_t>(particle.mode)] += std::exp(particle.log_weight);
+  return static_cast<MotionMode>(std::max_element(mass.begin(), mass.end()) - mass.begin());
+}
+
+Eigen::Index rank_of(const ObjectBelief& object) {
+  Eigen::Index rank = 0;
+  for (const Particle& particle : object.particles)
+    rank = std::max(rank, covariance_square_root(particle.covariance).cols());
+  return rank;
+}
+
+bool has_choice(const ObjectBelief& object) { return object.particles.size() > 1; }
+
+// The particle at quantile u of the weights.
+const Particle& chosen(const ObjectBelief& object, double u) {
+  double sum = 0.0;
+  for (const Particle& particle : object.particles) {
+    sum += std::exp(particle.log_weight);
+    if (u < sum) return particle;
+  }
+  return object.particles.back();
+}
+
+ObjectState state_of(const Particle& particle, const Eigen::Matrix<double, 12, 1>& d) {
+  ObjectState state{particle.X_WO, particle.V_WO, particle.mode, particle.physical};
+  if (!d.isZero(0.0)) state.X_WO = geometry::box_plus(particle.X_WO, d.head<6>());
+  state.V_WO.angular += d.segment<3>(6);
+  state.V_WO.linear += d.segment<3>(9);
+  return state;
+}
+
+void hash_vector(core::Hasher& hasher, const double* values, Eigen::Index count) {
+  for (Eigen::Index i = 0; i < count; ++i) hasher.value(values[i]);
+}
+
+void hash_pose(core::Hasher& hasher, const Pose& pose) {
+  hash_vector(hasher, pose.rotation.coeffs().data(), 4);
+  hash_vector(hasher, pose.translation.data(), 3);
+}
+
+void hash_particle(core::Hasher& hasher, const Particle& particle) {
+  hasher.value(particle.log_weight);
+  hash_pose(hasher, particle.X_WO);
+  hash_vector(hasher, particle.V_WO.angular.data(), 3);
+  hash_vector(hasher, particle.V_WO.linear.data(), 3);
+  hash_vector(hasher, particle.covariance.data(), particle.covariance.size());
+  hasher.value(particle.mode).value(particle.physical.mass);
+  hash_vector(hasher, particle.physical.center_of_mass.data(), 3);
+  hasher.value(particle.physical.friction)
+      .value(particle.physical.impact_friction)
+      .value(particle.physical.restitution);
+}
+
+}  // namespace
+
+std::string to_string(TrackState state) {
+  switch (state) {
+    case TrackState::kTracked:
+      return "tracked";
+    case TrackState::kDoubtful:
+      return "doubtful";
+    case TrackState::kUnseen:
+      return "unseen";
+    case TrackState::kLost:
+      return "lost";
+  }
+  PRESCENE_CHECK_MSG(false, "a TrackState outside of its enumeration");
+}
+
+std::string to_string(MotionMode mode) {
+  switch (mode) {
+    case MotionMode::kResting:
+      return "resting";
+    case MotionMode::kHeld:
+      return "held";
+    case MotionMode::kMoving:
+      return "moving";
+  }
+  PRESCENE_CHECK_MSG(false, "a MotionMode outside of its enumeration");
+}
+
+bool operator==(const Belief& a, const Belief& b) {
+  const bool same_scene = a.scene == b.scene || (a.scene && b.scene && *a.scene == *b.scene);
+  return same_scene && a.step == b.step && a.seed == b.seed && a.stamp_ns == b.stamp_ns && a.objects == b.objects &&
+         a.robot == b.robot && a.X_WC == b.X_WC;
+}
+
+ObjectEstimate estimate(const ObjectBelief& object) {
+  ObjectEstimate estimate;
+  const Particle& best = heaviest(object.particles);
+  estimate.mode = best.X_WO;
+  estimate.mean = weighted_mean(object.particles, best.X_WO);
+  estimate.covariance = mixture_covariance(object.particles, estimate.mean);
+  estimate.motion = likeliest_motion(object.particles);
+  estimate.effective_sample_size = effective_sample_size(object.particles);
+  double here = 0.0;
+  for (const Particle& particle : object.particles) {
+    const double weight = std::exp(particle.log_weight);
+    estimate.twist.angular += weight * particle.V_WO.angular;
+    estimate.twist.linear += weight * particle.V_WO.linear;
+    here += weight * probability_within(particle.X_WO.translation - estimate.mean.translation,
+                                        particle.covariance.block<3, 3>(3, 3), kHereDistance);
+  }
+  estimate.confidence = object.state == TrackState::kLost ? 0.0 : object.existence * std::min(here, 1.0);
+  return estimate;
+}
+
+std::optional<int> find_object(const Belief& belief, const std::string& name) {
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    if (belief.objects[i].name == name) return static_cast<int>(i);
+  return std::nullopt;
+}
+
+double effective_sample_size(const std::vector<Particle>& particles) {
+  double sum = 0.0, squares = 0.0;
+  for (const Particle& particle : particles) {
+    const double weight = std::exp(particle.log_weight);
+    sum += weight;
+    squares += weight * weight;
+  }
+  return squares > 0.0 ? sum * sum / squares : 0.0;
+}
+
+bool normalize(std::vector<Particle>& particles) {
+  if (particles.empty()) return false;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (Particle& particle : particles) {
+    if (std::isnan(particle.log_weight)) particle.log_weight = -std::numeric_limits<double>::infinity();
+    largest = std::max(largest, particle.log_weight);
+  }
+  if (!std::isfinite(largest)) {
+    for (Particle& particle : particles) particle.log_weight = -std::log(static_cast<double>(particles.size()));
+    return false;
+  }
+  double sum = 0.0;
+  for (const Particle& particle : particles) sum += std::exp(particle.log_weight - largest);
+  const double log_sum = largest + std::log(sum);
+  for (Particle& particle : particles) particle.log_weight -= log_sum;
+  return true;
+}
+
+WorldState most_likely_state(const Belief& belief) {
+  WorldState state;
+  for (const ObjectBelief& object : belief.objects)
+    state.objects.push_back(state_of(heaviest(object.particles), Eigen::Matrix<double, 12, 1>::Zero()));
+  return state;
+}
+
+int start_dimensions(const Belief& belief) {
+  Eigen::Index sum = 0;
+  for (const ObjectBelief& object : belief.objects) sum += (has_choice(object) ? 1 : 0) + rank_of(object);
+  return static_cast<int>(sum);
+}
+
+WorldState draw_start(const Belief& belief, std::span<const double> uniforms) {
+  // First the choice of each object's particle, then the widest direction of each object, the next widest of each, ...
+  struct Draw {
+    const Particle* particle;
+    Eigen::MatrixXd root;
+    Eigen::Index rank;
+    Eigen::Matrix<double, 12, 1> d = Eigen::Matrix<double, 12, 1>::Zero();
+  };
+  std::size_t next = 0;
+  const auto deal = [&] {
+    PRESCENE_CHECK(next < uniforms.size());
+    return uniforms[next++];
+  };
+  std::vector<Draw> draws;
+  Eigen::Index widest_rank = 0;
+  for (const ObjectBelief& object : belief.objects) {
+    PRESCENE_CHECK(!object.particles.empty());
+    const Particle& particle = has_choice(object) ? chosen(object, deal()) : object.particles.front();
+    draws.push_back({&particle, covariance_square_root(particle.covariance), rank_of(object)});
+    widest_rank = std::max(widest_rank, draws.back().rank);
+  }
+  for (Eigen::Index column = 0; column < widest_rank; ++column) {
+    for (Draw& draw : draws) {
+      if (column >= draw.rank) continue;
+      const double z = core::inverse_normal_cdf(deal());
+      if (column < draw.root.cols()) draw.d += z * draw.root.col(column);
+    }
+  }
+  PRESCENE_CHECK(next == uniforms.size());
+  WorldState state;
+  for (const Draw& draw : draws) state.objects.push_back(state_of(*draw.particle, draw.d));
+  return state;
+}
+
+std::uint64_t content_hash(const Belief& belief) {
+  core::Hasher hasher;
+  hasher.value(belief.step).value(belief.seed).value(belief.stamp_ns).value(belief.objects.size());
+  for (const ObjectBelief& object : belief.objects) {
+    hasher.text(object.name).value(object.model).value(object.existence).value(object.state);
+    hasher.value(object.evidence_per_pixel).value(object.visible_share).value(object.frames_unseen);
+    hasher.value(object.last_seen_ns).value(object.island).value(object.particles.size());
+    for (const Particle& particle : object.particles) hash_particle(hasher, particle);
+  }
+  hasher.value(belief.robot.size());
+  for (const Pose& pose : belief.robot) hash_pose(hasher, pose);
+  hash_pose(hasher, belief.X_WC);
+  return hasher.digest();
+}
+
+}  // namespace prescene::belief

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <set>
+
+#include "prescene/belief/scene.h"
+#include "prescene/belief/validation.h"
+
+namespace prescene::belief {
+namespace {
+
+using core::invalid_input;
+using core::not_found;
+using core::Status;
+
+std::string quoted(const char* what, const std::string& name) { return std::string(what) + " '" + name + "'"; }
+
+Status check_finite_positive(double value, const char* what) {
+  if (!(value > 0.0) || !(value <= 1e6))
+    return invalid_input(std::string(what) + " of " + std::to_string(value) + ": give more than 0 and at most 1e6");
+  return {};
+}
+
+Status check_object_name(const Scene& scene, const std::string& name) {
+  if (!find_object(scene, name)) return not_found("there is no object '" + name + "': name one of the scene's objects");
+  return {};
+}
+
+bool is_thing(const Scene& scene, const std::string& name) {
+  return find_object(scene, name) || find_support(scene, name) || find_robot_body(scene, name);
+}
+
+Status check_thing(const Scene& scene, const std::string& name) {
+  if (!is_thing(scene, name))
+    return not_found("there is no '" + name + "': name an object, a support or a robot body of the scene");
+  return {};
+}
+
+struct ActionCheck {
+  const Scene& scene;
+  Status operator()(const Release& release) const {
+    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, release.object));
+    if (!release.retreat.allFinite()) return invalid_input("the retreat is not finite: give metres");
+    return check_finite_positive(release.retreat_duration, "a retreat_duration");
+  }
+  Status operator()(const Place& place) const { return check_move(place.object, place.X_WO, place.duration); }
+  Status operator()(const Transport& transport) const {
+    return check_move(transport.object, transport.X_WO, transport.duration);
+  }
+  Status operator()(const Push& push) const {
+    if (!push.from.allFinite() || !push.to.allFinite()) return invalid_input("the path is not finite: give metres");
+    PRESCENE_RETURN_IF_ERROR(check_finite_positive(push.duration, "a duration"));
+    PRESCENE_RETURN_IF_ERROR(check_finite_positive(push.radius, "a radius"));
+    return check_scalar(push.lateral_error, kLengthRange).at("lateral_error");
+  }
+  Status operator()(const Pour& pour) const {
+    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, pour.container));
+    if (!pour.axis_W.allFinite() || !(pour.axis_W.norm() > 1e-9) || !std::isfinite(pour.angle))
+      return invalid_input("the axis or the angle is not a number: give an axis of some length and radians");
+    return check_finite_positive(pour.duration, "a duration");
+  }
+  Status operator()(const Grasp& grasp) const {
+    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, grasp.object));
+    if (!find_robot_body(scene, grasp.hand))
+      return not_found("there is no robot body '" + grasp.hand + "': name one of the scene's robot bodies");
+    return {};
+  }
+  Status check_move(const std::string& object, const PoseDistribution& to, double duration) const {
+    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, object));
+    PRESCENE_RETURN_IF_ERROR(check_pose(to));
+    return check_finite_positive(duration, "a duration");
+  }
+};
+
+struct PredicateCheck {
+  const Scene& scene;
+  Status operator()(const InsideVolume& inside) const {
+    PRESCENE_RETURN_IF_ERROR(check_pose(inside.X_WV));
+    for (int i = 0; i < 3; ++i) PRESCENE_RETURN_IF_ERROR(check_finite_positive(inside.size[i], "a volume's edge"));
+    return {};
+  }
+  Status operator()(const RestingOn& resting) const { return check_thing(scene, resting.support); }
+  Status operator()(const UprightWithin& upright) const {
+    PRESCENE_RETURN_IF_ERROR(check_unit(upright.axis_O));
+    return check_angle(upright.max_angle);
+  }
+  Status operator()(const FaceUp& face) const {
+    PRESCENE_RETURN_IF_ERROR(check_unit(face.axis_O));
+    if (face.axis_O.cwiseAbs().maxCoeff() < 1.0 - 1e-6)
+      return invalid_input("a face is one of +-x, +-y, +-z: give such an axis");
+    return {};
+  }
+  Status operator()(const BelowHeight& below) const {
+    if (!std::isfinite(below.height)) return invalid_input("the height is not a number: give metres");
+    return {};
+  }
+  Status operator()(const MovedMoreThan& moved) const {
+    if (!(moved.distance >= 0.0) || !std::isfinite(moved.distance))
+      return invalid_input("the distance is not a number of at least 0: give metres");
+    return {};
+  }
+  Status operator()(const TurnedMoreThan& turned) const { return check_angle(turned.angle); }
+  Status operator()(const Touched& touched) const { return check_thing(scene, touched.other); }
+  Status operator()(const StillMoving&) const { return {}; }
+
+  static Status check_unit(const Vector3d& axis) {
+    if (!axis.allFinite() || std::abs(axis.norm() - 1.0) > 1e-6)
+      return invalid_input("the axis is not of length 1: normalise it");
+    return {};
+  }
+  static Status check_angle(double angle) {
+    if (!(angle >= 0.0) || !(angle <= 3.2)) return invalid_input("the angle is not between 0 and pi: give radians");
+    return {};
+  }
+};
+
+Status check_unique(const Scene& scene) {
+  std::set<std::string> models, things;
+  for (const ObjectModel& model : scene.models)
+    if (!models.insert(model.name).second)
+      return invalid_input("two models are called '" + model.name + "': rename one");
+  const auto add = [&](const std::string& name) -> Status {
+    if (things.insert(name).second) return {};
+    return invalid_input("two of the objects, supports and robot bodies are called '" + name + "': rename one");
+  };
+  for (const SceneObject& object : scene.objects) PRESCENE_RETURN_IF_ERROR(add(object.name));
+  for (const Support& support : scene.supports) PRESCENE_RETURN_IF_ERROR(add(support.name));
+  for (const KinematicBody& body : scene.robot) PRESCENE_RETURN_IF_ERROR(add(body.name));
+  return {};
+}
+
+Status check_support(const Support& support) {
+  PRESCENE_RETURN_IF_ERROR(check_name(support.name));
+  PRESCENE_RETURN_IF_ERROR(check_shapes(support.collision));
+  PRESCENE_RETURN_IF_ERROR(check_pose(support.X_WS));
+  PRESCENE_RETURN_IF_ERROR(check_contact(support.contact));
+  return check_color(support.color);
+}
+
+Status check_robot_body(const KinematicBody& body) {
+  PRESCENE_RETURN_IF_ERROR(check_name(body.name));
+  PRESCENE_RETURN_IF_ERROR(check_shapes(body.collision));
+  PRESCENE_RETURN_IF_ERROR(check_contact(body.contact));
+  PRESCENE_RETURN_IF_ERROR(check_color(body.color));
+  if (body.timeline.empty()) return invalid_input("its timeline is empty: give at least one pose");
+  for (std::size_t i = 0; i < body.timeline.size(); ++i) {
+    PRESCENE_RETURN_IF_ERROR(check_pose(body.timeline[i].X_WG).at("timeline"));
+    if (!std::isfinite(body.timeline[i].time)) return invalid_input("a time is not a number: give seconds");
+    if (i > 0 && !(body.timeline[i].time > body.timeline[i - 1].time))
+      return invalid_input("the times of its timeline do not grow: sort them and make them differ");
+  }
+  return {};
+}
+
+Status check_object(const Scene& scene, const SceneObject& object) {
+  PRESCENE_RETURN_IF_ERROR(check_name(object.name));
+  if (object.model < 0 || object.model >= std::ssize(scene.models))
+    return not_found("its model " + std::to_string(object.model) +
+                     " is not among the scene's models: name one of them");
+  PRESCENE_RETURN_IF_ERROR(check_pose(object.pose).at("pose"));
+  PRESCENE_RETURN_IF_ERROR(check_vector(object.twist.angular, kSpeedRange).at("angular velocity"));
+  PRESCENE_RETURN_IF_ERROR(check_vector(object.twist.linear, kSpeedRange).at("velocity"));
+  if (object.held_by && !find_robot_body(scene, *object.held_by))
+    return not_found("there is no robot body '" + *object.held_by +
+                     "' to hold it: name one of the scene's robot bodies");
+  return {};
+}
+
+Status check_outcome(const Scene& scene, const Outcome& outcome) {
+  if (outcome.name.empty()) return invalid_input("an outcome has no name: name it");
+  const std::string place = quoted("outcome", outcome.name);
+  PRESCENE_RETURN_IF_ERROR(check_object_name(scene, outcome.object).at(place));
+  if (outcome.all_of.empty()) return invalid_input("it has no condition: give at least one").at(place);
+  for (const Condition& condition : outcome.all_of)
+    PRESCENE_RETURN_IF_ERROR(std::visit(PredicateCheck{scene}, condition.predicate).at(place));
+  return {};
+}
+
+Status check_outcomes(const Scene& scene) {
+  std::set<std::string> names;
+  for (const Outcome& outcome : scene.outcomes) {
+    PRESCENE_RETURN_IF_ERROR(check_outcome(scene, outcome));
+    if (!names.insert(outcome.name).second)
+      return invalid_input("two outcomes are called '" + outcome.name + "': rename one");
+  }
+  std::set<std::string> groups;
+  for (const ExclusiveOutcomes& group : scene.exclusive_outcomes) {
+    const std::string place = quoted("exclusive outcomes", group.name);
+    if (!groups.insert(group.name).second) return invalid_input("two groups have this name: rename one").at(place);
+    if (group.outcomes.empty()) return invalid_input("the group is empty: give at least one outcome").at(place);
+    std::set<std::string> members{"other"};
+    for (const Outcome& outcome : group.outcomes) {
+      PRESCENE_RETURN_IF_ERROR(check_outcome(scene, outcome).at(place));
+      if (!members.insert(outcome.name).second)
+        return invalid_input("two outcomes are called '" + outcome.name + "' ('other' is made by itself): rename one")
+            .at(place);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Status validate(const Scene& scene) {
+  for (const ObjectModel& model : scene.models) PRESCENE_RETURN_IF_ERROR(validate(model));
+  PRESCENE_RETURN_IF_ERROR(check_unique(scene));
+  for (const Support& support : scene.supports)
+    PRESCENE_RETURN_IF_ERROR(check_support(support).at(quoted("support", support.name)));
+  for (const KinematicBody& body : scene.robot)
+    PRESCENE_RETURN_IF_ERROR(check_robot_body(body).at(quoted("robot body", body.name)));
+  for (const SceneObject& object : scene.objects)
+    PRESCENE_RETURN_IF_ERROR(check_object(scene, object).at(quoted("object", object.name)));
+  if (scene.camera) {
+    PRESCENE_RETURN_IF_ERROR(geometry::validate(scene.camera->intrinsics).at("camera"));
+    PRESCENE_RETURN_IF_ERROR(check_pose(scene.camera->X_WC).at("camera"));
+  }
+  if (!scene.gravity_W.allFinite()) return invalid_input("gravity is not finite: give m/s^2");
+  PRESCENE_RETURN_IF_ERROR(check_finite_positive(scene.duration, "a duration"));
+  double last = 0.0;
+  for (const Action& action : scene.actions) {
+    const std::string place = "action " + kind_of(action);
+    if (!(action.time >= last) || !std::isfinite(action.time))
+      return invalid_input("its time is before 0 or before that of the action above: sort the actions by time")
+          .at(place);
+    last = action.time;
+    PRESCENE_RETURN_IF_ERROR(std::visit(ActionCheck{scene}, action.what).at(place));
+  }
+  return check_outcomes(scene);
+}
+
+}  // namespace prescene::belief
