@@ -6,15 +6,17 @@
 #include <vector>
 
 #include "prescene/geometry/pose.h"
+#include "prescene/geometry/pose_error.h"
 #include "prescene/geometry/triangle_mesh.h"
 
 namespace prescene::geometry {
 
-/// A group of rotations about the point p_BoC of the body: a finite list, and/or a continuous axis.
-/// No symmetry: `rotations` empty and no axis.
+/// A group of rotations about the point p_BoC of the body: a finite list, and/or a continuous axis, or all of them.
+/// No symmetry: `rotations` empty, no axis, no ball.
 struct SymmetryGroup {
   std::vector<Quaterniond> rotations;  ///< Besides the identity; closed under products together with it and the axis.
   std::optional<Vector3d> axis;        ///< Unit vector in B: every turn about it is a symmetry.
+  bool ball = false;                   ///< Every rotation is a symmetry; the two above do not matter then.
   Vector3d p_BoC = Vector3d::Zero();   ///< The point that all symmetries keep.
 
   static SymmetryGroup none() { return {}; }
@@ -24,8 +26,10 @@ struct SymmetryGroup {
   static SymmetryGroup continuous(const Vector3d& axis, bool flip, const Vector3d& p_BoC = Vector3d::Zero());
   /// The four rotations of a cuboid of three different edges.
   static SymmetryGroup cuboid(const Vector3d& p_BoC = Vector3d::Zero());
+  /// Every rotation about p_BoC.
+  static SymmetryGroup every_rotation(const Vector3d& p_BoC = Vector3d::Zero());
 
-  bool trivial() const { return rotations.empty() && !axis; }
+  bool trivial() const { return rotations.empty() && !axis && !ball; }
   friend bool operator==(const SymmetryGroup& a, const SymmetryGroup& b);
 };
 
@@ -34,13 +38,9 @@ Pose closest_equivalent(const Pose& X_WB, const Pose& X_WR, const SymmetryGroup&
 /// Rotation angle between two poses modulo the group, radians.
 double symmetric_angle(const Pose& X_a, const Pose& X_b, const SymmetryGroup& group);
 
-/// Candidate symmetries of a mesh that keep sampled surface points within `tolerance` (m) of the surface.
+/// Candidate symmetries of a mesh that keep sampled surface points within `tolerance` (m) of the surface. Tried are the
+/// axes of the mesh's frame, the principal axes and, for bodies whose moments are (almost) equal, the diagonals of the
+/// frame, through the centre of mass, with 2 to 8 steps and continuous. Empty meshes have none.
 SymmetryGroup suggest_symmetry(const TriangleMesh& mesh, double tolerance);
-
-/// Mean distance of model points under two poses [Hinterstoisser et al. 2012], m.
-double add_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth);
-/// Mean over points of the true pose of the distance to the nearest point of the estimate (ADD-S) [Xiang et al. 2018],
-/// m.
-double adds_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth);
 
 }  // namespace prescene::geometry
