@@ -44,3 +44,8 @@ option(PRESCENE_PARALLEL_STD_THREAD "Run parallel loops on std::thread instead o
 if(PRESCENE_PARALLEL_STD_THREAD)
   add_compile_definitions(PRESCENE_PARALLEL_STD_THREAD)
 endif()
+
+option(PRESCENE_DCHECKS "Arm the checks on hot paths, ours and those of the standard library" OFF)
+if(PRESCENE_DCHECKS)
+  add_compile_definitions(PRESCENE_DCHECKS=1 _GLIBCXX_ASSERTIONS)
+endif()

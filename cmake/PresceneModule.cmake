@@ -3,6 +3,9 @@
 # an include root of its own, a folder of links in the build tree; whoever does not name the module in USES, directly or
 # through a module that does, cannot include them.
 
+# Sources that the build makes (message types): clang-tidy needs them, though nothing else of the build.
+add_custom_target(prescene_generated)
+
 # Adds the folders that have a CMakeLists.txt.
 function(prescene_add_folders)
   foreach(folder IN LISTS ARGN)

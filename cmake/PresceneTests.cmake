@@ -6,7 +6,16 @@
 
 # RapidCheck would otherwise draw another seed in every run.
 set(PRESCENE_TEST_ENVIRONMENT "RC_PARAMS=seed=20220" "PRESCENE_SOURCE_DIR=${PROJECT_SOURCE_DIR}" "PRESCENE_BUILD_DIR=${PROJECT_BINARY_DIR}")
+if(PRESCENE_SANITIZERS MATCHES "address")
+  list(APPEND PRESCENE_TEST_ENVIRONMENT "ASAN_OPTIONS=detect_stack_use_after_return=1:strict_init_order=1"
+       "UBSAN_OPTIONS=print_stacktrace=1")
+elseif(PRESCENE_SANITIZERS MATCHES "thread")
+  list(APPEND PRESCENE_TEST_ENVIRONMENT
+       "TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tools/tsan.supp:halt_on_error=1:second_deadlock_stack=1")
+endif()
 set(PRESCENE_FUZZERS OFF CACHE BOOL "Build fuzz targets as libFuzzer programs (clang) instead of replays of their corpus")
+
+add_custom_target(prescene_fuzzers)
 
 # prescene_tests(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...
 #   TIMEOUT <seconds>         of each case, default 300
@@ -52,6 +61,7 @@ function(prescene_fuzz_target name)
   add_executable(fuzz_${name} ${F_SOURCES})
   target_link_libraries(fuzz_${name} PRIVATE ${F_USES} ${F_PRIVATE_LINKS})
   set_target_properties(fuzz_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/fuzz")
+  add_dependencies(prescene_fuzzers fuzz_${name})
   if(PRESCENE_FUZZERS)
     target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
   else()

@@ -127,16 +127,7 @@ verb_test() {
 run_tests() {
   local preset=$1
   shift
-  sanitizer_environment "$preset"
   ctest --test-dir "build/$preset" -j "$jobs" --output-on-failure --no-tests=error --progress "$@"
-}
-
-# Whole libraries outside of our code are the only suppressions; see tools/tsan.supp.
-sanitizer_environment() {
-  export ASAN_OPTIONS=${ASAN_OPTIONS:-detect_stack_use_after_return=1:strict_init_order=1:detect_leaks=1}
-  export LSAN_OPTIONS=${LSAN_OPTIONS:-suppressions=$PWD/tools/lsan.supp:print_suppressions=0}
-  export UBSAN_OPTIONS=${UBSAN_OPTIONS:-print_stacktrace=1}
-  export TSAN_OPTIONS=${TSAN_OPTIONS:-suppressions=$PWD/tools/tsan.supp:halt_on_error=1:second_deadlock_stack=1}
 }
 
 # ---------------------------------------------------------------------------------------------------- demo, bench
@@ -210,7 +201,7 @@ verb_fuzz() {
 fuzz_one() {
   local name=$1 seconds=$2
   mkdir -p "build/fuzz/corpus/$name" build/fuzz/crashes
-  sanitizer_environment fuzz
+  export UBSAN_OPTIONS=print_stacktrace=1
   "build/fuzz/fuzz/fuzz_$name" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 -verbosity=0 \
     "-artifact_prefix=build/fuzz/crashes/$name-" "build/fuzz/corpus/$name" "tests/fuzz/corpus/$name"
 }

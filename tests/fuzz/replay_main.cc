@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands in for libFuzzer in builds without it: feeds each file of the given folders and files to the fuzz target once, in
-// the order of their names, so that every input that was ever a crash stays a test.
+// Stands in for libFuzzer in builds without it: feeds each file of the given folders and files to the fuzz target once,
+// in the order of their names, so that every input that was ever a crash stays a test.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
