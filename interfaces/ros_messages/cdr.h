@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bytes of the messages in messages.h, in the encoding that ROS 2 puts on the wire and into recordings: a four-byte header and plain
-// CDR, version 1 (XCDR1), without any DDS library.
+// Bytes of the messages in messages.h, in the encoding that ROS 2 puts on the wire and into recordings: a four-byte
+// header and plain CDR, version 1 (XCDR1), without any DDS library.
 //
 //   std::vector<std::uint8_t> bytes = encode_cdr(image);
 //   PRESCENE_TRY(RosImage image, decode_cdr<RosImage>(bytes));

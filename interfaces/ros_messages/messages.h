@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ROS 2 messages that Prescene reads and writes, as plain structs with the fields of their .msg files in wire order.
-// Nothing here is checked: values are as a sender wrote them. conversions.h turns them into geometry with every check,
-// cdr.h turns them into bytes and back, schemas.h names them.
+// The ROS 2 messages that Prescene reads and writes, as plain structs with the fields of their .msg files in wire
+// order. Nothing here is checked: values are as a sender wrote them. conversions.h turns them into geometry with every
+// check, cdr.h turns them into bytes and back, schemas.h names them.
 #pragma once
 
 #include <array>

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/bytes/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "prescene/core/check.h"
+#include "prescene/interfaces/bytes/text.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::Result;
+using core::Status;
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+Status open_error(const std::filesystem::path& path, int error) {
+  const std::string place = path.string() + ": ";
+  if (error == ENOENT) return core::not_found(place + "no such file; check the path");
+  if (error == EACCES) return core::unavailable(place + "permission denied; change the file's permissions or the user");
+  return core::unavailable(place + "cannot be opened: " + reason(error));
+}
+
+Status write_error(const std::filesystem::path& path, int error) {
+  const std::string text = path.string() + ": cannot be written: " + reason(error);
+  if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
+    return core::resource_exhausted(text + "; free some space or choose another disk");
+  }
+  return core::unavailable(text);
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
+  PRESCENE_TRY(const InputFile file, InputFile::open(path));
+  if (file.size() > max_bytes) {
+    return core::resource_exhausted(path.string() + ": " + size_text(file.size()) + " are more than the limit of " +
+                                    size_text(max_bytes) + "; use a smaller file or raise the limit");
+  }
+  std::vector<std::uint8_t> bytes(file.size());
+  PRESCENE_RETURN_IF_ERROR(file.read(0, bytes));
+  return bytes;
+}
+
+Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  std::filesystem::path partial = path;
+  partial += ".partial";
+  Status status;
+  {
+    Result<OutputFile> file = OutputFile::create(partial);
+    if (!file) return file.status();
+    status = file->write(bytes);
+    if (const Status closed = file->close(); status.ok()) status = closed;
+  }
+  std::error_code error;
+  if (status.ok()) {
+    std::filesystem::rename(partial, path, error);
+    if (!error) return status;
+    status = core::unavailable(path.string() + ": cannot be replaced: " + error.message());
+  }
+  std::filesystem::remove(partial, error);
+  return status;
+}
+
+Status write_file(const std::filesystem::path& path, std::string_view text) {
+  return write_file(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(descriptor_, other.descriptor_);
+  return *this;
+}
+
+OutputFile::~OutputFile() {
+  if (is_open()) ::close(descriptor_);
+}
+
+Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
+  OutputFile file;
+  file.path_ = path;
+  file.descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file.descriptor_ >= 0) return file;
+  const int error = errno;
+  if (error == ENOENT) return core::not_found(path.string() + ": its folder does not exist; make it first");
+  return write_error(path, error);
+}
+
+Status OutputFile::write(std::span<const std::uint8_t> bytes) {
+  PRESCENE_CHECK(is_open());
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return write_error(path_, errno);
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return core::ok_status();
+}
+
+Status OutputFile::sync() {
+  PRESCENE_CHECK(is_open());
+  // Pipes and character devices cannot be synchronised; that is not a loss.
+  if (::fdatasync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) return write_error(path_, errno);
+  return core::ok_status();
+}
+
+Status OutputFile::close() {
+  if (!is_open()) return core::ok_status();
+  if (::close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) return write_error(path_, errno);
+  return core::ok_status();
+}
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      size_(std::exchange(other.size_, 0)) {}
+
+InputFile& InputFile::operator=(InputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(descriptor_, other.descriptor_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+InputFile::~InputFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+Result<InputFile> InputFile::open(const std::filesystem::path& path) {
+  InputFile file;
+  file.path_ = path;
+  // Without O_NONBLOCK, opening a named pipe would wait for a writer.
+  file.descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file.descriptor_ < 0) return open_error(path, errno);
+  struct stat information {};
+  if (::fstat(file.descriptor_, &information) != 0) return open_error(path, errno);
+  if (S_ISDIR(information.st_mode)) return core::invalid_input(path.string() + ": is a folder; name a file in it");
+  if (!S_ISREG(information.st_mode)) {
+    return core::invalid_input(path.string() + ": is no regular file; copy its content into one");
+  }
+  file.size_ = static_cast<std::uint64_t>(information.st_size);
+  return file;
+}
+
+Status InputFile::read(std::uint64_t offset, std::span<std::uint8_t> out) const {
+  while (!out.empty()) {
+    const ssize_t count = ::pread(descriptor_, out.data(), out.size(), static_cast<off_t>(offset));
+    if (count < 0) {
+      if (errno == EINTR) continue;
+      return core::unavailable(path_.string() + ": cannot be read: " + reason(errno));
+    }
+    if (count == 0) return core::data_loss(path_.string() + ": ends at byte " + std::to_string(offset));
+    offset += static_cast<std::uint64_t>(count);
+    out = out.subspan(static_cast<std::size_t>(count));
+  }
+  return core::ok_status();
+}
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files read with a size cap and written with every call checked, so that a full disk or a wrong path is a clear
+// status.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "prescene/core/status.h"
+
+namespace prescene::interfaces {
+
+/// The whole content of a regular file. kNotFound when there is none, kInvalidInput for a folder, kResourceExhausted
+/// above `max_bytes`, kUnavailable when it can't be opened or read; the text begins with the path.
+core::Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::size_t max_bytes);
+
+/// Writes beside the target and renames at the end: the old content stays when anything fails. Makes no folders.
+core::Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+core::Status write_file(const std::filesystem::path& path, std::string_view text);
+
+/// A file that is being written front to back. Not thread-safe; closing is checked only by close().
+class OutputFile {
+ public:
+  OutputFile() = default;
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&& other) noexcept;
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  ~OutputFile();  ///< Closes; errors are lost, so call close() first.
+
+  /// Truncates an existing file.
+  static core::Result<OutputFile> create(const std::filesystem::path& path);
+
+  bool is_open() const { return descriptor_ >= 0; }
+  const std::filesystem::path& path() const { return path_; }
+  /// All bytes or an error (disk full: kResourceExhausted).
+  core::Status write(std::span<const std::uint8_t> bytes);
+  /// Waits until the bytes are on the disk.
+  core::Status sync();
+  core::Status close();
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+};
+
+/// A file that is read at any place; its size is the one at opening. Not thread-safe.
+class InputFile {
+ public:
+  InputFile() = default;
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&& other) noexcept;
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+  ~InputFile();
+
+  static core::Result<InputFile> open(const std::filesystem::path& path);
+
+  const std::filesystem::path& path() const { return path_; }
+  std::uint64_t size() const { return size_; }
+  /// Fills `out` from `offset`; kDataLoss when the file ends before.
+  core::Status read(std::uint64_t offset, std::span<std::uint8_t> out) const;
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::Result;
+using core::Status;
+using geometry::PinholeCamera;
+
+/// The part of the full image that arrives, in pixels of the full image, and how many of them make one.
+struct Readout {
+  std::uint32_t x_offset;
+  std::uint32_t y_offset;
+  std::uint32_t width;
+  std::uint32_t height;
+  std::uint32_t binning_x;
+  std::uint32_t binning_y;
+};
+
+Result<Readout> to_readout(const RosCameraInfo& info) {
+  if (info.width == 0 || info.height == 0) {
+    return core::invalid_input("width x height: is " + std::to_string(info.width) + " x " +
+                               std::to_string(info.height) + "; set the size that the camera was calibrated at");
+  }
+  Readout readout{
+      info.roi.x_offset,           info.roi.y_offset, info.roi.width, info.roi.height, std::max(info.binning_x, 1U),
+      std::max(info.binning_y, 1U)};
+  if (readout.width == 0) readout.width = info.width - std::min(info.width, readout.x_offset);
+  if (readout.height == 0) readout.height = info.height - std::min(info.height, readout.y_offset);
+  const bool fits = std::uint64_t{readout.x_offset} + readout.width <= info.width &&
+                    std::uint64_t{readout.y_offset} + readout.height <= info.height && readout.width > 0 &&
+                    readout.height > 0;
+  if (!fits) {
+    return core::invalid_input("roi: does not lie in the image of " + std::to_string(info.width) + " x " +
+                               std::to_string(info.height) + " pixels; give it in pixels of the full image");
+  }
+  if (readout.binning_x > readout.width || readout.binning_y > readout.height) {
+    return core::invalid_input("binning: " + std::to_string(readout.binning_x) + " x " +
+                               std::to_string(readout.binning_y) + " leaves no pixel of the image");
+  }
+  return readout;
+}
+
+/// Shift in normalised coordinates by the distortion models of OpenCV, or false when the model is unknown.
+bool distortion_shift(const RosCameraInfo& info, double x, double y, double* dx, double* dy) {
+  const auto& d = info.d;
+  const double r2 = x * x + y * y;
+  if ((info.distortion_model == "plumb_bob" && (d.size() == 4 || d.size() == 5)) ||
+      (info.distortion_model == "rational_polynomial" && d.size() == 8)) {
+    const auto k = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
+    const double radial = (1.0 + r2 * (k(0) + r2 * (k(1) + r2 * k(4)))) / (1.0 + r2 * (k(5) + r2 * (k(6) + r2 * k(7))));
+    *dx = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x) - x;
+    *dy = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y - y;
+    return true;
+  }
+  if ((info.distortion_model == "equidistant" || info.distortion_model == "fisheye") && d.size() == 4) {
+    const double r = std::sqrt(r2);
+    const double a = std::atan(r);
+    const double a2 = a * a;
+    const double scale = r < 1e-12 ? 1.0 : a * (1.0 + a2 * (d[0] + a2 * (d[1] + a2 * (d[2] + a2 * d[3])))) / r;
+    *dx = x * scale - x;
+    *dy = y * scale - y;
+    return true;
+  }
+  return false;
+}
+
+void report_distortion(const RosCameraInfo& info, const PinholeCamera& camera, CameraReport* report) {
+  const bool none = std::all_of(info.d.begin(), info.d.end(), [](double v) { return v == 0.0; });
+  if (none) return;
+  for (const double u : {0.0, camera.width - 1.0}) {
+    for (const double v : {0.0, camera.height - 1.0}) {
+      double dx = 0.0;
+      double dy = 0.0;
+      if (!distortion_shift(info, (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, &dx, &dy)) {
+        report->warnings.push_back("distortion_model: " + quoted(info.distortion_model) + " with " +
+                                   std::to_string(info.d.size()) +
+                                   " coefficients is unknown, the distortion is ignored; send plumb_bob with 5, "
+                                   "rational_polynomial with 8 or equidistant with 4, or rectified images");
+        return;
+      }
+      const double shift = std::hypot(dx * camera.fx, dy * camera.fy);
+      report->max_distortion = std::isfinite(shift) ? std::max(report->max_distortion, shift) : 1e9;
+    }
+  }
+  if (report->max_distortion > 1.0) {
+    report->warnings.push_back("d: the lens distortion moves the image corners by up to " +
+                               std::to_string(std::lround(report->max_distortion)) +
+                               " pixels and is ignored; send rectified images (image_proc) and use P");
+  }
+}
+
+}  // namespace
+
+Result<PinholeCamera> to_camera(const RosCameraInfo& info, const CameraRules& rules, CameraReport* report) {
+  CameraReport own_report;
+  if (report == nullptr) report = &own_report;
+  *report = {};
+  PRESCENE_TRY(const Readout readout, to_readout(info));
+
+  const char* field = rules.rectified ? "p" : "k";
+  const double fx = rules.rectified ? info.p[0] : info.k[0];
+  const double fy = rules.rectified ? info.p[5] : info.k[4];
+  const double cx = rules.rectified ? info.p[2] : info.k[2];
+  const double cy = rules.rectified ? info.p[6] : info.k[5];
+  if (fx == 0.0) {
+    return core::invalid_input(std::string(field) + ": is zero, the camera is not calibrated; load its calibration");
+  }
+  if (!(fx > 0.0 && fy > 0.0) || !std::isfinite(fx + fy + cx + cy)) {
+    return core::invalid_input(std::string(field) + ": focal lengths " + number_text(fx) + ", " + number_text(fy) +
+                               " and principal point (" + number_text(cx) + ", " + number_text(cy) +
+                               ") are no camera; load its calibration");
+  }
+
+  PinholeCamera camera;
+  camera.width = static_cast<int>(readout.width / readout.binning_x);
+  camera.height = static_cast<int>(readout.height / readout.binning_y);
+  camera.fx = fx / readout.binning_x;
+  camera.fy = fy / readout.binning_y;
+  camera.cx = (cx - readout.x_offset) / readout.binning_x;
+  camera.cy = (cy - readout.y_offset) / readout.binning_y;
+  const bool size_differs = (rules.image_width > 0 && rules.image_width != camera.width) ||
+                            (rules.image_height > 0 && rules.image_height != camera.height);
+  if (size_differs) {
+    return core::invalid_input("width x height: describes images of " + std::to_string(camera.width) + " x " +
+                               std::to_string(camera.height) + " pixels, but they have " +
+                               std::to_string(rules.image_width) + " x " + std::to_string(rules.image_height) +
+                               "; send the calibration of this resolution, or set binning and roi");
+  }
+  PRESCENE_RETURN_IF_ERROR(geometry::validate(camera));
+
+  if (!rules.rectified) report_distortion(info, camera, report);
+  if (rules.rectified && info.p[3] != 0.0) {
+    report->warnings.push_back("p: is that of the right camera of a stereo pair, " +
+                               number_text(-info.p[3] / info.p[0]) +
+                               " m right of the left one; its frame must be the right camera's");
+  }
+  return camera;
+}
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// Between ROS 2 messages and our geometry, with every check that a careless or hostile sender calls for. The text of an
+// error names the field and what the sender has to change; add the topic with Status::at().
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "prescene/core/status.h"
+#include "prescene/geometry/camera.h"
+#include "prescene/geometry/image.h"
+#include "prescene/geometry/pose.h"
+#include "prescene/interfaces/ros_messages/messages.h"
+
+namespace prescene::interfaces {
+
+// --- Time, frames, poses -------------------------------------------------------------------------------------------
+
+/// Nanoseconds since 1970. kInvalidInput for nanosec >= 10^9 and for negative seconds; 0 (a sender without a clock)
+/// passes.
+core::Result<std::int64_t> to_stamp_ns(const RosTime& stamp);
+/// 0 <= stamp_ns < 2^31 s (checked).
+RosTime to_ros_time(std::int64_t stamp_ns);
+
+/// The frame's name without the leading '/' of ROS 1. kInvalidInput when empty, longer than 255 bytes or with control
+/// bytes.
+core::Result<std::string> to_frame_id(std::string_view frame_id);
+
+struct PoseRules {
+  double max_coordinate = 1e5;               ///< Metres; more is nonsense or another unit.
+  bool zero_quaternion_is_identity = false;  ///< Accept 0, 0, 0, 0 (a default-constructed message) as no turn.
+};
+
+/// A unit quaternion with w >= 0. kInvalidInput for NaN, infinity, all zero, and a norm off 1 by more than 0.1.
+core::Result<geometry::Quaterniond> to_rotation(const RosQuaternion& quaternion, const PoseRules& rules = {});
+core::Result<geometry::Pose> to_pose(const RosPose& pose, const PoseRules& rules = {});
+core::Result<geometry::Pose> to_pose(const RosTransform& transform, const PoseRules& rules = {});
+/// Finite velocities; the frame is the sender's.
+core::Result<geometry::Twist> to_twist(const RosTwist& twist);
+
+/// Covariance of a pose in geometry's error coordinates (rotation in the body frame, then translation), from ROS's
+/// (translation, then turns about the parent's axes). None when unknown (all zero, or -1 in the first place).
+/// kInvalidInput for NaN and infinity; made symmetric, negative eigenvalues become 0.
+core::Result<std::optional<geometry::Matrix6d>> to_covariance(const RosPoseWithCovariance& pose);
+
+RosPose to_ros_pose(const geometry::Pose& X);
+RosTransform to_ros_transform(const geometry::Pose& X);
+RosTwist to_ros_twist(const geometry::Twist& V);
+RosPoseWithCovariance to_ros_pose(const geometry::Pose& X, const geometry::Matrix6d& covariance);
+
+/// One edge of the tree of frames: X_PC, the pose of `child` in `parent`, at a time.
+struct FrameTransform {
+  std::string parent;
+  std::string child;
+  std::int64_t stamp_ns = 0;
+  geometry::Pose X_PC;
+};
+/// The transforms that are sound, and one status for each that is not (the others are not lost by it).
+struct FrameTransforms {
+  std::vector<FrameTransform> accepted;
+  std::vector<core::Status> rejected;
+};
+/// kResourceExhausted above `max_transforms`; never fails otherwise.
+core::Result<FrameTransforms> to_transforms(const RosTfMessage& message, std::size_t max_transforms = 4096,
+                                            const PoseRules& rules = {});
+RosTransformStamped to_ros_transform(const FrameTransform& transform);
+
+// --- Images and cameras --------------------------------------------------------------------------------------------
+
+struct ImageRules {
+  std::uint32_t max_side = 16384;        ///< Pixels.
+  double metres_per_unit_16uc1 = 0.001;  ///< REP 118: millimetres.
+  double metres_per_unit_32fc1 = 1.0;    ///< REP 118: metres.
+  bool mono16_is_depth = false;          ///< Some drivers send depth as mono16.
+};
+
+/// What to_depth_image saw on the way.
+struct DepthImageReport {
+  std::int64_t measured = 0;          ///< Pixels with a depth.
+  std::int64_t missing = 0;           ///< Pixels that were 0, NaN, infinite, negative or full scale; 0 in the image.
+  double median_depth = 0.0;          ///< Of an even sample of the measured pixels, metres; 0 when there are none.
+  std::vector<std::string> warnings;  ///< Sentences for a person: doubtful unit or byte order.
+};
+
+/// Depth in metres from encodings 16UC1 and 32FC1 (mono16 by rule), either byte order, padded rows, and a last row
+/// without its padding. kInvalidInput when a field contradicts another (step, data, size), for a depth whose median
+/// is above 100 m in 32FC1 (millimetres?), and for colour; kUnsupported for other encodings.
+core::Result<geometry::DepthImage> to_depth_image(const RosImage& image, const ImageRules& rules = {},
+                                                  DepthImageReport* report = nullptr);
+/// Colour from rgb8, bgr8, rgba8, bgra8, 8UC3 (blue first) and 8UC4, grey from mono8, 8UC1 and mono16 (its upper byte).
+/// kUnsupported with the encodings that would do for others (bayer, yuv), kInvalidInput as above.
+core::Result<geometry::ColorImage> to_color_image(const RosImage& image, const ImageRules& rules = {});
+
+struct CameraRules {
+  bool rectified = false;  ///< The images are rectified: use P instead of K.
+  int image_width = 0;     ///< Of the images that go with it; 0 = not checked.
+  int image_height = 0;
+};
+/// What to_camera saw on the way.
+struct CameraReport {
+  double max_distortion =
+      0.0;  ///< Largest shift of an image corner by the lens distortion, which is not modelled; pixels.
+  std::vector<std::string> warnings;
+};
+/// The pinhole camera of the images as they arrive: K (or P), with binning and region of interest applied as ROS's
+/// image_geometry does: c' = (c - offset) / binning. kInvalidInput when uncalibrated (K all zero), NaN, focal lengths
+/// <= 0, or a size that does not fit the image. Lens distortion is left out: the report says how much that is.
+core::Result<geometry::PinholeCamera> to_camera(const RosCameraInfo& info, const CameraRules& rules = {},
+                                                CameraReport* report = nullptr);
+
+/// 16UC1 in millimetres, rounded; depths above 65.535 m and missing ones become 0.
+RosImage to_ros_image_16uc1(const geometry::DepthImage& depth, const RosHeader& header);
+/// 32FC1 in metres; missing depths become NaN.
+RosImage to_ros_image_32fc1(const geometry::DepthImage& depth, const RosHeader& header);
+/// rgb8.
+RosImage to_ros_image(const geometry::ColorImage& color, const RosHeader& header);
+/// plumb_bob without distortion, R the identity, P = [K 0].
+RosCameraInfo to_ros_camera_info(const geometry::PinholeCamera& camera, const RosHeader& header);
+
+// --- Joints ---------------------------------------------------------------------------------------------------------
+
+struct JointSample {
+  std::string name;
+  double position = 0.0;           ///< rad or m
+  std::optional<double> velocity;  ///< rad/s or m/s
+  std::optional<double> effort;    ///< N m or N
+  friend bool operator==(const JointSample&, const JointSample&) = default;
+};
+/// By name, in the message's order; entries without position are left out. kInvalidInput for arrays of unequal length,
+/// empty or repeated names, NaN or infinity.
+core::Result<std::vector<JointSample>> to_joint_samples(const RosJointState& state);
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fields of each message in wire order, as tuples of (name, pointer to member): what the codec walks.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <vector>
+
+#include "prescene/interfaces/ros_messages/messages.h"
+
+namespace prescene::interfaces::message_fields {
+
+template <class Message, class Value>
+struct Field {
+  const char* name;
+  Value Message::*member;
+};
+
+template <class Message>
+struct Fields;
+
+#define PRESCENE_FIELDS(type, ...)                        \
+  template <>                                             \
+  struct Fields<type> {                                   \
+    using M = type;                                       \
+    static constexpr auto list = std::tuple{__VA_ARGS__}; \
+  }
+
+PRESCENE_FIELDS(RosTime, Field{"sec", &M::sec}, Field{"nanosec", &M::nanosec});
+PRESCENE_FIELDS(RosDuration, Field{"sec", &M::sec}, Field{"nanosec", &M::nanosec});
+PRESCENE_FIELDS(RosClock, Field{"clock", &M::clock});
+PRESCENE_FIELDS(RosHeader, Field{"stamp", &M::stamp}, Field{"frame_id", &M::frame_id});
+PRESCENE_FIELDS(RosString, Field{"data", &M::data});
+PRESCENE_FIELDS(RosColorRgba, Field{"r", &M::r}, Field{"g", &M::g}, Field{"b", &M::b}, Field{"a", &M::a});
+PRESCENE_FIELDS(RosVector3, Field{"x", &M::x}, Field{"y", &M::y}, Field{"z", &M::z});
+PRESCENE_FIELDS(RosPoint, Field{"x", &M::x}, Field{"y", &M::y}, Field{"z", &M::z});
+PRESCENE_FIELDS(RosQuaternion, Field{"x", &M::x}, Field{"y", &M::y}, Field{"z", &M::z}, Field{"w", &M::w});
+PRESCENE_FIELDS(RosPose, Field{"position", &M::position}, Field{"orientation", &M::orientation});
+PRESCENE_FIELDS(RosPoseStamped, Field{"header", &M::header}, Field{"pose", &M::pose});
+PRESCENE_FIELDS(RosPoseWithCovariance, Field{"pose", &M::pose}, Field{"covariance", &M::covariance});
+PRESCENE_FIELDS(RosPoseWithCovarianceStamped, Field{"header", &M::header}, Field{"pose", &M::pose});
+PRESCENE_FIELDS(RosPoseArray, Field{"header", &M::header}, Field{"poses", &M::poses});
+PRESCENE_FIELDS(RosTransform, Field{"translation", &M::translation}, Field{"rotation", &M::rotation});
+PRESCENE_FIELDS(RosTransformStamped, Field{"header", &M::header}, Field{"child_frame_id", &M::child_frame_id},
+                Field{"transform", &M::transform});
+PRESCENE_FIELDS(RosTfMessage, Field{"transforms", &M::transforms});
+PRESCENE_FIELDS(RosTwist, Field{"linear", &M::linear}, Field{"angular", &M::angular});
+PRESCENE_FIELDS(RosTwistStamped, Field{"header", &M::header}, Field{"twist", &M::twist});
+PRESCENE_FIELDS(RosImage, Field{"header", &M::header}, Field{"height", &M::height}, Field{"width", &M::width},
+                Field{"encoding", &M::encoding}, Field{"is_bigendian", &M::is_bigendian}, Field{"step", &M::step},
+                Field{"data", &M::data});
+PRESCENE_FIELDS(RosCompressedImage, Field{"header", &M::header}, Field{"format", &M::format}, Field{"data", &M::data});
+PRESCENE_FIELDS(RosRegionOfInterest, Field{"x_offset", &M::x_offset}, Field{"y_offset", &M::y_offset},
+                Field{"height", &M::height}, Field{"width", &M::width}, Field{"do_rectify", &M::do_rectify});
+PRESCENE_FIELDS(RosCameraInfo, Field{"header", &M::header}, Field{"height", &M::height}, Field{"width", &M::width},
+                Field{"distortion_model", &M::distortion_model}, Field{"d", &M::d}, Field{"k", &M::k},
+                Field{"r", &M::r}, Field{"p", &M::p}, Field{"binning_x", &M::binning_x},
+                Field{"binning_y", &M::binning_y}, Field{"roi", &M::roi});
+PRESCENE_FIELDS(RosJointState, Field{"header", &M::header}, Field{"name", &M::name}, Field{"position", &M::position},
+                Field{"velocity", &M::velocity}, Field{"effort", &M::effort});
+PRESCENE_FIELDS(RosObjectHypothesis, Field{"class_id", &M::class_id}, Field{"score", &M::score});
+PRESCENE_FIELDS(RosObjectHypothesisWithPose, Field{"hypothesis", &M::hypothesis}, Field{"pose", &M::pose});
+PRESCENE_FIELDS(RosBoundingBox3d, Field{"center", &M::center}, Field{"size", &M::size});
+PRESCENE_FIELDS(RosDetection3d, Field{"header", &M::header}, Field{"results", &M::results}, Field{"bbox", &M::bbox},
+                Field{"id", &M::id});
+PRESCENE_FIELDS(RosDetection3dArray, Field{"header", &M::header}, Field{"detections", &M::detections});
+PRESCENE_FIELDS(RosUvCoordinate, Field{"u", &M::u}, Field{"v", &M::v});
+PRESCENE_FIELDS(RosMeshFile, Field{"filename", &M::filename}, Field{"data", &M::data});
+PRESCENE_FIELDS(RosMarker, Field{"header", &M::header}, Field{"ns", &M::ns}, Field{"id", &M::id},
+                Field{"type", &M::type}, Field{"action", &M::action}, Field{"pose", &M::pose},
+                Field{"scale", &M::scale}, Field{"color", &M::color}, Field{"lifetime", &M::lifetime},
+                Field{"frame_locked", &M::frame_locked}, Field{"points", &M::points}, Field{"colors", &M::colors},
+                Field{"texture_resource", &M::texture_resource}, Field{"texture", &M::texture},
+                Field{"uv_coordinates", &M::uv_coordinates}, Field{"text", &M::text},
+                Field{"mesh_resource", &M::mesh_resource}, Field{"mesh_file", &M::mesh_file},
+                Field{"mesh_use_embedded_materials", &M::mesh_use_embedded_materials});
+PRESCENE_FIELDS(RosMarkerArray, Field{"markers", &M::markers});
+PRESCENE_FIELDS(RosKeyValue, Field{"key", &M::key}, Field{"value", &M::value});
+PRESCENE_FIELDS(RosDiagnosticStatus, Field{"level", &M::level}, Field{"name", &M::name}, Field{"message", &M::message},
+                Field{"hardware_id", &M::hardware_id}, Field{"values", &M::values});
+PRESCENE_FIELDS(RosDiagnosticArray, Field{"header", &M::header}, Field{"status", &M::status});
+
+#undef PRESCENE_FIELDS
+
+/// Fewest bytes that a value can take on the wire, padding not counted.
+template <class T>
+struct MinWireSize {
+  static constexpr std::size_t value = std::apply(
+      [](auto... field) {
+        return (MinWireSize<std::remove_cvref_t<decltype(std::declval<T>().*field.member)>>::value + ...);
+      },
+      Fields<T>::list);
+};
+template <class T>
+requires std::is_arithmetic_v<T>
+struct MinWireSize<T> {
+  static constexpr std::size_t value = sizeof(T);
+};
+template <>
+struct MinWireSize<std::string> {
+  static constexpr std::size_t value = 4;
+};
+template <class T>
+struct MinWireSize<std::vector<T>> {
+  static constexpr std::size_t value = 4;
+};
+template <class T, std::size_t n>
+struct MinWireSize<std::array<T, n>> {
+  static constexpr std::size_t value = n * MinWireSize<T>::value;
+};
+
+}  // namespace prescene::interfaces::message_fields
+
+/// Every message of messages.h, for explicit instantiation.
+#define PRESCENE_FOR_EACH_MESSAGE(DO)                                                                                 \
+  DO(RosTime)                                                                                                         \
+  DO(RosDuration) DO(RosClock) DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) DO(RosPoint)               \
+      DO(RosQuaternion) DO(RosPose) DO(RosPoseStamped) DO(RosPoseWithCovariance) DO(RosPoseWithCovarianceStamped)     \
+          DO(RosPoseArray) DO(RosTransform) DO(RosTransformStamped) DO(RosTfMessage) DO(RosTwist) DO(RosTwistStamped) \
+              DO(RosImage) DO(RosCompressedImage) DO(RosRegionOfInterest) DO(RosCameraInfo) DO(RosJointState)         \
+                  DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose) DO(RosBoundingBox3d) DO(RosDetection3d)     \
+                      DO(RosDetection3dArray) DO(RosUvCoordinate) DO(RosMeshFile) DO(RosMarker) DO(RosMarkerArray)    \
+                          DO(RosKeyValue) DO(RosDiagnosticStatus) DO(RosDiagnosticArray)

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/ros_messages/schemas.h"
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "prescene/core/check.h"
+#include "prescene/interfaces/ros_messages/messages.h"
+
+namespace prescene::interfaces {
+namespace {
+
+constexpr std::array<RosType, 36> kTypes = {{
+    {"builtin_interfaces/msg/Duration", "builtin_interfaces::msg::dds_::Duration_",
+     "RIHS01_e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b",
+     "int32 sec\n"
+     "uint32 nanosec\n"},
+    {"builtin_interfaces/msg/Time", "builtin_interfaces::msg::dds_::Time_",
+     "RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197",
+     "int32 sec\n"
+     "uint32 nanosec\n"},
+    {"diagnostic_msgs/msg/DiagnosticArray", "diagnostic_msgs::msg::dds_::DiagnosticArray_",
+     "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
+     "std_msgs/Header header\n"
+     "DiagnosticStatus[] status\n"},
+    {"diagnostic_msgs/msg/DiagnosticStatus", "diagnostic_msgs::msg::dds_::DiagnosticStatus_",
+     "RIHS01_b0e3e692ea2d54a8af2f4ef1930e81556a2db55216b771f8a7d2724ed47bf0e4",
+     "byte level\n"
+     "string name\n"
+     "string message\n"
+     "string hardware_id\n"
+     "KeyValue[] values\n"},
+    {"diagnostic_msgs/msg/KeyValue", "diagnostic_msgs::msg::dds_::KeyValue_",
+     "RIHS01_d68081eaa540288c5440753baecef0c4e16e81a5f78ad68902ded5100413bb42",
+     "string key\n"
+     "string value\n"},
+    {"geometry_msgs/msg/Point", "geometry_msgs::msg::dds_::Point_",
+     "RIHS01_6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881",
+     "float64 x\n"
+     "float64 y\n"
+     "float64 z\n"},
+    {"geometry_msgs/msg/Pose", "geometry_msgs::msg::dds_::Pose_",
+     "RIHS01_d501954e9476cea2996984e812054b68026ae0bfae789d9a10b23daf35cc90fa",
+     "Point position\n"
+     "Quaternion orientation\n"},
+    {"geometry_msgs/msg/PoseArray", "geometry_msgs::msg::dds_::PoseArray_",
+     "RIHS01_af0cc36d190e104d546d168d6b39df04fa4b4ccecf59cb4c9ed328d3d5004aa0",
+     "std_msgs/Header header\n"
+     "Pose[] poses\n"},
+    {"geometry_msgs/msg/PoseStamped", "geometry_msgs::msg::dds_::PoseStamped_",
+     "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
+     "std_msgs/Header header\n"
+     "Pose pose\n"},
+    {"geometry_msgs/msg/PoseWithCovariance", "geometry_msgs::msg::dds_::PoseWithCovariance_",
+     "RIHS01_9a7c0fd234b7f45c6098745ecccd773ca1085670e64107135397aee31c02e1bb",
+     "Pose pose\n"
+     "float64[36] covariance\n"},
+    {"geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_",
+     "RIHS01_26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e",
+     "std_msgs/Header header\n"
+     "PoseWithCovariance pose\n"},
+    {"geometry_msgs/msg/Quaternion", "geometry_msgs::msg::dds_::Quaternion_",
+     "RIHS01_8a765f66778c8ff7c8ab94afcc590a2ed5325a1d9a076ffff38fbce36f458684",
+     "float64 x 0\n"
+     "float64 y 0\n"
+     "float64 z 0\n"
+     "float64 w 1\n"},
+    {"geometry_msgs/msg/Transform", "geometry_msgs::msg::dds_::Transform_",
+     "RIHS01_beb83fbe698636351461f6f35d1abb20010c43d55374d81bd041f1ba2581fddc",
+     "Vector3 translation\n"
+     "Quaternion rotation\n"},
+    {"geometry_msgs/msg/TransformStamped", "geometry_msgs::msg::dds_::TransformStamped_",
+     "RIHS01_0a241f87d04668d94099cbb5ba11691d5ad32c2f29682e4eb5653424bd275206",
+     "std_msgs/Header header\n"
+     "string child_frame_id\n"
+     "Transform transform\n"},
+    {"geometry_msgs/msg/Twist", "geometry_msgs::msg::dds_::Twist_",
+     "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+     "Vector3 linear\n"
+     "Vector3 angular\n"},
+    {"geometry_msgs/msg/TwistStamped", "geometry_msgs::msg::dds_::TwistStamped_",
+     "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
+     "std_msgs/Header header\n"
+     "Twist twist\n"},
+    {"geometry_msgs/msg/Vector3", "geometry_msgs::msg::dds_::Vector3_",
+     "RIHS01_cc12fe83e4c02719f1ce8070bfd14aecd40f75a96696a67a2a1f37f7dbb0765d",
+     "float64 x\n"
+     "float64 y\n"
+     "float64 z\n"},
+    {"rosgraph_msgs/msg/Clock", "rosgraph_msgs::msg::dds_::Clock_",
+     "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564", "builtin_interfaces/Time clock\n"},
+    {"sensor_msgs/msg/CameraInfo", "sensor_msgs::msg::dds_::CameraInfo_",
+     "RIHS01_b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275",
+     "std_msgs/Header header\n"
+     "uint32 height\n"
+     "uint32 width\n"
+     "string distortion_model\n"
+     "float64[] d\n"
+     "float64[9] k\n"
+     "float64[9] r\n"
+     "float64[12] p\n"
+     "uint32 binning_x\n"
+     "uint32 binning_y\n"
+     "RegionOfInterest roi\n"},
+    {"sensor_msgs/msg/CompressedImage", "sensor_msgs::msg::dds_::CompressedImage_",
+     "RIHS01_15640771531571185e2efc8a100baf923961a4d15d5569652e6cb6691e8e371a",
+     "std_msgs/Header header\n"
+     "string format\n"
+     "uint8[] data\n"},
+    {"sensor_msgs/msg/Image", "sensor_msgs::msg::dds_::Image_",
+     "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
+     "std_msgs/Header header\n"
+     "uint32 height\n"
+     "uint32 width\n"
+     "string encoding\n"
+     "uint8 is_bigendian\n"
+     "uint32 step\n"
+     "uint8[] data\n"},
+    {"sensor_msgs/msg/JointState", "sensor_msgs::msg::dds_::JointState_",
+     "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
+     "std_msgs/Header header\n"
+     "string[] name\n"
+     "float64[] position\n"
+     "float64[] velocity\n"
+     "float64[] effort\n"},
+    {"sensor_msgs/msg/RegionOfInterest", "sensor_msgs::msg::dds_::RegionOfInterest_",
+     "RIHS01_ad16bcba5f9131dcdba6fbded19f726f5440e3c513b4fb586dd3027eeed8abb1",
+     "uint32 x_offset\n"
+     "uint32 y_offset\n"
+     "uint32 height\n"
+     "uint32 width\n"
+     "bool do_rectify\n"},
+    {"std_msgs/msg/ColorRGBA", "std_msgs::msg::dds_::ColorRGBA_",
+     "RIHS01_77a7a5b9ae477306097665106e0413ba74440245b1f3d0c6d6405fe5c7813fe8",
+     "float32 r\n"
+     "float32 g\n"
+     "float32 b\n"
+     "float32 a\n"},
+    {"std_msgs/msg/Header", "std_msgs::msg::dds_::Header_",
+     "RIHS01_f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01",
+     "builtin_interfaces/Time stamp\n"
+     "string frame_id\n"},
+    {"std_msgs/msg/String", "std_msgs::msg::dds_::String_",
+     "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18", "string data\n"},
+    {"tf2_msgs/msg/TFMessage", "tf2_msgs::msg::dds_::TFMessage_",
+     "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
+     "geometry_msgs/TransformStamped[] transforms\n"},
+    {"vision_msgs/msg/BoundingBox3D", "vision_msgs::msg::dds_::BoundingBox3D_",
+     "RIHS01_bbb73a65c163d7f9bb29009c7bde9f7faa576bd2d23299c4511d19230dab4698",
+     "geometry_msgs/Pose center\n"
+     "geometry_msgs/Vector3 size\n"},
+    {"vision_msgs/msg/Detection3D", "vision_msgs::msg::dds_::Detection3D_",
+     "RIHS01_ddd703be132ab0b69d33121f1bb034132bfbb3b0ac5f9fb1516005ba1c8a265b",
+     "std_msgs/Header header\n"
+     "ObjectHypothesisWithPose[] results\n"
+     "BoundingBox3D bbox\n"
+     "string id\n"},
+    {"vision_msgs/msg/Detection3DArray", "vision_msgs::msg::dds_::Detection3DArray_",
+     "RIHS01_793f5eab9595ac1c0da07873cc859db42eae51f0ee76056db8562515d830e018",
+     "std_msgs/Header header\n"
+     "Detection3D[] detections\n"},
+    {"vision_msgs/msg/ObjectHypothesis", "vision_msgs::msg::dds_::ObjectHypothesis_",
+     "RIHS01_51da43cec11c01957a64d1e05a24acd18aae7745ec30b74348ad5f6d634f7f90",
+     "string class_id\n"
+     "float64 score\n"},
+    {"vision_msgs/msg/ObjectHypothesisWithPose", "vision_msgs::msg::dds_::ObjectHypothesisWithPose_",
+     "RIHS01_41c12344c0396c48b81df12467c192d99b2a0eb1463c5c37194e4223251c80bc",
+     "ObjectHypothesis hypothesis\n"
+     "geometry_msgs/PoseWithCovariance pose\n"},
+    {"visualization_msgs/msg/Marker", "visualization_msgs::msg::dds_::Marker_",
+     "RIHS01_45b13ccf791f225962bf74e746f9644518855d783a6f42ba0cc14fde2b4f3ce0",
+     "std_msgs/Header header\n"
+     "string ns\n"
+     "int32 id\n"
+     "int32 type\n"
+     "int32 action\n"
+     "geometry_msgs/Pose pose\n"
+     "geometry_msgs/Vector3 scale\n"
+     "std_msgs/ColorRGBA color\n"
+     "builtin_interfaces/Duration lifetime\n"
+     "bool frame_locked\n"
+     "geometry_msgs/Point[] points\n"
+     "std_msgs/ColorRGBA[] colors\n"
+     "string texture_resource\n"
+     "sensor_msgs/CompressedImage texture\n"
+     "UVCoordinate[] uv_coordinates\n"
+     "string text\n"
+     "string mesh_resource\n"
+     "MeshFile mesh_file\n"
+     "bool mesh_use_embedded_materials\n"},
+    {"visualization_msgs/msg/MarkerArray", "visualization_msgs::msg::dds_::MarkerArray_",
+     "RIHS01_86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf", "Marker[] markers\n"},
+    {"visualization_msgs/msg/MeshFile", "visualization_msgs::msg::dds_::MeshFile_",
+     "RIHS01_7710ece15a148fb7c9b546364cfb215bb06098087bd6394fe5b73a493508f8c4",
+     "string filename\n"
+     "uint8[] data\n"},
+    {"visualization_msgs/msg/UVCoordinate", "visualization_msgs::msg::dds_::UVCoordinate_",
+     "RIHS01_f27f7ed21fe360c6066944f856b801a0c0d1e94e815b6886444b42d90b196a26",
+     "float32 u\n"
+     "float32 v\n"},
+}};
+
+constexpr std::array<std::string_view, 15> kPrimitives = {"bool",   "byte",  "char",   "float32", "float64",
+                                                          "int8",   "uint8", "int16",  "uint16",  "int32",
+                                                          "uint32", "int64", "uint64", "string",  "wstring"};
+
+const RosType& named(std::string_view name);
+
+std::string_view package_of(std::string_view name) { return name.substr(0, name.find('/')); }
+std::string_view last_part(std::string_view name) { return name.substr(name.rfind('/') + 1); }
+
+/// "Pose[]" in geometry_msgs is geometry_msgs/msg/Pose; nullptr for a primitive.
+const RosType* nested_type(std::string_view field_type, std::string_view package) {
+  const std::string_view element = field_type.substr(0, field_type.find('['));
+  if (std::find(kPrimitives.begin(), kPrimitives.end(), element) != kPrimitives.end()) return nullptr;
+  const bool has_package = element.find('/') != std::string_view::npos;
+  const std::string name = has_package ? std::string(element) : std::string(package) + "/" + std::string(element);
+  return &named(name);
+}
+
+void append_nested(const RosType& type, std::set<const RosType*>* done, std::string* out) {
+  std::string_view rest = type.text;
+  while (!rest.empty()) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(line.size() + 1);
+    const RosType* nested = nested_type(line.substr(0, line.find(' ')), package_of(type.name));
+    if (nested == nullptr || !done->insert(nested).second) continue;
+    *out += std::string(80, '=') + "\nMSG: " + std::string(package_of(nested->name)) + "/" +
+            std::string(last_part(nested->name)) + "\n" + std::string(nested->text);
+    append_nested(*nested, done, out);
+  }
+}
+
+const RosType& named(std::string_view name) {
+  const RosType* type = find_ros_type(name);
+  PRESCENE_CHECK_MSG(type != nullptr, name);
+  return *type;
+}
+
+}  // namespace
+
+std::span<const RosType> ros_types() { return kTypes; }
+
+const RosType* find_ros_type(std::string_view name) {
+  for (const RosType& type : kTypes) {
+    if (type.name == name) return &type;
+    if (package_of(type.name) == package_of(name) && last_part(type.name) == last_part(name) &&
+        std::count(name.begin(), name.end(), '/') == 1) {
+      return &type;
+    }
+  }
+  return nullptr;
+}
+
+std::string ros2msg_schema(const RosType& type) {
+  std::string out(type.text);
+  std::set<const RosType*> done = {&type};
+  append_nested(type, &done, &out);
+  return out;
+}
+
+#define PRESCENE_NAME(Message, name)          \
+  template <>                                 \
+  const RosType& ros_type<Message>() {        \
+    static const RosType& type = named(name); \
+    return type;                              \
+  }
+PRESCENE_NAME(RosDuration, "builtin_interfaces/msg/Duration")
+PRESCENE_NAME(RosTime, "builtin_interfaces/msg/Time")
+PRESCENE_NAME(RosDiagnosticArray, "diagnostic_msgs/msg/DiagnosticArray")
+PRESCENE_NAME(RosDiagnosticStatus, "diagnostic_msgs/msg/DiagnosticStatus")
+PRESCENE_NAME(RosKeyValue, "diagnostic_msgs/msg/KeyValue")
+PRESCENE_NAME(RosPoint, "geometry_msgs/msg/Point")
+PRESCENE_NAME(RosPose, "geometry_msgs/msg/Pose")
+PRESCENE_NAME(RosPoseArray, "geometry_msgs/msg/PoseArray")
+PRESCENE_NAME(RosPoseStamped, "geometry_msgs/msg/PoseStamped")
+PRESCENE_NAME(RosPoseWithCovariance, "geometry_msgs/msg/PoseWithCovariance")
+PRESCENE_NAME(RosPoseWithCovarianceStamped, "geometry_msgs/msg/PoseWithCovarianceStamped")
+PRESCENE_NAME(RosQuaternion, "geometry_msgs/msg/Quaternion")
+PRESCENE_NAME(RosTransform, "geometry_msgs/msg/Transform")
+PRESCENE_NAME(RosTransformStamped, "geometry_msgs/msg/TransformStamped")
+PRESCENE_NAME(RosTwist, "geometry_msgs/msg/Twist")
+PRESCENE_NAME(RosTwistStamped, "geometry_msgs/msg/TwistStamped")
+PRESCENE_NAME(RosVector3, "geometry_msgs/msg/Vector3")
+PRESCENE_NAME(RosClock, "rosgraph_msgs/msg/Clock")
+PRESCENE_NAME(RosCameraInfo, "sensor_msgs/msg/CameraInfo")
+PRESCENE_NAME(RosCompressedImage, "sensor_msgs/msg/CompressedImage")
+PRESCENE_NAME(RosImage, "sensor_msgs/msg/Image")
+PRESCENE_NAME(RosJointState, "sensor_msgs/msg/JointState")
+PRESCENE_NAME(RosRegionOfInterest, "sensor_msgs/msg/RegionOfInterest")
+PRESCENE_NAME(RosColorRgba, "std_msgs/msg/ColorRGBA")
+PRESCENE_NAME(RosHeader, "std_msgs/msg/Header")
+PRESCENE_NAME(RosString, "std_msgs/msg/String")
+PRESCENE_NAME(RosTfMessage, "tf2_msgs/msg/TFMessage")
+PRESCENE_NAME(RosBoundingBox3d, "vision_msgs/msg/BoundingBox3D")
+PRESCENE_NAME(RosDetection3d, "vision_msgs/msg/Detection3D")
+PRESCENE_NAME(RosDetection3dArray, "vision_msgs/msg/Detection3DArray")
+PRESCENE_NAME(RosObjectHypothesis, "vision_msgs/msg/ObjectHypothesis")
+PRESCENE_NAME(RosObjectHypothesisWithPose, "vision_msgs/msg/ObjectHypothesisWithPose")
+PRESCENE_NAME(RosMarker, "visualization_msgs/msg/Marker")
+PRESCENE_NAME(RosMarkerArray, "visualization_msgs/msg/MarkerArray")
+PRESCENE_NAME(RosMeshFile, "visualization_msgs/msg/MeshFile")
+PRESCENE_NAME(RosUvCoordinate, "visualization_msgs/msg/UVCoordinate")
+#undef PRESCENE_NAME
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/bytes/file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <utility>
+
+#include "prescene/tests/support/paths.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::StatusCode;
+
+std::vector<std::uint8_t> bytes_of(std::string_view text) { return {text.begin(), text.end()}; }
+
+TEST(ReadFile, ReturnsWhatWriteFileWrote) {
+  const tests::ScratchDir dir;
+  const auto path = dir.path() / "a.bin";
+  ASSERT_TRUE(write_file(path, "one").ok());
+  ASSERT_TRUE(write_file(path, "two!").ok()) << "an existing file is replaced";
+  EXPECT_EQ(*read_file(path, 4), bytes_of("two!"));
+  EXPECT_FALSE(std::filesystem::exists(dir.path() / "a.bin.partial"));
+}
+
+TEST(ReadFile, NamesThePathAndTheRemedy) {
+  const tests::ScratchDir dir;
+  const auto missing = read_file(dir.path() / "none.ply", 100).status();
+  EXPECT_EQ(missing.code(), StatusCode::kNotFound);
+  EXPECT_NE(missing.message().find("none.ply: no such file; check the path"), std::string::npos) << missing.message();
+
+  EXPECT_EQ(read_file(dir.path(), 100).status().code(), StatusCode::kInvalidInput) << "a folder";
+
+  const auto pipe = dir.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(read_file(pipe, 100).status().code(), StatusCode::kInvalidInput) << "a named pipe must not block";
+
+  ASSERT_TRUE(write_file(dir.path() / "big", "12345").ok());
+  const auto capped = read_file(dir.path() / "big", 4).status();
+  EXPECT_EQ(capped.code(), StatusCode::kResourceExhausted);
+  EXPECT_NE(capped.message().find("5 bytes are more than the limit of 4 bytes"), std::string::npos) << capped.message();
+}
+
+TEST(WriteFile, SaysThatTheFolderIsMissing) {
+  const tests::ScratchDir dir;
+  const auto status = write_file(dir.path() / "no" / "a", "x");
+  EXPECT_EQ(status.code(), StatusCode::kNotFound);
+  EXPECT_NE(status.message().find("folder does not exist"), std::string::npos) << status.message();
+}
+
+TEST(OutputFile, ReportsAFullDisk) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  auto file = OutputFile::create("/dev/full");
+  ASSERT_TRUE(file.ok()) << file.status().message();
+  const auto status = file->write(bytes_of("x"));
+  EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
+  EXPECT_NE(status.message().find("/dev/full: cannot be written"), std::string::npos) << status.message();
+}
+
+TEST(InputFile, ReadsAnywhereAndSaysWhereTheFileEnds) {
+  const tests::ScratchDir dir;
+  ASSERT_TRUE(write_file(dir.path() / "a", "0123456789").ok());
+  auto opened = InputFile::open(dir.path() / "a");
+  ASSERT_TRUE(opened.ok());
+  const InputFile file = std::move(*opened);
+  EXPECT_EQ(file.size(), 10U);
+  std::vector<std::uint8_t> out(3);
+  ASSERT_TRUE(file.read(7, out).ok());
+  EXPECT_EQ(out, bytes_of("789"));
+  EXPECT_EQ(file.read(8, out).code(), StatusCode::kDataLoss);
+}
+
+}  // namespace
+}  // namespace prescene::interfaces

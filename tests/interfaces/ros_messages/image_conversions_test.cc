@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <cstring>
+#include <limits>
+
+#include "prescene/core/random.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::StatusCode;
+using geometry::ColorImage;
+using geometry::DepthImage;
+using testing::HasSubstr;
+
+RosImage image_of(int width, int height, const char* encoding, std::vector<std::uint8_t> data, std::uint32_t step) {
+  RosImage image;
+  image.width = static_cast<std::uint32_t>(width);
+  image.height = static_cast<std::uint32_t>(height);
+  image.encoding = encoding;
+  image.step = step;
+  image.data = std::move(data);
+  return image;
+}
+
+TEST(DepthImages, ReadMillimetresOfEitherByteOrderWithPaddedRows) {
+  // 1000, 0 | 65535, 258; two bytes of padding after the first row, none after the last.
+  const auto little = image_of(2, 2, "16UC1", {0xe8, 0x03, 0, 0, 9, 9, 0xff, 0xff, 0x02, 0x01}, 6);
+  auto big = image_of(2, 2, "16UC1", {0x03, 0xe8, 0, 0, 9, 9, 0xff, 0xff, 0x01, 0x02}, 6);
+  big.is_bigendian = 1;
+  DepthImageReport report;
+  const auto depth = to_depth_image(little, {}, &report);
+  ASSERT_TRUE(depth.ok()) << depth.status().message();
+  EXPECT_FLOAT_EQ((*depth)(0, 0), 1.0F);
+  EXPECT_EQ((*depth)(1, 0), 0.0F);
+  EXPECT_EQ((*depth)(0, 1), 0.0F) << "full scale means no measurement";
+  EXPECT_FLOAT_EQ((*depth)(1, 1), 0.258F);
+  EXPECT_EQ(report.measured, 2);
+  EXPECT_EQ(report.missing, 2);
+  EXPECT_EQ(*to_depth_image(big), *depth);
+}
+
+TEST(DepthImages, TakeNanInfinityZeroAndNegativeAsMissing) {
+  const float values[6] = {std::numeric_limits<float>::quiet_NaN(),
+                           std::numeric_limits<float>::infinity(),
+                           -std::numeric_limits<float>::infinity(),
+                           -1.0F,
+                           0.0F,
+                           0.5F};
+  std::vector<std::uint8_t> data(sizeof values);
+  std::memcpy(data.data(), values, sizeof values);
+  const auto depth = to_depth_image(image_of(6, 1, "32FC1", data, 24));
+  ASSERT_TRUE(depth.ok());
+  for (int x = 0; x < 5; ++x) EXPECT_EQ((*depth)(x, 0), 0.0F) << x;
+  EXPECT_EQ((*depth)(5, 0), 0.5F);
+}
+
+TEST(DepthImages, NameTheFieldAndTheRemedy) {
+  const std::vector<std::uint8_t> four(4);
+  const auto message = [](const RosImage& image) { return to_depth_image(image).status().message(); };
+  EXPECT_THAT(message(image_of(0, 2, "16UC1", four, 2)), HasSubstr("width x height: is 0 x 2"));
+  EXPECT_THAT(message(image_of(2, 1, "16UC1", four, 3)), HasSubstr("step: 3 is less than a row of 2 pixels"));
+  EXPECT_THAT(message(image_of(1, 2, "16UC1", four, 4)), HasSubstr("data: has 4 bytes, but step 4 x height 2"));
+  EXPECT_THAT(message(image_of(2, 1, "rgb8", four, 6)), HasSubstr("encoding: 'rgb8' is no depth image; send 16UC1"));
+  EXPECT_THAT(message(image_of(2, 1, "mono16", four, 4)), HasSubstr("mono16_is_depth"));
+  EXPECT_TRUE(to_depth_image(image_of(2, 1, "mono16", four, 4), {.mono16_is_depth = true}).ok());
+  auto odd = image_of(2, 1, "16UC1", four, 4);
+  odd.is_bigendian = 7;
+  EXPECT_THAT(message(odd), HasSubstr("is_bigendian: is 7"));
+  const auto huge = image_of(16385, 1, "16UC1", four, 0xffffffff);
+  EXPECT_EQ(to_depth_image(huge).status().code(), StatusCode::kResourceExhausted);
+  auto product = image_of(16384, 16384, "16UC1", four, 0xffffffff);  // step * height does not fit in 32 bits.
+  EXPECT_THAT(message(product), HasSubstr("data: has 4 bytes"));
+}
+
+DepthImage ramp(float first, float slope) {
+  DepthImage depth(64, 48);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) depth(x, y) = first + slope * static_cast<float>(x + y);
+  }
+  return depth;
+}
+
+TEST(DepthImages, DoubtTheUnit) {
+  const auto millimetres = to_depth_image(to_ros_image_32fc1(ramp(800.0F, 1.0F), {})).status();
+  EXPECT_EQ(millimetres.code(), StatusCode::kInvalidInput);
+  EXPECT_THAT(millimetres.message(), HasSubstr("does the sender put millimetres into 32FC1?"));
+  EXPECT_TRUE(to_depth_image(to_ros_image_32fc1(ramp(800.0F, 1.0F), {}), {.metres_per_unit_32fc1 = 0.001}).ok());
+
+  DepthImageReport report;
+  ASSERT_TRUE(to_depth_image(to_ros_image_16uc1(ramp(0.002F, 0.0F), {}), {}, &report).ok());
+  ASSERT_EQ(report.warnings.size(), 1U);
+  EXPECT_THAT(report.warnings[0], HasSubstr("is a unit of 0.001 m right"));
+}
+
+TEST(DepthImages, DoubtTheByteOrder) {
+  for (auto image : {to_ros_image_16uc1(ramp(0.8F, 0.003F), {}), to_ros_image_32fc1(ramp(0.8F, 0.003F), {})}) {
+    DepthImageReport report;
+    ASSERT_TRUE(to_depth_image(image, {}, &report).ok());
+    EXPECT_TRUE(report.warnings.empty()) << report.warnings[0];
+    image.is_bigendian = 1 - image.is_bigendian;
+    const auto depth = to_depth_image(image, {}, &report);
+    ASSERT_EQ(report.warnings.size(), 1U) << image.encoding;
+    EXPECT_THAT(report.warnings[0], HasSubstr("looks byte-swapped"));
+  }
+}
+
+TEST(ColorImages, PutTheChannelsInOrder) {
+  const geometry::Rgb red_green_blue = {1, 2, 3};
+  const auto pixel = [](const char* encoding, std::vector<std::uint8_t> data, std::uint8_t is_bigendian = 0) {
+    const auto step = static_cast<std::uint32_t>(data.size());
+    auto image = image_of(1, 1, encoding, std::move(data), step);
+    image.is_bigendian = is_bigendian;
+    return (*to_color_image(image))(0, 0);
+  };
+  EXPECT_EQ(pixel("rgb8", {1, 2, 3}), red_green_blue);
+  EXPECT_EQ(pixel("bgr8", {3, 2, 1}), red_green_blue);
+  EXPECT_EQ(pixel("8UC3", {3, 2, 1}), red_green_blue);
+  EXPECT_EQ(pixel("rgba8", {1, 2, 3, 9}), red_green_blue);
+  EXPECT_EQ(pixel("bgra8", {3, 2, 1, 9}), red_green_blue);
+  EXPECT_EQ(pixel("mono8", {7}), (geometry::Rgb{7, 7, 7}));
+  EXPECT_EQ(pixel("mono16", {5, 7}), (geometry::Rgb{7, 7, 7}));
+  EXPECT_EQ(pixel("mono16", {7, 5}, 1), (geometry::Rgb{7, 7, 7}));
+}
+
+TEST(ColorImages, RefuseOthersByName) {
+  const auto bayer = to_color_image(image_of(2, 1, "bayer_rggb8\n", {1, 2}, 2)).status();
+  EXPECT_EQ(bayer.code(), StatusCode::kUnsupported);
+  EXPECT_THAT(bayer.message(),
+              HasSubstr("encoding: 'bayer_rggb8\\x0a' is no colour image that can be read; send one of rgb8"));
+  EXPECT_EQ(to_color_image(image_of(1, 1, "RGB8", {1, 2, 3}, 3)).status().code(), StatusCode::kUnsupported);
+  EXPECT_EQ(to_color_image(image_of(2, 2, "rgb8", std::vector<std::uint8_t>(11), 6)).status().code(),
+            StatusCode::kInvalidInput);
+}
+
+TEST(ImageLaws, GoThereAndBack) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    core::RandomStream stream(seed, core::Purpose::kTest);
+    const auto width = static_cast<int>(1 + stream.uniform_below(20));
+    const auto height = static_cast<int>(1 + stream.uniform_below(20));
+    ColorImage color(width, height);
+    DepthImage depth(width, height);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        for (auto& channel : color(x, y)) channel = static_cast<std::uint8_t>(stream.uniform_below(256));
+        depth(x, y) = stream.uniform() < 0.2 ? 0.0F : static_cast<float>(stream.uniform(0.1, 60.0));
+      }
+    }
+    RC_ASSERT(*to_color_image(to_ros_image(color, {})) == color);
+    RC_ASSERT(*to_depth_image(to_ros_image_32fc1(depth, {})) == depth);
+    const DepthImage rounded = *to_depth_image(to_ros_image_16uc1(depth, {}));
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+      RC_ASSERT(std::abs(rounded.data()[i] - depth.data()[i]) <= 0.000501F);
+      RC_ASSERT((rounded.data()[i] == 0.0F) == (depth.data()[i] == 0.0F));
+    }
+  }));
+}
+
+}  // namespace
+}  // namespace prescene::interfaces
