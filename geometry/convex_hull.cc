@@ -21,6 +21,11 @@ __extension__ using Wide = __int128;
 using GridPoint = std::array<std::int64_t, 3>;
 using WideVector = std::array<Wide, 3>;
 
+// What is left out, and four times as much: what has to be above a plane for points not to count as flat, in grid
+// steps.
+constexpr double kTolerance = 0x1p-30 * (std::int64_t{1} << kGridBits);
+constexpr double kThin = 4.0 * kTolerance;
+
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 GridPoint difference(const GridPoint& a, const GridPoint& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -32,6 +37,10 @@ WideVector cross(const GridPoint& a, const GridPoint& b) {
   return {term(1, 2), term(2, 0), term(0, 1)};
 }
 
+Wide squared_length(const GridPoint& d) {
+  return static_cast<Wide>(d[0]) * d[0] + static_cast<Wide>(d[1]) * d[1] + static_cast<Wide>(d[2]) * d[2];
+}
+
 double norm(const WideVector& v) {
   return std::hypot(static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]));
 }
@@ -41,6 +50,7 @@ struct Face {
   std::array<std::uint32_t, 3> corners;
   std::array<std::uint32_t, 3> neighbours{kNone, kNone, kNone};
   WideVector normal{};
+  Wide tolerance = 0;                  // Height of a point that is just worth adding.
   std::vector<std::uint32_t> outside;  // Points above it that no earlier face took.
   bool alive = true;
   bool visible = false;
@@ -51,11 +61,15 @@ class Quickhull {
  public:
   explicit Quickhull(const std::vector<GridPoint>& points) : points_(points), face_from_(points.size(), kNone) {}
 
-  // False when all points lie in (almost) one plane: thinner than 2^-30 of their extent.
+  // False when all points lie in (almost) one plane.
   bool build() {
     if (!make_simplex()) return false;
-    for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-      while (faces_[f].alive && !faces_[f].outside.empty()) add_point(f, farthest(f));
+    for (std::uint32_t f = 0; f < faces_.size();) {
+      for (; f < faces_.size(); ++f) {
+        while (faces_[f].alive && !faces_[f].outside.empty()) add_point(f, farthest(f));
+      }
+      // A point may be just above a face that is gone but clearly above one of those that stayed.
+      f = reconsider_skipped();
     }
     return true;
   }
@@ -100,89 +114,103 @@ class Quickhull {
     core::check_failed(__FILE__, __LINE__, "two faces of a hull share all corners", {});
   }
 
-  // The farthest point above a face; of several the last, which is a corner of what they span.
-  std::uint32_t farthest(std::uint32_t f) const {
-    const Face& face = faces_[f];
-    std::uint32_t best = face.outside.front();
-    Wide best_height = height(face, best);
-    for (const std::uint32_t point : face.outside) {
-      const Wide h = height(face, point);
-      if (h > best_height || (h == best_height && point > best)) {
-        best = point;
-        best_height = h;
+  // Of some points one with (almost) the largest value, the one most distant from `reference`. The value alone is the
+  // same along sides and edges but for rounding, so it could pick a point inside of one; distance is largest at their
+  // corners.
+  template <class Value>
+  std::uint32_t pick(const std::vector<std::uint32_t>& candidates, std::uint32_t reference, double tolerance,
+                     const Value& value) const {
+    double largest = 0.0;
+    for (const std::uint32_t i : candidates) largest = std::max(largest, value(i));
+    std::uint32_t best = candidates.front();
+    Wide best_distance = -1;
+    for (const std::uint32_t i : candidates) {
+      if (value(i) < largest - tolerance) continue;
+      const Wide distance = squared_length(difference(points_[i], points_[reference]));
+      if (distance > best_distance) {
+        best = i;
+        best_distance = distance;
       }
     }
     return best;
+  }
+
+  std::uint32_t farthest(std::uint32_t f) const {
+    const Face& face = faces_[f];
+    return pick(face.outside, face.corners[0], static_cast<double>(face.tolerance),
+                [&](std::uint32_t i) { return static_cast<double>(height(face, i)); });
   }
 
   std::uint32_t add_face(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     Face face;
     face.corners = {a, b, c};
     face.normal = cross(difference(points_[b], points_[a]), difference(points_[c], points_[a]));
+    face.tolerance = static_cast<Wide>(kTolerance * norm(face.normal));
     faces_.push_back(std::move(face));
     return static_cast<std::uint32_t>(faces_.size() - 1);
   }
 
-  // Gives each point to the first of the faces from `begin` that it lies above; the others are inside.
-  template <class Points>
-  void assign(const Points& candidates, std::uint32_t begin) {
+  // Gives each point to the first of the faces from `begin` that it lies clearly above; the others are inside, or
+  // skipped.
+  void assign(const std::vector<std::uint32_t>& candidates, std::uint32_t begin) {
     for (const std::uint32_t point : candidates) {
-      for (std::uint32_t f = begin; f < faces_.size(); ++f) {
-        if (height(faces_[f], point) > 0) {
-          faces_[f].outside.push_back(point);
-          break;
-        }
+      bool above = false;
+      bool taken = false;
+      for (std::uint32_t f = begin; f < faces_.size() && !taken; ++f) {
+        const Wide h = height(faces_[f], point);
+        above = above || h > 0;
+        taken = h > faces_[f].tolerance;
+        if (taken) faces_[f].outside.push_back(point);
       }
+      if (above && !taken) skipped_.push_back(point);
     }
+  }
+
+  // Gives skipped points to faces that they are more than twice the tolerance above; returns the first such face, or
+  // the number of faces when there is none.
+  std::uint32_t reconsider_skipped() {
+    auto first = static_cast<std::uint32_t>(faces_.size());
+    std::erase_if(skipped_, [&](std::uint32_t point) {
+      for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+        if (!faces_[f].alive || height(faces_[f], point) <= 2 * faces_[f].tolerance) continue;
+        faces_[f].outside.push_back(point);
+        first = std::min(first, f);
+        return true;
+      }
+      return false;
+    });
+    return first;
   }
 
   bool make_simplex() {
     if (points_.size() < 4) return false;
-    constexpr double kThin = 0x1p-30 * (std::int64_t{1} << kGridBits);
-    const auto last = static_cast<std::uint32_t>(points_.size() - 1);
-    const GridPoint base = difference(points_[last], points_[0]);
+    std::vector<std::uint32_t> all(points_.size());
+    for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+    const auto anywhere = [](std::uint32_t) { return 0.0; };
+    const std::uint32_t first = pick(all, 0, 0.0, anywhere);
+    const std::uint32_t second = pick(all, first, 0.0, anywhere);
+    const GridPoint base = difference(points_[second], points_[first]);
+    const double base_length = std::sqrt(static_cast<double>(squared_length(base)));
+    const auto from_base = [&](std::uint32_t i) {
+      return norm(cross(base, difference(points_[i], points_[first]))) / base_length;
+    };
+    const std::uint32_t third = pick(all, first, kTolerance, from_base);
+    if (from_base(third) < kThin) return false;
 
-    std::array<std::uint32_t, 3> far_point{};
-    WideVector far_value{};
-    for (std::uint32_t i = 0; i <= last; ++i) {
-      const WideVector c = cross(base, difference(points_[i], points_[0]));
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Wide value = c[k] < 0 ? -c[k] : c[k];
-        if (value >= far_value[k]) {
-          far_value[k] = value;
-          far_point[k] = i;
-        }
-      }
-    }
-    const auto k = static_cast<std::size_t>(std::max_element(far_value.begin(), far_value.end()) - far_value.begin());
-    const std::uint32_t third = far_point[k];
-    const double base_length =
-        std::hypot(static_cast<double>(base[0]), static_cast<double>(base[1]), static_cast<double>(base[2]));
-    if (norm(cross(base, difference(points_[third], points_[0]))) < kThin * base_length) return false;
-
-    const std::uint32_t first_face = add_face(0, last, third);
-    std::uint32_t fourth = 0;
-    Wide fourth_height = 0;
-    for (std::uint32_t i = 0; i <= last; ++i) {
-      const Wide h = height(faces_[first_face], i);
-      if ((h < 0 ? -h : h) >= (fourth_height < 0 ? -fourth_height : fourth_height)) {
-        fourth = i;
-        fourth_height = h;
-      }
-    }
-    if (std::abs(static_cast<double>(fourth_height)) < kThin * norm(faces_[first_face].normal)) return false;
+    const Face base_face = faces_[add_face(first, second, third)];
+    const auto from_base_face = [&](std::uint32_t i) { return std::abs(static_cast<double>(height(base_face, i))); };
+    const std::uint32_t fourth = pick(all, first, static_cast<double>(base_face.tolerance), from_base_face);
+    if (from_base_face(fourth) < kThin * norm(base_face.normal)) return false;
 
     faces_.clear();
-    std::array<std::uint32_t, 3> floor = {0, last, third};
-    if (fourth_height > 0) std::swap(floor[1], floor[2]);  // The floor faces away from the fourth point.
+    std::array<std::uint32_t, 3> floor = {first, second, third};
+    if (height(base_face, fourth) > 0) std::swap(floor[1], floor[2]);  // The floor faces away from the fourth point.
     add_face(floor[0], floor[1], floor[2]);
     for (std::size_t e = 0; e < 3; ++e) add_face(floor[(e + 1) % 3], floor[e], fourth);
     for (std::uint32_t e = 0; e < 3; ++e) {
       faces_[0].neighbours[e] = 1 + e;
       faces_[1 + e].neighbours = {0, 1 + (e + 2) % 3, 1 + (e + 1) % 3};
     }
-    std::vector<std::uint32_t> all(points_.size());
-    for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
     assign(all, 0);
     return true;
   }
@@ -232,6 +260,7 @@ class Quickhull {
 
   const std::vector<GridPoint>& points_;
   std::vector<Face> faces_;
+  std::vector<std::uint32_t> skipped_;    // Points above a face by less than the tolerance.
   std::vector<std::uint32_t> face_from_;  // While a cone is made: its face whose outline edge starts at the vertex.
 };
 
@@ -278,26 +307,26 @@ core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) {
     if (!p.allFinite()) return core::invalid_input("a point for a convex hull is not finite: repair the mesh first");
   }
   std::vector<GridEntry> entries = snapped(points);
-  {
+  // Again with the corners only until none is left out: vertices inside of sides and edges are gone then.
+  while (true) {
     const std::vector<GridPoint> places = places_of(entries);
     Quickhull hull(places);
     if (!hull.build()) {
       return core::invalid_input("a convex hull needs points that do not lie in one plane; these " +
                                  std::to_string(points.size()) + " do: give the body a thickness");
     }
+    const std::vector<std::uint32_t> kept = hull.corners();
     std::vector<GridEntry> corners;
-    for (const std::uint32_t i : hull.corners()) corners.push_back(entries[i]);
+    corners.reserve(kept.size());
+    for (const std::uint32_t i : kept) corners.push_back(entries[i]);
+    if (corners.size() == entries.size()) {
+      TriangleMesh mesh;
+      mesh.triangles = hull.triangles();
+      for (const GridEntry& corner : corners) mesh.vertices.push_back(corner.position);
+      return mesh;
+    }
     entries = std::move(corners);
   }
-  // Again with the corners only: points inside of sides and edges that were vertices on the way are gone.
-  const std::vector<GridPoint> places = places_of(entries);
-  Quickhull hull(places);
-  PRESCENE_CHECK(hull.build());
-  TriangleMesh mesh;
-  mesh.triangles = hull.triangles();
-  mesh.vertices.reserve(entries.size());
-  for (const GridEntry& entry : entries) mesh.vertices.push_back(entry.position);
-  return mesh;
 }
 
 }  // namespace prescene::geometry
