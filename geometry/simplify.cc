@@ -40,19 +40,13 @@ struct Quadric {
   double at(const Vector3d& x) const { return std::max(0.0, x.dot(A * x) + 2.0 * b.dot(x) + c); }
 };
 
-// What a collapse must keep. Tried in this order: most meshes never need the second.
-enum class Care {
-  kShapeAndTopology,  // No triangle turns over, the surface stays manifold where it is.
-  kTopology,
-  kNone,
-};
-
 struct Collapse {
   double cost;
   std::uint32_t keep;
   std::uint32_t drop;
   std::uint32_t version;  // Sum of both vertices' versions when it was made: an older one is out of date.
   Vector3d position;
+  bool changes_topology = false;
 
   // The cheapest first; vertices break ties, so that the order is total.
   friend bool operator<(const Collapse& x, const Collapse& y) {
@@ -78,18 +72,30 @@ class Simplifier {
     make_quadrics();
   }
 
-  void run(std::size_t max_triangles, Care care) {
+  // Collapses the cheapest edges first. With `keep_shape` none that turns a triangle over or squeezes it to a sliver,
+  // so that more triangles may be left than wanted.
+  void run(std::size_t max_triangles, bool keep_shape) {
     if (left_ <= max_triangles) return;
     std::priority_queue<Collapse> queue;
     for_each_edge(edge_uses(alive_triangles()),
                   [&](std::span<const EdgeUse> edge) { queue.push(make_collapse(edge[0].low, edge[0].high)); });
     while (left_ > max_triangles && !queue.empty()) {
-      const Collapse collapse = queue.top();
+      Collapse collapse = queue.top();
       queue.pop();
       if (collapse.version != versions_[collapse.keep] + versions_[collapse.drop]) continue;
       if (triangles_of_[collapse.drop].empty() || triangles_of_[collapse.keep].empty()) continue;
-      if (!allowed(collapse, care)) continue;
+      if (!collapse.changes_topology && !keeps_topology(collapse)) {
+        // Tunnels and necks stay as long as there is something nearly as cheap to do. Forbidding it would be worse:
+        // scans have such tunnels in their noise by the hundred, and all triangles would end up there.
+        constexpr double kTopologyFactor = 10.0;
+        collapse.changes_topology = true;
+        collapse.cost *= kTopologyFactor;
+        queue.push(collapse);
+        continue;
+      }
+      if (keep_shape && !keeps_shape(collapse)) continue;
       apply(collapse);
+      if (collapse.changes_topology) remove_cancelling(collapse.keep);
       for (const std::uint32_t v : neighbours(collapse.keep)) {
         queue.push(make_collapse(std::min(v, collapse.keep), std::max(v, collapse.keep)));
       }
@@ -246,32 +252,47 @@ class Simplifier {
     return true;
   }
 
-  bool allowed(const Collapse& collapse, Care care) const {
-    if (care != Care::kNone && !keeps_topology(collapse)) return false;
-    return care != Care::kShapeAndTopology || keeps_shape(collapse);
-  }
-
   void apply(const Collapse& collapse) {
     positions_[collapse.keep] = collapse.position;
     quadrics_[collapse.keep].add(quadrics_[collapse.drop]);
-    std::vector<std::uint32_t>& kept = triangles_of_[collapse.keep];
-    for (const std::uint32_t i : triangles_of_[collapse.drop]) {
+    const std::vector<std::uint32_t> moving = triangles_of_[collapse.drop];
+    for (const std::uint32_t i : moving) {
       if (has(i, collapse.keep)) {
-        alive_[i] = false;
-        --left_;
-        for (const std::uint32_t w : triangles_[i]) {
-          if (w != collapse.drop) std::erase(triangles_of_[w], i);
-        }
+        remove(i);
         continue;
       }
-      for (std::uint32_t& w : triangles_[i]) {
-        if (w == collapse.drop) w = collapse.keep;
-      }
-      kept.push_back(i);
+      std::replace(triangles_[i].begin(), triangles_[i].end(), collapse.drop, collapse.keep);
+      triangles_of_[collapse.keep].push_back(i);
     }
     triangles_of_[collapse.drop].clear();
     ++versions_[collapse.keep];
     ++versions_[collapse.drop];
+  }
+
+  void remove(std::uint32_t triangle) {
+    alive_[triangle] = false;
+    --left_;
+    for (const std::uint32_t w : triangles_[triangle]) std::erase(triangles_of_[w], triangle);
+  }
+
+  // Removes pairs of triangles back to back at a vertex: they enclose nothing.
+  void remove_cancelling(std::uint32_t v) {
+    const auto opposite_sides = [&](std::uint32_t i, std::uint32_t j) {
+      const Triangle& t = triangles_[i];
+      const Triangle& u = triangles_[j];
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (u[k] == t[0] && u[(k + 1) % 3] == t[2] && u[(k + 2) % 3] == t[1]) return true;
+      }
+      return false;
+    };
+    const std::vector<std::uint32_t> around = triangles_of_[v];
+    for (std::size_t i = 0; i < around.size(); ++i) {
+      for (std::size_t j = i + 1; j < around.size() && alive_[around[i]]; ++j) {
+        if (!alive_[around[j]] || !opposite_sides(around[i], around[j])) continue;
+        remove(around[i]);
+        remove(around[j]);
+      }
+    }
   }
 
   Vector3d middle_;
@@ -293,12 +314,12 @@ TriangleMesh simplified(const TriangleMesh& mesh, int max_triangles) {
   TriangleMesh clean = mesh;
   if (auto repaired = repair_mesh(mesh, nullptr); repaired.ok()) clean = *std::move(repaired);
   Simplifier simplifier(clean);
-  for (const Care care : {Care::kShapeAndTopology, Care::kTopology, Care::kNone}) {
+  for (const bool keep_shape : {true, false}) {
     // What was not allowed at its turn may be later.
     std::size_t before = 0;
     do {
       before = simplifier.triangles_left();
-      simplifier.run(wanted, care);
+      simplifier.run(wanted, keep_shape);
     } while (simplifier.triangles_left() < before);
   }
   return simplifier.mesh();

@@ -109,7 +109,9 @@ class SymmetryTest {
     for (int k = 1; k <= 8 && any_turn; ++k) any_turn = holds(exp_rotation(k * kGoldenAngle * axis));
     if (any_turn) return 0;
     for (int n = 8; n >= 2; --n) {
-      if (holds(exp_rotation(2.0 * std::numbers::pi / n * axis))) return n;
+      bool all = true;
+      for (int k = 1; 2 * k <= n && all; ++k) all = holds(exp_rotation(2.0 * std::numbers::pi * k / n * axis));
+      if (all) return n;
     }
     return 1;
   }

@@ -71,8 +71,9 @@ TriangleMesh joined(const TriangleMesh& a, const TriangleMesh& b);
 /// Connected components, in the order of their first triangle.
 std::vector<TriangleMesh> connected_components(const TriangleMesh& mesh);
 /// A coarser mesh of at most `max_triangles` (edge collapse by quadric error [Garland & Heckbert 1997], deterministic);
-/// the same mesh when it is small enough already. Closed surfaces stay closed as long as that many triangles allow it:
-/// four for each component, more for each handle. max_triangles >= 4 (checked).
+/// the same mesh when it is small enough already. What bounds a volume still does so; tunnels and necks that are small
+/// for so few triangles close, and leave edges with four triangles where they pinch the surface. max_triangles >= 4
+/// (checked).
 TriangleMesh simplified(const TriangleMesh& mesh, int max_triangles);
 /// The convex hull, outward triangles (Fails with kInvalidInput when all points lie in a plane).
 core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points);
