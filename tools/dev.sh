@@ -71,7 +71,7 @@ apt_update() { as_root apt-get update -q; }
 # Prints apt's own estimate, e.g. "186 MB to download, 798 MB on disk"; fails when apt does not know a package.
 apt_estimate() {
   local plan
-  plan=$(LC_ALL=C apt-get install --assume-no --no-install-recommends "$@" 2>&1) || true
+  plan=$(LC_ALL=C apt-get install --assume-no --no-install-recommends -o Debug::NoLocking=1 "$@" 2>&1) || true
   if grep -q '^E: \(Unable to locate\|Package .* has no\)' <<< "$plan"; then return 1; fi
   sed -n -e 's/^Need to get \(.*\) of archives\.$/\1 to download/p' \
     -e 's/^After this operation, \(.*\) of additional disk space will be used\.$/\1 on disk/p' <<< "$plan" |
