@@ -6,22 +6,38 @@
 namespace prescene::rendering {
 namespace {
 
-ScreenPoint<float> projected(const Vector3f& p_C, const geometry::PinholeCamera& camera) {
-  const float scale = 1.0f / p_C.z();
-  return {static_cast<float>(camera.fx) * p_C.x() * scale + static_cast<float>(camera.cx),
-          static_cast<float>(camera.fy) * p_C.y() * scale + static_cast<float>(camera.cy)};
+ProjectedPoint projected(const Vector3f& p_C, const geometry::PinholeCamera& camera) {
+  const float inverse_depth = 1.0f / p_C.z();
+  return {{static_cast<float>(camera.fx) * p_C.x() * inverse_depth + static_cast<float>(camera.cx),
+           static_cast<float>(camera.fy) * p_C.y() * inverse_depth + static_cast<float>(camera.cy)},
+          inverse_depth};
 }
+
+/// A rotation in columns: the compiler inlines this, but not the product of two matrices.
+struct Rotation {
+  Vector3f x;
+  Vector3f y;
+  Vector3f z;
+
+  explicit Rotation(const geometry::Pose& X) {
+    const Eigen::Matrix3f R = X.rotation.toRotationMatrix().cast<float>();
+    x = R.col(0);
+    y = R.col(1);
+    z = R.col(2);
+  }
+  Vector3f operator*(const Vector3f& p) const { return x * p.x() + y * p.y() + z * p.z(); }
+};
 
 }  // namespace
 
 void ObjectRaster::project(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera,
                            bool cut) {
-  const Eigen::Matrix3f R_CO = X_CO.rotation.toRotationMatrix().cast<float>();
+  const Rotation R_CO(X_CO);
   const Vector3f p_CO = X_CO.translation.cast<float>();
   const std::size_t count = mesh.vertices.size();
   if (points_C_.size() < count) {
     points_C_.resize(count);
-    pixels_.resize(count);
+    projected_.resize(count);
   }
   if (cut) {
     // Corners behind the camera have no pixel: faces are projected as they are cut.
@@ -33,19 +49,16 @@ void ObjectRaster::project(const RenderMesh& mesh, const geometry::Pose& X_CO, c
   float x_min = kFar, x_max = -kFar, y_min = kFar, y_max = -kFar;
   for (std::size_t i = 0; i < count; ++i) {
     const Vector3f p_C = R_CO * mesh.vertices[i] + p_CO;
-    const ScreenPoint<float> pixel = projected(p_C, camera);
+    const ProjectedPoint point = projected(p_C, camera);
+    const ScreenPoint<float>& pixel = point.pixel;
     points_C_[i] = p_C;
-    pixels_[i] = pixel;
+    projected_[i] = point;
     x_min = std::min(x_min, pixel.x);
     x_max = std::max(x_max, pixel.x);
     y_min = std::min(y_min, pixel.y);
     y_max = std::max(y_max, pixel.y);
   }
-  const auto limited = [](float value, int size) { return std::clamp(value, -1.0f, static_cast<float>(size)); };
-  rect_.x_first = std::max(0, static_cast<int>(std::ceil(limited(x_min, width_))));
-  rect_.x_last = std::min(width_ - 1, static_cast<int>(std::floor(limited(x_max, width_))));
-  rect_.y_first = std::max(0, static_cast<int>(std::ceil(limited(y_min, height_))));
-  rect_.y_last = std::min(height_ - 1, static_cast<int>(std::floor(limited(y_max, height_))));
+  rect_ = {ceil_from(x_min, 0), ceil_from(y_min, 0), floor_to(x_max, width_ - 1), floor_to(y_max, height_ - 1)};
 }
 
 void ObjectRaster::clear(const geometry::PinholeCamera& camera) {
@@ -62,21 +75,22 @@ void ObjectRaster::clear(const geometry::PinholeCamera& camera) {
               inverse_depth_.begin() + static_cast<std::ptrdiff_t>(index(x_last, y)) + 1, 0.0f);
 }
 
-void ObjectRaster::fill(const Vector3f& a, const Vector3f& b, const Vector3f& c, ScreenPoint<float> pa,
-                        ScreenPoint<float> pb, ScreenPoint<float> pc) {
+void ObjectRaster::fill(const ProjectedPoint& a, const ProjectedPoint& b, const ProjectedPoint& c,
+                        const FacePlane& plane) {
+  const PixelRect box = bounding_pixels(a.pixel, b.pixel, c.pixel, rect_);
+  if (box.empty()) return;
+  const auto face = static_cast<std::uint32_t>(faces_.size());
+  faces_.push_back(plane);
   // 1/z is linear over the image: n . ray / distance. Kept between the corners' own, which edge-on faces would leave.
-  const FacePlane& plane = faces_.back();
-  const auto face = static_cast<std::uint32_t>(faces_.size() - 1);
   const float scale = 1.0f / plane.distance;
   const float along_x = plane.normal.x() * inverse_fx_ * scale;
   const float along_y = plane.normal.y() * inverse_fy_ * scale;
   const float at_centre = plane.normal.z() * scale;
-  const auto [z_min, z_max] = std::minmax({a.z(), b.z(), c.z()});
-  const float low = 1.0f / z_max;
-  const float high = 1.0f / z_min;
-  for_each_covered_pixel(pa, pb, pc, rect_, [&](int x, int y) {
+  const float low = std::min(a.inverse_depth, std::min(b.inverse_depth, c.inverse_depth));
+  const float high = std::max(a.inverse_depth, std::max(b.inverse_depth, c.inverse_depth));
+  for_each_covered_pixel(a.pixel, b.pixel, c.pixel, box, [&](int x, int y) {
     const float linear = at_centre + along_x * (static_cast<float>(x) - cx_) + along_y * (static_cast<float>(y) - cy_);
-    const float inverse_depth = std::clamp(linear, low, high);
+    const float inverse_depth = std::max(low, std::min(high, linear));
     const std::size_t i = index(x, y);
     if (inverse_depth <= inverse_depth_[i]) return;
     inverse_depth_[i] = inverse_depth;
@@ -100,14 +114,12 @@ void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, cons
   project(mesh, X_CO, camera, cut);
   if (rect_.empty()) return;
   clear(camera);
-  faces_.reserve(mesh.triangles.size());
+  faces_.reserve(2 * mesh.triangles.size());  // a cut face is drawn in two
 
-  const Eigen::Matrix3f R_CO = X_CO.rotation.toRotationMatrix().cast<float>();
+  const Rotation R_CO(X_CO);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& triangle = mesh.triangles[i];
     const Vector3f& a = points_C_[triangle[0]];
-    const Vector3f& b = points_C_[triangle[1]];
-    const Vector3f& c = points_C_[triangle[2]];
     Vector3f normal = R_CO * mesh.normals[i];
     float distance = normal.dot(a);
     // Seen from behind: never visible on a closed mesh that the near plane leaves whole.
@@ -118,18 +130,15 @@ void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, cons
     }
     if (distance == 0.0f) continue;
     if (!cut) {
-      faces_.push_back({normal, distance});
-      fill(a, b, c, pixels_[triangle[0]], pixels_[triangle[1]], pixels_[triangle[2]]);
+      fill(projected_[triangle[0]], projected_[triangle[1]], projected_[triangle[2]], {normal, distance});
       continue;
     }
-    const Vector3f corners[3] = {a, b, c};
+    const Vector3f corners[3] = {a, points_C_[triangle[1]], points_C_[triangle[2]]};
     Vector3f polygon[4];
     const int count = clip_to_near(corners, near_depth, polygon);
-    if (count < 3) continue;
-    faces_.push_back({normal, distance});
     for (int k = 2; k < count; ++k)
-      fill(polygon[0], polygon[k - 1], polygon[k], projected(polygon[0], camera), projected(polygon[k - 1], camera),
-           projected(polygon[k], camera));
+      fill(projected(polygon[0], camera), projected(polygon[k - 1], camera), projected(polygon[k], camera),
+           {normal, distance});
   }
 }
 

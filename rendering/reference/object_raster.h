@@ -17,6 +17,12 @@ struct FacePlane {
   float distance;
 };
 
+/// Where a point is seen.
+struct ProjectedPoint {
+  ScreenPoint<float> pixel;
+  float inverse_depth;
+};
+
 /// Draws objects. draw() overwrites what the previous one left; allocates only while it grows.
 class ObjectRaster {
  public:
@@ -39,8 +45,7 @@ class ObjectRaster {
   }
   void project(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera, bool cut);
   void clear(const geometry::PinholeCamera& camera);
-  void fill(const Vector3f& a, const Vector3f& b, const Vector3f& c, ScreenPoint<float> pa, ScreenPoint<float> pb,
-            ScreenPoint<float> pc);
+  void fill(const ProjectedPoint& a, const ProjectedPoint& b, const ProjectedPoint& c, const FacePlane& plane);
 
   int width_ = 0;
   int height_ = 0;
@@ -50,7 +55,7 @@ class ObjectRaster {
   float cy_ = 0.0f;
   PixelRect rect_;
   std::vector<Vector3f> points_C_;
-  std::vector<ScreenPoint<float>> pixels_;
+  std::vector<ProjectedPoint> projected_;
   std::vector<FacePlane> faces_;
   std::vector<float> inverse_depth_;
   std::vector<std::uint32_t> face_of_pixel_;

@@ -45,17 +45,18 @@ void draw_triangle(const Vector3d (&corners)[3], const geometry::PinholeCamera& 
   const Vector3f towards_camera = (distance > 0.0 ? Vector3d(-normal) : normal).cast<float>();
   const PixelRect image = {0, 0, camera.width - 1, camera.height - 1};
   for (int k = 2; k < count; ++k) {
-    for_each_covered_pixel(
-        projected(polygon[0], camera), projected(polygon[k - 1], camera), projected(polygon[k], camera), image,
-        [&](int x, int y) {
-          const double linear = normal.dot(camera.unproject(x, y, 1.0)) / distance;
-          // Faces almost edge-on would leave the depths of their own corners.
-          const double inverse_depth = std::clamp(linear, 1.0 / z_max, 1.0 / z_min);
-          if (inverse_depth <= buffer->inverse_depth(x, y) || inverse_depth * options.far_depth < 1.0) return;
-          buffer->inverse_depth(x, y) = inverse_depth;
-          (*buffer->labels)(x, y) = label;
-          if (buffer->normals != nullptr) (*buffer->normals)(x, y) = towards_camera;
-        });
+    const ScreenPoint<double> a = projected(polygon[0], camera);
+    const ScreenPoint<double> b = projected(polygon[k - 1], camera);
+    const ScreenPoint<double> c = projected(polygon[k], camera);
+    for_each_covered_pixel(a, b, c, bounding_pixels(a, b, c, image), [&](int x, int y) {
+      const double linear = normal.dot(camera.unproject(x, y, 1.0)) / distance;
+      // Faces almost edge-on would leave the depths of their own corners.
+      const double inverse_depth = std::clamp(linear, 1.0 / z_max, 1.0 / z_min);
+      if (inverse_depth <= buffer->inverse_depth(x, y) || inverse_depth * options.far_depth < 1.0) return;
+      buffer->inverse_depth(x, y) = inverse_depth;
+      (*buffer->labels)(x, y) = label;
+      if (buffer->normals != nullptr) (*buffer->normals)(x, y) = towards_camera;
+    });
   }
 }
 

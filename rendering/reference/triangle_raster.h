@@ -42,6 +42,12 @@ class EdgeFunction {
     sign_ = swap ? Scalar(-1) : Scalar(1);
   }
 
+  /// Whether the pixels inside lie to the right of the line along each row, or to its left.
+  bool bounds_left() const { return sign_ * dy_ < 0; }
+  bool bounds_right() const { return sign_ * dy_ > 0; }
+  /// About where the line crosses the current row; for lines that are not along it.
+  Scalar crossing() const { return origin_.x + row_ / dy_; }
+
   void set_row(int y) { row_ = dx_ * (static_cast<Scalar>(y) - origin_.y); }
   /// Whether the pixel of the current row is on the right side.
   bool inside(int x) const {
@@ -58,34 +64,57 @@ class EdgeFunction {
   bool owns_line_;
 };
 
-/// Calls fill(x, y) for each pixel of `rect` that the triangle covers; either orientation.
-template <class Scalar, class Fill>
-void for_each_covered_pixel(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b, ScreenPoint<Scalar> c, const PixelRect& rect,
-                            Fill&& fill) {
-  // Bounds as numbers first: a point may be further out than an int can say.
-  const auto first = [](Scalar low, int limit) {
-    return low <= static_cast<Scalar>(limit) ? limit : static_cast<int>(std::ceil(std::min(low, Scalar(1e6))));
-  };
-  const auto last = [](Scalar high, int limit) {
-    return high >= static_cast<Scalar>(limit) ? limit : static_cast<int>(std::floor(std::max(high, Scalar(-1e6))));
-  };
-  const int x_first = first(std::min({a.x, b.x, c.x}), rect.x_first);
-  const int x_last = last(std::max({a.x, b.x, c.x}), rect.x_last);
-  const int y_first = first(std::min({a.y, b.y, c.y}), rect.y_first);
-  const int y_last = last(std::max({a.y, b.y, c.y}), rect.y_last);
-  if (x_last < x_first || y_last < y_first) return;
+/// The smallest integer >= value, at least `limit`; for any finite value. (The library's ceil is a call on the baseline
+/// instruction set, and there are six of them a triangle.)
+template <class Scalar>
+int ceil_from(Scalar value, int limit) {
+  if (value <= static_cast<Scalar>(limit)) return limit;
+  if (value > Scalar(1e6)) return 1000000;
+  const int truncated = static_cast<int>(value);
+  return truncated + (static_cast<Scalar>(truncated) < value ? 1 : 0);
+}
 
+/// The largest integer <= value, at most `limit`.
+template <class Scalar>
+int floor_to(Scalar value, int limit) {
+  if (value >= static_cast<Scalar>(limit)) return limit;
+  if (value < Scalar(-1e6)) return -1000000;
+  const int truncated = static_cast<int>(value);
+  return truncated - (static_cast<Scalar>(truncated) > value ? 1 : 0);
+}
+
+/// The pixels of `rect` whose centres lie within the triangle's bounding box.
+template <class Scalar>
+PixelRect bounding_pixels(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b, ScreenPoint<Scalar> c, const PixelRect& rect) {
+  return {ceil_from(std::min(a.x, std::min(b.x, c.x)), rect.x_first),
+          ceil_from(std::min(a.y, std::min(b.y, c.y)), rect.y_first),
+          floor_to(std::max(a.x, std::max(b.x, c.x)), rect.x_last),
+          floor_to(std::max(a.y, std::max(b.y, c.y)), rect.y_last)};
+}
+
+/// Calls fill(x, y) for each pixel that the triangle covers; either orientation. `box` is from bounding_pixels.
+template <class Scalar, class Fill>
+void for_each_covered_pixel(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b, ScreenPoint<Scalar> c, const PixelRect& box,
+                            Fill&& fill) {
   const Scalar area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
   if (area == 0) return;
   if (area < 0) std::swap(b, c);
   EdgeFunction<Scalar> ab(a, b);
   EdgeFunction<Scalar> bc(b, c);
   EdgeFunction<Scalar> ca(c, a);
-  for (int y = y_first; y <= y_last; ++y) {
-    ab.set_row(y);
-    bc.set_row(y);
-    ca.set_row(y);
-    for (int x = x_first; x <= x_last; ++x)
+  // On wide triangles, rows are narrowed to a pixel beyond where the lines cross them; the exact test decides there.
+  constexpr int kWide = 8;
+  const bool wide = box.x_last - box.x_first >= kWide;
+  for (int y = box.y_first; y <= box.y_last; ++y) {
+    int x_begin = box.x_first;
+    int x_end = box.x_last;
+    for (EdgeFunction<Scalar>* edge : {&ab, &bc, &ca}) {
+      edge->set_row(y);
+      if (!wide) continue;
+      if (edge->bounds_left()) x_begin = ceil_from(edge->crossing() - 1, x_begin);
+      if (edge->bounds_right()) x_end = floor_to(edge->crossing() + 1, x_end);
+    }
+    for (int x = x_begin; x <= x_end; ++x)
       if (ab.inside(x) && bc.inside(x) && ca.inside(x)) fill(x, y);
   }
 }
