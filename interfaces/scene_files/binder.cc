@@ -17,11 +17,21 @@ struct Unit {
   double factor;
 };
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::array kUnits{Unit{"mm", "m", 1e-3},       Unit{"cm", "m", 1e-2},      Unit{"m", "m", 1.0},
-                            Unit{"in", "m", 0.0254},     Unit{"g", "kg", 1e-3},      Unit{"kg", "kg", 1.0},
-                            Unit{"ms", "s", 1e-3},       Unit{"s", "s", 1.0},        Unit{"min", "s", 60.0},
-                            Unit{"deg", "rad", kDegree}, Unit{"rad", "rad", 1.0},    Unit{"deg", "deg", 1.0},
-                            Unit{"rad", "deg", 1.0 / kDegree}, Unit{"°", "deg", 1.0}, Unit{"°", "rad", kDegree}};
+constexpr std::array kUnits{Unit{"mm", "m", 1e-3},
+                            Unit{"cm", "m", 1e-2},
+                            Unit{"m", "m", 1.0},
+                            Unit{"in", "m", 0.0254},
+                            Unit{"g", "kg", 1e-3},
+                            Unit{"kg", "kg", 1.0},
+                            Unit{"ms", "s", 1e-3},
+                            Unit{"s", "s", 1.0},
+                            Unit{"min", "s", 60.0},
+                            Unit{"deg", "rad", kDegree},
+                            Unit{"rad", "rad", 1.0},
+                            Unit{"deg", "deg", 1.0},
+                            Unit{"rad", "deg", 1.0 / kDegree},
+                            Unit{"°", "deg", 1.0},
+                            Unit{"°", "rad", kDegree}};
 
 // "5 cm" where metres are needed: "write 0.05".
 std::optional<std::string> converted(std::string_view text, std::string_view base) {
@@ -83,15 +93,18 @@ std::optional<double> read_number(const LocatedValue& value, Problems& problems,
   if (value.kind != LocatedValue::Kind::kScalar || value.quoted || !parse_number(without_plus(value.text), &number)) {
     if (value.kind == LocatedValue::Kind::kScalar) {
       const std::optional<std::string> better = converted(value.text, range.unit);
-      problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + (value.quoted ? " is quoted text, not a number" : " is not a number"),
-                   better ? *better : std::string(range.remedy));
+      problems.add(
+          value.place, value.path,
+          interfaces::quoted(value.text, 40) + (value.quoted ? " is quoted text, not a number" : " is not a number"),
+          better ? *better : std::string(range.remedy));
     } else {
       report_type(value, problems, range.remedy);
     }
     return std::nullopt;
   }
   if (!std::isfinite(number)) {
-    problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + " is not a finite number", std::string(range.remedy));
+    problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + " is not a finite number",
+                 std::string(range.remedy));
     return std::nullopt;
   }
   if (number < range.low || number > range.high) {
@@ -145,11 +158,13 @@ std::optional<std::vector<double>> read_numbers(const LocatedValue& value, Probl
   return numbers;
 }
 
-std::optional<std::size_t> read_word(const LocatedValue& value, Problems& problems, const std::vector<std::string>& words) {
+std::optional<std::size_t> read_word(const LocatedValue& value, Problems& problems,
+                                     const std::vector<std::string>& words) {
   if (value.kind == LocatedValue::Kind::kScalar) {
     const auto found = std::find(words.begin(), words.end(), value.text);
     if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-    problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + " is not known here", suggestion(value.text, words));
+    problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + " is not known here",
+                 suggestion(value.text, words));
     return std::nullopt;
   }
   report_type(value, problems, suggestion("", words));
@@ -180,7 +195,8 @@ const LocatedValue* Binder::one_of(const std::vector<std::string>& keys, std::st
     const LocatedValue* value = find(key);
     if (!value) continue;
     if (found) {
-      problems_.add(value->place, value->path, interfaces::quoted(key) + " and " + interfaces::quoted(first) + " exclude each other",
+      problems_.add(value->place, value->path,
+                    interfaces::quoted(key) + " and " + interfaces::quoted(first) + " exclude each other",
                     "remove one of them");
       continue;
     }
@@ -241,7 +257,8 @@ void Binder::finish() {
     explained.insert(explained.end(), meant.begin(), meant.end());
     const bool near_present = meant.empty() && !nearest_words(key, present).empty();
     std::string remedy = suggestion(key, meant.empty() ? (near_present ? present : known_) : absent);
-    problems_.add(value_.keys[i].place, value_.items[i].path, "unknown key", remedy.empty() ? "remove it" : std::move(remedy));
+    problems_.add(value_.keys[i].place, value_.items[i].path, "unknown key",
+                  remedy.empty() ? "remove it" : std::move(remedy));
   }
   for (const Missing& missing : missing_) {
     const bool is_explained = std::any_of(missing.keys.begin(), missing.keys.end(), [&](const std::string& key) {
@@ -249,7 +266,8 @@ void Binder::finish() {
     });
     if (is_explained) continue;
     problems_.add(value_.place, value_.path,
-                  missing.keys.size() == 1 ? "the key " + interfaces::quoted(missing.keys[0]) + " is missing" : "a key is missing",
+                  missing.keys.size() == 1 ? "the key " + interfaces::quoted(missing.keys[0]) + " is missing"
+                                           : "a key is missing",
                   missing.remedy);
   }
 }

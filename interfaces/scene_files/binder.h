@@ -44,7 +44,8 @@ std::optional<std::string> read_text(const LocatedValue& value, Problems& proble
 std::optional<std::vector<double>> read_numbers(const LocatedValue& value, Problems& problems, std::size_t count,
                                                 const NumberRange& range = {});
 /// The index of the word among `words`.
-std::optional<std::size_t> read_word(const LocatedValue& value, Problems& problems, const std::vector<std::string>& words);
+std::optional<std::size_t> read_word(const LocatedValue& value, Problems& problems,
+                                     const std::vector<std::string>& words);
 
 /// Reports that `value` is not what is needed: "is a list: give ...".
 void report_type(const LocatedValue& value, Problems& problems, std::string_view remedy);

@@ -41,7 +41,8 @@ class TreeBuilder final : public YAML::EventHandler {
   }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (has_root_) stop(place_of(mark), "a second document begins here", "put one document into the file, without '---'");
+    if (has_root_)
+      stop(place_of(mark), "a second document begins here", "put one document into the file, without '---'");
   }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -49,7 +50,8 @@ class TreeBuilder final : public YAML::EventHandler {
     value.place = place_of(mark);
     finish(std::move(value), anchor);
   }
-  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, const std::string& text) override {
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& text) override {
     LocatedValue value;
     value.place = place_of(mark);
     value.kind = LocatedValue::Kind::kScalar;
@@ -66,11 +68,13 @@ class TreeBuilder final : public YAML::EventHandler {
     check_depth(known->second, stack_.size() + 1);
     finish(known->second, 0);
   }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override {
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
     open(mark, anchor, LocatedValue::Kind::kList);
   }
   void OnSequenceEnd() override { close(); }
-  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override {
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
     open(mark, anchor, LocatedValue::Kind::kMap);
   }
   void OnMapEnd() override { close(); }
@@ -96,8 +100,9 @@ class TreeBuilder final : public YAML::EventHandler {
     bytes_ += value.text.size();
     for (const LocatedValue::Key& key : value.keys) bytes_ += key.name.size();
     if (values_ > limits_.max_values || bytes_ > limits_.max_bytes)
-      stop(value.place, "the document holds more than " + std::to_string(limits_.max_values) + " values or " +
-                            size_text(limits_.max_bytes) + " with its aliases expanded",
+      stop(value.place,
+           "the document holds more than " + std::to_string(limits_.max_values) + " values or " +
+               size_text(limits_.max_bytes) + " with its aliases expanded",
            "make it smaller", core::StatusCode::kResourceExhausted);
     for (const LocatedValue& item : value.items) count(item);
   }
@@ -119,8 +124,8 @@ class TreeBuilder final : public YAML::EventHandler {
 
   void check_depth(const LocatedValue& value, std::size_t depth) const {
     if (depth > static_cast<std::size_t>(limits_.max_depth))
-      stop(value.place, "values are nested deeper than " + std::to_string(limits_.max_depth), "make the document flatter",
-           core::StatusCode::kResourceExhausted);
+      stop(value.place, "values are nested deeper than " + std::to_string(limits_.max_depth),
+           "make the document flatter", core::StatusCode::kResourceExhausted);
     for (const LocatedValue& item : value.items) check_depth(item, depth + 1);
   }
 
@@ -153,7 +158,9 @@ class TreeBuilder final : public YAML::EventHandler {
     const auto same = std::find_if(map.value.keys.begin(), map.value.keys.end(),
                                    [&](const LocatedValue::Key& other) { return other.name == key.text; });
     if (same != map.value.keys.end())
-      stop(key.place, "the key " + interfaces::quoted(key.text) + " is here twice, first on line " + std::to_string(same->place.line),
+      stop(key.place,
+           "the key " + interfaces::quoted(key.text) + " is here twice, first on line " +
+               std::to_string(same->place.line),
            "remove or rename one");
     map.value.keys.push_back({key.text, key.place});
     map.has_key = true;
@@ -188,9 +195,10 @@ class TreeBuilder final : public YAML::EventHandler {
 };
 
 core::Status syntax_error(const std::string& file, const YAML::Exception& error) {
-  std::string remedy = "check the indentation (spaces, no tabs), a space after each ':' and '-', and pairs of quotes and brackets";
-  const Problem problem{file, error.mark.is_null() ? 0 : error.mark.line + 1, error.mark.column + 1, "",
-                        "this is not YAML (" + error.msg + ")", std::move(remedy)};
+  std::string remedy =
+      "check the indentation (spaces, no tabs), a space after each ':' and '-', and pairs of quotes and brackets";
+  const Problem problem{file, error.mark.is_null() ? 0 : error.mark.line + 1, error.mark.column + 1,
+                        "",   "this is not YAML (" + error.msg + ")",         std::move(remedy)};
   return core::invalid_input(problem.text());
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A YAML document as a tree of values that each know where they stand in the file, so that every later complaint can name
-// the line. What the values mean is up to the reader: see binder.h.
+// A YAML document as a tree of values that each know where they stand in the file, so that every later complaint can
+// name the line. What the values mean is up to the reader: see binder.h.
 #pragma once
 
 #include <cstddef>
@@ -23,12 +23,12 @@ struct LocatedValue {
   };
 
   Kind kind = Kind::kNothing;
-  std::string text;                  ///< Of a scalar.
-  bool quoted = false;               ///< The scalar was written in quotes or as a block: it is text, never a number.
-  std::vector<Key> keys;             ///< Of a map, in the order of the file; keys.size() == items.size().
-  std::vector<LocatedValue> items;   ///< Of a list or map.
+  std::string text;                 ///< Of a scalar.
+  bool quoted = false;              ///< The scalar was written in quotes or as a block: it is text, never a number.
+  std::vector<Key> keys;            ///< Of a map, in the order of the file; keys.size() == items.size().
+  std::vector<LocatedValue> items;  ///< Of a list or map.
   FilePlace place;
-  std::string path;                  ///< "models.carton.mass", "actions[1].time"; empty at the root.
+  std::string path;  ///< "models.carton.mass", "actions[1].time"; empty at the root.
 
   /// The value of a key of a map, or null.
   const LocatedValue* find(std::string_view key) const;
@@ -36,8 +36,8 @@ struct LocatedValue {
 
 /// Bounds on what a document may ask for; beyond them reading fails with kResourceExhausted.
 struct YamlLimits {
-  std::size_t max_bytes = std::size_t{16} << 20;   ///< Of the text, and of all scalars once aliases are expanded.
-  std::size_t max_values = 200'000;                ///< Of the tree once aliases are expanded.
+  std::size_t max_bytes = std::size_t{16} << 20;  ///< Of the text, and of all scalars once aliases are expanded.
+  std::size_t max_values = 200'000;               ///< Of the tree once aliases are expanded.
   int max_depth = 48;
 };
 

@@ -13,7 +13,11 @@ constexpr std::size_t kMostProblems = 100;
 constexpr std::size_t kLongestWord = 64;
 
 Problem problem_at(const FilePlace& place, std::string_view key, std::string reason, std::string remedy) {
-  return {place.file ? *place.file : std::string(), place.line, place.column, std::string(key), std::move(reason),
+  return {place.file ? *place.file : std::string(),
+          place.line,
+          place.column,
+          std::string(key),
+          std::move(reason),
           std::move(remedy)};
 }
 

@@ -22,7 +22,7 @@ struct Problem {
   std::string file;
   int line = 0;
   int column = 0;
-  std::string key;     ///< Path of the key, as "models.carton.mass" or "actions[1].time"; empty = the whole document.
+  std::string key;  ///< Path of the key, as "models.carton.mass" or "actions[1].time"; empty = the whole document.
   std::string reason;
   std::string remedy;
 

@@ -73,6 +73,10 @@ class ActionReader {
     release.object = held_name(fields, "object");
     if (const LocatedValue* at = fields.find("retreat")) release.retreat = read_vector(*at, problems_, kPosition);
     fields.read("retreat_duration", release.retreat_duration, kDuration);
+    if (const LocatedValue* at = fields.find("velocity"))
+      release.disturbance.linear = read_vector_distribution(*at, problems_, kSpeed);
+    if (const LocatedValue* at = fields.find("angular_velocity"))
+      release.disturbance.angular = read_vector_distribution(*at, problems_, kTurnRate);
     held_.erase(release.object);
     return release;
   }
@@ -97,7 +101,8 @@ class ActionReader {
     push.to = vector(fields, "to", "give where the finger ends [x, y, z]");
     fields.read("duration", push.duration, kDuration);
     fields.read("radius", push.radius, kObjectSize);
-    if (const LocatedValue* at = fields.find("lateral_error")) push.lateral_error = read_scalar(*at, problems_, kPosition);
+    if (const LocatedValue* at = fields.find("lateral_error"))
+      push.lateral_error = read_scalar(*at, problems_, kPosition);
     return push;
   }
   belief::Pour read_pour(Binder& fields) {
@@ -106,7 +111,8 @@ class ActionReader {
     if (const LocatedValue* at = fields.find("axis")) pour.axis_W = read_axis(*at, problems_);
     double angle_deg = 0.0;
     if (const LocatedValue* at = fields.require("angle_deg", "give by how many degrees it is turned"))
-      angle_deg = read_number(*at, problems_, {-360.0, 360.0, "give degrees between -360 and 360", "deg"}).value_or(0.0);
+      angle_deg =
+          read_number(*at, problems_, {-360.0, 360.0, "give degrees between -360 and 360", "deg"}).value_or(0.0);
     pour.angle = kDegree * angle_deg;
     fields.read("duration", pour.duration, kDuration);
     return pour;

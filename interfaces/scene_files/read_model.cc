@@ -20,7 +20,8 @@ constexpr NumberRange kLever{0.0, 0.5, "give metres between 0 and 0.5", "m"};
 
 void read_contact(Binder& binder, ContactProperties& contact) {
   Problems& problems = binder.problems();
-  if (const LocatedValue* at = binder.find("friction")) contact.friction = read_scalar(*at, problems, kFriction, true, true);
+  if (const LocatedValue* at = binder.find("friction"))
+    contact.friction = read_scalar(*at, problems, kFriction, true, true);
   if (const LocatedValue* at = binder.find("impact_friction"))
     contact.impact_friction = read_scalar(*at, problems, kFriction, true, true);
   if (const LocatedValue* at = binder.find("restitution"))
@@ -45,7 +46,8 @@ SymmetryGroup read_symmetry(const LocatedValue& value, Problems& problems) {
   binder.read("flip", flip);
   binder.read("order", order, 2, 64, "give the number of equal turns");
   if (continuous == (order > 0)) {
-    problems.add(value.place, value.path, continuous ? "'order' and 'continuous' exclude each other" : "the turns are missing",
+    problems.add(value.place, value.path,
+                 continuous ? "'order' and 'continuous' exclude each other" : "the turns are missing",
                  "give either 'order: 4' (turns of 90 degrees) or 'continuous: true'");
     return {};
   }
@@ -94,9 +96,8 @@ void check_density(const LocatedValue& at, double mass, double volume, Problems&
     const double grams = density * 1e-3;
     problems.add(at.place, at.path,
                  number_text(mass) + " kg in this volume of " + number_text(volume) + " m^3 is denser than any metal",
-                 grams > kDensity.low && grams < kDensity.high
-                     ? "grams? then write " + number_text(mass * 1e-3)
-                     : std::string("check the mass (kg) and the sizes (m)"));
+                 grams > kDensity.low && grams < kDensity.high ? "grams? then write " + number_text(mass * 1e-3)
+                                                               : std::string("check the mass (kg) and the sizes (m)"));
   } else if (density < kDensity.low) {
     problems.add(at.place, at.path,
                  number_text(mass) + " kg in this volume of " + number_text(volume) + " m^3 is lighter than air",
@@ -107,7 +108,8 @@ void check_density(const LocatedValue& at, double mass, double volume, Problems&
 void read_mass(Binder& binder, const BodyShape& shape, ObjectModel& model) {
   Problems& problems = binder.problems();
   std::string which;
-  const LocatedValue* at = binder.one_of({"mass", "density"}, "give 'mass' in kg or 'density' in kg/m^3", false, &which);
+  const LocatedValue* at =
+      binder.one_of({"mass", "density"}, "give 'mass' in kg or 'density' in kg/m^3", false, &which);
   if (!at) return;
   const std::size_t before = problems.errors().size();
   if (which == "mass") {
@@ -122,7 +124,8 @@ void read_mass(Binder& binder, const BodyShape& shape, ObjectModel& model) {
   if (volume)
     model.mass = belief::FixedScalar{density * *volume};
   else
-    problems.add(at->place, at->path, "the mesh is not closed, so it has no volume", "give 'mass' instead, or close the mesh");
+    problems.add(at->place, at->path, "the mesh is not closed, so it has no volume",
+                 "give 'mass' instead, or close the mesh");
 }
 
 void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
@@ -135,8 +138,7 @@ void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
     if (auto derived = belief::with_derived_properties(model)) {
       model = *std::move(derived);
     } else if (!center || !inertia) {
-      problems.add(shape.place->place, shape.place->path,
-                   "no solid: " + derived.status().message(),
+      problems.add(shape.place->place, shape.place->path, "no solid: " + derived.status().message(),
                    "use its convex_hull, close the mesh, or give mass, center_of_mass and inertia");
     }
   }
@@ -147,8 +149,9 @@ void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
   const double mass = which == "inertia" ? belief::mean(model.mass) : 1.0;
   model.unit_inertia = *matrix / std::max(mass, 1e-9);
   if (!geometry::MassProperties{1.0, Vector3d::Zero(), model.unit_inertia}.is_physical())
-    problems.add(inertia->place, inertia->path, "no body has this inertia",
-                 "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
+    problems.add(
+        inertia->place, inertia->path, "no body has this inertia",
+        "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
 }
 
 // Of bodies without mass, for which nothing else asks for the hulls.
@@ -268,7 +271,8 @@ belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::
     if (const LocatedValue* time_at = waypoint.require("time", "give seconds since the start"))
       time = read_number(*time_at, problems, kTime).value_or(0.0);
     if (!body.timeline.empty() && !(time > body.timeline.back().time))
-      problems.add(item.place, item.path, "its time is not after the one before", "sort the timeline and make times differ");
+      problems.add(item.place, item.path, "its time is not after the one before",
+                   "sort the timeline and make times differ");
     body.timeline.push_back({time, read_pose_keys(waypoint)});
   }
   return body;

@@ -18,10 +18,11 @@ constexpr NumberRange kDistance{0.0, 1000.0, "give metres between 0 and 1000", "
 
 const std::vector<std::pair<std::string, When>> kWhens{
     {"at_end", When::kAtEnd}, {"ever", When::kEver}, {"always", When::kAlways}};
-const std::vector<std::string> kConditionKeys{"inside", "resting_on", "upright", "face_up", "below",
+const std::vector<std::string> kConditionKeys{"inside",          "resting_on",           "upright", "face_up", "below",
                                               "moved_more_than", "turned_more_than_deg", "touched", "moving"};
 constexpr const char* kConditionRemedy =
-    "give a condition: inside, resting_on, upright, face_up, below, moved_more_than, turned_more_than_deg, touched, moving, "
+    "give a condition: inside, resting_on, upright, face_up, below, moved_more_than, turned_more_than_deg, touched, "
+    "moving, "
     "not, or all_of with a list of them";
 
 class ConditionReader {
@@ -87,7 +88,8 @@ class ConditionReader {
     if (key == "upright") return {read_upright(value)};
     if (key == "face_up") return {read_face(value)};
     if (key == "below") return {belief::BelowHeight{read_number(value, problems_, kPosition).value_or(0.0)}};
-    if (key == "moved_more_than") return {belief::MovedMoreThan{read_number(value, problems_, kDistance).value_or(0.0)}};
+    if (key == "moved_more_than")
+      return {belief::MovedMoreThan{read_number(value, problems_, kDistance).value_or(0.0)}};
     if (key == "turned_more_than_deg")
       return {belief::TurnedMoreThan{kDegree * read_number(value, problems_, kTurn).value_or(0.0)}};
     if (key == "touched") return {belief::Touched{read_thing(value)}};
@@ -111,7 +113,8 @@ class ConditionReader {
         return volume;
       }
       volume.X_WV = read_pose_keys(binder);
-      if (const LocatedValue* size = binder.require("size", "give the edges [x, y, z] of the box, or 'hollow_of' a support"))
+      if (const LocatedValue* size =
+              binder.require("size", "give the edges [x, y, z] of the box, or 'hollow_of' a support"))
         volume.size = read_vector(*size, problems_, kSupportSize);
       return volume;
     }
@@ -188,8 +191,9 @@ belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::s
   Binder binder(value, problems);
   const std::string object = read_judged(binder, "", context);
   std::string which;
-  const LocatedValue* at = binder.one_of({"outcomes", "face_up"},
-                                         "give 'outcomes', of which the first that holds counts, or 'face_up: true'", false, &which);
+  const LocatedValue* at =
+      binder.one_of({"outcomes", "face_up"},
+                    "give 'outcomes', of which the first that holds counts, or 'face_up: true'", false, &which);
   if (!at) return group;
   if (which == "face_up") {
     if (!read_bool(*at, problems).value_or(true))

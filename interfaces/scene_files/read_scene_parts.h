@@ -40,9 +40,9 @@ belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::s
 /// Shapes of a body and what comes with them.
 struct BodyShape {
   std::vector<belief::CollisionShape> collision;
-  belief::MeshPtr visual;                  ///< Null: made from the collision shapes.
+  belief::MeshPtr visual;  ///< Null: made from the collision shapes.
   std::optional<belief::Hollow> hollow;
-  const LocatedValue* place = nullptr;     ///< Of the shape, for messages about it.
+  const LocatedValue* place = nullptr;  ///< Of the shape, for messages about it.
 };
 /// Reads the shape keys (box, sphere, ..., parts, visual, hollow) of a body's map. `size` bounds its edges.
 BodyShape read_body_shape(Binder& binder, const NumberRange& size, bool may_move, SceneContext& context);

@@ -16,7 +16,7 @@ using belief::PrimitiveShape;
 using geometry::Pose;
 using geometry::Vector3d;
 
-const std::vector<std::string> kShapeKeys{"box",  "sphere",       "cylinder", "capsule", "cone", "mesh",
+const std::vector<std::string> kShapeKeys{"box",   "sphere",       "cylinder", "capsule", "cone", "mesh",
                                           "lathe", "gable_carton", "open_bin", "ground",  "parts"};
 constexpr const char* kShapeRemedy =
     "give one shape: box, sphere, cylinder, capsule, cone, mesh, lathe, gable_carton, open_bin, ground or parts";
@@ -84,7 +84,8 @@ class ShapeReader {
     binder.read_enum("use", use, kMeshUses);
     if (use == MeshUse::kSurface && may_move_) {
       const LocatedValue& at = *binder.find("use");
-      problems_.add(at.place, at.path, "a surface of triangles can't move", "use convex_hull, convex_parts or decompose");
+      problems_.add(at.place, at.path, "a surface of triangles can't move",
+                    "use convex_hull, convex_parts or decompose");
     }
     BodyShape shape;
     if (MeshPtr mesh = read_mesh_file(binder)) {
@@ -148,17 +149,20 @@ class ShapeReader {
     }
     const std::size_t before = problems_.errors().size();
     for (const LocatedValue& item : at->items)
-      if (const auto point = read_numbers(item, problems_, 2, kPosition)) profile.emplace_back((*point)[0], (*point)[1]);
+      if (const auto point = read_numbers(item, problems_, 2, kPosition))
+        profile.emplace_back((*point)[0], (*point)[1]);
     if (problems_.errors().size() > before) return {};
     for (std::size_t i = 0; i < profile.size(); ++i) {
       const bool is_end = i == 0 || i + 1 == profile.size();
       if (profile[i].x() < (is_end ? 0.0 : size_.low) || profile[i].x() > size_.high)
-        problems_.add(at->items[i].place, at->items[i].path, "the radius " + number_text(profile[i].x()) + " is out of range",
+        problems_.add(at->items[i].place, at->items[i].path,
+                      "the radius " + number_text(profile[i].x()) + " is out of range",
                       "give metres, more than 0 (0 at the two ends only) and at most " + number_text(size_.high));
       if (i > 0 && profile[i] == profile[i - 1])
         problems_.add(at->items[i].place, at->items[i].path, "the point is the same as the one before", "remove it");
     }
-    if (profile.size() == 2 && (profile[0].x() == 0.0 || profile[1].x() == 0.0) && profile[0].x() + profile[1].x() == 0.0)
+    if (profile.size() == 2 && (profile[0].x() == 0.0 || profile[1].x() == 0.0) &&
+        profile[0].x() + profile[1].x() == 0.0)
       problems_.add(at->place, at->path, "the profile lies on the axis", "give radii of more than 0");
     if (problems_.errors().size() > before) return {};
     return mesh_shape(geometry::make_lathe(profile, segments), use);
@@ -210,11 +214,13 @@ class ShapeReader {
   // A flat box whose upper face is at z = 0.
   BodyShape read_ground(const LocatedValue& value) {
     Binder binder(value, problems_);
-    if (may_move_) problems_.add(value.place, value.path, "the ground can't move", "use it for a support, or give a box");
+    if (may_move_)
+      problems_.add(value.place, value.path, "the ground can't move", "use it for a support, or give a box");
     double size = 4.0;
     constexpr double kThickness = 0.1;
     binder.read("size", size, kSupportSize);
-    return primitive(geometry::BoxShape{{size, size, kThickness}}, Pose::from_translation({0.0, 0.0, -0.5 * kThickness}));
+    return primitive(geometry::BoxShape{{size, size, kThickness}},
+                     Pose::from_translation({0.0, 0.0, -0.5 * kThickness}));
   }
 
   BodyShape read_parts(const LocatedValue& value) {

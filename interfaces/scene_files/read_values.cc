@@ -25,22 +25,24 @@ using geometry::Vector6d;
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::size_t kMostSamples = 100'000;
 
-constexpr const char* kScalarForms = "give a number, {normal: [mean, deviation]}, {uniform: [low, high]} or {samples: [...]}";
+constexpr const char* kScalarForms =
+    "give a number, {normal: [mean, deviation]}, {uniform: [low, high]} or {samples: [...]}";
 
 // A deviation has the unit of its quantity and is not negative.
 NumberRange deviation_range(const NumberRange& range) {
-  return {0.0, std::max(std::abs(range.low), std::abs(range.high)), "give a standard deviation of at least 0", range.unit};
+  return {0.0, std::max(std::abs(range.low), std::abs(range.high)), "give a standard deviation of at least 0",
+          range.unit};
 }
 
-ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const NumberRange& range, bool cut_low, bool cut_high) {
+ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const NumberRange& range, bool cut_low,
+                               bool cut_high) {
   Problems& problems = binder.problems();
   NormalScalar normal;
   if (cut_low) normal.low = range.low;
   if (cut_high) normal.high = range.high;
   binder.read("min", normal.low, range);
   binder.read("max", normal.high, range);
-  if (normal.low > normal.high)
-    problems.add(value.place, value.path, "min is above max", "give a min below the max");
+  if (normal.low > normal.high) problems.add(value.place, value.path, "min is above max", "give a min below the max");
   if (value.kind != LocatedValue::Kind::kList || value.items.size() != 2) {
     report_type(value, problems, "give [mean, standard deviation]");
     return normal;
@@ -53,7 +55,8 @@ ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const 
 ScalarDistribution read_uniform(const LocatedValue& value, Problems& problems, const NumberRange& range) {
   const std::optional<std::vector<double>> ends = read_numbers(value, problems, 2, range);
   if (!ends) return FixedScalar{};
-  if ((*ends)[0] > (*ends)[1]) problems.add(value.place, value.path, "the interval runs backwards", "give [lowest, highest]");
+  if ((*ends)[0] > (*ends)[1])
+    problems.add(value.place, value.path, "the interval runs backwards", "give [lowest, highest]");
   return UniformScalar{(*ends)[0], (*ends)[1]};
 }
 
@@ -74,7 +77,8 @@ bool is_sample_list(const LocatedValue& value, Problems& problems) {
 ScalarDistribution read_samples(const LocatedValue& value, Problems& problems, const NumberRange& range) {
   if (!is_sample_list(value, problems)) return FixedScalar{};
   SampledScalar sampled;
-  for (const LocatedValue& item : value.items) sampled.samples.push_back(read_number(item, problems, range).value_or(0.0));
+  for (const LocatedValue& item : value.items)
+    sampled.samples.push_back(read_number(item, problems, range).value_or(0.0));
   return sampled;
 }
 
@@ -100,7 +104,8 @@ Matrix6d read_covariance(const LocatedValue& value, Problems& problems) {
   }
   const double scale = covariance.cwiseAbs().maxCoeff();
   if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > 1e-9 * scale) {
-    problems.add(value.place, value.path, "the covariance is not symmetric", "give the same value on both sides of the diagonal");
+    problems.add(value.place, value.path, "the covariance is not symmetric",
+                 "give the same value on both sides of the diagonal");
   } else if (Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance, Eigen::EigenvaluesOnly).eigenvalues().minCoeff() <
              -1e-9 * scale) {
     problems.add(value.place, value.path, "the covariance has a negative eigenvalue, which no distribution has",
@@ -116,12 +121,14 @@ belief::PoseDistribution read_normal_pose(const LocatedValue& value, Problems& p
   const LocatedValue* rotation = binder.find("rotation_deg");
   if (const LocatedValue* covariance = binder.find("covariance")) {
     if (position || rotation)
-      problems.add(covariance->place, covariance->path, "a covariance and deviations exclude each other", "remove one of them");
+      problems.add(covariance->place, covariance->path, "a covariance and deviations exclude each other",
+                   "remove one of them");
     normal.covariance = read_covariance(*covariance, problems);
     return normal;
   }
   if (!position && !rotation)
-    problems.add(value.place, value.path, "no deviation is given", "give 'position' (m), 'rotation_deg' or 'covariance'");
+    problems.add(value.place, value.path, "no deviation is given",
+                 "give 'position' (m), 'rotation_deg' or 'covariance'");
   Vector6d deviations = Vector6d::Zero();
   if (rotation)
     deviations.head<3>() = kDegree * read_deviations(*rotation, problems, {-180.0, 180.0, "give degrees", "deg"});
@@ -154,7 +161,8 @@ ScalarDistribution read_scalar(const LocatedValue& value, Problems& problems, co
   return which == "uniform" ? read_uniform(*form, problems, range) : read_samples(*form, problems, range);
 }
 
-belief::Vector3Distribution read_vector_distribution(const LocatedValue& value, Problems& problems, const NumberRange& range) {
+belief::Vector3Distribution read_vector_distribution(const LocatedValue& value, Problems& problems,
+                                                     const NumberRange& range) {
   if (value.kind == LocatedValue::Kind::kMap) {
     Binder binder(value, problems);
     const LocatedValue* uniform = binder.require("uniform", "give [x, y, z] or {uniform: {from: [..], to: [..]}}");
@@ -190,7 +198,8 @@ Vector3d read_axis(const LocatedValue& value, Problems& problems) {
   }
   const Vector3d axis = read_vector(value, problems, {-1e6, 1e6, "give a direction as x, -x, y, ... or [x, y, z]"});
   if (axis.norm() < 1e-9) {
-    problems.add(value.place, value.path, "the axis has no direction", "give x, -x, y, ... or [x, y, z] of some length");
+    problems.add(value.place, value.path, "the axis has no direction",
+                 "give x, -x, y, ... or [x, y, z] of some length");
     return Vector3d::UnitZ();
   }
   return axis.normalized();
@@ -199,10 +208,10 @@ Vector3d read_axis(const LocatedValue& value, Problems& problems) {
 Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
   Binder binder(value, problems);
   std::string which;
-  const LocatedValue* form =
-      binder.one_of({"quaternion", "euler_deg", "axis_angle_deg"},
-                    "give {quaternion: [w, x, y, z]}, {euler_deg: [roll, pitch, yaw]} or {axis_angle_deg: [x, y, z, angle]}",
-                    false, &which);
+  const LocatedValue* form = binder.one_of(
+      {"quaternion", "euler_deg", "axis_angle_deg"},
+      "give {quaternion: [w, x, y, z]}, {euler_deg: [roll, pitch, yaw]} or {axis_angle_deg: [x, y, z, angle]}", false,
+      &which);
   if (!form) return Quaterniond::Identity();
   if (which == "quaternion") {
     const auto q = read_numbers(*form, problems, 4, {-2.0, 2.0, "give a unit quaternion [w, x, y, z]"});
@@ -218,7 +227,8 @@ Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
   }
   if (which == "euler_deg") {
     const Vector3d angles = kDegree * read_vector(*form, problems, kAngleDeg);
-    return Quaterniond(Eigen::AngleAxisd(angles.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(angles.y(), Vector3d::UnitY()) *
+    return Quaterniond(Eigen::AngleAxisd(angles.z(), Vector3d::UnitZ()) *
+                       Eigen::AngleAxisd(angles.y(), Vector3d::UnitY()) *
                        Eigen::AngleAxisd(angles.x(), Vector3d::UnitX()));
   }
   const auto numbers = read_numbers(*form, problems, 4, {-36000.0, 36000.0, "give [x, y, z, angle in degrees]"});
@@ -233,8 +243,10 @@ Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
 
 Pose read_pose_keys(Binder& binder) {
   Pose pose;
-  if (const LocatedValue* position = binder.find("position")) pose.translation = read_vector(*position, binder.problems(), kPosition);
-  if (const LocatedValue* rotation = binder.find("rotation")) pose.rotation = read_rotation(*rotation, binder.problems());
+  if (const LocatedValue* position = binder.find("position"))
+    pose.translation = read_vector(*position, binder.problems(), kPosition);
+  if (const LocatedValue* rotation = binder.find("rotation"))
+    pose.rotation = read_rotation(*rotation, binder.problems());
   return pose;
 }
 

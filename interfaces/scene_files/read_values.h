@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readers of the values that scenes are made of: vectors, rotations, poses and distributions. Each reports what is wrong
-// and then returns something harmless; the scene is used only when nothing was reported.
+// Readers of the values that scenes are made of: vectors, rotations, poses and distributions. Each reports what is
+// wrong and then returns something harmless; the scene is used only when nothing was reported.
 #pragma once
 
 #include "prescene/belief/distribution.h"
@@ -20,15 +20,17 @@ inline constexpr NumberRange kDuration{1e-4, 1e5, "give seconds, more than 0 and
 inline constexpr NumberRange kAngleDeg{-36000.0, 36000.0, "give degrees", "deg"};
 inline constexpr NumberRange kSpeed{-1000.0, 1000.0, "give m/s between -1000 and 1000"};
 inline constexpr NumberRange kTurnRate{-1000.0, 1000.0, "give rad/s between -1000 and 1000", "rad"};
-inline constexpr NumberRange kFriction{0.0, 100.0, "give a Coulomb coefficient of at least 0 (ice 0.05, wood 0.4, rubber 1)"};
+inline constexpr NumberRange kFriction{0.0, 100.0,
+                                       "give a Coulomb coefficient of at least 0 (ice 0.05, wood 0.4, rubber 1)"};
 inline constexpr NumberRange kRestitution{0.0, 1.0, "give a coefficient between 0 (no bounce) and 1"};
 
-/// A number, or {normal: [mean, sd], min, max}, {uniform: [low, high]}, {samples: [...]}. Where an end of the range is an
-/// end in nature (`cut_low`, `cut_high`), a normal is cut there by itself.
+/// A number, or {normal: [mean, sd], min, max}, {uniform: [low, high]}, {samples: [...]}. Where an end of the range is
+/// an end in nature (`cut_low`, `cut_high`), a normal is cut there by itself.
 belief::ScalarDistribution read_scalar(const LocatedValue& value, Problems& problems, const NumberRange& range,
                                        bool cut_low = false, bool cut_high = false);
 /// [x, y, z], each a number or distribution; or {uniform: {from: [..], to: [..]}}.
-belief::Vector3Distribution read_vector_distribution(const LocatedValue& value, Problems& problems, const NumberRange& range);
+belief::Vector3Distribution read_vector_distribution(const LocatedValue& value, Problems& problems,
+                                                     const NumberRange& range);
 /// [x, y, z] in numbers.
 geometry::Vector3d read_vector(const LocatedValue& value, Problems& problems, const NumberRange& range);
 /// x, -x, y, ... or a vector of any length, which is made a unit vector.

@@ -25,7 +25,8 @@ std::vector<std::string> read_names(const LocatedValue* map, Problems& problems)
   for (std::size_t i = 0; i < map->keys.size(); ++i) {
     const std::string& name = map->keys[i].name;
     if (!belief::check_name(name).ok())
-      problems.add(map->keys[i].place, map->items[i].path, "the name " + interfaces::quoted(name) + " has characters that names can't have",
+      problems.add(map->keys[i].place, map->items[i].path,
+                   "the name " + interfaces::quoted(name) + " has characters that names can't have",
                    "use letters, digits, '_', '-' and '.', at most 128");
     names.push_back(name);
   }
@@ -40,11 +41,11 @@ void check_distinct(const LocatedValue& document, Problems& problems) {
     if (!map) continue;
     for (std::size_t i = 0; i < map->keys.size(); ++i) {
       const LocatedValue::Key& key = map->keys[i];
-      const auto same =
-          std::find_if(seen.begin(), seen.end(), [&](const LocatedValue::Key* other) { return other->name == key.name; });
+      const auto same = std::find_if(seen.begin(), seen.end(),
+                                     [&](const LocatedValue::Key* other) { return other->name == key.name; });
       if (same != seen.end())
-        problems.add(key.place, map->items[i].path,
-                     "the name is taken on line " + std::to_string((*same)->place.line), "rename one of the two");
+        problems.add(key.place, map->items[i].path, "the name is taken on line " + std::to_string((*same)->place.line),
+                     "rename one of the two");
       seen.push_back(&key);
     }
   }
@@ -117,15 +118,17 @@ void warn_of_oddities(const LocatedValue& document, const Scene& scene, Problems
   for (const belief::Action& action : scene.actions) {
     if (action.time <= scene.duration) continue;
     const LocatedValue& at = *document.find("actions");
-    problems.warn(at.place, at.path, "an action is at " + number_text(action.time) + " s, after the end at " +
-                                         number_text(scene.duration) + " s",
-                  "raise 'duration'");
+    problems.warn(
+        at.place, at.path,
+        "an action is at " + number_text(action.time) + " s, after the end at " + number_text(scene.duration) + " s",
+        "raise 'duration'");
   }
 }
 
 }  // namespace
 
-std::string SceneContext::read_name(const LocatedValue& value, const std::vector<std::string>& names, const std::string& what) {
+std::string SceneContext::read_name(const LocatedValue& value, const std::vector<std::string>& names,
+                                    const std::string& what) {
   const std::optional<std::string> name = read_text(value, problems);
   if (!name) return {};
   if (std::find(names.begin(), names.end(), *name) != names.end()) return *name;
@@ -177,10 +180,11 @@ belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context
   constexpr NumberRange kFocal{1.0, 1e5, "give the focal length in pixels, at least 1"};
   constexpr NumberRange kPixel{-1e5, 1e5, "give pixels"};
   std::string which;
-  const LocatedValue* lens = binder.one_of({"fx", "fov_deg"}, "give 'fx' in pixels, or 'fov_deg', the horizontal view in degrees",
-                                           false, &which);
+  const LocatedValue* lens = binder.one_of(
+      {"fx", "fov_deg"}, "give 'fx' in pixels, or 'fov_deg', the horizontal view in degrees", false, &which);
   if (lens && which == "fov_deg") {
-    const double fov = read_number(*lens, problems, {1.0, 170.0, "give degrees between 1 and 170", "deg"}).value_or(60.0);
+    const double fov =
+        read_number(*lens, problems, {1.0, 170.0, "give degrees between 1 and 170", "deg"}).value_or(60.0);
     in.fx = 0.5 * in.width / std::tan(0.5 * fov * std::numbers::pi / 180.0);
   } else if (lens) {
     in.fx = read_number(*lens, problems, kFocal).value_or(500.0);
@@ -245,8 +249,8 @@ core::Result<Scene> read_scene(const std::filesystem::path& path, const SceneFil
     if (report) report->errors.push_back({path.string(), 0, 0, "", bytes.status().message(), ""});
     return bytes.status();
   }
-  return parse_scene(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), path.string(), options,
-                     report);
+  return parse_scene(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), path.string(),
+                     options, report);
 }
 
 }  // namespace prescene::interfaces
