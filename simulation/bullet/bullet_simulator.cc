@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/simulation/bullet/bullet_simulator.h"
+
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+#include "compiled_scene.h"
+#include "contact_log.h"
+#include "instance_world.h"
+#include "prescene/core/check.h"
+#include "rest_detector.h"
+
+namespace prescene::simulation {
+namespace {
+
+/// What one thread needs to run instances one after another.
+struct Worker {
+  explicit Worker(std::shared_ptr<const CompiledScene> scene) : world(std::move(scene)) {}
+  InstanceWorld world;
+  RestDetector rest;
+  ContactLog contacts;
+};
+
+class BulletInstance : public Instance {
+ public:
+  BulletInstance(std::shared_ptr<const CompiledScene> scene, std::vector<belief::Action> actions,
+                 const core::RandomStream& stream)
+      : world_(scene), actions_(std::move(actions)), stream_(stream) {
+    set_state(belief::mean_start(scene->scene));
+  }
+  void set_state(const belief::WorldState& state) override {
+    world_.reset(state, actions_, stream_);
+    rest_.reset();
+  }
+  belief::WorldState state() const override {
+    belief::WorldState state;
+    world_.read(state);
+    return state;
+  }
+  void step() override { world_.step(); }
+  double step_size() const override { return world_.dt(); }
+  bool at_rest() const override { return rest_.at_rest(world_); }
+  Snapshot save() const override {
+    Snapshot snapshot;
+    world_.save(snapshot.bytes);
+    return snapshot;
+  }
+  core::Status restore(const Snapshot& snapshot) override {
+    const Snapshot now = save();
+    rest_.reset();
+    if (world_.restore(snapshot.bytes)) return core::ok_status();
+    PRESCENE_CHECK(world_.restore(now.bytes));
+    return core::invalid_input(
+        "the snapshot is of another simulator, scene or list of actions; restore it where it was saved");
+  }
+
+ private:
+  // Asking whether it rests nudges the world and puts it back, which leaves it as it was.
+  mutable InstanceWorld world_;
+  mutable RestDetector rest_;
+  std::vector<belief::Action> actions_;
+  core::RandomStream stream_;
+};
+
+class BulletSimulator : public Simulator {
+ public:
+  explicit BulletSimulator(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)) {}
+
+  void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
+           std::uint32_t first_instance, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+           const core::Cancellation* cancellation) const override {
+    PRESCENE_CHECK(starts.size() == trajectories.size());
+    pool.for_each_index(starts.size(), [&](std::size_t i) {
+      std::unique_ptr<Worker> worker = take_worker();
+      const auto particle = static_cast<std::uint32_t>(first_instance + i);
+      run_one(*worker, starts[i], request, stream.at(0, particle), trajectories[i], cancellation);
+      give_back(std::move(worker));
+    });
+  }
+
+  std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
+                                          const core::RandomStream& stream) const override {
+    return std::make_unique<BulletInstance>(scene_, actions, stream);
+  }
+
+ private:
+  void run_one(Worker& worker, const belief::WorldState& start, const RunRequest& request,
+               const core::RandomStream& stream, belief::Trajectory& trajectory,
+               const core::Cancellation* cancellation) const;
+
+  std::unique_ptr<Worker> take_worker() const {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!idle_.empty()) {
+        std::unique_ptr<Worker> worker = std::move(idle_.back());
+        idle_.pop_back();
+        return worker;
+      }
+    }
+    return std::make_unique<Worker>(scene_);
+  }
+  void give_back(std::unique_ptr<Worker> worker) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    idle_.push_back(std::move(worker));
+  }
+
+  std::shared_ptr<const CompiledScene> scene_;
+  mutable std::mutex mutex_;
+  mutable std::vector<std::unique_ptr<Worker>> idle_;
+};
+
+void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, const RunRequest& request,
+                              const core::RandomStream& stream, belief::Trajectory& trajectory,
+                              const core::Cancellation* cancellation) const {
+  InstanceWorld& world = worker.world;
+  world.reset(start, request.actions, stream);
+  worker.rest.reset();
+  worker.contacts.reset();
+  trajectory = belief::Trajectory{};
+  trajectory.states.push_back(start);
+  trajectory.end = belief::TrajectoryEnd::kDuration;
+  const double dt = world.dt();
+  // A duration is met to the nearest step; rounding in its division must not add one.
+  const auto steps = static_cast<std::int64_t>(std::ceil(request.stop.duration / dt - 1e-6));
+  double next_sample = request.sample_interval;
+  std::int64_t done = 0;
+  while (done < steps) {
+    if (cancellation && (done & 63) == 0 && cancellation->requested()) {
+      trajectory.end = belief::TrajectoryEnd::kCancelled;
+      break;
+    }
+    const double begin = world.time();
+    world.step();
+    ++done;
+    if (world.diverged()) {
+      trajectory.end = belief::TrajectoryEnd::kDiverged;
+      break;
+    }
+    worker.contacts.note(world.touches(), begin, world.time(), scene_->options.contact_merge_time);
+    const bool left = world.freeze_beyond(request.stop.world_radius);
+    const double elapsed = static_cast<double>(done) * dt;
+    const bool last = done == steps;
+    const bool ended = request.stop.stop_at_rest ? worker.rest.at_rest(world) : world.all_frozen();
+    if (ended) trajectory.end = left ? belief::TrajectoryEnd::kLeftTheWorld : belief::TrajectoryEnd::kAtRest;
+    if (ended || last) break;
+    if (request.sample_interval > 0.0 && elapsed >= next_sample - 0.5 * dt) {
+      trajectory.states.emplace_back();
+      world.read(trajectory.states.back());
+      while (next_sample - 0.5 * dt <= elapsed) next_sample += request.sample_interval;
+    }
+  }
+  if (trajectory.end != belief::TrajectoryEnd::kDiverged) {
+    belief::WorldState final_state;
+    world.read(final_state);
+    trajectory.states.push_back(std::move(final_state));
+    for (const Touch& touch : world.touches()) trajectory.final_contacts.emplace_back(touch.first, touch.second);
+  } else {
+    // The last state that was kept is the last that means something.
+    trajectory.states.push_back(trajectory.states.back());
+  }
+  worker.contacts.finish(trajectory.contacts);
+  trajectory.simulated_seconds = static_cast<double>(done) * dt;
+}
+
+}  // namespace
+
+core::Result<std::unique_ptr<Simulator>> make_bullet_simulator(const belief::Scene& scene, ShapeStore& shapes,
+                                                               const BulletOptions& options) {
+  PRESCENE_TRY(auto compiled, compile_scene(scene, shapes, options));
+  return std::unique_ptr<Simulator>(std::make_unique<BulletSimulator>(std::move(compiled)));
+}
+
+}  // namespace prescene::simulation

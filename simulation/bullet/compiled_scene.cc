@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compiled_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/belief/validation.h"
+#include "prescene/geometry/mass_properties.h"
+
+namespace prescene::simulation {
+namespace {
+
+void set_bounds(Part& part, const Vector3d& low, const Vector3d& high) {
+  const Vector3d center = 0.5 * (low + high);
+  part.box_center = part.X_OS * center;
+  part.box_half_size = part.X_OS.R.cwiseAbs() * (0.5 * (high - low));
+}
+
+Part convex_part(std::unique_ptr<ConvexCore> core, const Pose& X_OS) {
+  Part part;
+  part.X_OS = Frame(X_OS);
+  set_bounds(part, core->box_center() - core->box_half_size(), core->box_center() + core->box_half_size());
+  part.core = std::move(core);
+  return part;
+}
+
+core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double rounding, ShapeStore& shapes,
+                       const DecompositionSettings& decomposition, CompiledBody& body) {
+  if (const auto* primitive = std::get_if<belief::PrimitiveShape>(&shape)) {
+    body.parts.push_back(convex_part(ConvexCore::from_primitive(primitive->primitive, rounding), primitive->X_OS));
+    return core::ok_status();
+  }
+  const auto& mesh = std::get<belief::MeshShape>(shape);
+  if (!mesh.mesh) return core::invalid_input("a collision mesh is missing");
+  if (mesh.use == belief::MeshUse::kSurface) {
+    if (!fixed) {
+      return core::unsupported(
+          "a triangle surface can only be fixed or a robot body; use convex_hull, convex_parts or decompose for objects");
+    }
+    PRESCENE_TRY(const auto prepared, shapes.static_mesh(*mesh.mesh));
+    Part part;
+    part.X_OS = Frame(mesh.X_OS);
+    part.surface = std::make_shared<const SurfaceShape>(prepared);
+    const geometry::Box box = geometry::bounding_box(*mesh.mesh);
+    set_bounds(part, box.min(), box.max());
+    body.parts.push_back(std::move(part));
+    return core::ok_status();
+  }
+  PRESCENE_TRY(const auto parts, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
+  for (const ConvexPolytope& polytope : *parts) {
+    body.parts.push_back(convex_part(ConvexCore::from_polytope(polytope, rounding), mesh.X_OS));
+  }
+  return core::ok_status();
+}
+
+core::Result<CompiledBody> compile_body(const std::string& name, const std::vector<belief::CollisionShape>& collision,
+                                        const belief::ContactProperties& contact, bool fixed, ShapeStore& shapes,
+                                        const BulletOptions& options) {
+  CompiledBody body;
+  body.name = name;
+  body.friction = belief::mean(contact.friction);
+  body.impact_friction = contact.impact_friction ? belief::mean(*contact.impact_friction) : body.friction;
+  body.restitution = belief::mean(contact.restitution);
+  body.rolling_arm = contact.rolling_friction;
+  const double rounding = std::max(options.edge_rounding, contact.edge_radius);
+  for (std::size_t i = 0; i < collision.size(); ++i) {
+    const core::Status status = add_shape(collision[i], fixed, rounding, shapes, options.decomposition, body);
+    if (!status.ok()) return status.at(name + ", shape " + std::to_string(i + 1));
+  }
+  for (const Part& part : body.parts) {
+    body.radius = std::max(body.radius, (part.box_center.cwiseAbs() + part.box_half_size).norm());
+  }
+  return body;
+}
+
+}  // namespace
+
+core::Status validate(const BulletOptions& options) {
+  const auto in = [](double value, double low, double high) { return value >= low && value <= high; };
+  if (!in(options.step, 1e-5, 0.02)) return core::invalid_input("step must be in [1e-5, 0.02] s");
+  if (options.solver_iterations < 1 || options.solver_iterations > 1000) {
+    return core::invalid_input("solver_iterations must be in [1, 1000]");
+  }
+  if (!in(options.solver_accuracy, 1e-15, 1.0)) return core::invalid_input("solver_accuracy must be in [1e-15, 1] m/s");
+  if (!in(options.overlap_recovery, 1e-6, 1.0)) return core::invalid_input("overlap_recovery must be in [1e-6, 1]");
+  if (!in(options.restitution_speed, 0.0, 100.0)) return core::invalid_input("restitution_speed must be in [0, 100] m/s");
+  if (!in(options.impact_speed, 0.0, 100.0)) return core::invalid_input("impact_speed must be in [0, 100] m/s");
+  if (!in(options.edge_rounding, 1e-5, 0.01)) return core::invalid_input("edge_rounding must be in [1e-5, 0.01] m");
+  if (!in(options.touching_distance, 0.0, 0.1)) return core::invalid_input("touching_distance must be in [0, 0.1] m");
+  if (!in(options.contact_merge_time, 0.0, 10.0)) return core::invalid_input("contact_merge_time must be in [0, 10] s");
+  if (!in(options.rest.energy, 0.0, 1e3)) return core::invalid_input("rest.energy must be in [0, 1000] J/kg");
+  if (!in(options.rest.time, 0.0, 1e3)) return core::invalid_input("rest.time must be in [0, 1000] s");
+  return core::ok_status();
+}
+
+core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::Scene& scene, ShapeStore& shapes,
+                                                                 const BulletOptions& options) {
+  PRESCENE_RETURN_IF_ERROR(validate(options));
+  PRESCENE_RETURN_IF_ERROR(belief::validate(scene));
+  auto compiled = std::make_shared<CompiledScene>();
+  compiled->scene = scene;
+  compiled->options = options;
+  compiled->object_count = static_cast<int>(scene.objects.size());
+  compiled->support_count = static_cast<int>(scene.supports.size());
+  compiled->robot_count = static_cast<int>(scene.robot.size());
+  for (const belief::SceneObject& object : scene.objects) {
+    const belief::ObjectModel& model = scene.model_of(object);
+    PRESCENE_TRY(CompiledBody body, compile_body(object.name, model.collision, model.contact, false, shapes, options));
+    geometry::MassProperties unit;
+    unit.mass = 1.0;
+    unit.I_BBcm_B = model.unit_inertia;
+    const geometry::PrincipalInertia principal = geometry::principal_inertia(unit);
+    body.unit_moments = principal.moments;
+    body.R_OP = principal.R_BP;
+    compiled->bodies.push_back(std::move(body));
+  }
+  for (const belief::Support& support : scene.supports) {
+    PRESCENE_TRY(CompiledBody body,
+                 compile_body(support.name, support.collision, support.contact, true, shapes, options));
+    body.X_WO = support.X_WS;
+    compiled->bodies.push_back(std::move(body));
+  }
+  for (const belief::KinematicBody& robot : scene.robot) {
+    PRESCENE_TRY(CompiledBody body, compile_body(robot.name, robot.collision, robot.contact, true, shapes, options));
+    compiled->bodies.push_back(std::move(body));
+  }
+  return std::shared_ptr<const CompiledScene>(std::move(compiled));
+}
+
+}  // namespace prescene::simulation

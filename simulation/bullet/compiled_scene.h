@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scene made ready for simulation: shapes, contact properties and principal axes of each body. Built once, shared const
+// by all instances.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bullet_types.h"
+#include "contact_finder.h"
+#include "convex_core.h"
+#include "prescene/belief/scene.h"
+#include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/shape_store.h"
+
+namespace prescene::simulation {
+
+/// One convex core or surface of a body. Exactly one of `core` and `surface` is set.
+struct Part {
+  std::shared_ptr<const ConvexCore> core;
+  std::shared_ptr<const SurfaceShape> surface;
+  Frame X_OS;
+  Vector3d box_center, box_half_size;  // in O
+};
+
+struct CompiledBody {
+  std::string name;
+  std::vector<Part> parts;
+  double radius = 0.0;          ///< Farthest point of a part from O, m.
+  double friction = 0.0;        ///< Of supports and robot bodies; objects bring theirs.
+  double impact_friction = 0.0;
+  double restitution = 0.0;
+  double rolling_arm = 0.0;
+  Pose X_WO;                    ///< Of supports.
+  Vector3d unit_moments = Vector3d::Ones();  ///< Of objects: principal moments for 1 kg, m^2.
+  Matrix3d R_OP = Matrix3d::Identity();      ///< Of objects: principal axes.
+};
+
+struct CompiledScene {
+  belief::Scene scene;
+  BulletOptions options;
+  std::vector<CompiledBody> bodies;  ///< Objects, supports, robot bodies, in the scene's order.
+  int object_count = 0;
+  int support_count = 0;
+  int robot_count = 0;
+
+  int robot_body(int robot) const { return object_count + support_count + robot; }
+};
+
+core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::Scene& scene, ShapeStore& shapes,
+                                                                 const BulletOptions& options);
+
+}  // namespace prescene::simulation

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// InstanceWorld: saving, restoring and what the rest detector asks.
+#include <algorithm>
+#include <cmath>
+
+#include "instance_world.h"
+
+namespace prescene::simulation {
+namespace {
+
+constexpr std::uint32_t kSnapshotVersion = 1;
+
+}  // namespace
+
+void InstanceWorld::save(std::vector<std::uint8_t>& bytes) const {
+  bytes.clear();
+  ByteWriter out(bytes);
+  out.value(kSnapshotVersion);
+  out.value(static_cast<std::uint32_t>(objects_.size()));
+  out.value(start_time_);
+  out.value(steps_);
+  player_.save(out);
+  for (const Object& object : objects_) {
+    out.vector(object.p_WCm);
+    out.rotation(object.R_WO);
+    out.vector(object.v_WCm);
+    out.vector(object.w_WO);
+    out.value(object.physical.mass);
+    out.vector(object.physical.center_of_mass);
+    out.value(object.physical.friction);
+    out.value(object.physical.impact_friction);
+    out.value(object.physical.restitution);
+    out.value(object.calm_steps);
+    out.value(object.held);
+    out.value(object.frozen);
+  }
+  for (const std::uint8_t parting : parting_) out.value(parting);
+  out.value(static_cast<std::uint32_t>(warm_.size()));
+  for (const Warm& warm : warm_) {
+    out.value(warm.key);
+    out.vector(warm.position);
+    out.value(warm.impulse);
+    out.vector(warm.friction_impulse);
+  }
+}
+
+bool InstanceWorld::restore(const std::vector<std::uint8_t>& bytes) {
+  ByteReader in(bytes);
+  if (in.value<std::uint32_t>() != kSnapshotVersion) return false;
+  if (in.value<std::uint32_t>() != objects_.size()) return false;
+  start_time_ = in.value<double>();
+  steps_ = in.value<std::int64_t>();
+  player_.restore(in);
+  for (Object& object : objects_) {
+    object.p_WCm = in.vector();
+    object.R_WO = in.rotation();
+    object.v_WCm = in.vector();
+    object.w_WO = in.vector();
+    object.physical.mass = in.value<double>();
+    object.physical.center_of_mass = in.vector();
+    object.physical.friction = in.value<double>();
+    object.physical.impact_friction = in.value<double>();
+    object.physical.restitution = in.value<double>();
+    object.calm_steps = in.value<int>();
+    object.held = in.value<bool>();
+    object.frozen = in.value<bool>();
+  }
+  for (std::uint8_t& parting : parting_) parting = in.value<std::uint8_t>();
+  const auto count = in.value<std::uint32_t>();
+  if (!in.ok() || count > bytes.size()) return false;
+  warm_.resize(count);
+  for (Warm& warm : warm_) {
+    warm.key = in.value<std::uint64_t>();
+    warm.position = in.vector();
+    warm.impulse = in.value<double>();
+    warm.friction_impulse = in.vector();
+  }
+  contacts_.clear();
+  contact_keys_.clear();
+  touches_.clear();
+  return in.ok() && in.at_end();
+}
+
+void InstanceWorld::footprint(int object, std::vector<Vector3d>& points, bool& others) const {
+  points.clear();
+  others = false;
+  for (const SolverContact& c : contacts_) {
+    if (c.body_a != object && c.body_b != object) continue;
+    if (c.impulse <= 0.0 && c.gap > scene_->options.touching_distance) continue;
+    const int other = c.body_a == object ? c.body_b : c.body_a;
+    const bool fixed = other >= scene_->object_count && !moving_[static_cast<std::size_t>(other)].dynamic;
+    if (!fixed) {
+      others = true;
+      continue;
+    }
+    points.push_back(c.position);
+  }
+}
+
+void InstanceWorld::nudge(int index, const Vector3d& axis_W, double angle) {
+  Object& object = objects_[static_cast<std::size_t>(index)];
+  object.R_WO = (geometry::exp_rotation(angle * axis_W) * object.R_WO).normalized();
+  // Out of what it stands on: the solver pushes the rest of any overlap apart without adding energy.
+  object.v_WCm.setZero();
+  object.w_WO.setZero();
+}
+
+}  // namespace prescene::simulation

@@ -1,0 +1,493 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "instance_world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/core/check.h"
+
+namespace prescene::simulation {
+namespace {
+
+// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
+constexpr double kContactMargin = 5e-4;
+// Speeds beyond this (m/s, rad/s) are a simulation that blew up.
+constexpr double kLargestSpeed = 1e4;
+constexpr std::size_t kTypicalContacts = 64;
+
+std::unique_ptr<btRigidBody> make_rigid_body() {
+  btRigidBody::btRigidBodyConstructionInfo info(0.0, nullptr, nullptr);
+  return std::make_unique<btRigidBody>(info);
+}
+
+Matrix3d world_inertia(const Quaterniond& R_WO, const CompiledBody& body, double mass) {
+  const Matrix3d R_WP = R_WO.toRotationMatrix() * body.R_OP;
+  return R_WP * (mass * body.unit_moments).asDiagonal() * R_WP.transpose();
+}
+
+Matrix3d world_inverse_inertia(const Quaterniond& R_WO, const CompiledBody& body, double mass) {
+  const Matrix3d R_WP = R_WO.toRotationMatrix() * body.R_OP;
+  return R_WP * (mass * body.unit_moments).cwiseInverse().asDiagonal() * R_WP.transpose();
+}
+
+Quaterniond turned(const Quaterniond& R, const Vector3d& rotation_vector) {
+  return (geometry::exp_rotation(rotation_vector) * R).normalized();
+}
+
+}  // namespace
+
+InstanceWorld::InstanceWorld(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)), player_(*scene_) {
+  const BulletOptions& options = scene_->options;
+  settings_.iterations = options.solver_iterations;
+  settings_.converged = options.solver_accuracy;
+  settings_.overlap_recovery = options.overlap_recovery;
+  settings_.restitution_speed = options.restitution_speed;
+  settings_.impact_speed = options.impact_speed;
+  contacts_.reserve(kTypicalContacts);
+  contact_keys_.reserve(kTypicalContacts);
+  warm_.reserve(kTypicalContacts);
+  points_.reserve(kTypicalContacts);
+}
+
+const CompiledBody& InstanceWorld::compiled(int body) const {
+  const auto count = static_cast<int>(scene_->bodies.size());
+  return body < count ? scene_->bodies[static_cast<std::size_t>(body)]
+                      : pushers_[static_cast<std::size_t>(body - count)];
+}
+
+void InstanceWorld::reset(const belief::WorldState& start, const std::vector<belief::Action>& actions,
+                          core::RandomStream stream) {
+  PRESCENE_CHECK(static_cast<int>(start.objects.size()) == scene_->object_count);
+  start_time_ = start.time;
+  steps_ = 0;
+  warm_.clear();
+  contacts_.clear();
+  contact_keys_.clear();
+  touches_.clear();
+  player_.reset(actions, start, stream);
+  objects_.assign(start.objects.size(), Object{});
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const belief::ObjectState& given = start.objects[i];
+    Object& object = objects_[i];
+    object.R_WO = given.X_WO.rotation.normalized();
+    object.physical = given.physical;
+    const Vector3d arm = object.R_WO * given.physical.center_of_mass;
+    object.p_WCm = given.X_WO.translation + arm;
+    object.w_WO = given.V_WO.angular;
+    object.v_WCm = given.V_WO.linear + given.V_WO.angular.cross(arm);
+    object.held = player_.kinematic(static_cast<int>(i));
+  }
+  parting_.assign(objects_.size() * static_cast<std::size_t>(scene_->robot_count), 0);
+  pushers_.clear();
+  for (int i = 0; i < player_.pusher_count(); ++i) {
+    CompiledBody body;
+    body.name = "pusher";
+    Part part;
+    part.core = ConvexCore::from_primitive(geometry::Sphere{player_.pusher_radius(i)}, scene_->options.edge_rounding);
+    part.box_center = Vector3d::Zero();
+    part.box_half_size = part.core->box_half_size();
+    body.parts.push_back(std::move(part));
+    body.radius = player_.pusher_radius(i);
+    body.friction = body.impact_friction = 0.5;
+    pushers_.push_back(std::move(body));
+  }
+  const auto count = static_cast<std::size_t>(body_count());
+  moving_.assign(count, Moving{});
+  flights_.resize(objects_.size());
+  results_.resize(count);
+  while (rigid_.size() < count) rigid_.push_back(make_rigid_body());
+  rigid_pointers_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) rigid_pointers_[i] = rigid_[i].get();
+  for (int i = 0; i < scene_->support_count; ++i) {
+    const auto body = static_cast<std::size_t>(scene_->object_count + i);
+    moving_[body].X_WO = Frame(scene_->bodies[body].X_WO);
+    moving_[body].p_WCm = moving_[body].X_WO.p;
+    sweep(static_cast<int>(body));
+  }
+}
+
+double InstanceWorld::time() const { return start_time_ + static_cast<double>(steps_) * dt(); }
+
+Pose InstanceWorld::object_pose(const Object& object) const {
+  return {object.R_WO, object.p_WCm - object.R_WO * object.physical.center_of_mass};
+}
+
+void InstanceWorld::step() {
+  run_actions();
+  place_kinematic();
+  place_dynamic();
+  find_contacts();
+  solve();
+  integrate();
+  ++steps_;
+  note_touches();
+  note_calm();
+}
+
+void InstanceWorld::run_actions() {
+  poses_.clear();
+  for (const Object& object : objects_) poses_.push_back(object_pose(object));
+  released_.clear();
+  player_.advance(time(), dt(), poses_, released_);
+  for (const ActionPlayer::Released& event : released_) {
+    Object& object = objects_[static_cast<std::size_t>(event.object)];
+    object.w_WO = event.V_WO.angular;
+    object.v_WCm = event.V_WO.linear + event.V_WO.angular.cross(object.R_WO * object.physical.center_of_mass);
+    object.calm_steps = 0;
+    for (int r = 0; r < scene_->robot_count; ++r) {
+      parting_[static_cast<std::size_t>(event.object * scene_->robot_count + r)] = 1;
+    }
+  }
+  for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].held = player_.kinematic(static_cast<int>(i));
+}
+
+void InstanceWorld::place_kinematic() {
+  const double now = time();
+  const auto place = [&](int body, const Pose& X_now, const Pose& X_next) {
+    Moving& m = moving_[static_cast<std::size_t>(body)];
+    m.X_WO = Frame(X_now);
+    m.p_WCm = X_now.translation;
+    m.velocity = (X_next.translation - X_now.translation) / dt();
+    m.spin = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt();
+    m.velocity_before = m.velocity;
+    m.spin_before = m.spin;
+    m.dynamic = false;
+    m.present = true;
+    sweep(body);
+  };
+  for (int r = 0; r < scene_->robot_count; ++r) {
+    place(scene_->robot_body(r), player_.robot_pose(r, now), player_.robot_pose(r, now + dt()));
+  }
+  for (int i = 0; i < player_.pusher_count(); ++i) {
+    const int body = static_cast<int>(scene_->bodies.size()) + i;
+    place(body, Pose::from_translation(player_.pusher_position(i, now)),
+          Pose::from_translation(player_.pusher_position(i, now + dt())));
+    moving_[static_cast<std::size_t>(body)].present = player_.pusher_present(i, now);
+  }
+  for (int i = 0; i < scene_->object_count; ++i) {
+    Object& object = objects_[static_cast<std::size_t>(i)];
+    if (!object.held) continue;
+    const Pose X_next = player_.object_pose(i, now + dt());
+    place(i, object_pose(object), X_next);
+    Moving& m = moving_[static_cast<std::size_t>(i)];
+    object.v_WCm = m.velocity + m.spin.cross(object.p_WCm - m.p_WCm);
+    object.w_WO = m.spin;
+  }
+}
+
+void InstanceWorld::place_dynamic() {
+  const Vector3d& gravity = scene_->scene.gravity_W;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const Object& object = objects_[i];
+    Moving& m = moving_[i];
+    m.present = !object.frozen;
+    if (object.held || object.frozen) continue;
+    const CompiledBody& body = scene_->bodies[i];
+    // Without contact the step ends here: a parabola, and a rotation that keeps the angular momentum (midpoint rule).
+    Flight& flight = flights_[i];
+    flight.v_WCm = object.v_WCm + dt() * gravity;
+    flight.p_WCm = object.p_WCm + 0.5 * dt() * (object.v_WCm + flight.v_WCm);
+    const Vector3d momentum = world_inertia(object.R_WO, body, 1.0) * object.w_WO;
+    const Quaterniond middle = turned(object.R_WO, 0.5 * dt() * object.w_WO);
+    const Vector3d w_middle = world_inverse_inertia(middle, body, 1.0) * momentum;
+    flight.R_WO = turned(object.R_WO, dt() * w_middle);
+    flight.w_WO = world_inverse_inertia(flight.R_WO, body, 1.0) * momentum;
+
+    m.dynamic = true;
+    m.X_WO = Frame(object_pose(object));
+    m.p_WCm = object.p_WCm;
+    m.velocity = flight.v_WCm;
+    m.spin = flight.w_WO;
+    m.velocity_before = object.v_WCm;
+    m.spin_before = object.w_WO;
+    sweep(static_cast<int>(i));
+  }
+}
+
+void InstanceWorld::sweep(int index) {
+  Moving& m = moving_[static_cast<std::size_t>(index)];
+  const CompiledBody& body = compiled(index);
+  m.low = Vector3d::Constant(1e30);
+  m.high = Vector3d::Constant(-1e30);
+  const Matrix3d absolute = m.X_WO.R.cwiseAbs();
+  for (const Part& part : body.parts) {
+    const Vector3d center = m.X_WO * part.box_center;
+    const Vector3d half = absolute * part.box_half_size;
+    m.low = m.low.cwiseMin(center - half);
+    m.high = m.high.cwiseMax(center + half);
+  }
+  const double speed = std::max(m.velocity.norm(), m.velocity_before.norm());
+  const double spin = std::max(m.spin.norm(), m.spin_before.norm());
+  m.travel = dt() * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));
+  const Vector3d swell = Vector3d::Constant(m.travel + 0.5 * kContactMargin);
+  m.low -= swell;
+  m.high += swell;
+}
+
+void InstanceWorld::find_contacts() {
+  contacts_.clear();
+  contact_keys_.clear();
+  const int count = body_count();
+  for (int a = 0; a < scene_->object_count; ++a) {
+    const Moving& ma = moving_[static_cast<std::size_t>(a)];
+    if (!ma.present) continue;
+    for (int b = a + 1; b < count; ++b) {
+      const Moving& mb = moving_[static_cast<std::size_t>(b)];
+      if (!mb.present || !(ma.dynamic || mb.dynamic)) continue;
+      if ((ma.low.array() > mb.high.array()).any() || (mb.low.array() > ma.high.array()).any()) continue;
+      find_pair(a, b);
+    }
+  }
+}
+
+void InstanceWorld::find_pair(int a, int b) {
+  const Moving& ma = moving_[static_cast<std::size_t>(a)];
+  const Moving& mb = moving_[static_cast<std::size_t>(b)];
+  const CompiledBody& body_a = compiled(a);
+  const CompiledBody& body_b = compiled(b);
+  const double range = ma.travel + mb.travel + kContactMargin;
+  const std::size_t first = contacts_.size();
+  for (std::uint32_t i = 0; i < body_a.parts.size(); ++i) {
+    const Part& part_a = body_a.parts[i];
+    if (!part_a.core) continue;  // surfaces never move by themselves and never meet each other
+    const Vector3d center_a = ma.X_WO * part_a.box_center;
+    const Vector3d half_a = ma.X_WO.R.cwiseAbs() * part_a.box_half_size + Vector3d::Constant(range);
+    for (std::uint32_t j = 0; j < body_b.parts.size(); ++j) {
+      const Part& part_b = body_b.parts[j];
+      const Vector3d center_b = mb.X_WO * part_b.box_center;
+      const Vector3d half_b = mb.X_WO.R.cwiseAbs() * part_b.box_half_size;
+      if (((center_a - center_b).cwiseAbs().array() > (half_a + half_b).array()).any()) continue;
+      points_.clear();
+      if (part_b.core) {
+        finder_.convex_convex(*part_a.core, ma.X_WO * part_a.X_OS, *part_b.core, mb.X_WO * part_b.X_OS, range, points_);
+      } else {
+        finder_.convex_surface(*part_a.core, ma.X_WO * part_a.X_OS, *part_b.surface, mb.X_WO * part_b.X_OS, range,
+                               points_);
+      }
+      add_contacts(a, b, i, j);
+    }
+  }
+  const int robot = b - scene_->robot_body(0);
+  if (robot < 0 || robot >= scene_->robot_count) return;
+  std::uint8_t& parting = parting_[static_cast<std::size_t>(a * scene_->robot_count + robot)];
+  if (!parting) return;
+  const bool overlap = std::any_of(contacts_.begin() + static_cast<std::ptrdiff_t>(first), contacts_.end(),
+                                   [](const SolverContact& c) { return c.gap <= 0.0; });
+  if (overlap) {
+    contacts_.resize(first);
+    contact_keys_.resize(first);
+  } else {
+    parting = 0;
+  }
+}
+
+void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b) {
+  if (points_.empty()) return;
+  const Moving& ma = moving_[static_cast<std::size_t>(a)];
+  const Moving& mb = moving_[static_cast<std::size_t>(b)];
+  const CompiledBody& body_a = compiled(a);
+  const CompiledBody& body_b = compiled(b);
+  const auto friction = [&](int body, const CompiledBody& c) {
+    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.friction : c.friction;
+  };
+  const auto impact_friction = [&](int body, const CompiledBody& c) {
+    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.impact_friction
+                                       : c.impact_friction;
+  };
+  const auto restitution = [&](int body, const CompiledBody& c) {
+    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.restitution : c.restitution;
+  };
+  const std::uint64_t key = (static_cast<std::uint64_t>(a) << 48) | (static_cast<std::uint64_t>(b) << 32) |
+                            (static_cast<std::uint64_t>(part_a & 0xffffu) << 16) | (part_b & 0xffffu);
+  // A contact moves on its bodies by what they slide in a step.
+  const double reach = ma.travel + mb.travel + 1e-3;
+  for (const ContactPoint& point : points_) {
+    SolverContact c;
+    c.body_a = a;
+    c.body_b = b;
+    c.position = point.position;
+    c.normal = point.normal;
+    c.gap = point.gap;
+    c.friction = friction(a, body_a) * friction(b, body_b);
+    c.impact_friction = impact_friction(a, body_a) * impact_friction(b, body_b);
+    c.restitution = restitution(a, body_a) * restitution(b, body_b);
+    c.rolling_arm = std::max(body_a.rolling_arm, body_b.rolling_arm);
+    c.speed_before = point.normal.dot(ma.velocity_before + ma.spin_before.cross(point.position - ma.p_WCm) -
+                                      mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm));
+    const Vector3d p_B = mb.X_WO.inverse_times(point.position);
+    double nearest = reach * reach;
+    for (const Warm& warm : warm_) {
+      if (warm.key != key) continue;
+      const double distance = (warm.position - p_B).squaredNorm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      c.impulse = warm.impulse;
+      c.friction_impulse = warm.friction_impulse;
+    }
+    contacts_.push_back(c);
+    contact_keys_.push_back(key);
+  }
+}
+
+void InstanceWorld::solve() {
+  if (contacts_.empty()) {
+    for (BodyResult& result : results_) result = BodyResult{};
+    warm_.clear();
+    return;
+  }
+  const auto count = static_cast<std::size_t>(body_count());
+  for (std::size_t i = 0; i < count; ++i) {
+    const Moving& m = moving_[i];
+    btRigidBody& body = *rigid_[i];
+    const bool fixed = !m.dynamic && m.velocity.isZero(0.0) && m.spin.isZero(0.0);
+    const CompiledBody& shape = compiled(static_cast<int>(i));
+    if (m.dynamic) {
+      const double mass = objects_[i].physical.mass;
+      body.setMassProps(mass, to_bullet(mass * shape.unit_moments));
+      body.setCollisionFlags(0);
+    } else {
+      body.setMassProps(0.0, btVector3(0, 0, 0));
+      body.setCollisionFlags(fixed ? btCollisionObject::CF_STATIC_OBJECT : btCollisionObject::CF_KINEMATIC_OBJECT);
+    }
+    body.setWorldTransform(to_bullet(m.dynamic ? Matrix3d(m.X_WO.R * shape.R_OP) : m.X_WO.R, m.p_WCm));
+    body.setLinearVelocity(to_bullet(m.velocity));
+    body.setAngularVelocity(to_bullet(m.spin));
+    body.updateInertiaTensor();
+  }
+  solver_.solve_step(rigid_pointers_, contacts_, settings_, dt(), results_);
+  warm_.clear();
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    const SolverContact& c = contacts_[i];
+    if (c.impulse <= 0.0 || c.bounced) continue;
+    warm_.push_back({contact_keys_[i], moving_[static_cast<std::size_t>(c.body_b)].X_WO.inverse_times(c.position),
+                     c.impulse, c.friction_impulse});
+  }
+}
+
+void InstanceWorld::integrate() {
+  first_hit_.assign(objects_.size(), dt());
+  for (const SolverContact& c : contacts_) {
+    if (!c.bounced) continue;
+    for (const int body : {c.body_a, c.body_b}) {
+      if (body >= scene_->object_count) continue;
+      double& hit = first_hit_[static_cast<std::size_t>(body)];
+      hit = std::min(hit, c.hit_time);
+    }
+  }
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    Object& object = objects_[i];
+    if (object.frozen) continue;
+    if (object.held) {
+      const Pose X_WO = player_.object_pose(static_cast<int>(i), time() + dt());
+      object.R_WO = X_WO.rotation.normalized();
+      object.p_WCm = X_WO.translation + object.R_WO * object.physical.center_of_mass;
+      continue;
+    }
+    const BodyResult& result = results_[i];
+    const Flight& flight = flights_[i];
+    if (result.touched) {
+      // In flight until the first bounce within the step (at its start if there is none), then with what came out of it.
+      const double before = first_hit_[i] < dt() ? first_hit_[i] : 0.0;
+      const double after = dt() - before;
+      const Vector3d gravity = first_hit_[i] < dt() ? scene_->scene.gravity_W : Vector3d(Vector3d::Zero());
+      const Vector3d flown = before * (object.v_WCm + 0.5 * before * gravity);
+      const Vector3d turn_flown = before * object.w_WO;
+      object.v_WCm = from_bullet(rigid_[i]->getLinearVelocity());
+      object.w_WO = from_bullet(rigid_[i]->getAngularVelocity());
+      object.p_WCm += flown + after * (object.v_WCm - 0.5 * after * gravity) + dt() * result.push;
+      if (before > 0.0) object.R_WO = turned(object.R_WO, turn_flown);
+      object.R_WO = turned(object.R_WO, after * object.w_WO + dt() * result.turn);
+    } else {
+      object.v_WCm = flight.v_WCm;
+      object.w_WO = flight.w_WO;
+      object.p_WCm = flight.p_WCm + dt() * result.push;
+      object.R_WO = result.turn.isZero(0.0) ? flight.R_WO : turned(flight.R_WO, dt() * result.turn);
+    }
+  }
+}
+
+void InstanceWorld::note_touches() {
+  touches_.clear();
+  Vector3d normal = Vector3d::Zero();
+  const auto close = [&] {
+    const double norm = normal.norm();
+    if (!touches_.empty()) touches_.back().normal_z = norm > 0.0 ? normal.z() / norm : 0.0;
+    normal.setZero();
+  };
+  // Contacts of a pair lie together, and pairs ascend.
+  for (const SolverContact& c : contacts_) {
+    if (c.impulse <= 0.0 && c.gap > scene_->options.touching_distance) continue;
+    if (touches_.empty() || touches_.back().first != c.body_a || touches_.back().second != c.body_b) {
+      close();
+      touches_.push_back({c.body_a, c.body_b, 0.0, 0.0});
+    }
+    touches_.back().impulse += c.impulse;
+    // The mean is weighted by impulse; touching without pressing counts only where nothing presses.
+    normal += std::max(c.impulse, 1e-12) * c.normal;
+  }
+  close();
+}
+
+void InstanceWorld::note_calm() {
+  for (int i = 0; i < scene_->object_count; ++i) {
+    Object& object = objects_[static_cast<std::size_t>(i)];
+    object.calm_steps = free(i) && energy(i) < scene_->options.rest.energy ? object.calm_steps + 1 : 0;
+  }
+}
+
+bool InstanceWorld::free(int object) const {
+  const Object& o = objects_[static_cast<std::size_t>(object)];
+  return !o.held && !o.frozen;
+}
+
+double InstanceWorld::energy(int object) const {
+  const Object& o = objects_[static_cast<std::size_t>(object)];
+  const CompiledBody& body = scene_->bodies[static_cast<std::size_t>(object)];
+  return 0.5 * o.v_WCm.squaredNorm() + 0.5 * o.w_WO.dot(world_inertia(o.R_WO, body, 1.0) * o.w_WO);
+}
+
+bool InstanceWorld::diverged() const {
+  return std::any_of(objects_.begin(), objects_.end(), [](const Object& o) {
+    return !(o.p_WCm.allFinite() && o.R_WO.coeffs().allFinite() && o.v_WCm.norm() < kLargestSpeed &&
+             o.w_WO.norm() < kLargestSpeed);
+  });
+}
+
+bool InstanceWorld::freeze_beyond(double radius) {
+  bool any = false;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    Object& object = objects_[i];
+    if (!object.frozen && !object.held && object.p_WCm.norm() > radius) {
+      object.frozen = true;
+      object.v_WCm.setZero();
+      object.w_WO.setZero();
+      moving_[i].present = false;
+    }
+    any = any || object.frozen;
+  }
+  return any;
+}
+
+bool InstanceWorld::all_frozen() const {
+  return !objects_.empty() &&
+         std::all_of(objects_.begin(), objects_.end(), [](const Object& o) { return o.frozen; });
+}
+
+void InstanceWorld::read(belief::WorldState& state) const {
+  state.time = time();
+  state.objects.resize(objects_.size());
+  const int rest_steps = static_cast<int>(std::ceil(scene_->options.rest.time / dt()));
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const Object& object = objects_[i];
+    belief::ObjectState& out = state.objects[i];
+    out.X_WO = object_pose(object);
+    out.V_WO.angular = object.w_WO;
+    out.V_WO.linear = object.v_WCm - object.w_WO.cross(object.R_WO * object.physical.center_of_mass);
+    out.mode = object.held                            ? belief::MotionMode::kHeld
+               : object.calm_steps >= rest_steps      ? belief::MotionMode::kResting
+                                                      : belief::MotionMode::kMoving;
+    out.physical = object.physical;
+  }
+}
+
+}  // namespace prescene::simulation

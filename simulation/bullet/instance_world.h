@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// One simulated instance: the state of all bodies and one step of it. Everything that the next step depends on is here as
+// plain numbers; Bullet's bodies are filled from them before each solve and read after it, so that saving, restoring and
+// starting over leave nothing behind.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "action_player.h"
+#include "compiled_scene.h"
+#include "contact_finder.h"
+#include "contact_solver.h"
+
+namespace prescene::simulation {
+
+/// What a pair of bodies did to each other in a step. Numbered as belief::ContactInterval; first < second.
+struct Touch {
+  int first = 0;
+  int second = 0;
+  double impulse = 0.0;   ///< N s, sum of the normal impulses.
+  double normal_z = 0.0;  ///< Of the mean normal, from second to first.
+};
+
+class InstanceWorld {
+ public:
+  explicit InstanceWorld(std::shared_ptr<const CompiledScene> scene);
+
+  /// Starts over from `start`; nothing of what was before remains.
+  void reset(const belief::WorldState& start, const std::vector<belief::Action>& actions, core::RandomStream stream);
+  void step();
+
+  double time() const;
+  double dt() const { return scene_->options.step; }
+  /// Into `state`, reusing its memory.
+  void read(belief::WorldState& state) const;
+  /// Touching pairs of the last step, ordered.
+  const std::vector<Touch>& touches() const { return touches_; }
+  /// Some number is not finite or some speed beyond 1e4.
+  bool diverged() const;
+  /// Freezes objects beyond this distance from the origin. Returns whether any object has left.
+  bool freeze_beyond(double radius);
+  bool all_frozen() const;
+
+  int object_count() const { return scene_->object_count; }
+  /// Moves by itself: neither held nor frozen.
+  bool free(int object) const;
+  /// Kinetic energy per mass of a free object, J/kg.
+  double energy(int object) const;
+  /// Steps in a row for which the object's energy was below the rest rule's.
+  int calm_steps(int object) const { return objects_[static_cast<std::size_t>(object)].calm_steps; }
+  bool actions_finished() const { return player_.finished(time()); }
+  const CompiledScene& scene() const { return *scene_; }
+
+  /// Position of the centre of mass, W.
+  Vector3d center_of_mass(int object) const { return objects_[static_cast<std::size_t>(object)].p_WCm; }
+  Quaterniond rotation(int object) const { return objects_[static_cast<std::size_t>(object)].R_WO; }
+  /// Turns an object at rest about an axis through its centre of mass and lifts it by what keeps it out of its supports.
+  void nudge(int object, const Vector3d& axis_W, double angle);
+  /// Contact points of the last step that press on the object from a fixed body: positions in W, and whether any other
+  /// body touches it.
+  void footprint(int object, std::vector<Vector3d>& points, bool& others) const;
+
+  void save(std::vector<std::uint8_t>& bytes) const;
+  bool restore(const std::vector<std::uint8_t>& bytes);
+
+ private:
+  struct Object {
+    Vector3d p_WCm = Vector3d::Zero();          // centre of mass
+    Quaterniond R_WO = Quaterniond::Identity();
+    Vector3d v_WCm = Vector3d::Zero();
+    Vector3d w_WO = Vector3d::Zero();
+    belief::PhysicalParameters physical;
+    int calm_steps = 0;
+    bool held = false;
+    bool frozen = false;
+  };
+  /// Geometry and motion of any body during a step.
+  struct Moving {
+    Frame X_WO;
+    Vector3d p_WCm = Vector3d::Zero();   // what velocities refer to
+    Vector3d velocity = Vector3d::Zero();
+    Vector3d spin = Vector3d::Zero();
+    Vector3d velocity_before = Vector3d::Zero();  // without this step's gravity
+    Vector3d spin_before = Vector3d::Zero();
+    Vector3d low, high;                  // bounding box swept over the step
+    double travel = 0.0;                 // bound of any point's way in the step, m
+    bool present = true;
+    bool dynamic = false;
+  };
+  struct Warm {
+    std::uint64_t key = 0;               // bodies and parts
+    Vector3d position;                   // in B's frame
+    double impulse = 0.0;
+    Vector3d friction_impulse;
+  };
+  struct Flight {
+    Vector3d p_WCm, v_WCm, w_WO;
+    Quaterniond R_WO;
+  };
+
+  int body_count() const { return static_cast<int>(scene_->bodies.size()) + player_.pusher_count(); }
+  Pose object_pose(const Object& object) const;
+  void run_actions();
+  void place_kinematic();
+  void place_dynamic();
+  void sweep(int body);
+  void find_contacts();
+  void find_pair(int a, int b);
+  void add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b);
+  void solve();
+  void integrate();
+  void note_touches();
+  void note_calm();
+  const CompiledBody& compiled(int body) const;
+
+  std::shared_ptr<const CompiledScene> scene_;
+  ActionPlayer player_;
+  std::vector<Object> objects_;
+  /// Per object and robot body: they overlapped when the object came free and do not touch until they have parted.
+  std::vector<std::uint8_t> parting_;
+  double start_time_ = 0.0;
+  std::int64_t steps_ = 0;
+  std::vector<Warm> warm_;
+
+  // Scratch of a step.
+  ContactFinder finder_;
+  ContactSolver solver_;
+  SolverSettings settings_;
+  std::vector<Moving> moving_;
+  std::vector<Flight> flights_;
+  std::vector<ContactPoint> points_;
+  std::vector<SolverContact> contacts_;
+  std::vector<std::uint64_t> contact_keys_;
+  std::vector<std::unique_ptr<btRigidBody>> rigid_;
+  std::vector<btCollisionObject*> rigid_pointers_;
+  std::vector<BodyResult> results_;
+  std::vector<double> first_hit_;  // per object: when in the step it first bounced, or the step's length
+  std::vector<Touch> touches_;
+  std::vector<Pose> poses_;
+  std::vector<ActionPlayer::Released> released_;
+  std::vector<CompiledBody> pushers_;
+};
+
+}  // namespace prescene::simulation

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether an instance is at rest: everything has been calm for the rest rule's time, and nothing merely balances.
+//
+// Balance is tested twice. An object that only fixed bodies touch is stable when the vertical through its centre of mass
+// passes inside the polygon of its contacts, a nudge's reach or more from every side. All others (balanced on an edge or
+// tip, round, leaning, stacked) are nudged: in a copy of the instance each is turned by a small angle about horizontal axes
+// in turn, and a short simulation shows whether it stays near or runs away.
+#pragma once
+
+#include <vector>
+
+#include "instance_world.h"
+
+namespace prescene::simulation {
+
+class RestDetector {
+ public:
+  /// Calm, no action to come, and nothing balances. The costly test runs once for each calm: its answer holds until
+  /// something moves again.
+  bool at_rest(InstanceWorld& world);
+  void reset() { tested_ = false; }
+
+  /// Steps simulated by nudge tests so far.
+  std::int64_t nudge_steps() const { return nudge_steps_; }
+
+ private:
+  bool stands_firmly(const InstanceWorld& world, int object);
+  bool returns_after_nudges(InstanceWorld& world, int object);
+
+  bool tested_ = false;
+  bool stable_ = false;
+  std::int64_t nudge_steps_ = 0;
+  std::vector<Vector3d> footprint_;
+  std::vector<std::uint8_t> saved_;
+};
+
+}  // namespace prescene::simulation

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/simulation/shape_store.h"
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "prescene/core/hash.h"
+
+namespace prescene::simulation {
+namespace {
+
+using geometry::TriangleMesh;
+
+// An edge whose faces differ by less than this (rad) is flat: 2 degrees, what tessellated curved walls do not need.
+constexpr double kFlatAngle = 0.035;
+
+std::uint64_t settings_hash(belief::MeshUse use, const DecompositionSettings& settings) {
+  core::Hasher hasher;
+  hasher.value(use);
+  if (use == belief::MeshUse::kDecompose) {
+    hasher.value(settings.concavity).value(settings.min_parts).value(settings.max_part_vertices);
+  }
+  return hasher.digest();
+}
+
+core::Result<ConvexParts> hulls_of(const std::vector<TriangleMesh>& meshes) {
+  ConvexParts parts;
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    core::Result<ConvexPolytope> polytope = make_polytope(meshes[i].vertices);
+    if (!polytope) return polytope.status().at("convex part " + std::to_string(i + 1));
+    parts.push_back(std::move(*polytope));
+  }
+  if (parts.empty()) return core::invalid_input("the mesh has no triangle; check its file");
+  return parts;
+}
+
+core::Result<ConvexParts> build_parts(const TriangleMesh& mesh, belief::MeshUse use,
+                                      const DecompositionSettings& settings, const Decomposer& decomposer) {
+  switch (use) {
+    case belief::MeshUse::kConvexHull:
+      return hulls_of({mesh});
+    case belief::MeshUse::kConvexParts:
+      return hulls_of(geometry::connected_components(mesh));
+    case belief::MeshUse::kDecompose: {
+      if (!decomposer) {
+        return core::unsupported("convex decomposition is not built in; use convex_hull or convex_parts");
+      }
+      PRESCENE_TRY(const auto pieces, decomposer(mesh, settings));
+      return hulls_of(pieces);
+    }
+    case belief::MeshUse::kSurface:
+      break;
+  }
+  return core::unsupported("a triangle surface has no convex parts; only fixed things can use it");
+}
+
+using EdgeKey = std::pair<std::array<double, 3>, std::array<double, 3>>;
+
+// Corners by position, so that meshes with split vertices (one per face) still know their neighbours.
+EdgeKey edge_key(const Vector3d& a, const Vector3d& b) {
+  return {{a.x(), a.y(), a.z()}, {b.x(), b.y(), b.z()}};
+}
+
+StaticMesh build_static(const TriangleMesh& mesh) {
+  StaticMesh result{mesh, std::vector<std::uint8_t>(mesh.triangles.size(), 0)};
+  std::map<EdgeKey, std::uint32_t> directed;
+  const auto corner = [&](std::uint32_t triangle, int k) -> const Vector3d& {
+    return mesh.vertices[mesh.triangles[triangle][static_cast<std::size_t>(k % 3)]];
+  };
+  const auto normal = [&](std::uint32_t triangle) {
+    return Vector3d((corner(triangle, 1) - corner(triangle, 0)).cross(corner(triangle, 2) - corner(triangle, 0)))
+        .normalized();
+  };
+  const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+  for (std::uint32_t t = 0; t < count; ++t) {
+    for (int k = 0; k < 3; ++k) directed.emplace(edge_key(corner(t, k), corner(t, k + 1)), t);
+  }
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const Vector3d n = normal(t);
+    for (int k = 0; k < 3; ++k) {
+      const auto twin = directed.find(edge_key(corner(t, k + 1), corner(t, k)));
+      bool ridge = true;
+      if (twin != directed.end()) {
+        // The neighbour's third corner lies below this triangle's plane at a ridge, above it in a valley.
+        const Vector3d m = normal(twin->second);
+        const Vector3d edge = (corner(t, k + 1) - corner(t, k)).normalized();
+        ridge = n.cross(m).dot(edge) > std::sin(kFlatAngle) || n.dot(m) < -0.999;
+      }
+      if (ridge) result.ridges[t] = static_cast<std::uint8_t>(result.ridges[t] | (1u << k));
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+template <class Value, class Build>
+core::Result<std::shared_ptr<const Value>> ShapeStore::find_or_build(Slots<Value>& slots, const Key& key,
+                                                                     const Build& build) {
+  std::shared_ptr<Slot<Value>> slot;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::shared_ptr<Slot<Value>>& entry = slots[key];
+    if (!entry) entry = std::make_shared<Slot<Value>>();
+    slot = entry;
+  }
+  std::call_once(slot->once, [&] {
+    core::Result<Value> value = build();
+    if (value) {
+      slot->value = std::make_shared<const Value>(std::move(*value));
+    } else {
+      slot->value = value.status();
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++built_;
+  });
+  return slot->value;
+}
+
+core::Result<std::shared_ptr<const ConvexParts>> ShapeStore::convex_parts(const TriangleMesh& mesh, belief::MeshUse use,
+                                                                          const DecompositionSettings& settings) {
+  const Key key{geometry::content_hash(mesh), settings_hash(use, settings)};
+  return find_or_build(parts_, key, [&] { return build_parts(mesh, use, settings, decomposer_); });
+}
+
+core::Result<std::shared_ptr<const StaticMesh>> ShapeStore::static_mesh(const TriangleMesh& mesh) {
+  const Key key{geometry::content_hash(mesh), 0};
+  return find_or_build(meshes_, key, [&]() -> core::Result<StaticMesh> {
+    if (mesh.empty()) return core::invalid_input("the mesh has no triangle; check its file");
+    return build_static(mesh);
+  });
+}
+
+std::size_t ShapeStore::built() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return built_;
+}
+
+}  // namespace prescene::simulation

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shapes that are expensive to make, made once: convex parts of meshes and prepared static triangle meshes, keyed by the
+// mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
+// threads may hold it.
+//
+//   ShapeStore shapes(decomposer);                       // decomposer: prescene/simulation/bullet/convex_decomposition.h
+//   auto parts = shapes.convex_parts(mesh, belief::MeshUse::kConvexHull, {});
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "prescene/belief/object_model.h"
+#include "prescene/simulation/convex_polytope.h"
+
+namespace prescene::simulation {
+
+/// How a mesh is cut into (about) convex parts.
+struct DecompositionSettings {
+  /// Depth of a dent that may be filled, as a share of the mesh's bounding diagonal, in (0, 1].
+  double concavity = 0.01;
+  int min_parts = 1;           ///< >= 1
+  int max_part_vertices = 64;  ///< >= 8; hulls with more are simplified by the decomposer.
+  friend bool operator==(const DecompositionSettings&, const DecompositionSettings&) = default;
+};
+
+/// Cuts a mesh into parts that are each nearly convex; the caller takes their hulls.
+using Decomposer = std::function<core::Result<std::vector<geometry::TriangleMesh>>(const geometry::TriangleMesh& mesh,
+                                                                                  const DecompositionSettings& settings)>;
+
+/// The convex parts that stand for a mesh in contacts, in the mesh's frame.
+using ConvexParts = std::vector<ConvexPolytope>;
+
+/// A static triangle mesh with what contact finding has to know of its edges.
+struct StaticMesh {
+  geometry::TriangleMesh mesh;
+  /// Per triangle a bit k for the edge from corner k to corner k + 1: set when the edge is a ridge (convex) or a border.
+  /// Contacts at other edges (flat seams, valleys) must take the triangle's own normal, or bodies trip over seams.
+  std::vector<std::uint8_t> ridges;
+};
+
+/// Thread-safe. Two threads that ask for the same shape at once: one makes it, the other waits.
+class ShapeStore {
+ public:
+  /// Without a decomposer, MeshUse::kDecompose fails with kUnsupported.
+  explicit ShapeStore(Decomposer decomposer = nullptr) : decomposer_(std::move(decomposer)) {}
+
+  /// The parts of a mesh under kConvexHull, kConvexParts or kDecompose. Fails with kInvalidInput for flat or empty
+  /// parts and kUnsupported for kSurface.
+  core::Result<std::shared_ptr<const ConvexParts>> convex_parts(const geometry::TriangleMesh& mesh, belief::MeshUse use,
+                                                                const DecompositionSettings& settings);
+  /// Fails with kInvalidInput when the mesh has no triangle.
+  core::Result<std::shared_ptr<const StaticMesh>> static_mesh(const geometry::TriangleMesh& mesh);
+
+  /// How many shapes have been made so far (not found), for tests and statistics.
+  std::size_t built() const;
+
+ private:
+  using Key = std::pair<std::uint64_t, std::uint64_t>;  // content of the mesh, settings
+  template <class Value>
+  struct Slot {
+    std::once_flag once;
+    core::Result<std::shared_ptr<const Value>> value = core::Result<std::shared_ptr<const Value>>(nullptr);
+  };
+  template <class Value>
+  using Slots = std::map<Key, std::shared_ptr<Slot<Value>>>;
+
+  template <class Value, class Build>
+  core::Result<std::shared_ptr<const Value>> find_or_build(Slots<Value>& slots, const Key& key, const Build& build);
+
+  Decomposer decomposer_;
+  mutable std::mutex mutex_;
+  Slots<ConvexParts> parts_;
+  Slots<StaticMesh> meshes_;
+  std::size_t built_ = 0;
+};
+
+}  // namespace prescene::simulation
