@@ -40,6 +40,8 @@ struct ActionCheck {
   Status operator()(const Release& release) const {
     PRESCENE_RETURN_IF_ERROR(check_object_name(scene, release.object));
     if (!release.retreat.allFinite()) return invalid_input("the retreat is not finite: give metres");
+    PRESCENE_RETURN_IF_ERROR(check_vector(release.disturbance.linear, kSpeedRange).at("velocity"));
+    PRESCENE_RETURN_IF_ERROR(check_vector(release.disturbance.angular, kSpeedRange).at("angular_velocity"));
     return check_finite_positive(release.retreat_duration, "a retreat_duration");
   }
   Status operator()(const Place& place) const { return check_move(place.object, place.X_WO, place.duration); }

@@ -6,15 +6,16 @@
 #include "prescene/core/check.h"
 
 namespace prescene::core {
-namespace {
 
-std::array<std::uint32_t, 4> philox(const std::array<std::uint32_t, 4>& counter,
-                                    const std::array<std::uint32_t, 2>& key) {
+std::array<std::uint32_t, 4> philox_words(const std::array<std::uint32_t, 4>& counter,
+                                          const std::array<std::uint32_t, 2>& key) {
   const r123::Philox4x32::ctr_type c = {{counter[0], counter[1], counter[2], counter[3]}};
   const r123::Philox4x32::key_type k = {{key[0], key[1]}};
   const r123::Philox4x32::ctr_type r = r123::Philox4x32()(c, k);
   return {r[0], r[1], r[2], r[3]};
 }
+
+namespace {
 
 constexpr std::uint32_t low_word(std::uint64_t v) { return static_cast<std::uint32_t>(v); }
 constexpr std::uint32_t high_word(std::uint64_t v) { return static_cast<std::uint32_t>(v >> 32); }
@@ -23,7 +24,7 @@ constexpr std::uint32_t high_word(std::uint64_t v) { return static_cast<std::uin
 // neither neighbouring seeds nor neighbouring purposes give related keys.
 std::array<std::uint32_t, 2> key_of(std::uint64_t seed, Purpose purpose) {
   constexpr std::array<std::uint32_t, 2> kFixedKey = {0x70726573, 0x63656e65};  // "prescene"
-  const auto words = philox({low_word(seed), high_word(seed), static_cast<std::uint32_t>(purpose), 0}, kFixedKey);
+  const auto words = philox_words({low_word(seed), high_word(seed), static_cast<std::uint32_t>(purpose), 0}, kFixedKey);
   return {words[0], words[1]};
 }
 
@@ -45,7 +46,7 @@ RandomStream RandomStream::for_purpose(Purpose purpose) const { return {seed_, p
 
 std::uint32_t RandomStream::next_u32() {
   if (used_ == 4) {
-    words_ = philox({block_++, particle_, low_word(step_), high_word(step_)}, key_);
+    words_ = philox_words({block_++, particle_, low_word(step_), high_word(step_)}, key_);
     used_ = 0;
   }
   return words_[used_++];

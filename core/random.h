@@ -34,6 +34,10 @@ enum class Purpose : std::uint32_t {
   kSurface = 13,
 };
 
+/// The Philox4x32-10 bijection itself [Salmon et al. 2011]: the four words of a counter under a key.
+std::array<std::uint32_t, 4> philox_words(const std::array<std::uint32_t, 4>& counter,
+                                          const std::array<std::uint32_t, 2>& key);
+
 /// A stream of Philox4x32-10 draws [Salmon et al. 2011], keyed by (seed, purpose), counted by (step, particle, draw).
 /// A value type: copying it forks the position. Period 2^34 32-bit draws per (step, particle).
 class RandomStream {

@@ -38,7 +38,7 @@ class ColorHistogram {
 
 struct ColorModelOptions {
   double smoothing_bins = 1.0;  ///< Standard deviation of the Gaussian that both histograms are smoothed by.
-  double prior_count = 1.0;     ///< Spread evenly over all bins, so that an unseen colour says little.
+  double uniform_share = 0.02;  ///< Of both distributions, spread over all bins: a colour seen in neither says nothing.
   double max_ratio = 20.0;      ///< Ratios are clipped to [1/max_ratio, max_ratio].
 };
 

@@ -62,8 +62,8 @@ struct FrameTerms {
   TemperingOptions tempering;
   geometry::PinholeCamera camera;         ///< Of the reduced images.
   int step = 1;                           ///< Full-image pixels between two sampled ones.
-  geometry::DepthImage depth;             ///< Measured, 0 = missing or out of the model's range.
-  geometry::Image<float> log_absent;      ///< log p(z | object absent), 1/m; 0 where missing.
+  geometry::DepthImage depth;             ///< Measured, cut to the model's range; 0 = missing.
+  geometry::Image<float> absent;          ///< p(z | object absent), 1/m; 0 where missing.
   geometry::Image<float> absent_peak;     ///< Depth that the absent model expects, 0 = none.
   geometry::Image<float> absent_missing;  ///< Probability of no return when absent; negative = not known.
   geometry::DepthImage known;  ///< Nearest other known surface, 0 = none; what lies behind it carries no evidence.

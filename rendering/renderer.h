@@ -38,6 +38,9 @@ struct RenderJob {
   geometry::Pose X_WC;
 };
 
+/// The kInvalidInput cases of Renderer::render; for backends.
+core::Status validate(const RenderJob& job, const RenderOptions& options);
+
 /// What a renderer is and promises.
 struct RendererInfo {
   std::string name;                 ///< "reference", "egl".

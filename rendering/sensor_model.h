@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "prescene/core/random.h"
+#include "prescene/core/status.h"
 #include "prescene/rendering/render_scene.h"
 
 namespace prescene::rendering {
@@ -72,6 +73,7 @@ struct PixelMixture {
   double behind = 0.0;    ///< Distributed as if the object were absent.
   double outlier = 0.0;   ///< Uniform on [min_depth, max_depth].
   double missing = 0.0;
+  double missing_opaque = 0.0;  ///< The same for an opaque surface.
 };
 
 /// What a pixel returns when the object is absent: around a known depth (`peak_weight` > 0), else anywhere in range.
@@ -84,6 +86,11 @@ struct AbsentMixture {
   double missing = -1.0;
 };
 
+/// Weights and probabilities within [0, 1), positive lengths, ordered classes; the message names the field.
+core::Status validate(const SensorModelOptions& options);
+/// Shares within [0, 1] that sum to 1, missing in [0, 1).
+core::Status validate(const SurfaceMaterial& material);
+
 /// Not copied per pixel; immutable, any number of threads.
 class SensorModel {
  public:
@@ -94,7 +101,7 @@ class SensorModel {
 
   /// Standard deviation of a hit, m.
   double hit_sigma(double depth, double cosine) const;
-  /// Probability of no return of a material.
+  /// Probability of no return of a material; within [0.001, 0.999] whatever the settings, so that ratios stay finite.
   double missing_probability(const SurfaceMaterial& material, double cosine, double outline_px) const;
   PixelMixture mixture(const SurfaceMaterial& material, const PixelGeometry& pixel) const;
 

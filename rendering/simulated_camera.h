@@ -3,7 +3,7 @@
 // correlated noise, flying pixels at edges, quantisation.
 //
 //   SimulatedCamera simulated(SensorModel(), options);
-//   simulated.sample(scene, view, camera, X_WC, stream.at(frame), &depth, &color);
+//   simulated.sample(scene, view, nullptr, camera, X_WC, stream, frame, &depth, &color);
 #pragma once
 
 #include "prescene/core/random.h"
@@ -21,8 +21,9 @@ struct SimulatedCameraOptions {
   double correlated_share = 0.5;
   double correlation_px = 12.0;  ///< Cell of the correlated noise; half of its correlation is gone there.
   double quantisation_per_depth_squared = 0.0013;  ///< Step of the returned depth, 1/m: 1.3 mm at 1 m.
-  double depth_edge = 0.02;   ///< m; a jump that counts as an edge even between pixels of one object.
-  bool flying_pixels = true;  ///< At edges, outliers lie between the two surfaces.
+  double depth_edge = 0.02;        ///< m; a jump that counts as an edge even between pixels of one object.
+  double interior_outlier = 0.01;  ///< Share of returns far from any edge that are anywhere in range.
+  bool flying_pixels = true;       ///< At edges, outliers lie between the two surfaces.
   bool missing = true;
   double color_noise = 2.0;                         ///< Standard deviation of each channel, of 255.
   geometry::Rgb background_low = {70, 74, 82};      ///< Colour of empty pixels at the bottom of the image ...
@@ -38,13 +39,12 @@ class SimulatedCamera {
   const SensorModel& model() const { return model_; }
   const SimulatedCameraOptions& options() const { return options_; }
 
-  /// What the camera returns of a view rendered with normals. `view.labels` index scene.instances' materials; the
-  /// stream's step is the frame's number. Unmodelled occluders are not invented: what stands in front must be in the
-  /// scene. A transparent surface shows `behind` of the scene rendered without transparent things: pass that view, or
-  /// null.
+  /// What the camera returns of a view of `scene` rendered with normals, in frame number `frame`: the same numbers for
+  /// the same stream and frame. Unmodelled occluders are not invented: what stands in front must be in the scene.
+  /// Through a transparent surface it sees `behind`, the scene rendered without transparent things (null: nothing).
   void sample(const RenderScene& scene, const RenderedView& view, const RenderedView* behind,
               const geometry::PinholeCamera& camera, const geometry::Pose& X_WC, const core::RandomStream& stream,
-              geometry::DepthImage* depth, geometry::ColorImage* color) const;
+              std::uint64_t frame, geometry::DepthImage* depth, geometry::ColorImage* color) const;
 
  private:
   SensorModel model_;

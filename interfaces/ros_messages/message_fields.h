@@ -18,6 +18,8 @@ struct Field {
   const char* name;
   Value Message::*member;
 };
+template <class Message, class Value>
+Field(const char*, Value Message::*) -> Field<Message, Value>;  // clang 14 deduces none for an aggregate
 
 template <class Message>
 struct Fields;

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/dds/dds_node.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <dds/dds.h>
+#include <dds/ddsi/ddsi_serdata.h>
+#include "graph_announcement.h"
+#include "idl_messages.h"
+#include "prescene/core/check.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "topic_table.h"
+
+namespace prescene::interfaces {
+namespace {
+
+core::Status dds_status(dds_return_t code, const std::string& doing) {
+  if (code >= 0) return core::ok_status();
+  return core::unavailable(doing + ": " + dds_strretcode(-code) + "; Cyclone DDS prints the cause above, CYCLONEDDS_URI sets it up");
+}
+
+// Ours first, so that the user's CYCLONEDDS_URI has the last word.
+std::string configuration(const DdsOptions& options) {
+  std::string xml = "<General><MaxMessageSize>65500B</MaxMessageSize></General>"
+                    "<Internal><SocketReceiveBufferSize max=\"" + std::to_string(options.receive_buffer_bytes) +
+                    "B\"/><MaxSampleSize>" + std::to_string(options.max_message_bytes) + "B</MaxSampleSize></Internal>";
+  if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
+  return xml;
+}
+
+}  // namespace
+
+struct DdsNode::Impl {
+  struct Subscription {
+    std::string topic;
+    std::string type;
+    dds_entity_t reader = 0;
+    std::function<void(ReceivedMessage&&)> on_message;
+  };
+  struct Publication {
+    std::string topic;
+    std::string type;
+    dds_entity_t writer = 0;
+  };
+
+  DdsOptions options;
+  core::LogSink log;
+  dds_entity_t participant = 0;
+  dds_entity_t waitset = 0;
+  dds_entity_t stop = 0;
+  std::unique_ptr<GraphAnnouncement> graph;
+  mutable std::mutex mutex;                 // guards the two lists; their entries stay where they are
+  std::deque<Subscription> subscriptions;
+  std::deque<Publication> publications;
+  std::atomic<std::uint64_t> dropped{0};
+  std::thread thread;
+
+  ~Impl() {
+    if (thread.joinable()) {
+      dds_set_guardcondition(stop, true);
+      thread.join();
+    }
+    graph.reset();
+    if (participant > 0) dds_delete(participant);
+  }
+
+  void run();
+  void take(Subscription& subscription);
+  core::Result<dds_entity_t> make_topic(const std::string& topic, const std::string& type) const;
+  template <class CType, class Message>
+  core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
+  void announce();
+};
+
+void DdsNode::Impl::run() {
+  std::vector<dds_attach_t> triggered(64);
+  for (;;) {
+    const dds_return_t count = dds_waitset_wait(waitset, triggered.data(), triggered.size(), DDS_INFINITY);
+    if (count < 0) return;
+    const auto filled = std::min(static_cast<std::size_t>(count), triggered.size());
+    for (std::size_t i = 0; i < filled; ++i) {
+      if (triggered[i] == 0) return;  // the stop condition
+      Subscription* subscription = nullptr;
+      {
+        const std::lock_guard lock(mutex);
+        subscription = &subscriptions[static_cast<std::size_t>(triggered[i] - 1)];
+      }
+      take(*subscription);
+    }
+  }
+}
+
+void DdsNode::Impl::take(Subscription& subscription) {
+  constexpr std::uint32_t kBatch = 16;
+  for (;;) {
+    ddsi_serdata* samples[kBatch] = {};
+    dds_sample_info_t infos[kBatch];
+    const dds_return_t count = dds_takecdr(subscription.reader, samples, kBatch, infos, DDS_ANY_STATE);
+    if (count <= 0) break;
+    for (dds_return_t i = 0; i < count; ++i) {
+      if (infos[i].valid_data) {
+        const std::size_t size = ddsi_serdata_size(samples[i]);
+        if (size <= options.max_message_bytes) {
+          ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size), infos[i].source_timestamp,
+                                  core::wall_now_ns()};
+          ddsi_serdata_to_ser(samples[i], 0, size, message.cdr.data());
+          subscription.on_message(std::move(message));
+        } else {
+          dropped.fetch_add(1, std::memory_order_relaxed);
+        }
+      }
+      ddsi_serdata_unref(samples[i]);
+    }
+    if (count < static_cast<dds_return_t>(kBatch)) break;
+  }
+  dds_sample_lost_status_t lost;
+  if (dds_get_sample_lost_status(subscription.reader, &lost) == DDS_RETCODE_OK && lost.total_count_change > 0) {
+    dropped.fetch_add(static_cast<std::uint64_t>(lost.total_count_change), std::memory_order_relaxed);
+  }
+}
+
+core::Result<dds_entity_t> DdsNode::Impl::make_topic(const std::string& topic, const std::string& type) const {
+  PRESCENE_TRY(const std::string name, dds_topic_name(topic));
+  const dds_topic_descriptor_t* descriptor = descriptor_of(type);
+  if (!descriptor) return core::unsupported("topic " + topic + ": the type '" + type + "' is not one that this program speaks");
+  const dds_entity_t entity = dds_create_topic(participant, descriptor, name.c_str(), nullptr, nullptr);
+  PRESCENE_RETURN_IF_ERROR(dds_status(entity, "topic " + topic + " of " + type));
+  return entity;
+}
+
+void DdsNode::Impl::announce() {
+  if (!graph) return;
+  std::vector<dds_entity_t> readers;
+  std::vector<dds_entity_t> writers;
+  for (const Subscription& subscription : subscriptions) readers.push_back(subscription.reader);
+  for (const Publication& publication : publications) writers.push_back(publication.writer);
+  graph->publish(options.node_name, readers, writers);
+}
+
+DdsNode::DdsNode(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DdsNode::~DdsNode() = default;
+
+core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options, const core::LogSink& log) {
+  // 0.10's port mapping overflows 65535 beyond domain 232; ROS allows up to 230 with the default port range.
+  if (options.domain < 0 || options.domain > 230) {
+    return core::invalid_input("DDS domain " + std::to_string(options.domain) + ": ROS_DOMAIN_ID is a number from 0 to 230");
+  }
+  auto impl = std::make_unique<Impl>();
+  impl->options = options;
+  impl->log = log;
+  const auto domain_id = static_cast<dds_domainid_t>(options.domain);
+  const dds_entity_t domain = dds_create_domain(domain_id, configuration(options).c_str());
+  // A second node of this process finds the domain made already and shares its configuration.
+  if (domain < 0 && domain != DDS_RETCODE_PRECONDITION_NOT_MET) {
+    return dds_status(domain, "DDS domain " + std::to_string(options.domain));
+  }
+  QosPtr qos(dds_create_qos());
+  const std::string enclave = "enclave=/;";
+  dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
+  dds_qset_entity_name(qos.get(), options.node_name.c_str());
+  impl->participant = dds_create_participant(domain_id, qos.get(), nullptr);
+  PRESCENE_RETURN_IF_ERROR(dds_status(impl->participant, "DDS participant in domain " + std::to_string(options.domain)));
+  impl->waitset = dds_create_waitset(impl->participant);
+  PRESCENE_RETURN_IF_ERROR(dds_status(impl->waitset, "DDS waitset"));
+  impl->stop = dds_create_guardcondition(impl->participant);
+  PRESCENE_RETURN_IF_ERROR(dds_status(impl->stop, "DDS guard condition"));
+  PRESCENE_RETURN_IF_ERROR(dds_status(dds_waitset_attach(impl->waitset, impl->stop, 0), "DDS waitset"));
+  if (options.ros_distro) {
+    PRESCENE_TRY(impl->graph, GraphAnnouncement::create(impl->participant, *options.ros_distro));
+    impl->announce();
+  }
+  impl->thread = std::thread([raw = impl.get()] { raw->run(); });
+  return std::unique_ptr<DdsNode>(new DdsNode(std::move(impl)));
+}
+
+core::Status DdsNode::subscribe(const std::string& topic, const std::string& type, TopicQos qos,
+                                std::function<void(ReceivedMessage&&)> on_message) {
+  PRESCENE_TRY(const dds_entity_t topic_entity, impl_->make_topic(topic, type));
+  const dds_entity_t reader = dds_create_reader(impl_->participant, topic_entity, make_qos(qos, type).get(), nullptr);
+  PRESCENE_RETURN_IF_ERROR(dds_status(reader, "reader of " + topic));
+  const std::lock_guard lock(impl_->mutex);
+  impl_->subscriptions.push_back({topic, type, reader, std::move(on_message)});
+  impl_->announce();
+  dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
+  return dds_status(dds_waitset_attach(impl_->waitset, reader, static_cast<dds_attach_t>(impl_->subscriptions.size())),
+                    "reader of " + topic);
+}
+
+core::Result<DdsPublisher> DdsNode::advertise(const std::string& topic, const std::string& type, TopicQos qos) {
+  PRESCENE_TRY(const dds_entity_t topic_entity, impl_->make_topic(topic, type));
+  const dds_entity_t writer = dds_create_writer(impl_->participant, topic_entity, make_qos(qos, type).get(), nullptr);
+  PRESCENE_RETURN_IF_ERROR(dds_status(writer, "writer of " + topic));
+  const std::lock_guard lock(impl_->mutex);
+  impl_->publications.push_back({topic, type, writer});
+  impl_->announce();
+  return DdsPublisher{static_cast<int>(impl_->publications.size()) - 1};
+}
+
+template <class CType, class Message>
+core::Status DdsNode::Impl::write(DdsPublisher publisher, const std::string& type, const Message& message) {
+  const Publication* publication = nullptr;
+  {
+    const std::lock_guard lock(mutex);
+    PRESCENE_CHECK(publisher.index >= 0 && publisher.index < static_cast<int>(publications.size()));
+    publication = &publications[static_cast<std::size_t>(publisher.index)];
+  }
+  if (publication->type != type) {
+    return core::invalid_input("topic " + publication->topic + " carries " + publication->type + ", not " + type);
+  }
+  SampleArena arena;
+  CType sample{};
+  fill(sample, message, arena);
+  return dds_status(dds_write(publication->writer, &sample), "write to " + publication->topic);
+}
+
+core::Status DdsNode::publish(DdsPublisher publisher, const RosImage& message) {
+  return impl_->write<sensor_msgs_msg_dds__Image_>(publisher, "sensor_msgs/msg/Image", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosCameraInfo& message) {
+  return impl_->write<sensor_msgs_msg_dds__CameraInfo_>(publisher, "sensor_msgs/msg/CameraInfo", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosTfMessage& message) {
+  return impl_->write<tf2_msgs_msg_dds__TFMessage_>(publisher, "tf2_msgs/msg/TFMessage", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosString& message) {
+  return impl_->write<std_msgs_msg_dds__String_>(publisher, "std_msgs/msg/String", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosClock& message) {
+  return impl_->write<rosgraph_msgs_msg_dds__Clock_>(publisher, "rosgraph_msgs/msg/Clock", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosPoseWithCovarianceStamped& message) {
+  return impl_->write<geometry_msgs_msg_dds__PoseWithCovarianceStamped_>(publisher, "geometry_msgs/msg/PoseWithCovarianceStamped",
+                                                                         message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosDetection3dArray& message) {
+  return impl_->write<vision_msgs_msg_dds__Detection3DArray_>(publisher, "vision_msgs/msg/Detection3DArray", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosMarkerArray& message) {
+  return impl_->write<visualization_msgs_msg_dds__MarkerArray_>(publisher, "visualization_msgs/msg/MarkerArray", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosDiagnosticArray& message) {
+  return impl_->write<diagnostic_msgs_msg_dds__DiagnosticArray_>(publisher, "diagnostic_msgs/msg/DiagnosticArray", message);
+}
+
+core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr) {
+  const auto decoded = [&]<class Message>(const Message&) -> core::Status {
+    PRESCENE_TRY(const Message message, decode_cdr<Message>(cdr));
+    return publish(publisher, message);
+  };
+  std::string type;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    type = impl_->publications[static_cast<std::size_t>(publisher.index)].type;
+  }
+  if (type == "sensor_msgs/msg/Image") return decoded(RosImage{});
+  if (type == "sensor_msgs/msg/CameraInfo") return decoded(RosCameraInfo{});
+  if (type == "tf2_msgs/msg/TFMessage") return decoded(RosTfMessage{});
+  if (type == "std_msgs/msg/String") return decoded(RosString{});
+  if (type == "rosgraph_msgs/msg/Clock") return decoded(RosClock{});
+  if (type == "geometry_msgs/msg/PoseWithCovarianceStamped") return decoded(RosPoseWithCovarianceStamped{});
+  if (type == "vision_msgs/msg/Detection3DArray") return decoded(RosDetection3dArray{});
+  if (type == "visualization_msgs/msg/MarkerArray") return decoded(RosMarkerArray{});
+  if (type == "diagnostic_msgs/msg/DiagnosticArray") return decoded(RosDiagnosticArray{});
+  return core::unsupported("messages of type '" + type + "' can't be published from recordings");
+}
+
+int DdsNode::matched_readers(DdsPublisher publisher) const {
+  const std::lock_guard lock(impl_->mutex);
+  dds_publication_matched_status_t status;
+  const dds_entity_t writer = impl_->publications[static_cast<std::size_t>(publisher.index)].writer;
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK ? static_cast<int>(status.current_count) : 0;
+}
+
+int DdsNode::matched_writers(const std::string& topic) const {
+  const std::lock_guard lock(impl_->mutex);
+  for (const Impl::Subscription& subscription : impl_->subscriptions) {
+    dds_subscription_matched_status_t status;
+    if (subscription.topic == topic && dds_get_subscription_matched_status(subscription.reader, &status) == DDS_RETCODE_OK) {
+      return static_cast<int>(status.current_count);
+    }
+  }
+  return 0;
+}
+
+std::uint64_t DdsNode::dropped_samples() const { return impl_->dropped.load(std::memory_order_relaxed); }
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// One participant on a DDS bus that ROS 2 users share: topics, types, qualities of service and type hashes are those that
+// ROS 2 Humble and Jazzy use, so that `ros2 topic list`, `echo` and `pub` work without glue.
+//
+//   PRESCENE_TRY(auto node, DdsNode::create(options, log));
+//   PRESCENE_RETURN_IF_ERROR(node->subscribe("/camera/depth", "sensor_msgs/msg/Image", TopicQos::kSensor, on_image));
+//   PRESCENE_TRY(auto poses, node->advertise("/prescene/markers", "visualization_msgs/msg/MarkerArray", TopicQos::kReliable));
+//   node->publish(poses, markers);
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/core/clock.h"
+#include "prescene/core/log.h"
+#include "prescene/core/status.h"
+#include "prescene/interfaces/ros_messages/messages.h"
+
+namespace prescene::interfaces {
+
+/// The release whose form of `ros_discovery_info` is published: the two don't understand each other's.
+enum class RosDistro { kHumble, kJazzy };
+
+struct DdsOptions {
+  int domain = 0;                        ///< 0 to 230; ROS_DOMAIN_ID.
+  std::string node_name = "prescene";    ///< As `ros2 node list` shows it.
+  /// Publish which nodes there are (for `ros2 node list`); topics work without it. Set it to the release that all others on
+  /// the bus have: the wrong form confuses their nodes.
+  std::optional<RosDistro> ros_distro;
+  /// Receive buffer asked of the system; RGB-D is lost below 4 MiB. A smaller one that the system grants is logged.
+  int receive_buffer_bytes = 8 << 20;
+  std::size_t max_message_bytes = std::size_t{64} << 20;   ///< Larger samples are dropped unread.
+};
+
+/// How a topic is offered or asked for; names say who uses it.
+enum class TopicQos {
+  kSensor,      ///< Best effort, keep last 5: readers of cameras match every driver.
+  kImages,      ///< Reliable, keep last 2: writers of images serve best-effort and reliable readers.
+  kReliable,    ///< Reliable, keep last 10: poses, markers, diagnostics, queries and answers.
+  kTf,          ///< Reliable, keep last 100.
+  kLatched,     ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
+  kTfStatic,    ///< Reader of /tf_static: reliable, transient local, keep last 100.
+};
+
+/// One sample as it came: CDR bytes with their header, for decode_cdr and recordings.
+struct ReceivedMessage {
+  std::string topic;             ///< "/camera/depth/image_raw"
+  std::string type;              ///< "sensor_msgs/msg/Image"
+  std::vector<std::uint8_t> cdr;
+  core::TimeNs source_ns = 0;    ///< The writer's time.
+  core::TimeNs received_ns = 0;  ///< Ours.
+};
+
+/// Handle of a topic to publish on.
+struct DdsPublisher {
+  int index = -1;
+};
+
+class DdsNode {
+ public:
+  /// Joins the bus. Fails with kUnavailable and Cyclone's own words when the participant can't be made (a misspelt
+  /// CYCLONEDDS_URI, no network interface), kInvalidInput for options out of range.
+  static core::Result<std::unique_ptr<DdsNode>> create(const DdsOptions& options, const core::LogSink& log);
+  ~DdsNode();
+  DdsNode(const DdsNode&) = delete;
+  DdsNode& operator=(const DdsNode&) = delete;
+
+  /// Calls `on_message` for each sample, from the node's one thread, until the node ends. Types: those of messages.h that
+  /// ros_messages.idl holds; another one is kUnsupported.
+  core::Status subscribe(const std::string& topic, const std::string& type, TopicQos qos,
+                         std::function<void(ReceivedMessage&&)> on_message);
+
+  core::Result<DdsPublisher> advertise(const std::string& topic, const std::string& type, TopicQos qos);
+  /// Writes one sample (copied). kUnavailable when the middleware refuses; kInvalidInput when the message is not of the
+  /// publisher's type. May be called from any thread.
+  core::Status publish(DdsPublisher publisher, const RosImage& message);
+  core::Status publish(DdsPublisher publisher, const RosCameraInfo& message);
+  core::Status publish(DdsPublisher publisher, const RosTfMessage& message);
+  core::Status publish(DdsPublisher publisher, const RosString& message);
+  core::Status publish(DdsPublisher publisher, const RosClock& message);
+  core::Status publish(DdsPublisher publisher, const RosPoseWithCovarianceStamped& message);
+  core::Status publish(DdsPublisher publisher, const RosDetection3dArray& message);
+  core::Status publish(DdsPublisher publisher, const RosMarkerArray& message);
+  core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
+  /// Decodes a recorded message of the publisher's type and publishes it.
+  core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
+
+  /// How many readers on the bus match a publisher now.
+  int matched_readers(DdsPublisher publisher) const;
+  /// How many writers match a subscription now, 0 for an unknown topic.
+  int matched_writers(const std::string& topic) const;
+  /// Samples that were dropped because they could not be decoded, were too large or were lost on the way.
+  std::uint64_t dropped_samples() const;
+
+  struct Impl;
+
+ private:
+  explicit DdsNode(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace prescene::interfaces

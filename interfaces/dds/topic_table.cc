@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "topic_table.h"
+
+#include <algorithm>
+#include <cctype>
+#include <string_view>
+
+#include "prescene/interfaces/ros_messages/schemas.h"
+#include "ros_messages.h"
+
+namespace prescene::interfaces {
+
+const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
+  struct Row {
+    std::string_view type;
+    const dds_topic_descriptor_t* descriptor;
+  };
+  static constexpr Row kRows[] = {
+      {"sensor_msgs/msg/Image", &sensor_msgs_msg_dds__Image__desc},
+      {"sensor_msgs/msg/CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
+      {"sensor_msgs/msg/CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
+      {"tf2_msgs/msg/TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
+      {"std_msgs/msg/String", &std_msgs_msg_dds__String__desc},
+      {"rosgraph_msgs/msg/Clock", &rosgraph_msgs_msg_dds__Clock__desc},
+      {"geometry_msgs/msg/PoseWithCovarianceStamped", &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc},
+      {"vision_msgs/msg/Detection3DArray", &vision_msgs_msg_dds__Detection3DArray__desc},
+      {"visualization_msgs/msg/MarkerArray", &visualization_msgs_msg_dds__MarkerArray__desc},
+      {"diagnostic_msgs/msg/DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
+  };
+  const auto* row = std::find_if(std::begin(kRows), std::end(kRows), [&](const Row& r) { return r.type == ros_type; });
+  return row == std::end(kRows) ? nullptr : row->descriptor;
+}
+
+core::Result<std::string> dds_topic_name(const std::string& ros_topic) {
+  const std::string remedy = ": ROS names are '/' and then letters, digits, '_' and '/', no token empty or begun by a digit";
+  if (ros_topic.size() < 2 || ros_topic.front() != '/' || ros_topic.back() == '/' || ros_topic.size() > 250) {
+    return core::invalid_input("topic '" + ros_topic + "'" + remedy);
+  }
+  char before = '\0';
+  for (const char c : ros_topic) {
+    const auto u = static_cast<unsigned char>(c);
+    const bool fits = c == '/' ? before != '/' : (std::isalpha(u) || c == '_' || (std::isdigit(u) && before != '/'));
+    if (!fits || u > 127) return core::invalid_input("topic '" + ros_topic + "'" + remedy);
+    before = c;
+  }
+  return "rt" + ros_topic;
+}
+
+QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
+  QosPtr qos(dds_create_qos());
+  int depth = 10;
+  bool reliable = true;
+  bool latched = false;
+  switch (kind) {
+    case TopicQos::kSensor: depth = 5; reliable = false; break;
+    case TopicQos::kImages: depth = 2; break;
+    case TopicQos::kReliable: break;
+    case TopicQos::kTf: depth = 100; break;
+    case TopicQos::kLatched: depth = 1; latched = true; break;
+    case TopicQos::kTfStatic: depth = 100; latched = true; break;
+  }
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  dds_qset_reliability(qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));
+  dds_qset_durability(qos.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  if (latched) {
+    // Cyclone replays to late joiners what the durability service keeps, not what the history does.
+    dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED);
+  }
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+  dds_qset_data_representation(qos.get(), 1, &xcdr1);
+  if (const RosType* type = find_ros_type(ros_type)) {
+    const std::string user_data = "typehash=" + std::string(type->type_hash) + ";";
+    dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
+  }
+  return qos;
+}
+
+}  // namespace prescene::interfaces

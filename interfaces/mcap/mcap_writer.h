@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes MCAP recordings that rosbag2 and Foxglove open.
+//
+//   PRESCENE_TRY(auto writer, McapWriter::create("run.mcap", {}));
+//   PRESCENE_TRY(const int depth, writer->add_channel(ros_channel("/camera/depth", "sensor_msgs/msg/Image")));
+//   PRESCENE_RETURN_IF_ERROR(writer->write({depth, 0, log_time_ns, publish_time_ns, cdr}));
+//   PRESCENE_RETURN_IF_ERROR(writer->close());
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "prescene/core/status.h"
+#include "prescene/interfaces/mcap/mcap.h"
+
+namespace prescene::interfaces {
+
+struct McapWriterOptions {
+  std::string profile = "ros2";
+  McapCompression compression = McapCompression::kZstd;
+  /// A chunk is closed when it is this large; what is in closed chunks survives a crash.
+  std::size_t chunk_bytes = std::size_t{1} << 20;
+};
+
+/// Not thread-safe. Every write to the file is checked: a full disk is kResourceExhausted, naming the file, and what was
+/// in closed chunks stays readable.
+class McapWriter {
+ public:
+  static core::Result<std::unique_ptr<McapWriter>> create(const std::filesystem::path& path, const McapWriterOptions& options);
+  /// Closes without telling of errors; call close() to hear of them.
+  ~McapWriter();
+  McapWriter(const McapWriter&) = delete;
+  McapWriter& operator=(const McapWriter&) = delete;
+
+  /// The number to give to messages. An equal channel gets the same number again.
+  core::Result<int> add_channel(const McapChannel& channel);
+  core::Status write(const McapMessage& message);
+  core::Status write_metadata(const McapMetadata& metadata);
+  /// Ends the current chunk and hands everything to the operating system.
+  core::Status flush();
+  /// Writes the index, statistics and footer. Nothing can be written afterwards.
+  core::Status close();
+
+ private:
+  struct Impl;
+  explicit McapWriter(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The channel of a ROS 2 type of ros_messages/schemas.h, with rosbag2's metadata and the type's hash.
+McapChannel ros_channel(const std::string& topic, const std::string& type);
+
+}  // namespace prescene::interfaces

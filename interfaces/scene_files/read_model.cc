@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/belief/validation.h"
+#include "prescene/interfaces/bytes/text.h"
+#include "read_scene_parts.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using belief::ContactProperties;
+using belief::ObjectModel;
+using geometry::Matrix3d;
+using geometry::SymmetryGroup;
+using geometry::Vector3d;
+
+constexpr NumberRange kDensity{0.1, 25000.0, "give kg/m^3 (water 1000, wood 600, steel 7850)"};
+constexpr NumberRange kLever{0.0, 0.5, "give metres between 0 and 0.5", "m"};
+
+void read_contact(Binder& binder, ContactProperties& contact) {
+  Problems& problems = binder.problems();
+  if (const LocatedValue* at = binder.find("friction"))
+    contact.friction = read_scalar(*at, problems, kFriction, true, true);
+  if (const LocatedValue* at = binder.find("impact_friction"))
+    contact.impact_friction = read_scalar(*at, problems, kFriction, true, true);
+  if (const LocatedValue* at = binder.find("restitution"))
+    contact.restitution = read_scalar(*at, problems, kRestitution, true, true);
+  binder.read("rolling_friction", contact.rolling_friction, kLever);
+  binder.read("edge_radius", contact.edge_radius, kLever);
+}
+
+SymmetryGroup read_symmetry(const LocatedValue& value, Problems& problems) {
+  if (value.kind == LocatedValue::Kind::kScalar) {
+    const auto word = read_word(value, problems, {"none", "cuboid"});
+    return word == 1 ? SymmetryGroup::cuboid() : SymmetryGroup::none();
+  }
+  Binder binder(value, problems);
+  const LocatedValue* axis_at = binder.require("axis", "give x, y, z or a direction [x, y, z]");
+  const Vector3d axis = axis_at ? read_axis(*axis_at, problems) : Vector3d(Vector3d::UnitZ());
+  Vector3d center = Vector3d::Zero();
+  if (const LocatedValue* at = binder.find("center")) center = read_vector(*at, problems, kPosition);
+  bool continuous = false, flip = false;
+  int order = 0;
+  binder.read("continuous", continuous);
+  binder.read("flip", flip);
+  binder.read("order", order, 2, 64, "give the number of equal turns");
+  if (continuous == (order > 0)) {
+    problems.add(value.place, value.path,
+                 continuous ? "'order' and 'continuous' exclude each other" : "the turns are missing",
+                 "give either 'order: 4' (turns of 90 degrees) or 'continuous: true'");
+    return {};
+  }
+  if (flip && !continuous)
+    problems.add(value.place, value.path, "'flip' goes with 'continuous: true' only", "remove it");
+  return continuous ? SymmetryGroup::continuous(axis, flip, center) : SymmetryGroup::cyclic(axis, order, center);
+}
+
+// [xx, yy, zz], or three rows.
+std::optional<Matrix3d> read_matrix(const LocatedValue& value, Problems& problems) {
+  constexpr NumberRange kEntry{-1e6, 1e6, "give the inertia about the centre of mass"};
+  const bool is_rows = value.kind == LocatedValue::Kind::kList && !value.items.empty() &&
+                       value.items[0].kind == LocatedValue::Kind::kList;
+  if (!is_rows) {
+    const auto diagonal = read_numbers(value, problems, 3, kEntry);
+    if (!diagonal) return std::nullopt;
+    return Vector3d((*diagonal)[0], (*diagonal)[1], (*diagonal)[2]).asDiagonal().toDenseMatrix();
+  }
+  if (value.items.size() != 3) {
+    report_type(value, problems, "give [xx, yy, zz] or three rows of three numbers");
+    return std::nullopt;
+  }
+  Matrix3d matrix;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto row = read_numbers(value.items[i], problems, 3, kEntry);
+    if (!row) return std::nullopt;
+    for (std::size_t j = 0; j < 3; ++j) matrix(static_cast<int>(i), static_cast<int>(j)) = (*row)[j];
+  }
+  return matrix;
+}
+
+std::optional<double> volume_of(const BodyShape& shape) {
+  double volume = 0.0;
+  for (const belief::CollisionShape& part : shape.collision) {
+    const auto solid = belief::mass_properties(part, 1.0);
+    if (!solid) return std::nullopt;
+    volume += solid->mass;
+  }
+  return volume;
+}
+
+// What a mass of that volume can't be: lighter than air, heavier than any metal.
+void check_density(const LocatedValue& at, double mass, double volume, Problems& problems) {
+  const double density = mass / volume;
+  if (density > kDensity.high) {
+    const double grams = density * 1e-3;
+    problems.add(at.place, at.path,
+                 number_text(mass) + " kg in this volume of " + number_text(volume) + " m^3 is denser than any metal",
+                 grams > kDensity.low && grams < kDensity.high ? "grams? then write " + number_text(mass * 1e-3)
+                                                               : std::string("check the mass (kg) and the sizes (m)"));
+  } else if (density < kDensity.low) {
+    problems.add(at.place, at.path,
+                 number_text(mass) + " kg in this volume of " + number_text(volume) + " m^3 is lighter than air",
+                 "check the sizes (metres, not millimetres or centimetres) and the mass (kg)");
+  }
+}
+
+void read_mass(Binder& binder, const BodyShape& shape, ObjectModel& model) {
+  Problems& problems = binder.problems();
+  std::string which;
+  const LocatedValue* at =
+      binder.one_of({"mass", "density"}, "give 'mass' in kg or 'density' in kg/m^3", false, &which);
+  if (!at) return;
+  const std::size_t before = problems.errors().size();
+  if (which == "mass") {
+    model.mass = read_scalar(*at, problems, kMass, true, true);
+    const std::optional<double> volume = shape.collision.empty() ? std::nullopt : volume_of(shape);
+    if (problems.errors().size() == before && volume) check_density(*at, belief::mean(model.mass), *volume, problems);
+    return;
+  }
+  const double density = read_number(*at, problems, kDensity).value_or(1000.0);
+  if (shape.collision.empty()) return;
+  const std::optional<double> volume = volume_of(shape);
+  if (volume)
+    model.mass = belief::FixedScalar{density * *volume};
+  else
+    problems.add(at->place, at->path, "the mesh is not closed, so it has no volume",
+                 "give 'mass' instead, or close the mesh");
+}
+
+void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
+  Problems& problems = binder.problems();
+  const LocatedValue* center = binder.find("center_of_mass");
+  std::string which;
+  const LocatedValue* inertia = binder.one_of({"unit_inertia", "inertia"}, "", true, &which);
+  if (!shape.collision.empty()) {
+    model.collision = shape.collision;
+    if (auto derived = belief::with_derived_properties(model)) {
+      model = *std::move(derived);
+    } else if (!center || !inertia) {
+      problems.add(shape.place->place, shape.place->path, "no solid: " + derived.status().message(),
+                   "use its convex_hull, close the mesh, or give mass, center_of_mass and inertia");
+    }
+  }
+  if (center) model.center_of_mass = read_vector_distribution(*center, problems, kPosition);
+  if (!inertia) return;
+  const std::optional<Matrix3d> matrix = read_matrix(*inertia, problems);
+  if (!matrix) return;
+  const double mass = which == "inertia" ? belief::mean(model.mass) : 1.0;
+  model.unit_inertia = *matrix / std::max(mass, 1e-9);
+  if (!geometry::MassProperties{1.0, Vector3d::Zero(), model.unit_inertia}.is_physical())
+    problems.add(
+        inertia->place, inertia->path, "no body has this inertia",
+        "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
+}
+
+// Of bodies without mass, for which nothing else asks for the hulls.
+void check_hulls(const BodyShape& shape, Problems& problems) {
+  for (const belief::CollisionShape& part : shape.collision) {
+    const auto* mesh = std::get_if<belief::MeshShape>(&part);
+    if (!mesh || mesh->use == belief::MeshUse::kSurface || mesh->use == belief::MeshUse::kDecompose) continue;
+    if (const auto solid = belief::mass_properties(part, 1.0); !solid)
+      problems.add(shape.place->place, shape.place->path, "the mesh has no hull: " + solid.status().message(),
+                   "give a mesh that is not flat, or 'use: surface'");
+  }
+}
+
+// The map under `model:` of the file, with the keys of the scene put over it.
+std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneContext& context) {
+  const LocatedValue& file = *value.find("file");
+  const std::optional<std::string> name = read_text(file, context.problems);
+  if (!name) return std::nullopt;
+  if (!context.options.follow_files) {
+    context.problems.add(file.place, file.path, "model files can't be read here", "describe the model in place");
+    return std::nullopt;
+  }
+  const core::Result<LocatedValue> document =
+      read_yaml(std::filesystem::path(*file.place.file).parent_path() / *name, context.options.limits);
+  if (!document) {
+    context.problems.add(file.place, file.path, "the model file can't be used", document.status().message());
+    return std::nullopt;
+  }
+  Binder binder(*document, context.problems);
+  const LocatedValue* model = binder.require("model", "a model file holds one key 'model' with the model's keys");
+  if (!model) return std::nullopt;
+  LocatedValue merged = *model;
+  for (std::size_t i = 0; i < value.items.size(); ++i) {
+    if (value.keys[i].name == "file") continue;
+    const auto same = std::find_if(merged.keys.begin(), merged.keys.end(),
+                                   [&](const LocatedValue::Key& key) { return key.name == value.keys[i].name; });
+    if (same == merged.keys.end()) {
+      merged.keys.push_back(value.keys[i]);
+      merged.items.push_back(value.items[i]);
+    } else {
+      const auto index = static_cast<std::size_t>(same - merged.keys.begin());
+      merged.keys[index] = value.keys[i];
+      merged.items[index] = value.items[i];
+    }
+  }
+  return merged;
+}
+
+}  // namespace
+
+belief::ObjectModel read_object_model(const LocatedValue& value, const std::string& name, SceneContext& context) {
+  ObjectModel model;
+  model.name = name;
+  std::optional<LocatedValue> merged;
+  if (value.find("file")) {
+    merged = merged_with_file(value, context);
+    if (!merged) return model;
+  }
+  Binder binder(merged ? *merged : value, context.problems);
+  const BodyShape shape = read_body_shape(binder, kObjectSize, true, context);
+  model.visual = shape.visual;
+  model.hollow = shape.hollow;
+  read_mass(binder, shape, model);
+  read_inertia(binder, shape, model);
+  read_contact(binder, model.contact);
+  if (const LocatedValue* at = binder.find("symmetry")) model.symmetry = read_symmetry(*at, context.problems);
+  if (const LocatedValue* at = binder.find("color")) model.color = read_color(*at, context.problems);
+  static const std::vector<std::pair<std::string, belief::SurfaceKind>> kSurfaces{
+      {"opaque", belief::SurfaceKind::kOpaque},
+      {"transparent", belief::SurfaceKind::kTransparent},
+      {"mirror", belief::SurfaceKind::kMirror}};
+  binder.read_enum("surface", model.surface, kSurfaces);
+  if (!merged) binder.note_known("file");
+  return model;
+}
+
+belief::Support read_support(const LocatedValue& value, const std::string& name, SceneContext& context) {
+  belief::Support support;
+  support.name = name;
+  Binder binder(value, context.problems);
+  BodyShape shape = read_body_shape(binder, kSupportSize, false, context);
+  check_hulls(shape, context.problems);
+  support.collision = std::move(shape.collision);
+  support.visual = std::move(shape.visual);
+  support.hollow = shape.hollow;
+  if (const LocatedValue* at = binder.find("pose")) support.X_WS = read_pose(*at, context.problems);
+  read_contact(binder, support.contact);
+  if (const LocatedValue* at = binder.find("color")) support.color = read_color(*at, context.problems);
+  return support;
+}
+
+belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::string& name, SceneContext& context) {
+  Problems& problems = context.problems;
+  belief::KinematicBody body;
+  body.name = name;
+  Binder binder(value, problems);
+  BodyShape shape = read_body_shape(binder, kObjectSize, true, context);
+  check_hulls(shape, problems);
+  body.collision = std::move(shape.collision);
+  body.visual = std::move(shape.visual);
+  read_contact(binder, body.contact);
+  if (const LocatedValue* at = binder.find("color")) body.color = read_color(*at, problems);
+  std::string which;
+  const LocatedValue* at = binder.one_of({"pose", "timeline"}, "give 'pose', or 'timeline' if it moves", false, &which);
+  if (!at) return body;
+  if (which == "pose") {
+    body.timeline.push_back({0.0, read_pose(*at, problems)});
+    return body;
+  }
+  if (at->kind != LocatedValue::Kind::kList || at->items.empty()) {
+    report_type(*at, problems, "give a list of at least one {time, position, rotation}");
+    return body;
+  }
+  for (const LocatedValue& item : at->items) {
+    Binder waypoint(item, problems);
+    double time = 0.0;
+    if (const LocatedValue* time_at = waypoint.require("time", "give seconds since the start"))
+      time = read_number(*time_at, problems, kTime).value_or(0.0);
+    if (!body.timeline.empty() && !(time > body.timeline.back().time))
+      problems.add(item.place, item.path, "its time is not after the one before",
+                   "sort the timeline and make times differ");
+    body.timeline.push_back({time, read_pose_keys(waypoint)});
+  }
+  return body;
+}
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <numbers>
+
+#include "prescene/interfaces/bytes/text.h"
+#include "read_scene_parts.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using belief::Condition;
+using belief::When;
+using geometry::Vector3d;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr NumberRange kTurn{0.0, 180.0, "give degrees between 0 and 180", "deg"};
+constexpr NumberRange kDistance{0.0, 1000.0, "give metres between 0 and 1000", "m"};
+
+const std::vector<std::pair<std::string, When>> kWhens{
+    {"at_end", When::kAtEnd}, {"ever", When::kEver}, {"always", When::kAlways}};
+const std::vector<std::string> kConditionKeys{"inside",          "resting_on",           "upright", "face_up", "below",
+                                              "moved_more_than", "turned_more_than_deg", "touched", "moving"};
+constexpr const char* kConditionRemedy =
+    "give a condition: inside, resting_on, upright, face_up, below, moved_more_than, turned_more_than_deg, touched, "
+    "moving, "
+    "not, or all_of with a list of them";
+
+class ConditionReader {
+ public:
+  explicit ConditionReader(SceneContext& context) : context_(context), problems_(context.problems) {}
+
+  // All conditions among the keys of a map, each of which has to hold.
+  std::vector<Condition> read_keys(Binder& binder) {
+    std::vector<Condition> conditions;
+    When when = When::kAtEnd;
+    const bool has_when = binder.read_enum("when", when, kWhens);
+    for (const std::string& key : kConditionKeys) {
+      const LocatedValue* value = binder.find(key);
+      if (!value) continue;
+      Condition condition = read(key, *value);
+      condition.when = when;
+      if (has_when && key == "touched" && when == When::kAlways)
+        problems_.add(value->place, value->path, "'touched' is about any time, not 'always'", "remove 'when'");
+      conditions.push_back(std::move(condition));
+    }
+    if (const LocatedValue* negated = binder.find("not")) read_negated(*negated, conditions);
+    return conditions;
+  }
+
+  std::vector<Condition> read_list(const LocatedValue& value) {
+    std::vector<Condition> conditions;
+    if (value.kind != LocatedValue::Kind::kList || value.items.empty()) {
+      report_type(value, problems_, "give a list of at least one condition");
+      return conditions;
+    }
+    for (const LocatedValue& item : value.items) {
+      Binder binder(item, problems_);
+      const std::vector<Condition> read = read_keys(binder);
+      if (read.empty() && item.kind == LocatedValue::Kind::kMap && item.keys.empty())
+        problems_.add(item.place, item.path, "the condition is empty", kConditionRemedy);
+      conditions.insert(conditions.end(), read.begin(), read.end());
+    }
+    return conditions;
+  }
+
+ private:
+  // None of these may hold.
+  void read_negated(const LocatedValue& value, std::vector<Condition>& conditions) {
+    std::vector<Condition> read;
+    if (value.kind == LocatedValue::Kind::kList) {
+      read = read_list(value);
+    } else {
+      Binder binder(value, problems_);
+      read = read_keys(binder);
+      if (read.size() > 1)
+        problems_.add(value.place, value.path, "'not' holds " + std::to_string(read.size()) + " conditions",
+                      "give one, or a list of which none may hold: not: [{...}, {...}]");
+    }
+    for (Condition& condition : read) {
+      condition.negated = !condition.negated;
+      conditions.push_back(std::move(condition));
+    }
+  }
+
+  Condition read(const std::string& key, const LocatedValue& value) {
+    if (key == "inside") return {read_inside(value)};
+    if (key == "resting_on") return {belief::RestingOn{read_thing(value)}};
+    if (key == "upright") return {read_upright(value)};
+    if (key == "face_up") return {read_face(value)};
+    if (key == "below") return {belief::BelowHeight{read_number(value, problems_, kPosition).value_or(0.0)}};
+    if (key == "moved_more_than")
+      return {belief::MovedMoreThan{read_number(value, problems_, kDistance).value_or(0.0)}};
+    if (key == "turned_more_than_deg")
+      return {belief::TurnedMoreThan{kDegree * read_number(value, problems_, kTurn).value_or(0.0)}};
+    if (key == "touched") return {belief::Touched{read_thing(value)}};
+    Condition moving{belief::StillMoving{}};
+    moving.negated = !read_bool(value, problems_).value_or(true);
+    return moving;
+  }
+
+  std::string read_thing(const LocatedValue& value) {
+    return context_.read_name(value, context_.all_things(), "an object, a support or a robot body");
+  }
+
+  // A support's hollow by its name, or a box of its own.
+  belief::InsideVolume read_inside(const LocatedValue& value) {
+    belief::InsideVolume volume{geometry::Pose{}, Vector3d::Ones()};
+    if (value.kind == LocatedValue::Kind::kMap) {
+      Binder binder(value, problems_);
+      binder.read("whole", volume.whole);
+      if (const LocatedValue* hollow = binder.find("hollow_of")) {
+        set_hollow(*hollow, volume);
+        return volume;
+      }
+      volume.X_WV = read_pose_keys(binder);
+      if (const LocatedValue* size =
+              binder.require("size", "give the edges [x, y, z] of the box, or 'hollow_of' a support"))
+        volume.size = read_vector(*size, problems_, kSupportSize);
+      return volume;
+    }
+    set_hollow(value, volume);
+    return volume;
+  }
+
+  void set_hollow(const LocatedValue& value, belief::InsideVolume& volume) {
+    const std::string name = context_.read_name(value, context_.supports, "a support with a hollow");
+    const std::optional<int> index = belief::find_support(context_.scene, name);
+    if (!index) return;
+    const belief::Support& support = context_.scene.supports[static_cast<std::size_t>(*index)];
+    if (!support.hollow) {
+      problems_.add(value.place, value.path, interfaces::quoted(name) + " has no hollow",
+                    "make it an open_bin, give it 'hollow: {size: ...}', or give a box {position, size}");
+      return;
+    }
+    volume.X_WV = support.X_WS * support.hollow->X_OV;
+    volume.size = support.hollow->size;
+  }
+
+  belief::UprightWithin read_upright(const LocatedValue& value) {
+    belief::UprightWithin upright;
+    Binder binder(value, problems_);
+    if (const LocatedValue* at = binder.require("within_deg", "give the largest angle to the vertical in degrees"))
+      upright.max_angle = kDegree * read_number(*at, problems_, kTurn).value_or(15.0);
+    if (const LocatedValue* at = binder.find("axis")) upright.axis_O = read_axis(*at, problems_);
+    return upright;
+  }
+
+  belief::FaceUp read_face(const LocatedValue& value) {
+    static const std::vector<std::string> kFaces{"x", "-x", "y", "-y", "z", "-z"};
+    const std::size_t face = read_word(value, problems_, kFaces).value_or(4);
+    return {(face % 2 == 0 ? 1.0 : -1.0) * Vector3d::Unit(static_cast<int>(face) / 2)};
+  }
+
+  SceneContext& context_;
+  Problems& problems_;
+};
+
+// The object that is judged: named, or the only one.
+std::string read_judged(Binder& binder, const std::string& default_object, SceneContext& context) {
+  if (const LocatedValue* at = binder.find("object")) return context.read_name(*at, context.objects, "an object");
+  if (!default_object.empty()) return default_object;
+  if (context.objects.size() == 1) return context.objects[0];
+  binder.require("object", "name the object that is judged");
+  return {};
+}
+
+}  // namespace
+
+belief::Outcome read_outcome(const LocatedValue& value, const std::string& name, const std::string& default_object,
+                             SceneContext& context) {
+  Binder binder(value, context.problems);
+  belief::Outcome outcome{name, read_judged(binder, default_object, context), {}};
+  ConditionReader reader(context);
+  outcome.all_of = reader.read_keys(binder);
+  if (const LocatedValue* list = binder.find("all_of")) {
+    const std::vector<Condition> more = reader.read_list(*list);
+    outcome.all_of.insert(outcome.all_of.end(), more.begin(), more.end());
+  }
+  if (outcome.all_of.empty()) {
+    const std::size_t before = context.problems.errors().size();
+    binder.finish();  // a mistyped key explains it
+    if (value.kind == LocatedValue::Kind::kMap && context.problems.errors().size() == before)
+      context.problems.add(value.place, value.path, "the outcome has no condition", kConditionRemedy);
+  }
+  return outcome;
+}
+
+belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::string& name, SceneContext& context) {
+  Problems& problems = context.problems;
+  belief::ExclusiveOutcomes group{name, {}};
+  Binder binder(value, problems);
+  const std::string object = read_judged(binder, "", context);
+  std::string which;
+  const LocatedValue* at =
+      binder.one_of({"outcomes", "face_up"},
+                    "give 'outcomes', of which the first that holds counts, or 'face_up: true'", false, &which);
+  if (!at) return group;
+  if (which == "face_up") {
+    if (!read_bool(*at, problems).value_or(true))
+      problems.add(at->place, at->path, "'face_up: false' says nothing", "write face_up: true, or give 'outcomes'");
+    return belief::which_face_up(name, object);
+  }
+  if (at->kind != LocatedValue::Kind::kMap || at->keys.empty()) {
+    report_type(*at, problems, "give a map of named outcomes");
+    return group;
+  }
+  for (std::size_t i = 0; i < at->keys.size(); ++i) {
+    if (at->keys[i].name == "other")
+      problems.add(at->keys[i].place, at->items[i].path, "'other' is made by itself", "give it another name");
+    group.outcomes.push_back(read_outcome(at->items[i], at->keys[i].name, object, context));
+  }
+  return group;
+}
+
+}  // namespace prescene::interfaces

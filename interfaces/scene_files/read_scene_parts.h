@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of a scene file, each read by one function. All share a context; each reports what is wrong and returns
+// something harmless then.
+#pragma once
+
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "prescene/interfaces/scene_files/scene_file.h"
+#include "read_values.h"
+
+namespace prescene::interfaces {
+
+struct SceneContext {
+  Problems& problems;
+  const SceneFileOptions& options;
+  belief::Scene& scene;
+  /// Names that may be referred to, in the order of the file; known before anything is read.
+  std::vector<std::string> models, objects, supports, robot;
+  /// Meshes read so far, so that two models of one file share it.
+  std::map<std::tuple<std::string, double, bool>, belief::MeshPtr> meshes;
+
+  /// Reads a name and looks it up; `what` is what it should be ("a model").
+  std::string read_name(const LocatedValue& value, const std::vector<std::string>& names, const std::string& what);
+  std::vector<std::string> all_things() const;
+};
+
+belief::ObjectModel read_object_model(const LocatedValue& value, const std::string& name, SceneContext& context);
+belief::Support read_support(const LocatedValue& value, const std::string& name, SceneContext& context);
+belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::string& name, SceneContext& context);
+belief::SceneObject read_object(const LocatedValue& value, const std::string& name, SceneContext& context);
+belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context);
+std::vector<belief::Action> read_actions(const LocatedValue& value, SceneContext& context);
+belief::Outcome read_outcome(const LocatedValue& value, const std::string& name, const std::string& default_object,
+                             SceneContext& context);
+belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::string& name, SceneContext& context);
+
+/// Shapes of a body and what comes with them.
+struct BodyShape {
+  std::vector<belief::CollisionShape> collision;
+  belief::MeshPtr visual;  ///< Null: made from the collision shapes.
+  std::optional<belief::Hollow> hollow;
+  const LocatedValue* place = nullptr;  ///< Of the shape, for messages about it.
+};
+/// Reads the shape keys (box, sphere, ..., parts, visual, hollow) of a body's map. `size` bounds its edges.
+BodyShape read_body_shape(Binder& binder, const NumberRange& size, bool may_move, SceneContext& context);
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/scene_files/scene_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "prescene/belief/validation.h"
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/bytes/text.h"
+#include "read_scene_parts.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using belief::Scene;
+using geometry::Vector3d;
+
+constexpr NumberRange kGravity{-100.0, 100.0, "give m/s^2 as [x, y, z], [0, 0, -9.81] on Earth"};
+
+// The names of a map's entries, checked; in the order of the file.
+std::vector<std::string> read_names(const LocatedValue* map, Problems& problems) {
+  std::vector<std::string> names;
+  if (!map) return names;
+  for (std::size_t i = 0; i < map->keys.size(); ++i) {
+    const std::string& name = map->keys[i].name;
+    if (!belief::check_name(name).ok())
+      problems.add(map->keys[i].place, map->items[i].path,
+                   "the name " + interfaces::quoted(name) + " has characters that names can't have",
+                   "use letters, digits, '_', '-' and '.', at most 128");
+    names.push_back(name);
+  }
+  return names;
+}
+
+// Objects, supports and robot bodies share their names.
+void check_distinct(const LocatedValue& document, Problems& problems) {
+  std::vector<const LocatedValue::Key*> seen;
+  for (const char* section : {"objects", "supports", "robot"}) {
+    const LocatedValue* map = document.find(section);
+    if (!map) continue;
+    for (std::size_t i = 0; i < map->keys.size(); ++i) {
+      const LocatedValue::Key& key = map->keys[i];
+      const auto same = std::find_if(seen.begin(), seen.end(),
+                                     [&](const LocatedValue::Key* other) { return other->name == key.name; });
+      if (same != seen.end())
+        problems.add(key.place, map->items[i].path, "the name is taken on line " + std::to_string((*same)->place.line),
+                     "rename one of the two");
+      seen.push_back(&key);
+    }
+  }
+}
+
+// Calls read(value, name) for each entry of a map of named things.
+template <class Read>
+void for_each_named(const LocatedValue* map, Problems& problems, const Read& read) {
+  if (!map) return;
+  if (map->kind != LocatedValue::Kind::kMap) {
+    report_type(*map, problems, "give a map of names, each with a map of its keys");
+    return;
+  }
+  for (std::size_t i = 0; i < map->keys.size(); ++i) read(map->items[i], map->keys[i].name);
+}
+
+void read_gravity(Binder& binder, Scene& scene) {
+  const LocatedValue* at = binder.find("gravity");
+  if (at) scene.gravity_W = read_vector(*at, binder.problems(), kGravity);
+}
+
+void read_sections(const LocatedValue& document, SceneContext& context) {
+  Problems& problems = context.problems;
+  Scene& scene = context.scene;
+  Binder binder(document, problems);
+  binder.read("name", scene.name);
+  read_gravity(binder, scene);
+  binder.read("duration", scene.duration, kDuration);
+  binder.read("stop_at_rest", scene.stop_at_rest);
+
+  const LocatedValue* models = binder.find("models");
+  const LocatedValue* supports = binder.find("supports");
+  const LocatedValue* robot = binder.find("robot");
+  const LocatedValue* objects = binder.require("objects", "name at least one object that may move");
+  context.models = read_names(models, problems);
+  context.supports = read_names(supports, problems);
+  context.robot = read_names(robot, problems);
+  context.objects = read_names(objects, problems);
+  check_distinct(document, problems);
+
+  for_each_named(models, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.models.push_back(read_object_model(value, name, context));
+  });
+  for_each_named(supports, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.supports.push_back(read_support(value, name, context));
+  });
+  for_each_named(robot, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.robot.push_back(read_kinematic_body(value, name, context));
+  });
+  for_each_named(objects, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.objects.push_back(read_object(value, name, context));
+  });
+  if (const LocatedValue* at = binder.find("camera")) scene.camera = read_camera(*at, context);
+  if (const LocatedValue* at = binder.find("actions")) scene.actions = read_actions(*at, context);
+  const LocatedValue* outcomes = binder.find("outcomes");
+  read_names(outcomes, problems);
+  for_each_named(outcomes, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.outcomes.push_back(read_outcome(value, name, "", context));
+  });
+  const LocatedValue* groups = binder.find("exclusive_outcomes");
+  read_names(groups, problems);
+  for_each_named(groups, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.exclusive_outcomes.push_back(read_exclusive(value, name, context));
+  });
+}
+
+void warn_of_oddities(const LocatedValue& document, const Scene& scene, Problems& problems) {
+  if (scene.supports.empty())
+    problems.warn(document.place, "", "the scene has no support, so everything falls", "add a table or a 'ground'");
+  for (const belief::Action& action : scene.actions) {
+    if (action.time <= scene.duration) continue;
+    const LocatedValue& at = *document.find("actions");
+    problems.warn(
+        at.place, at.path,
+        "an action is at " + number_text(action.time) + " s, after the end at " + number_text(scene.duration) + " s",
+        "raise 'duration'");
+  }
+}
+
+}  // namespace
+
+std::string SceneContext::read_name(const LocatedValue& value, const std::vector<std::string>& names,
+                                    const std::string& what) {
+  const std::optional<std::string> name = read_text(value, problems);
+  if (!name) return {};
+  if (std::find(names.begin(), names.end(), *name) != names.end()) return *name;
+  std::string remedy = suggestion(*name, names);
+  problems.add(value.place, value.path, interfaces::quoted(*name) + " is not " + what + " of this file",
+               remedy.empty() ? "define it first" : std::move(remedy));
+  return {};
+}
+
+std::vector<std::string> SceneContext::all_things() const {
+  std::vector<std::string> all = objects;
+  all.insert(all.end(), supports.begin(), supports.end());
+  all.insert(all.end(), robot.begin(), robot.end());
+  return all;
+}
+
+belief::SceneObject read_object(const LocatedValue& value, const std::string& name, SceneContext& context) {
+  belief::SceneObject object;
+  object.name = name;
+  Binder binder(value, context.problems);
+  if (const LocatedValue* at = binder.require("model", "name one of the models")) {
+    const std::string model = context.read_name(*at, context.models, "a model");
+    const auto found = std::find(context.models.begin(), context.models.end(), model);
+    if (found != context.models.end()) object.model = static_cast<int>(found - context.models.begin());
+  }
+  if (const LocatedValue* at = binder.require("pose", "give {position: [x, y, z]} in the world"))
+    object.pose = read_pose_distribution(*at, context.problems);
+  if (const LocatedValue* at = binder.find("velocity"))
+    object.twist.linear = read_vector_distribution(*at, context.problems, kSpeed);
+  if (const LocatedValue* at = binder.find("angular_velocity"))
+    object.twist.angular = read_vector_distribution(*at, context.problems, kTurnRate);
+  if (const LocatedValue* at = binder.find("held_by")) {
+    const std::string hand = context.read_name(*at, context.robot, "a robot body");
+    if (!hand.empty()) object.held_by = hand;
+  }
+  return object;
+}
+
+belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context) {
+  Problems& problems = context.problems;
+  belief::SceneCamera camera;
+  Binder binder(value, problems);
+  binder.read("name", camera.name);
+  geometry::PinholeCamera& in = camera.intrinsics;
+  in.width = 640;
+  in.height = 480;
+  binder.read("width", in.width, 1, 16384, "give a number of pixels");
+  binder.read("height", in.height, 1, 16384, "give a number of pixels");
+  constexpr NumberRange kFocal{1.0, 1e5, "give the focal length in pixels, at least 1"};
+  constexpr NumberRange kPixel{-1e5, 1e5, "give pixels"};
+  std::string which;
+  const LocatedValue* lens = binder.one_of(
+      {"fx", "fov_deg"}, "give 'fx' in pixels, or 'fov_deg', the horizontal view in degrees", false, &which);
+  if (lens && which == "fov_deg") {
+    const double fov =
+        read_number(*lens, problems, {1.0, 170.0, "give degrees between 1 and 170", "deg"}).value_or(60.0);
+    in.fx = 0.5 * in.width / std::tan(0.5 * fov * std::numbers::pi / 180.0);
+  } else if (lens) {
+    in.fx = read_number(*lens, problems, kFocal).value_or(500.0);
+  }
+  in.fy = in.fx;
+  in.cx = 0.5 * (in.width - 1);
+  in.cy = 0.5 * (in.height - 1);
+  binder.read("fy", in.fy, kFocal);
+  binder.read("cx", in.cx, kPixel);
+  binder.read("cy", in.cy, kPixel);
+  const LocatedValue* place =
+      binder.one_of({"pose", "look"}, "give 'pose', or 'look: {from: [x, y, z], at: [x, y, z]}'", false, &which);
+  if (!place) return camera;
+  if (which == "pose") {
+    camera.X_WC = read_pose(*place, problems);
+    return camera;
+  }
+  Binder look(*place, problems);
+  const LocatedValue* from_at = look.require("from", "give the camera's position [x, y, z]");
+  const LocatedValue* at_at = look.require("at", "give the point that it looks at [x, y, z]");
+  Vector3d up = Vector3d::UnitZ();
+  if (const LocatedValue* at = look.find("up")) up = read_axis(*at, problems);
+  if (!from_at || !at_at) return camera;
+  const Vector3d from = read_vector(*from_at, problems, kPosition), to = read_vector(*at_at, problems, kPosition);
+  const Vector3d z = to - from, x = z.cross(up);
+  if (z.norm() < 1e-9 || x.norm() < 1e-6 * z.norm()) {
+    problems.add(place->place, place->path, "the direction of view is none, or is along 'up'",
+                 "move 'at' away from 'from', or give another 'up'");
+    return camera;
+  }
+  geometry::Matrix3d R_WC;
+  R_WC << x.normalized(), z.cross(x).normalized(), z.normalized();
+  camera.X_WC = {geometry::Quaterniond(R_WC).normalized(), from};
+  return camera;
+}
+
+core::Result<Scene> parse_scene(std::string_view text, const std::string& file, const SceneFileOptions& options,
+                                FileReport* report) {
+  core::Result<LocatedValue> document = parse_yaml(text, file, options.limits);
+  if (!document) {
+    if (report) report->errors.push_back({file, 0, 0, "", document.status().message(), ""});
+    return document.status();
+  }
+  Problems problems;
+  Scene scene;
+  SceneContext context{problems, options, scene, {}, {}, {}, {}, {}};
+  read_sections(*document, context);
+  if (problems.empty()) {
+    // Everything that a person can get wrong was found above, with its line; this is the contract of belief::Scene.
+    if (const core::Status status = belief::validate(scene); !status.ok())
+      problems.add({document->place.file, 0, 0}, "", status.message(), "correct it");
+  }
+  if (problems.empty()) warn_of_oddities(*document, scene, problems);
+  if (report) *report = {problems.errors(), problems.warnings()};
+  if (!problems.empty()) return problems.status();
+  return scene;
+}
+
+core::Result<Scene> read_scene(const std::filesystem::path& path, const SceneFileOptions& options, FileReport* report) {
+  const core::Result<std::vector<std::uint8_t>> bytes = read_file(path, options.limits.max_bytes);
+  if (!bytes) {
+    if (report) report->errors.push_back({path.string(), 0, 0, "", bytes.status().message(), ""});
+    return bytes.status();
+  }
+  return parse_scene(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), path.string(),
+                     options, report);
+}
+
+}  // namespace prescene::interfaces

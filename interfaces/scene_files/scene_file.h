@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scene files: YAML that a person writes, read into a belief::Scene. docs/scene_files.md is the page for who writes
+// them.
+//
+//   SceneFileOptions options;
+//   options.read_mesh = ...;                              // how meshes are read; see MeshReader
+//   auto scene = read_scene("scenarios/milk_on_bin.yaml", options);
+//   if (!scene) show(scene.status());                     // every mistake, each with file, line, key, reason and
+//   remedy
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "prescene/belief/scene.h"
+#include "prescene/core/status.h"
+#include "prescene/interfaces/scene_files/located_value.h"
+#include "prescene/interfaces/scene_files/problems.h"
+
+namespace prescene::interfaces {
+
+/// A mesh that a scene asks for.
+struct MeshRequest {
+  std::filesystem::path path;  ///< Already relative to the working folder or absolute.
+  double scale = 1.0;          ///< Metres per unit of the file.
+  bool y_up = false;           ///< The file's y axis points up: it becomes z.
+};
+/// Reads a mesh into metres with z up; its messages name file and remedy.
+using MeshReader = std::function<core::Result<geometry::TriangleMesh>(const MeshRequest&)>;
+
+struct SceneFileOptions {
+  MeshReader read_mesh;      ///< Empty: meshes and model files that name one are errors.
+  bool follow_files = true;  ///< Else `file:` of a model is an error: the text comes from somebody else.
+  YamlLimits limits;
+};
+
+/// Everything that was found wrong, for who wants to show it in another form than Status's text.
+struct FileReport {
+  std::vector<Problem> errors;
+  std::vector<Problem> warnings;
+};
+
+/// Reads and checks a scene; relative paths in it start at the folder of the file they stand in. The status of a
+/// failure holds every problem on a line of its own; `report`, if given, holds them one by one, and the warnings.
+core::Result<belief::Scene> read_scene(const std::filesystem::path& path, const SceneFileOptions& options = {},
+                                       FileReport* report = nullptr);
+/// The same from text; `file` is its name in messages and where relative paths start.
+core::Result<belief::Scene> parse_scene(std::string_view text, const std::string& file,
+                                        const SceneFileOptions& options = {}, FileReport* report = nullptr);
+
+}  // namespace prescene::interfaces

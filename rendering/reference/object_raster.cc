@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "object_raster.h"
+
+#include <limits>
+
+namespace prescene::rendering {
+namespace {
+
+ProjectedPoint projected(const Vector3f& p_C, const geometry::PinholeCamera& camera) {
+  const float inverse_depth = 1.0f / p_C.z();
+  return {{static_cast<float>(camera.fx) * p_C.x() * inverse_depth + static_cast<float>(camera.cx),
+           static_cast<float>(camera.fy) * p_C.y() * inverse_depth + static_cast<float>(camera.cy)},
+          inverse_depth};
+}
+
+/// A rotation in columns: the compiler inlines this, but not the product of two matrices.
+struct Rotation {
+  Vector3f x;
+  Vector3f y;
+  Vector3f z;
+
+  explicit Rotation(const geometry::Pose& X) {
+    const Eigen::Matrix3f R = X.rotation.toRotationMatrix().cast<float>();
+    x = R.col(0);
+    y = R.col(1);
+    z = R.col(2);
+  }
+  Vector3f operator*(const Vector3f& p) const { return x * p.x() + y * p.y() + z * p.z(); }
+};
+
+}  // namespace
+
+void ObjectRaster::project(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera,
+                           bool cut) {
+  const Rotation R_CO(X_CO);
+  const Vector3f p_CO = X_CO.translation.cast<float>();
+  const std::size_t count = mesh.vertices.size();
+  if (points_C_.size() < count) {
+    points_C_.resize(count);
+    projected_.resize(count);
+  }
+  if (cut) {
+    // Corners behind the camera have no pixel: faces are projected as they are cut.
+    for (std::size_t i = 0; i < count; ++i) points_C_[i] = R_CO * mesh.vertices[i] + p_CO;
+    rect_ = {0, 0, width_ - 1, height_ - 1};
+    return;
+  }
+  constexpr float kFar = std::numeric_limits<float>::max();
+  float x_min = kFar, x_max = -kFar, y_min = kFar, y_max = -kFar;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vector3f p_C = R_CO * mesh.vertices[i] + p_CO;
+    const ProjectedPoint point = projected(p_C, camera);
+    const ScreenPoint<float>& pixel = point.pixel;
+    points_C_[i] = p_C;
+    projected_[i] = point;
+    x_min = std::min(x_min, pixel.x);
+    x_max = std::max(x_max, pixel.x);
+    y_min = std::min(y_min, pixel.y);
+    y_max = std::max(y_max, pixel.y);
+  }
+  rect_ = {ceil_from(x_min, 0), ceil_from(y_min, 0), floor_to(x_max, width_ - 1), floor_to(y_max, height_ - 1)};
+}
+
+void ObjectRaster::clear(const geometry::PinholeCamera& camera) {
+  const std::size_t size = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  if (inverse_depth_.size() < size) {
+    inverse_depth_.resize(size);
+    face_of_pixel_.resize(size);
+  }
+  // One pixel more on each side, for at_outline.
+  const int x_first = std::max(0, rect_.x_first - 1);
+  const int x_last = std::min(width_ - 1, rect_.x_last + 1);
+  for (int y = std::max(0, rect_.y_first - 1); y <= std::min(height_ - 1, rect_.y_last + 1); ++y)
+    std::fill(inverse_depth_.begin() + static_cast<std::ptrdiff_t>(index(x_first, y)),
+              inverse_depth_.begin() + static_cast<std::ptrdiff_t>(index(x_last, y)) + 1, 0.0f);
+}
+
+void ObjectRaster::fill(const ProjectedPoint& a, const ProjectedPoint& b, const ProjectedPoint& c,
+                        const FacePlane& plane) {
+  const PixelRect box = bounding_pixels(a.pixel, b.pixel, c.pixel, rect_);
+  if (box.empty()) return;
+  const auto face = static_cast<std::uint32_t>(faces_.size());
+  faces_.push_back(plane);
+  // 1/z is linear over the image: n . ray / distance. Kept between the corners' own, which edge-on faces would leave.
+  const float scale = 1.0f / plane.distance;
+  const float along_x = plane.normal.x() * inverse_fx_ * scale;
+  const float along_y = plane.normal.y() * inverse_fy_ * scale;
+  const float at_centre = plane.normal.z() * scale;
+  const float low = std::min(a.inverse_depth, std::min(b.inverse_depth, c.inverse_depth));
+  const float high = std::max(a.inverse_depth, std::max(b.inverse_depth, c.inverse_depth));
+  for_each_covered_pixel(a.pixel, b.pixel, c.pixel, box, [&](int x, int y) {
+    const float linear = at_centre + along_x * (static_cast<float>(x) - cx_) + along_y * (static_cast<float>(y) - cy_);
+    const float inverse_depth = std::max(low, std::min(high, linear));
+    const std::size_t i = index(x, y);
+    if (inverse_depth <= inverse_depth_[i]) return;
+    inverse_depth_[i] = inverse_depth;
+    face_of_pixel_[i] = face;
+  });
+}
+
+void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera,
+                        float near_depth) {
+  width_ = camera.width;
+  height_ = camera.height;
+  inverse_fx_ = static_cast<float>(1.0 / camera.fx);
+  inverse_fy_ = static_cast<float>(1.0 / camera.fy);
+  cx_ = static_cast<float>(camera.cx);
+  cy_ = static_cast<float>(camera.cy);
+  faces_.clear();
+  rect_ = PixelRect{};
+  const auto centre_z = static_cast<float>((X_CO * mesh.centre.cast<double>().eval()).z());
+  if (mesh.triangles.empty() || centre_z + mesh.radius <= near_depth) return;
+  const bool cut = centre_z - mesh.radius < near_depth;
+  project(mesh, X_CO, camera, cut);
+  if (rect_.empty()) return;
+  clear(camera);
+  faces_.reserve(2 * mesh.triangles.size());  // a cut face is drawn in two
+
+  const Rotation R_CO(X_CO);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& triangle = mesh.triangles[i];
+    const Vector3f& a = points_C_[triangle[0]];
+    Vector3f normal = R_CO * mesh.normals[i];
+    float distance = normal.dot(a);
+    // Seen from behind: never visible on a closed mesh that the near plane leaves whole.
+    if (distance > 0.0f) {
+      if (mesh.closed && !cut) continue;
+      normal = -normal;
+      distance = -distance;
+    }
+    if (distance == 0.0f) continue;
+    if (!cut) {
+      fill(projected_[triangle[0]], projected_[triangle[1]], projected_[triangle[2]], {normal, distance});
+      continue;
+    }
+    const Vector3f corners[3] = {a, points_C_[triangle[1]], points_C_[triangle[2]]};
+    Vector3f polygon[4];
+    const int count = clip_to_near(corners, near_depth, polygon);
+    for (int k = 2; k < count; ++k)
+      fill(projected(polygon[0], camera), projected(polygon[k - 1], camera), projected(polygon[k], camera),
+           {normal, distance});
+  }
+}
+
+bool ObjectRaster::at_outline(int x, int y) const {
+  const float* pixel = &inverse_depth_[index(x, y)];
+  return (x > 0 && pixel[-1] == 0.0f) || (x + 1 < width_ && pixel[1] == 0.0f) || (y > 0 && pixel[-width_] == 0.0f) ||
+         (y + 1 < height_ && pixel[width_] == 0.0f);
+}
+
+}  // namespace prescene::rendering

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/rendering/reference/reference_likelihood.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "object_raster.h"
+#include "prescene/core/check.h"
+#include "prescene/rendering/portable_math.h"
+
+namespace prescene::rendering {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::Vector6d;
+
+/// A visible or matching pixel is within this many standard deviations of the predicted surface.
+constexpr float kMatchSigmas = 3.0f;
+
+/// No pixel counts more against a pose than this, even when a material is said to have no outliers.
+constexpr float kMinRatio = 1e-12f;
+
+class ReferenceWorkspace final : public LikelihoodWorkspace {
+ public:
+  ObjectRaster raster;
+};
+
+/// The parts of a pixel's mixture that depend only on the material and the class of the pixel (docs/sensor_model.md).
+struct PixelClass {
+  float hit;  ///< Weight over sqrt(2 pi).
+  float occluder;
+  float behind;
+  float outlier_density;  ///< 1/m
+  float missing;
+  float returned;            ///< 1 - missing.
+  float returned_ratio;      ///< Return against an opaque surface's, for backgrounds whose share is not known.
+  double log_missing_ratio;  ///< The same of no return.
+};
+
+/// The classes of one material: four of incidence, inside and at the outline.
+class PixelClasses {
+ public:
+  PixelClasses(const SensorModel& model, const SurfaceMaterial& material, int step) {
+    const auto& bounds = model.options().incidence_cosine;
+    for (std::size_t i = 0; i < bounds.size(); ++i) bounds_[i] = static_cast<float>(bounds[i]);
+    for (std::size_t i = 0; i < kIncidences; ++i) {
+      const double cosine = i < bounds.size() ? bounds[i] : 1.0;
+      // A reduced pixel with an empty neighbour is half a reduced pixel from the outline, on average.
+      classes_[2 * i] = make(model, material, {1.0, cosine});
+      classes_[2 * i + 1] = make(model, material, {1.0, cosine, 0.5 * step});
+    }
+  }
+
+  const PixelClass& at(float cosine, bool outline) const {
+    std::size_t i = 0;
+    while (i < bounds_.size() && cosine > bounds_[i]) ++i;
+    return classes_[2 * i + (outline ? 1 : 0)];
+  }
+
+ private:
+  static constexpr std::size_t kIncidences = 4;
+
+  static PixelClass make(const SensorModel& model, const SurfaceMaterial& material, const PixelGeometry& pixel) {
+    constexpr double kInverseSqrt2Pi = 0.3989422804014327;
+    const PixelMixture m = model.mixture(material, pixel);
+    PixelClass c;
+    c.hit = static_cast<float>(m.hit * kInverseSqrt2Pi);
+    c.occluder = static_cast<float>(m.occluder);
+    c.behind = static_cast<float>(m.behind);
+    c.outlier_density = static_cast<float>(m.outlier / model.range());
+    c.missing = static_cast<float>(m.missing);
+    c.returned = static_cast<float>(1.0 - m.missing);
+    c.returned_ratio = static_cast<float>((1.0 - m.missing) / (1.0 - m.missing_opaque));
+    c.log_missing_ratio = portable_log(m.missing / m.missing_opaque);
+    return c;
+  }
+
+  std::array<float, 3> bounds_;
+  std::array<PixelClass, 2 * kIncidences> classes_;
+};
+
+/// The logarithm of a product of many numbers with one logarithm in a while.
+class LogProduct {
+ public:
+  void multiply(float factor) {
+    product_ *= static_cast<double>(factor);
+    // Factors lie between kMinRatio and 1e9, so 16 of them stay far from the ends of double precision.
+    if (++count_ == 16) flush();
+  }
+  double log() {
+    flush();
+    return sum_;
+  }
+
+ private:
+  void flush() {
+    sum_ += portable_log(product_);
+    product_ = 1.0;
+    count_ = 0;
+  }
+
+  double product_ = 1.0;
+  double sum_ = 0.0;
+  int count_ = 0;
+};
+
+/// One covered pixel that no known surface hides.
+struct Pixel {
+  int x;
+  int y;
+  Vector3f ray;    ///< Through the pixel's centre, z = 1.
+  float depth;     ///< Rendered.
+  float measured;  ///< 0 = no return.
+  float slope;     ///< n . ray of the ray with z = 1, < 0.
+  float cosine;
+  const FacePlane* face;
+};
+
+/// Adds up what the pixels of one hypothesis say.
+class EvidenceSum {
+ public:
+  EvidenceSum(const FrameTerms& frame, const PoseHypothesis& hypothesis)
+      : frame_(frame),
+        classes_(frame.model, *hypothesis.material, frame.step),
+        min_depth_(static_cast<float>(frame.model.options().min_depth)),
+        sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)),
+        knee_(static_cast<float>(frame.model.options().incidence_knee)),
+        max_growth_(static_cast<float>(frame.model.options().incidence_max_growth)) {
+    if (hypothesis.color_model < 0 || frame.color_ratio.empty()) return;
+    PRESCENE_CHECK(static_cast<std::size_t>(hypothesis.color_model) < frame.color_ratio.size());
+    color_ratio_ = &frame.color_ratio[static_cast<std::size_t>(hypothesis.color_model)];
+  }
+
+  void add(const Pixel& pixel, bool outline) {
+    const PixelClass& c = classes_.at(pixel.cosine, outline);
+    const float absent_missing = frame_.absent_missing(pixel.x, pixel.y);
+    ++evidence_.covered;
+    if (pixel.measured == 0.0f) {
+      missing_ +=
+          absent_missing < 0.0f ? c.log_missing_ratio : portable_log(static_cast<double>(c.missing / absent_missing));
+      return;
+    }
+    const float sigma = sigma_scale_ * pixel.depth * pixel.depth * std::clamp(knee_ / pixel.cosine, 1.0f, max_growth_);
+    const float deviation = (pixel.measured - pixel.depth) / sigma;
+    float density = c.outlier_density;
+    // Ten standard deviations off, the hit is nothing beside the outliers.
+    if (std::abs(deviation) < 10.0f) {
+      const float hit = c.hit / sigma * portable_exp(-0.5f * deviation * deviation);
+      density += color_ratio_ != nullptr ? hit * (*color_ratio_)(pixel.x, pixel.y) : hit;
+    }
+    if (deviation < 0.0f) density += c.occluder / (pixel.depth - min_depth_);
+    const float returned = absent_missing < 0.0f ? c.returned_ratio : c.returned / (1.0f - absent_missing);
+    const float ratio = std::max(returned * (density / frame_.absent(pixel.x, pixel.y) + c.behind), kMinRatio);
+    ++evidence_.measured;
+    if (deviation < -kMatchSigmas) {
+      occluded_.multiply(ratio);
+      return;
+    }
+    ++evidence_.visible;
+    visible_.multiply(ratio);
+    if (deviation <= kMatchSigmas) ++evidence_.hits;
+  }
+
+  PoseEvidence result(int in_view, double tempering_pixels) {
+    evidence_.in_view = in_view;
+    evidence_.visible_log_ratio = visible_.log();
+    evidence_.log_ratio = evidence_.visible_log_ratio + occluded_.log() + missing_;
+    const double pixels = tempering_pixels > 0.0 ? tempering_pixels : evidence_.measured;
+    evidence_.tempered = tempering(frame_.tempering.weight_pixels, pixels) * evidence_.log_ratio;
+    return evidence_;
+  }
+
+ private:
+  const FrameTerms& frame_;
+  PixelClasses classes_;
+  const geometry::Image<float>* color_ratio_ = nullptr;
+  float min_depth_;
+  float sigma_scale_;
+  float knee_;
+  float max_growth_;
+  LogProduct visible_;
+  LogProduct occluded_;
+  double missing_ = 0.0;
+  PoseEvidence evidence_;
+};
+
+/// Adds up the Gauss-Newton equations of one hypothesis in camera axes.
+class EquationSum {
+ public:
+  EquationSum(const FrameTerms& frame, const PoseHypothesis& hypothesis, const LineariseOptions& options)
+      : X_CO_(hypothesis.X_CO),
+        p_CO_(hypothesis.X_CO.translation.cast<float>()),
+        two_over_gate_(static_cast<float>(2.0 / options.gate)),
+        min_cosine_(static_cast<float>(options.min_cosine)),
+        sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)) {}
+
+  void add(const Pixel& pixel) {
+    if (pixel.measured == 0.0f || pixel.cosine < min_cosine_) return;
+    // Measured and rendered point are on one ray, so their difference along the normal is the slope's share of it.
+    const float residual = pixel.slope * (pixel.measured - pixel.depth);
+    const float scaled = two_over_gate_ * residual;
+    const float root = 1.0f / (1.0f + scaled * scaled);
+    const float robust = root * root;
+    const float sigma = sigma_scale_ * pixel.depth * pixel.depth;
+    const float weight = robust / (sigma * sigma);
+    const Vector3f& normal = pixel.face->normal;
+    const Vector3f moment = (pixel.ray * pixel.depth - p_CO_).cross(normal);
+    const std::array<float, 6> row = {moment.x(), moment.y(), moment.z(), normal.x(), normal.y(), normal.z()};
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < 6; ++i) {
+      const float weighted = weight * row[i];
+      g_[i] += static_cast<double>(weighted * residual);
+      for (std::size_t j = i; j < 6; ++j) H_[k++] += static_cast<double>(weighted * row[j]);
+    }
+    ++result_.pixels;
+    result_.weight += static_cast<double>(robust);
+    result_.squares += static_cast<double>(robust * residual * residual);
+  }
+
+  /// The sums with rotations turned from camera axes to the body's.
+  PoseLinearisation result() {
+    Matrix6d H;
+    Vector6d g;
+    std::size_t k = 0;
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      g[i] = g_[static_cast<std::size_t>(i)];
+      for (Eigen::Index j = i; j < 6; ++j) H(i, j) = H(j, i) = H_[k++];
+    }
+    Matrix6d to_body = Matrix6d::Identity();
+    to_body.topLeftCorner<3, 3>() = X_CO_.rotation.toRotationMatrix().transpose();
+    const Matrix6d turned = to_body * H * to_body.transpose();
+    result_.H = 0.5 * (turned + turned.transpose());
+    result_.g = to_body * g;
+    return result_;
+  }
+
+ private:
+  geometry::Pose X_CO_;
+  Vector3f p_CO_;
+  float two_over_gate_;
+  float min_cosine_;
+  float sigma_scale_;
+  std::array<double, 21> H_{};
+  std::array<double, 6> g_{};
+  PoseLinearisation result_;
+};
+
+/// Draws a hypothesis and calls visit(pixel) for each pixel that it covers before the end of the range and that no
+/// known surface hides. Returns the number of pixels covered, hidden ones included.
+template <class Visit>
+int for_each_pixel(const FrameTerms& frame, const PoseHypothesis& hypothesis, ObjectRaster& raster, Visit&& visit) {
+  const geometry::PinholeCamera& camera = frame.camera;
+  const SensorModelOptions& options = frame.model.options();
+  // A hair beyond the range's start, where the occluder's interval has no length.
+  raster.draw(*hypothesis.mesh, hypothesis.X_CO, camera, static_cast<float>(options.min_depth) + 1e-4f);
+  const auto max_depth = static_cast<float>(options.max_depth);
+  const auto inverse_fx = static_cast<float>(1.0 / camera.fx);
+  const auto inverse_fy = static_cast<float>(1.0 / camera.fy);
+  const PixelRect& rect = raster.rect();
+  int in_view = 0;
+  for (int y = rect.y_first; y <= rect.y_last; ++y) {
+    const float ray_y = (static_cast<float>(y) - static_cast<float>(camera.cy)) * inverse_fy;
+    for (int x = rect.x_first; x <= rect.x_last; ++x) {
+      const float inverse_depth = raster.inverse_depth(x, y);
+      if (inverse_depth == 0.0f) continue;
+      const float depth = 1.0f / inverse_depth;
+      if (depth >= max_depth) continue;
+      ++in_view;
+      const float known = frame.known(x, y);
+      if (known > 0.0f && known < depth) continue;
+      const float ray_x = (static_cast<float>(x) - static_cast<float>(camera.cx)) * inverse_fx;
+      const FacePlane& face = raster.face(x, y);
+      const float slope = face.distance * inverse_depth;
+      const float cosine = -slope / std::sqrt(ray_x * ray_x + ray_y * ray_y + 1.0f);
+      visit(Pixel{x, y, Vector3f(ray_x, ray_y, 1.0f), depth, frame.depth(x, y), slope, std::max(cosine, 1e-6f), &face});
+    }
+  }
+  return in_view;
+}
+
+class ReferenceLikelihoodBatch final : public LikelihoodBatch {
+ public:
+  LikelihoodBatchInfo info() const override { return {"reference", true}; }
+
+  std::unique_ptr<LikelihoodWorkspace> make_workspace() const override {
+    return std::make_unique<ReferenceWorkspace>();
+  }
+
+  void evaluate(const FrameTerms& frame, std::span<const PoseHypothesis> hypotheses, LikelihoodWorkspace& workspace,
+                std::span<PoseEvidence> evidences) const override {
+    PRESCENE_CHECK(hypotheses.size() == evidences.size());
+    ObjectRaster& raster = static_cast<ReferenceWorkspace&>(workspace).raster;
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      EvidenceSum sum(frame, hypotheses[i]);
+      const int in_view = for_each_pixel(frame, hypotheses[i], raster, [&](const Pixel& pixel) {
+        sum.add(pixel, raster.at_outline(pixel.x, pixel.y));
+      });
+      evidences[i] = sum.result(in_view, hypotheses[i].tempering_pixels);
+    }
+  }
+
+  void linearise(const FrameTerms& frame, std::span<const PoseHypothesis> hypotheses, const LineariseOptions& options,
+                 LikelihoodWorkspace& workspace, std::span<PoseLinearisation> linearisations) const override {
+    PRESCENE_CHECK(hypotheses.size() == linearisations.size());
+    PRESCENE_CHECK(options.gate > 0.0);
+    ObjectRaster& raster = static_cast<ReferenceWorkspace&>(workspace).raster;
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      EquationSum equations(frame, hypotheses[i], options);
+      if (!options.with_evidence) {
+        for_each_pixel(frame, hypotheses[i], raster, [&](const Pixel& pixel) { equations.add(pixel); });
+        linearisations[i] = equations.result();
+        continue;
+      }
+      EvidenceSum sum(frame, hypotheses[i]);
+      const int in_view = for_each_pixel(frame, hypotheses[i], raster, [&](const Pixel& pixel) {
+        equations.add(pixel);
+        sum.add(pixel, raster.at_outline(pixel.x, pixel.y));
+      });
+      linearisations[i] = equations.result();
+      linearisations[i].evidence = sum.result(in_view, hypotheses[i].tempering_pixels);
+    }
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<LikelihoodBatch> make_reference_likelihood_batch() {
+  return std::make_unique<ReferenceLikelihoodBatch>();
+}
+
+}  // namespace prescene::rendering

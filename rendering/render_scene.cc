@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/rendering/render_scene.h"
+
+#include <algorithm>
+
+#include "prescene/core/check.h"
+#include "prescene/geometry/mass_properties.h"
+
+namespace prescene::rendering {
+
+MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh) {
+  auto result = std::make_shared<RenderMesh>();
+  result->vertices.reserve(mesh.vertices.size());
+  for (const geometry::Vector3d& vertex : mesh.vertices) result->vertices.push_back(vertex.cast<float>());
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t index : triangle)
+      PRESCENE_CHECK_MSG(index < mesh.vertices.size(), "a mesh must be repaired before it is rendered");
+    const geometry::Vector3d& a = mesh.vertices[triangle[0]];
+    const geometry::Vector3d cross = (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
+    const double twice_area = cross.norm();
+    if (!(twice_area > 0.0)) continue;
+    result->triangles.push_back(triangle);
+    result->normals.push_back((cross / twice_area).cast<float>());
+  }
+  if (result->triangles.empty()) return result;
+
+  const geometry::Box box = geometry::bounding_box(mesh);
+  const geometry::Vector3d centre = box.center();
+  result->centre = centre.cast<float>();
+  // A little larger than needed, so that rounding to single precision leaves no vertex outside.
+  result->radius = static_cast<float>(geometry::radius_about(mesh, centre) * (1.0 + 1e-6));
+  const geometry::MeshTopology topology = geometry::mesh_topology(mesh);
+  result->closed = topology.watertight() && topology.oriented() && geometry::signed_volume(mesh) > 0.0;
+  return result;
+}
+
+SurfaceMaterial SurfaceMaterial::opaque(const geometry::Rgb& color) {
+  SurfaceMaterial material;
+  material.color = color;
+  return material;
+}
+
+SurfaceMaterial SurfaceMaterial::transparent(const geometry::Rgb& color) {
+  SurfaceMaterial material;
+  material.hit = 0.25;
+  material.occluder = 0.03;
+  material.behind = 0.65;
+  material.outlier = 0.07;
+  material.missing = 0.30;
+  material.color = color;
+  return material;
+}
+
+SurfaceMaterial SurfaceMaterial::mirror(const geometry::Rgb& color) {
+  SurfaceMaterial material;
+  material.hit = 0.55;
+  material.occluder = 0.06;
+  material.behind = 0.0;
+  material.outlier = 0.39;
+  material.missing = 0.60;
+  material.color = color;
+  return material;
+}
+
+}  // namespace prescene::rendering

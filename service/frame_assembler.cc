@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/frame_assembler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "prescene/interfaces/ros_messages/conversions.h"
+
+namespace prescene::service {
+namespace {
+
+// Bounds of what waits: the newest frame wins, so more would never be used. 8 frames are 0.27 s at 30 Hz.
+constexpr std::size_t kMaxWaiting = 8;
+constexpr std::size_t kMaxColors = 8;
+// A stamp this much older than the last one taken means that the sender's clock was set back (a looped recording).
+constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
+
+core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llround(seconds * 1e9)); }
+
+}  // namespace
+
+FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies, TfBufferSettings tf_settings)
+    : settings_(std::move(settings)), robot_bodies_(std::move(robot_bodies)), tf_(tf_settings) {}
+
+core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns) {
+  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
+  std::string frame_id = settings_.camera_frame;
+  if (frame_id.empty() && !image.header.frame_id.empty()) {
+    PRESCENE_TRY(frame_id, interfaces::to_frame_id(image.header.frame_id));
+  }
+  interfaces::ImageRules rules;
+  rules.mono16_is_depth = settings_.mono16_is_depth;
+  PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules));
+
+  if (last_taken_ns_ && stamp_ns + kClockJumpNs < *last_taken_ns_) clock_jumped_back();
+  Waiting entry{index, stamp_ns, received_ns, std::move(frame_id), std::make_shared<geometry::DepthImage>(std::move(depth))};
+  if (last_taken_ns_ && stamp_ns <= *last_taken_ns_) {
+    skip(entry, "not newer than the frame before it");
+    return core::ok_status();
+  }
+  const auto place = std::upper_bound(waiting_.begin(), waiting_.end(), stamp_ns,
+                                      [](core::TimeNs t, const Waiting& other) { return t < other.stamp_ns; });
+  waiting_.insert(place, std::move(entry));
+  if (waiting_.size() > kMaxWaiting) {
+    skip(waiting_.front(), "too many frames wait");
+    waiting_.pop_front();
+  }
+  return core::ok_status();
+}
+
+core::Status FrameAssembler::add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs) {
+  if (!settings_.use_color) return core::ok_status();
+  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
+  PRESCENE_TRY(geometry::ColorImage color, interfaces::to_color_image(image));
+  colors_.push_back({index, stamp_ns, std::make_shared<geometry::ColorImage>(std::move(color))});
+  if (colors_.size() > kMaxColors) colors_.pop_front();
+  return core::ok_status();
+}
+
+core::Status FrameAssembler::add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index) {
+  PRESCENE_TRY(camera_, interfaces::to_camera(info));
+  camera_index_ = index;
+  return core::ok_status();
+}
+
+core::Status FrameAssembler::add_tf(const interfaces::RosTfMessage& message, MessageIndex index, bool is_static) {
+  tf_until_ = index;
+  PRESCENE_TRY(const interfaces::FrameTransforms transforms, interfaces::to_transforms(message));
+  core::Status first_bad = transforms.rejected.empty() ? core::ok_status() : transforms.rejected.front();
+  for (const interfaces::FrameTransform& transform : transforms.accepted) {
+    core::Status added = tf_.add(transform.parent, transform.child, transform.stamp_ns, transform.X_PC, is_static);
+    if (!added.ok() && first_bad.ok()) first_bad = std::move(added);
+  }
+  return first_bad;
+}
+
+const FrameAssembler::Color* FrameAssembler::color_of(const Waiting& waiting) const {
+  const Color* best = nullptr;
+  for (const Color& color : colors_) {
+    if (!best || std::abs(color.stamp_ns - waiting.stamp_ns) < std::abs(best->stamp_ns - waiting.stamp_ns)) best = &color;
+  }
+  return best && std::abs(best->stamp_ns - waiting.stamp_ns) <= ns_of(settings_.max_stamp_difference_s) ? best : nullptr;
+}
+
+FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool out_of_time) const {
+  if (!camera_) return {{}, "no usable camera info has come", false};
+  if (camera_->width != waiting.depth->width() || camera_->height != waiting.depth->height()) {
+    return {{}, "the camera info is for " + std::to_string(camera_->width) + " x " + std::to_string(camera_->height) +
+                    " pixels, the depth image has " + std::to_string(waiting.depth->width()) + " x " +
+                    std::to_string(waiting.depth->height()), true};
+  }
+  AssembledFrame frame;
+  frame.depth = waiting.index;
+  frame.camera_info = camera_index_;
+  frame.tf_until = tf_until_;
+  belief::Observation& observation = frame.observation;
+  observation.stamp_ns = waiting.stamp_ns;
+  observation.frame.depth = waiting.depth;
+  observation.frame.camera = *camera_;
+
+  // Colour helps but is not needed: a frame whose colour does not come in time goes without it.
+  if (settings_.use_color) {
+    const Color* color = color_of(waiting);
+    if (!color && !out_of_time) return {{}, "its colour image has not come", false};
+    if (color && color->image->width() == camera_->width && color->image->height() == camera_->height) {
+      observation.frame.color = color->image;
+      frame.color = color->index;
+    }
+  }
+  core::Result<geometry::Pose> X_WC =
+      waiting.frame_id.empty() ? core::Result<geometry::Pose>(core::not_found("the depth image names no frame"))
+                               : tf_.lookup(settings_.world_frame, waiting.frame_id, waiting.stamp_ns);
+  if (!X_WC && !settings_.X_WC) return {{}, X_WC.status().message(), false};
+  if (!X_WC && !out_of_time && tf_.knows(waiting.frame_id)) return {{}, X_WC.status().message(), false};
+  observation.X_WC = X_WC ? *X_WC : *settings_.X_WC;
+
+  for (const std::string& body : robot_bodies_) {
+    const core::Result<geometry::Pose> X_WG = tf_.lookup(settings_.world_frame, body, waiting.stamp_ns);
+    if (X_WG) {
+      observation.robot[body] = *X_WG;
+    } else if (tf_.knows(body) && !out_of_time) {
+      return {{}, X_WG.status().message(), false};
+    }
+  }
+  return {std::move(frame), "", false};
+}
+
+std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
+  for (std::size_t newest = waiting_.size(); newest > 0; --newest) {
+    const Waiting& waiting = waiting_[newest - 1];
+    const bool out_of_time = now_ns - waiting.received_ns >= ns_of(settings_.max_wait_s);
+    Attempt attempt = assemble(waiting, out_of_time);
+    if (attempt.frame) {
+      last_taken_ns_ = waiting.stamp_ns;
+      for (std::size_t older = 0; older + 1 < newest; ++older) skip(waiting_[older], "a newer frame was ready");
+      waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(newest));
+      return std::move(attempt.frame);
+    }
+    if (attempt.hopeless || out_of_time) {
+      skip(waiting, attempt.missing);
+      waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(newest - 1));
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<core::TimeNs> FrameAssembler::next_deadline() const {
+  std::optional<core::TimeNs> deadline;
+  for (const Waiting& waiting : waiting_) {
+    const core::TimeNs mine = waiting.received_ns + ns_of(settings_.max_wait_s);
+    deadline = deadline ? std::min(*deadline, mine) : mine;
+  }
+  return deadline;
+}
+
+std::vector<SkippedFrame> FrameAssembler::take_skipped() { return std::exchange(skipped_, {}); }
+
+void FrameAssembler::skip(const Waiting& waiting, std::string reason) {
+  skipped_.push_back({waiting.index, waiting.stamp_ns, std::move(reason)});
+}
+
+void FrameAssembler::clock_jumped_back() {
+  for (const Waiting& waiting : waiting_) skip(waiting, "the sender's clock jumped back");
+  waiting_.clear();
+  colors_.clear();
+  tf_.forget_moving();
+  last_taken_ns_.reset();
+}
+
+}  // namespace prescene::service

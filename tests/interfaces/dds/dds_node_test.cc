@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/dds/dds_node.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "prescene/interfaces/ros_messages/cdr.h"
+
+namespace prescene::interfaces {
+namespace {
+
+/// Collects what comes in; waiting ends with the arrival, the limit only guards a hang.
+class Inbox {
+ public:
+  void put(ReceivedMessage&& message) {
+    const std::lock_guard lock(mutex_);
+    messages_.push_back(std::move(message));
+    changed_.notify_all();
+  }
+  bool wait_for(std::size_t count, std::chrono::milliseconds at_most = std::chrono::seconds(30)) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, at_most, [&] { return messages_.size() >= count; });
+  }
+  std::vector<ReceivedMessage> messages() {
+    const std::lock_guard lock(mutex_);
+    return messages_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<ReceivedMessage> messages_;
+};
+
+// Each run in a domain of its own, so that runs beside each other don't hear one another.
+DdsOptions options() {
+  DdsOptions options;
+  options.domain = 10 + static_cast<int>(getpid() % 200);
+  return options;
+}
+
+template <class Message>
+void expect_round_trip(const Message& message, const std::string& type) {
+  auto writer_node = DdsNode::create(options(), {});
+  auto reader_node = DdsNode::create(options(), {});
+  ASSERT_TRUE(writer_node.ok()) << writer_node.status().message();
+  ASSERT_TRUE(reader_node.ok()) << reader_node.status().message();
+  Inbox inbox;
+  // Latched, so that it does not matter who is there first.
+  const auto publisher = (*writer_node)->advertise("/test/round_trip", type, TopicQos::kLatched);
+  ASSERT_TRUE(publisher.ok()) << publisher.status().message();
+  ASSERT_TRUE((*writer_node)->publish(*publisher, message).ok());
+  ASSERT_TRUE((*reader_node)
+                  ->subscribe("/test/round_trip", type, TopicQos::kTfStatic,
+                              [&](ReceivedMessage&& received) { inbox.put(std::move(received)); })
+                  .ok());
+  ASSERT_TRUE(inbox.wait_for(1)) << type;
+  const ReceivedMessage received = inbox.messages()[0];
+  EXPECT_EQ(received.topic, "/test/round_trip");
+  EXPECT_EQ(received.type, type);
+  const auto decoded = decode_cdr<Message>(received.cdr);
+  ASSERT_TRUE(decoded.ok()) << decoded.status().message();
+  EXPECT_TRUE(*decoded == message) << type;
+  ASSERT_TRUE((*writer_node)->publish_cdr(*publisher, received.cdr).ok());
+  ASSERT_TRUE(inbox.wait_for(2));
+  EXPECT_TRUE(decode_cdr<Message>(inbox.messages()[1].cdr).ok());
+  reader_node->reset();  // before the inbox goes
+}
+
+const RosHeader kHeader{{12, 34}, "camera"};
+
+TEST(DdsNode, CarriesImages) {
+  expect_round_trip(RosImage{kHeader, 2, 3, "16UC1", 0, 6, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}}, "sensor_msgs/msg/Image");
+}
+
+TEST(DdsNode, CarriesLargeImages) {
+  RosImage image{kHeader, 720, 1280, "rgb8", 0, 3840, {}};
+  for (int i = 0; i < 720 * 3840; ++i) image.data.push_back(static_cast<std::uint8_t>(i * 7));
+  expect_round_trip(image, "sensor_msgs/msg/Image");
+}
+
+TEST(DdsNode, CarriesEveryFieldOfTheOtherTypes) {
+  RosCameraInfo info;
+  info.header = kHeader;
+  info.height = 480;
+  info.width = 640;
+  info.distortion_model = "plumb_bob";
+  info.d = {0.1, -0.2, 0.3, 0.4, 0.5};
+  for (std::size_t i = 0; i < 9; ++i) info.k[i] = 1.5 + static_cast<double>(i);
+  for (std::size_t i = 0; i < 9; ++i) info.r[i] = 2.5 + static_cast<double>(i);
+  for (std::size_t i = 0; i < 12; ++i) info.p[i] = 3.5 + static_cast<double>(i);
+  info.binning_x = 1;
+  info.binning_y = 2;
+  info.roi = {1, 2, 3, 4, true};
+  expect_round_trip(info, "sensor_msgs/msg/CameraInfo");
+
+  RosTfMessage tf;
+  tf.transforms.push_back({kHeader, "hand", {{1.0, 2.0, 3.0}, {0.1, 0.2, 0.3, 0.9}}});
+  tf.transforms.push_back({kHeader, "finger", {{-1.0, -2.0, -3.0}, {0.0, 0.0, 0.0, 1.0}}});
+  expect_round_trip(tf, "tf2_msgs/msg/TFMessage");
+  expect_round_trip(RosString{"{\"where\": {}}"}, "std_msgs/msg/String");
+  expect_round_trip(RosClock{{5, 6}}, "rosgraph_msgs/msg/Clock");
+
+  RosPoseWithCovarianceStamped pose;
+  pose.header = kHeader;
+  pose.pose.pose = {{1.0, 2.0, 3.0}, {0.1, 0.2, 0.3, 0.9}};
+  for (std::size_t i = 0; i < 36; ++i) pose.pose.covariance[i] = 0.25 * static_cast<double>(i);
+  expect_round_trip(pose, "geometry_msgs/msg/PoseWithCovarianceStamped");
+
+  RosDetection3dArray detections{kHeader, {{kHeader, {{{"carton", 0.75}, pose.pose}}, {pose.pose.pose, {0.1, 0.2, 0.3}}, "7"}}};
+  expect_round_trip(detections, "vision_msgs/msg/Detection3DArray");
+
+  RosMarker marker;
+  marker.header = kHeader;
+  marker.ns = "belief";
+  marker.id = 3;
+  marker.type = 11;
+  marker.pose = pose.pose.pose;
+  marker.scale = {1.0, 1.0, 1.0};
+  marker.color = {0.1F, 0.2F, 0.3F, 0.4F};
+  marker.lifetime = {1, 2};
+  marker.frame_locked = true;
+  marker.points = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+  marker.colors = {{0.5F, 0.5F, 0.5F, 1.0F}};
+  marker.texture = {kHeader, "png", {1, 2, 3}};
+  marker.uv_coordinates = {{0.25F, 0.75F}};
+  marker.text = "carton";
+  marker.mesh_resource = "file:///nowhere";
+  marker.mesh_file = {"a.ply", {9, 8}};
+  marker.mesh_use_embedded_materials = true;
+  expect_round_trip(RosMarkerArray{{marker, marker}}, "visualization_msgs/msg/MarkerArray");
+
+  expect_round_trip(RosDiagnosticArray{kHeader, {{1, "tracker", "late frames", "cpu", {{"skipped", "3"}, {"steps", "40"}}}}},
+                    "diagnostic_msgs/msg/DiagnosticArray");
+}
+
+TEST(DdsNode, BestEffortAndReliableReadersBothMatchAnImageWriter) {
+  auto node = DdsNode::create(options(), {});
+  auto other = DdsNode::create(options(), {});
+  ASSERT_TRUE(node.ok() && other.ok());
+  Inbox sensor;
+  Inbox reliable;
+  const std::string type = "sensor_msgs/msg/Image";
+  ASSERT_TRUE((*other)->subscribe("/image", type, TopicQos::kSensor, [&](ReceivedMessage&& m) { sensor.put(std::move(m)); }).ok());
+  ASSERT_TRUE(
+      (*other)->subscribe("/image", type, TopicQos::kReliable, [&](ReceivedMessage&& m) { reliable.put(std::move(m)); }).ok());
+  const auto publisher = (*node)->advertise("/image", type, TopicQos::kImages);
+  ASSERT_TRUE(publisher.ok());
+  // Volatile topics reach only who has been found: publish until both have heard one.
+  const RosImage image{kHeader, 1, 1, "mono8", 0, 1, {5}};
+  for (int attempt = 0; attempt < 3000 && (sensor.messages().empty() || reliable.messages().empty()); ++attempt) {
+    ASSERT_TRUE((*node)->publish(*publisher, image).ok());
+    (sensor.messages().empty() ? sensor : reliable).wait_for(1, std::chrono::milliseconds(10));
+  }
+  EXPECT_FALSE(sensor.messages().empty());
+  EXPECT_FALSE(reliable.messages().empty());
+  EXPECT_EQ((*other)->matched_writers("/image"), 1);
+  other->reset();
+}
+
+TEST(DdsNode, AnnouncesItselfInEitherForm) {
+  for (const RosDistro distro : {RosDistro::kHumble, RosDistro::kJazzy}) {
+    DdsOptions announced = options();
+    announced.ros_distro = distro;
+    const auto node = DdsNode::create(announced, {});
+    ASSERT_TRUE(node.ok()) << node.status().message();
+    EXPECT_TRUE((*node)->advertise("/prescene/answer", "std_msgs/msg/String", TopicQos::kReliable).ok());
+  }
+}
+
+TEST(DdsNode, BadNamesTypesAndOptionsAreRefusedWithTheRemedy) {
+  DdsOptions wrong = options();
+  wrong.domain = 300;
+  EXPECT_EQ(DdsNode::create(wrong, {}).status().code(), core::StatusCode::kInvalidInput);
+  auto node = DdsNode::create(options(), {});
+  ASSERT_TRUE(node.ok());
+  for (const char* topic : {"", "relative", "/", "/a//b", "/1a", "/a b", "/a/", "/\xc3\xa4"}) {
+    EXPECT_EQ((*node)->advertise(topic, "std_msgs/msg/String", TopicQos::kReliable).status().code(),
+              core::StatusCode::kInvalidInput)
+        << topic;
+  }
+  EXPECT_EQ((*node)->advertise("/a", "std_msgs/msg/Strin", TopicQos::kReliable).status().code(), core::StatusCode::kUnsupported);
+  const auto publisher = (*node)->advertise("/a", "std_msgs/msg/String", TopicQos::kReliable);
+  ASSERT_TRUE(publisher.ok());
+  EXPECT_EQ((*node)->publish(*publisher, RosClock{}).code(), core::StatusCode::kInvalidInput);
+  EXPECT_FALSE((*node)->publish_cdr(*publisher, {1, 2, 3}).ok());
+}
+
+}  // namespace
+}  // namespace prescene::interfaces

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/frame_assembler.h"
+
+#include <gtest/gtest.h>
+
+#include "prescene/interfaces/ros_messages/conversions.h"
+
+namespace prescene::service {
+namespace {
+
+constexpr core::TimeNs kMs = 1'000'000;
+
+interfaces::RosHeader header(core::TimeNs stamp_ns, const std::string& frame = "camera") {
+  return {interfaces::to_ros_time(stamp_ns), frame};
+}
+
+interfaces::RosImage depth_at(core::TimeNs stamp_ns, int width = 8) {
+  return interfaces::to_ros_image_16uc1(geometry::DepthImage(width, 6, 0.75f), header(stamp_ns));
+}
+
+interfaces::RosImage color_at(core::TimeNs stamp_ns) {
+  return interfaces::to_ros_image(geometry::ColorImage(8, 6, {1, 2, 3}), header(stamp_ns));
+}
+
+interfaces::RosCameraInfo camera_info() {
+  return interfaces::to_ros_camera_info({8, 6, 10.0, 10.0, 3.5, 2.5}, header(0));
+}
+
+interfaces::RosTfMessage transform(const std::string& child, core::TimeNs stamp_ns, double x) {
+  return {{interfaces::to_ros_transform(
+      interfaces::FrameTransform{"world", child, stamp_ns, geometry::Pose::from_translation({x, 0.0, 0.0})})}};
+}
+
+AssemblerSettings without_color() {
+  AssemblerSettings settings;
+  settings.use_color = false;
+  return settings;
+}
+
+TEST(FrameAssembler, PairsWhatBelongsTogether) {
+  FrameAssembler assembler({}, {"gripper"});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("gripper", 90 * kMs, 2.0), 3, false).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("gripper", 110 * kMs, 3.0), 4, false).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 5, 101 * kMs).ok());
+  EXPECT_FALSE(assembler.take(102 * kMs).has_value()) << "its colour image is still on the way";
+  ASSERT_TRUE(assembler.add_color(color_at(103 * kMs), 6, 104 * kMs).ok());
+  const auto frame = assembler.take(105 * kMs);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->depth, 5u);
+  EXPECT_EQ(frame->color, 6u);
+  EXPECT_EQ(frame->camera_info, 1u);
+  EXPECT_EQ(frame->tf_until, 4u);
+  EXPECT_EQ(frame->observation.stamp_ns, 100 * kMs);
+  EXPECT_DOUBLE_EQ(frame->observation.X_WC.translation.x(), 1.0);
+  EXPECT_NEAR(frame->observation.robot.at("gripper").translation.x(), 2.5, 1e-12);
+  EXPECT_FLOAT_EQ((*frame->observation.frame.depth)(3, 3), 0.75f);
+  EXPECT_FALSE(assembler.take(106 * kMs).has_value());
+  EXPECT_TRUE(assembler.take_skipped().empty());
+}
+
+TEST(FrameAssembler, GoesWithoutColourWhenItDoesNotComeInTime) {
+  FrameAssembler assembler({}, {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 3, 101 * kMs).ok());
+  ASSERT_TRUE(assembler.next_deadline().has_value());
+  EXPECT_FALSE(assembler.take(*assembler.next_deadline() - 1).has_value());
+  const auto frame = assembler.take(*assembler.next_deadline());
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->observation.frame.color, nullptr);
+}
+
+TEST(FrameAssembler, SkipsWithAReasonWhatStaysIncomplete) {
+  FrameAssembler assembler({}, {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 2, 101 * kMs).ok());
+  EXPECT_FALSE(assembler.take(200 * kMs).has_value());
+  const auto skipped = assembler.take_skipped();
+  ASSERT_EQ(skipped.size(), 1u);
+  EXPECT_EQ(skipped[0].depth, 2u);
+  EXPECT_NE(skipped[0].reason.find("'camera'"), std::string::npos) << skipped[0].reason;
+}
+
+TEST(FrameAssembler, TheNewestFrameWinsAndOlderOnesAreCounted) {
+  FrameAssembler assembler(without_color(), {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(assembler.add_depth(depth_at((100 + 33 * i) * kMs), 3u + i, 200 * kMs).ok());
+  const auto frame = assembler.take(201 * kMs);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->depth, 5u);
+  EXPECT_EQ(assembler.take_skipped().size(), 2u);
+  ASSERT_TRUE(assembler.add_depth(depth_at(150 * kMs), 6, 210 * kMs).ok());
+  EXPECT_FALSE(assembler.take(211 * kMs).has_value()) << "older than what was taken";
+  EXPECT_EQ(assembler.take_skipped().size(), 1u);
+}
+
+TEST(FrameAssembler, ACameraInfoOfAnotherSizeIsNamed) {
+  FrameAssembler assembler(without_color(), {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs, 16), 3, 100 * kMs).ok());
+  EXPECT_FALSE(assembler.take(101 * kMs).has_value());
+  const auto skipped = assembler.take_skipped();
+  ASSERT_EQ(skipped.size(), 1u);
+  EXPECT_NE(skipped[0].reason.find("16 x 6"), std::string::npos);
+}
+
+TEST(FrameAssembler, UsesTheSetCameraPoseWhenTfKnowsNone) {
+  AssemblerSettings settings = without_color();
+  settings.X_WC = geometry::Pose::from_translation({0.0, 0.0, 3.0});
+  FrameAssembler assembler(settings, {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 2, 100 * kMs).ok());
+  const auto frame = assembler.take(101 * kMs);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_DOUBLE_EQ(frame->observation.X_WC.translation.z(), 3.0);
+}
+
+TEST(FrameAssembler, StartsAgainWhenTheClockJumpsBack) {
+  FrameAssembler assembler(without_color(), {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(60'000 * kMs), 3, 0).ok());
+  ASSERT_TRUE(assembler.take(1).has_value());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 4, 2).ok());
+  EXPECT_TRUE(assembler.take(3).has_value());
+}
+
+TEST(FrameAssembler, ABadMessageIsRefusedAndLosesNothing) {
+  FrameAssembler assembler(without_color(), {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  interfaces::RosImage broken = depth_at(100 * kMs);
+  broken.data.resize(5);
+  EXPECT_EQ(assembler.add_depth(broken, 3, 100 * kMs).code(), core::StatusCode::kInvalidInput);
+  interfaces::RosCameraInfo uncalibrated = camera_info();
+  uncalibrated.k.fill(0.0);
+  EXPECT_FALSE(assembler.add_camera_info(uncalibrated, 4).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(110 * kMs), 5, 110 * kMs).ok());
+  EXPECT_TRUE(assembler.take(111 * kMs).has_value());
+}
+
+}  // namespace
+}  // namespace prescene::service

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tf_buffer.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace prescene::service {
+namespace {
+
+using core::StatusCode;
+using geometry::Pose;
+using geometry::Vector3d;
+
+constexpr core::TimeNs kSecond = 1'000'000'000;
+
+Pose turned_z(double angle, const Vector3d& p) { return {geometry::exp_rotation({0.0, 0.0, angle}), p}; }
+
+TEST(TfBuffer, ComposesAlongTheTreeInBothDirections) {
+  TfBuffer tf;
+  const Pose X_WB = turned_z(0.3, {1.0, 2.0, 0.1});
+  const Pose X_BC = turned_z(-1.1, {0.2, 0.0, 0.7});
+  const Pose X_BG = turned_z(2.0, {0.5, -0.4, 0.3});
+  ASSERT_TRUE(tf.add("world", "base", 0, X_WB, true).ok());
+  ASSERT_TRUE(tf.add("base", "/camera", 0, X_BC, true).ok());
+  ASSERT_TRUE(tf.add("base", "gripper", 0, X_BG, true).ok());
+  const auto X_CG = tf.lookup("camera", "gripper", 5 * kSecond);
+  ASSERT_TRUE(X_CG.ok()) << X_CG.status().message();
+  const Vector3d p_GQ(0.1, 0.2, 0.3);
+  EXPECT_LT(((X_WB * X_BG) * p_GQ - (X_WB * X_BC) * (*X_CG * p_GQ)).norm(), 1e-12);
+  const auto X_GC = tf.lookup("gripper", "camera", 0);
+  ASSERT_TRUE(X_GC.ok());
+  EXPECT_LT((*X_CG * (*X_GC * p_GQ) - p_GQ).norm(), 1e-12);
+}
+
+TEST(TfBuffer, InterpolatesBetweenSamplesAndRefusesTimesOutside) {
+  TfBuffer tf;
+  ASSERT_TRUE(tf.add("world", "hand", 1 * kSecond, turned_z(0.0, {0.0, 0.0, 0.0}), false).ok());
+  ASSERT_TRUE(tf.add("world", "hand", 2 * kSecond, turned_z(std::numbers::pi / 2, {1.0, 0.0, 0.0}), false).ok());
+  const auto middle = tf.lookup("world", "hand", 1 * kSecond + kSecond / 4);
+  ASSERT_TRUE(middle.ok());
+  EXPECT_NEAR(middle->translation.x(), 0.25, 1e-12);
+  EXPECT_NEAR(geometry::log_rotation(middle->rotation).z(), std::numbers::pi / 8, 1e-12);
+  EXPECT_EQ(tf.lookup("world", "hand", 0).status().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(tf.lookup("world", "hand", 3 * kSecond).status().code(), StatusCode::kUnavailable);
+}
+
+TEST(TfBuffer, AMovingEdgeAboveTheCommonAncestorIsNotNeeded) {
+  TfBuffer tf;
+  ASSERT_TRUE(tf.add("world", "base", 0, turned_z(1.0, {1.0, 0.0, 0.0}), false).ok());
+  ASSERT_TRUE(tf.add("base", "camera", 0, turned_z(0.2, {0.0, 1.0, 0.0}), true).ok());
+  ASSERT_TRUE(tf.add("base", "hand", 0, turned_z(0.5, {0.0, 0.0, 1.0}), true).ok());
+  EXPECT_TRUE(tf.lookup("camera", "hand", 9 * kSecond).ok());
+  EXPECT_FALSE(tf.lookup("world", "hand", 9 * kSecond).ok());
+}
+
+TEST(TfBuffer, RefusesWhatIsNoTreeAndStaysAsItWas) {
+  TfBuffer tf;
+  ASSERT_TRUE(tf.add("a", "b", 0, Pose::identity(), true).ok());
+  ASSERT_TRUE(tf.add("b", "c", 0, Pose::identity(), true).ok());
+  EXPECT_EQ(tf.add("c", "a", 0, Pose::identity(), true).code(), StatusCode::kInvalidInput);
+  EXPECT_EQ(tf.add("d", "d", 0, Pose::identity(), true).code(), StatusCode::kInvalidInput);
+  EXPECT_EQ(tf.add("", "d", 0, Pose::identity(), true).code(), StatusCode::kInvalidInput);
+  EXPECT_EQ(tf.add("other", "c", 0, Pose::identity(), true).code(), StatusCode::kInvalidInput);
+  Pose broken;
+  broken.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(tf.add("a", "e", 0, broken, true).code(), StatusCode::kInvalidInput);
+  EXPECT_TRUE(tf.lookup("a", "c", 0).ok());
+  EXPECT_FALSE(tf.knows("d"));
+  EXPECT_FALSE(tf.knows("other"));
+}
+
+TEST(TfBuffer, UnknownAndUnconnectedFramesAreNamed) {
+  TfBuffer tf;
+  ASSERT_TRUE(tf.add("a", "b", 0, Pose::identity(), true).ok());
+  ASSERT_TRUE(tf.add("c", "d", 0, Pose::identity(), true).ok());
+  EXPECT_NE(tf.lookup("a", "nowhere", 0).status().message().find("nowhere"), std::string::npos);
+  EXPECT_EQ(tf.lookup("b", "d", 0).status().code(), StatusCode::kNotFound);
+}
+
+TEST(TfBuffer, AFrameMayChangeItsParentOnceItsOldTransformsHaveExpired) {
+  TfBuffer tf({.history_s = 2.0});
+  ASSERT_TRUE(tf.add("table", "cup", 0, Pose::identity(), false).ok());
+  EXPECT_FALSE(tf.add("hand", "cup", 1 * kSecond, Pose::identity(), false).ok());
+  EXPECT_TRUE(tf.add("hand", "cup", 3 * kSecond, Pose::identity(), false).ok());
+  EXPECT_TRUE(tf.lookup("hand", "cup", 3 * kSecond).ok());
+  EXPECT_FALSE(tf.knows("table"));
+}
+
+TEST(TfBuffer, KeepsBoundedHistoryAndFrames) {
+  TfBuffer tf({.history_s = 1.0, .max_frames = 2});
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_TRUE(tf.add("world", "hand", i * kSecond / 10, turned_z(0.0, {i * 0.1, 0.0, 0.0}), false).ok());
+  }
+  EXPECT_FALSE(tf.lookup("world", "hand", 1 * kSecond).ok());
+  EXPECT_TRUE(tf.lookup("world", "hand", 9 * kSecond).ok());
+  ASSERT_TRUE(tf.add("world", "camera", 0, Pose::identity(), true).ok());
+  EXPECT_EQ(tf.add("world", "third", 0, Pose::identity(), true).code(), StatusCode::kResourceExhausted);
+  tf.forget_moving();
+  EXPECT_FALSE(tf.knows("hand"));
+  EXPECT_TRUE(tf.knows("camera"));
+}
+
+}  // namespace
+}  // namespace prescene::service

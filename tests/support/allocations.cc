@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/tests/support/allocations.h"
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PRESCENE_COUNTS_ALLOCATIONS 0
+#else
+#define PRESCENE_COUNTS_ALLOCATIONS 1
+#endif
+
+namespace {
+
+std::atomic<std::uint64_t> allocations{0};
+
+}  // namespace
+
+#if PRESCENE_COUNTS_ALLOCATIONS
+void* operator new(std::size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  const auto step = static_cast<std::size_t>(alignment);
+  if (void* memory = std::aligned_alloc(step, (size + step - 1) / step * step)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+#endif
+
+namespace prescene::tests {
+
+bool can_count_allocations() { return PRESCENE_COUNTS_ALLOCATIONS != 0; }
+std::uint64_t allocation_count() { return allocations.load(std::memory_order_relaxed); }
+
+}  // namespace prescene::tests
