@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/segmentation.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "prescene/core/check.h"
+
+namespace prescene::filter {
+namespace {
+
+using Eigen::Vector2d;
+
+bool measured(const Vector3d& p) { return p.z() > 0.0; }
+
+/// Two unit vectors that span a plane.
+std::array<Vector3d, 2> plane_axes(const Vector3d& normal) {
+  const Vector3d helper = std::abs(normal.x()) < 0.7 ? Vector3d::UnitX() : Vector3d::UnitY();
+  const Vector3d x = helper.cross(normal).normalized();
+  return {x, normal.cross(x)};
+}
+
+std::optional<geometry::Plane> plane_through(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const Vector3d n = (b - a).cross(c - a);
+  if (n.norm() < 1e-6) return std::nullopt;
+  geometry::Plane plane;
+  plane.normal = n.normalized();
+  plane.offset = -plane.normal.dot(a);
+  if (plane.offset < 0.0) {  // the camera, at the origin, is above it
+    plane.normal = -plane.normal;
+    plane.offset = -plane.offset;
+  }
+  return plane;
+}
+
+geometry::Plane fitted(std::span<const Vector3d> points) {
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& p : points) mean += p;
+  mean /= static_cast<double>(points.size());
+  geometry::Matrix3d scatter = geometry::Matrix3d::Zero();
+  for (const Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<geometry::Matrix3d> solver(scatter);
+  geometry::Plane plane;
+  plane.normal = solver.eigenvectors().col(0);
+  plane.offset = -plane.normal.dot(mean);
+  if (plane.offset < 0.0) {
+    plane.normal = -plane.normal;
+    plane.offset = -plane.offset;
+  }
+  return plane;
+}
+
+/// Labels of 4-connected pixels for which `inside` holds and `joined` holds between neighbours; pixels of each component
+/// in ascending order, components in the order of their first pixel.
+template <class Inside, class Joined>
+std::vector<std::vector<int>> components(int width, int height, const Inside& inside, const Joined& joined) {
+  std::vector<std::uint8_t> seen(static_cast<std::size_t>(width * height), 0);
+  std::vector<std::vector<int>> result;
+  std::vector<int> stack;
+  for (int start = 0; start < width * height; ++start) {
+    if (seen[static_cast<std::size_t>(start)] || !inside(start)) continue;
+    std::vector<int> component;
+    stack.assign(1, start);
+    seen[static_cast<std::size_t>(start)] = 1;
+    while (!stack.empty()) {
+      const int i = stack.back();
+      stack.pop_back();
+      component.push_back(i);
+      const int x = i % width;
+      const auto visit = [&](bool exists, int j) {
+        if (!exists || seen[static_cast<std::size_t>(j)] || !inside(j) || !joined(i, j)) return;
+        seen[static_cast<std::size_t>(j)] = 1;
+        stack.push_back(j);
+      };
+      visit(x > 0, i - 1);
+      visit(x + 1 < width, i + 1);
+      visit(i >= width, i - width);
+      visit(i + width < width * height, i + width);
+    }
+    std::sort(component.begin(), component.end());
+    result.push_back(std::move(component));
+  }
+  return result;
+}
+
+/// Pixels of the plane whose 3 x 3 neighbourhood is on the plane too: thin bridges to other things are cut.
+std::vector<std::uint8_t> eroded_inliers(const SampledDepth& sampled, const geometry::Plane& plane, double inlier) {
+  const int width = sampled.camera.width, height = sampled.camera.height;
+  const auto on_plane = [&](int x, int y) {
+    const Vector3d& p = sampled.points_C[static_cast<std::size_t>(y * width + x)];
+    return measured(p) && std::abs(plane.signed_distance(p)) < inlier;
+  };
+  std::vector<std::uint8_t> eroded(static_cast<std::size_t>(width * height), 0);
+  for (int y = 1; y + 1 < height; ++y)
+    for (int x = 1; x + 1 < width; ++x) {
+      bool all = true;
+      for (int dy = -1; dy <= 1 && all; ++dy)
+        for (int dx = -1; dx <= 1 && all; ++dx) all = on_plane(x + dx, y + dy);
+      eroded[static_cast<std::size_t>(y * width + x)] = all;
+    }
+  return eroded;
+}
+
+double cross(const Vector2d& o, const Vector2d& a, const Vector2d& b) {
+  return (a.x() - o.x()) * (b.y() - o.y()) - (a.y() - o.y()) * (b.x() - o.x());
+}
+
+/// Andrew's monotone chain; counter-clockwise.
+std::vector<Vector2d> hull_of(std::vector<Vector2d> points) {
+  std::sort(points.begin(), points.end(), [](const Vector2d& a, const Vector2d& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  if (points.size() < 3) return points;
+  std::vector<Vector2d> hull;
+  const auto extend = [&](const Vector2d& p, std::size_t floor) {
+    while (hull.size() >= floor + 2 && cross(hull[hull.size() - 2], hull.back(), p) <= 0.0) hull.pop_back();
+    hull.push_back(p);
+  };
+  for (const Vector2d& p : points) extend(p, 0);
+  const std::size_t lower = hull.size() - 1;
+  for (auto p = points.rbegin() + 1; p != points.rend(); ++p) extend(*p, lower);
+  hull.pop_back();
+  return hull;
+}
+
+}  // namespace
+
+SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
+                          const SegmentationOptions& options) {
+  PRESCENE_CHECK(depth.width() == camera.width && depth.height() == camera.height);
+  const int step = std::max(1, static_cast<int>(std::lround(static_cast<double>(camera.width) / options.target_width)));
+  const int offset = step / 2;
+  SampledDepth sampled;
+  sampled.camera = camera.subsampled(step, offset);
+  sampled.depth = geometry::DepthImage(sampled.camera.width, sampled.camera.height);
+  sampled.points_C.assign(sampled.depth.size(), Vector3d::Zero());
+  for (int y = 0; y < sampled.camera.height; ++y)
+    for (int x = 0; x < sampled.camera.width; ++x) {
+      const float z = depth(offset + step * x, offset + step * y);
+      if (!(z >= options.min_depth && z <= options.max_depth)) continue;
+      sampled.depth(x, y) = z;
+      sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)] = sampled.camera.unproject(x, y, z);
+    }
+  return sampled;
+}
+
+std::vector<Vector3d> convex_outline(const geometry::Plane& plane, std::span<const Vector3d> points, double margin) {
+  const auto [x_axis, y_axis] = plane_axes(plane.normal);
+  std::vector<Vector2d> flat;
+  Vector2d centre = Vector2d::Zero();
+  for (const Vector3d& p : points) flat.emplace_back(x_axis.dot(p), y_axis.dot(p));
+  std::vector<Vector2d> hull = hull_of(std::move(flat));
+  for (const Vector2d& p : hull) centre += p / static_cast<double>(hull.size());
+  std::vector<Vector3d> outline;
+  for (const Vector2d& p : hull) {
+    const Vector2d outwards = p - centre;
+    const Vector2d widened = p + margin * outwards / std::max(outwards.norm(), 1e-9);
+    outline.push_back(widened.x() * x_axis + widened.y() * y_axis - plane.offset * plane.normal);
+  }
+  return outline;
+}
+
+bool stands_on(const rendering::SupportRegion& support, const Vector3d& p_CQ) {
+  const std::size_t n = support.outline_C.size();
+  if (n < 3) return true;
+  const Vector3d& normal = support.plane_C.normal;
+  int left = 0, right = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector3d& a = support.outline_C[i];
+    const Vector3d& b = support.outline_C[(i + 1) % n];
+    (normal.dot((b - a).cross(p_CQ - a)) >= 0.0 ? left : right)++;
+  }
+  return left == 0 || right == 0;
+}
+
+std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, const SegmentationOptions& options,
+                                               const core::RandomStream& stream, const std::optional<Vector3d>& up_C) {
+  std::vector<Vector3d> points;
+  for (const Vector3d& p : sampled.points_C)
+    if (measured(p)) points.push_back(p);
+  if (points.size() < 50) return std::nullopt;
+  core::RandomStream draws = stream;
+  const auto counts = [&](const geometry::Plane& plane) {
+    return !up_C || plane.normal.dot(*up_C) >= std::cos(options.max_plane_tilt);
+  };
+  geometry::Plane best;
+  std::size_t best_inliers = 0;
+  for (int draw = 0; draw < options.plane_draws; ++draw) {
+    std::array<Vector3d, 3> corner;
+    for (Vector3d& p : corner) p = points[draws.uniform_below(points.size())];
+    const auto plane = plane_through(corner[0], corner[1], corner[2]);
+    if (!plane || !counts(*plane)) continue;
+    std::size_t inliers = 0;
+    for (const Vector3d& p : points) inliers += std::abs(plane->signed_distance(p)) < options.plane_inlier;
+    if (inliers > best_inliers) best = *plane, best_inliers = inliers;
+  }
+  if (static_cast<double>(best_inliers) < options.min_plane_share * static_cast<double>(points.size()) ||
+      best_inliers < 30)
+    return std::nullopt;
+
+  for (int round = 0; round < 3; ++round) {
+    std::vector<Vector3d> inliers;
+    for (const Vector3d& p : points)
+      if (std::abs(best.signed_distance(p)) < options.plane_inlier) inliers.push_back(p);
+    if (inliers.size() < 30) return std::nullopt;
+    best = fitted(inliers);
+  }
+  SupportPlane support;
+  support.region.plane_C = best;
+  double squares = 0.0;
+  for (const Vector3d& p : points) {
+    const double distance = best.signed_distance(p);
+    if (std::abs(distance) >= options.plane_inlier) continue;
+    ++support.inliers;
+    squares += distance * distance;
+  }
+  support.rms = std::sqrt(squares / std::max(1, support.inliers));
+
+  const std::vector<std::uint8_t> on_plane = eroded_inliers(sampled, best, options.plane_inlier);
+  const auto patches = components(
+      sampled.camera.width, sampled.camera.height, [&](int i) { return on_plane[static_cast<std::size_t>(i)] != 0; },
+      [](int, int) { return true; });
+  const auto largest = std::max_element(patches.begin(), patches.end(),
+                                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  if (largest == patches.end() || largest->size() < 10) return std::nullopt;
+  std::vector<Vector3d> patch;
+  for (const int i : *largest) patch.push_back(sampled.points_C[static_cast<std::size_t>(i)]);
+  support.region.outline_C = convex_outline(best, patch, options.outline_margin);
+  return support;
+}
+
+std::vector<Cluster> find_clusters(const SampledDepth& sampled, const rendering::SupportRegion& support,
+                                   const geometry::Image<std::uint8_t>& explained, const SegmentationOptions& options) {
+  const auto inside = [&](int i) {
+    const Vector3d& p = sampled.points_C[static_cast<std::size_t>(i)];
+    if (!measured(p) || (!explained.empty() && explained.data()[i] != 0)) return false;
+    const double height = support.plane_C.signed_distance(p);
+    return height > options.min_height && height < options.max_height && stands_on(support, p);
+  };
+  const auto joined = [&](int i, int j) {
+    return std::abs(sampled.depth.data()[i] - sampled.depth.data()[j]) < options.depth_step;
+  };
+  std::vector<Cluster> clusters;
+  for (std::vector<int>& pixels : components(sampled.camera.width, sampled.camera.height, inside, joined)) {
+    if (static_cast<int>(pixels.size()) < options.min_cluster_pixels) continue;
+    Cluster cluster;
+    for (const int i : pixels) cluster.points_C.push_back(sampled.points_C[static_cast<std::size_t>(i)]);
+    cluster.pixels = std::move(pixels);
+    clusters.push_back(std::move(cluster));
+  }
+  std::stable_sort(clusters.begin(), clusters.end(),
+                   [](const Cluster& a, const Cluster& b) { return a.pixels.size() > b.pixels.size(); });
+  return clusters;
+}
+
+}  // namespace prescene::filter
