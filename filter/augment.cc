@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/augment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/geometry/sampling.h"
+
+namespace prescene::filter {
+namespace {
+
+using belief::ObjectBelief;
+using belief::Particle;
+
+bool lighter(const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }
+
+std::vector<Pose> recovery_starts(const Pose& X_CO, const SearchTarget& target, std::span<const Vector3d> points,
+                                  const AugmentOptions& options, const core::RandomStream& stream) {
+  const int near = points.empty() ? options.recover_starts
+                                  : static_cast<int>(std::lround(options.near_share * options.recover_starts));
+  std::vector<Pose> starts =
+      disturbed_starts(X_CO, target.centre(), options.near_shift, options.near_turn, near, stream);
+  core::RandomStream draws = stream.for_purpose(core::Purpose::kDetection);
+  while (static_cast<int>(starts.size()) < options.recover_starts) {
+    const Vector3d& seen = points[draws.uniform_below(points.size())];
+    const Vector3d centre = seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
+    Pose start;
+    // Half of them keep the rotation that it had: things are moved more often than turned over.
+    start.rotation = draws.uniform() < 0.5
+                         ? (X_CO.rotation * geometry::exp_rotation(0.3 * geometry::normal_vector(draws))).normalized()
+                         : geometry::uniform_rotation(draws);
+    start.translation = centre - start.rotation * target.centre();
+    starts.push_back(start);
+  }
+  return starts;
+}
+
+/// Puts the lightest particles at the find; together they then weigh more than the others.
+void inject(const Pose& X_WO, const AugmentOptions& options, const InitialiseOptions& spread,
+            const core::RandomStream& stream, ObjectBelief& object) {
+  std::stable_sort(object.particles.begin(), object.particles.end(), lighter);
+  const auto total = static_cast<int>(object.particles.size());
+  const int count = std::clamp(static_cast<int>(std::lround(options.injected_share * total)), 1, total);
+  const std::vector<Particle> fresh = particles_about(X_WO, object.particles.back().physical,
+                                                      belief::MotionMode::kMoving, count, spread, stream);
+  const double share = count == total ? 1.0 : 0.9;
+  for (int i = 0; i < total; ++i) {
+    Particle& particle = object.particles[static_cast<std::size_t>(i)];
+    if (i < count) {
+      particle = fresh[static_cast<std::size_t>(i)];
+      // The first of them is the find itself.
+      const double mine = i == 0 ? 0.5 : 0.5 / std::max(1, count - 1);
+      particle.log_weight = std::log(share * (count == 1 ? 1.0 : mine));
+    } else {
+      particle.log_weight += std::log(1.0 - share);
+    }
+  }
+  belief::normalize(object.particles);
+}
+
+}  // namespace
+
+std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const rendering::FrameTerms& terms,
+                                         double tolerance) {
+  std::vector<Vector3d> points;
+  for (int y = 0; y < terms.camera.height; ++y)
+    for (int x = 0; x < terms.camera.width; ++x) {
+      const double z = terms.depth(x, y);
+      if (z == 0.0 || z >= frame.terms.model.options().max_depth) continue;
+      const double expected = terms.absent_peak(x, y);
+      if (expected > 0.0 && z > expected - tolerance) continue;
+      points.push_back(terms.camera.unproject(x, y, z));
+    }
+  return points;
+}
+
+bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
+             const rendering::PoseEvidence& current, const AugmentOptions& options, const WeightOptions& weighting,
+             const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
+             ObjectBelief& object) {
+  const Particle& last = *std::max_element(object.particles.begin(), object.particles.end(), lighter);
+  const Pose X_CO = frame.X_CW * last.X_WO;
+  const std::vector<Vector3d> points = unexplained_points(frame, terms, options.explained);
+  const std::vector<Pose> starts = recovery_starts(X_CO, target, points, options, stream);
+  const PoseCandidate found = tools.search->run(terms, target, starts, options.search, stream).front();
+
+  const rendering::PoseEvidence& e = found.evidence;
+  const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
+  if (e.log_ratio < options.accept_log_ratio || e.log_ratio < current.log_ratio + options.min_gain) return false;
+  if (shown < options.accept_visible_share || e.hit_share() < options.accept_hit_share) return false;
+  const double outline = outline_support(
+      terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer), weighting.outline_step);
+  const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
+  const double reach = std::max(0.10, options.reach_speed * unseen);
+  const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
+  const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
+  if (supported_evidence(e, outline, weighting) < needed) return false;
+  inject(frame.X_WC * found.X_CO, options, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
+  return true;
+}
+
+int new_objects(const FilterFrame& frame, const belief::Observation& observation, const geometry::DepthImage& known,
+                const AugmentOptions& options, const InitialiseOptions& spread, const FilterTools& tools,
+                const core::RandomStream& stream, belief::Belief& belief) {
+  const SegmentationOptions& segmentation = options.detection.segmentation;
+  const SampledDepth sampled = sample_depth(*observation.frame.depth, observation.frame.camera, segmentation);
+  const auto region = region_of(sampled, frame.X_CW, belief.scene->gravity_W, segmentation, stream);
+  if (!region) return 0;
+  std::vector<WantedModel> wanted;
+  for (const belief::ObjectModel& model : belief.scene->models) wanted.push_back({target_of(model, frame, tools), 1});
+  DetectionOptions detection = options.detection;
+  detection.min_log_ratio = std::max(detection.min_log_ratio, options.new_log_ratio);
+  rendering::FrameTerms terms;
+  with_known_surfaces(frame.terms, known, &terms);
+  const std::vector<Detection> found = detect(terms, known, sampled, *region, wanted, detection, tools, stream);
+  if (found.empty()) return 0;
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  for (const Detection& detection_found : found) {
+    const belief::ObjectModel& model = scene->models[static_cast<std::size_t>(detection_found.model)];
+    ObjectBelief object;
+    for (int number = 2; object.name.empty() || belief::find_object(*scene, object.name); ++number)
+      object.name = model.name + "_" + std::to_string(number);
+    object.model = detection_found.model;
+    const Pose X_WO = frame.X_WC * detection_found.X_CO;
+    belief::PhysicalParameters physical;
+    physical.mass = belief::mean(model.mass);
+    physical.center_of_mass = belief::mean(model.center_of_mass);
+    physical.friction = belief::mean(model.contact.friction);
+    physical.impact_friction =
+        model.contact.impact_friction ? belief::mean(*model.contact.impact_friction) : physical.friction;
+    physical.restitution = belief::mean(model.contact.restitution);
+    object.particles = particles_about(X_WO, physical, belief::MotionMode::kResting, spread.particles, spread, stream);
+    object.existence = spread.found_existence;
+    object.evidence_per_pixel = detection_found.evidence.log_ratio_per_visible_pixel();
+    object.last_seen_ns = frame.stamp_ns;
+    object.island = static_cast<int>(belief.objects.size());
+    belief::SceneObject in_scene;
+    in_scene.name = object.name;
+    in_scene.model = object.model;
+    in_scene.pose = belief::FixedPose{X_WO};
+    scene->objects.push_back(std::move(in_scene));
+    belief.objects.push_back(std::move(object));
+  }
+  belief.scene = std::move(scene);
+  return static_cast<int>(found.size());
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds known objects in a single frame without knowing where they are: clusters above a support, poses proposed per
+// cluster and model, the best explanation accepted first, then a second look at what is left.
+//
+//   std::vector<Detection> found = detect(terms, sampled, support, wanted, options, tools, stream);
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "prescene/filter/frame.h"
+#include "prescene/filter/pose_search.h"
+#include "prescene/filter/segmentation.h"
+
+namespace prescene::filter {
+
+struct DetectionOptions {
+  SegmentationOptions segmentation;
+  int starts = 64;                 ///< Random poses tried per cluster and model.
+  SearchOptions search;
+  int keep = 3;                    ///< Best poses per cluster and model that compete.
+  int rounds = 2;                  ///< The second round looks at what the first left unexplained.
+  int max_clusters = 12;           ///< Largest ones only.
+  double min_hit_share = 0.6;      ///< Of the visible pixels.
+  double min_log_ratio = 40.0;     ///< nats, untempered, at the likelihood's resolution.
+  double explained = 0.015;        ///< m; a measurement so near to a known surface (or behind it) is explained.
+  RefineOptions settle = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};  ///< Joint refinement of what is accepted.
+};
+
+/// A model that is looked for, and how many of it may be found.
+struct WantedModel {
+  SearchTarget target;
+  int count = 1;
+};
+
+struct Detection {
+  int model = 0;          ///< Index into the wanted models.
+  Pose X_CO;
+  rendering::PoseEvidence evidence;  ///< With the other detections as known surfaces.
+};
+
+/// Objects found, in the order of their acceptance (strongest first). `terms` is the frame with what is known put in;
+/// `known` its rendered depth at terms.camera (empty = nothing). The same bits for any number of threads.
+std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry::DepthImage& known,
+                              const SampledDepth& sampled, const rendering::SupportRegion& support,
+                              std::span<const WantedModel> wanted, const DetectionOptions& options,
+                              const FilterTools& tools, const core::RandomStream& stream);
+
+/// The measured pixels of `sampled` that a surface of `known` (depth in `camera`) explains, as a mask of the sampled
+/// camera's size.
+geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, const geometry::DepthImage& known,
+                                               const geometry::PinholeCamera& camera, double tolerance);
+
+/// Random poses with the target's centre near points of a cluster and any rotation.
+std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& target, int count,
+                                 const core::RandomStream& stream);
+
+}  // namespace prescene::filter

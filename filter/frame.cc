@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/frame.h"
+
+#include <algorithm>
+
+#include "prescene/core/check.h"
+
+namespace prescene::filter {
+namespace {
+
+constexpr double kClearlyInFront = 0.02;  // m: a support nearer to the object than this may be what it stands on
+
+core::Status render_depth(const rendering::RenderScene& scene, const geometry::PinholeCamera& camera, const Pose& X_WC,
+                          rendering::Renderer& renderer, geometry::DepthImage* depth) {
+  *depth = geometry::DepthImage(camera.width, camera.height);
+  if (scene.instances.empty()) return core::ok_status();
+  rendering::RenderedView view;
+  PRESCENE_RETURN_IF_ERROR(renderer.render(scene, camera, X_WC, {}, &view));
+  *depth = std::move(view.depth);
+  return core::ok_status();
+}
+
+/// The pixels of `full` that the reduced image of make_frame_terms shows.
+geometry::DepthImage sampled_like(const geometry::DepthImage& full, const rendering::FrameTerms& terms) {
+  const int offset = std::min({terms.step / 2, full.width() - 1, full.height() - 1});
+  geometry::DepthImage reduced(terms.camera.width, terms.camera.height);
+  for (int y = 0; y < reduced.height(); ++y)
+    for (int x = 0; x < reduced.width(); ++x) reduced(x, y) = full(offset + terms.step * x, offset + terms.step * y);
+  return reduced;
+}
+
+rendering::RenderScene only(const BeliefView& view, InstanceKind kind) {
+  rendering::RenderScene scene;
+  for (std::size_t i = 0; i < view.kinds.size(); ++i)
+    if (view.kinds[i] == kind) scene.instances.push_back(view.scene.instances[i]);
+  return scene;
+}
+
+}  // namespace
+
+core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
+                           std::span<const Pose> X_WG, const ColorModels& colors, const FrameOptions& options,
+                           const FilterTools& tools, FrameCache& cache, FilterFrame* frame) {
+  const belief::RgbdFrame& rgbd = observation.frame;
+  if (!rgbd.depth || rgbd.depth->empty())
+    return core::invalid_input("the frame has no depth image: the filter needs one, colour is optional");
+  if (!observation.X_WC.is_finite())
+    return core::invalid_input("the camera's pose is not finite: check the transform of its frame");
+  for (const Pose& pose : X_WG)
+    if (!pose.is_finite()) return core::invalid_input("a robot body's pose is not finite: check its transforms");
+  PRESCENE_RETURN_IF_ERROR(geometry::validate(rgbd.camera).at("the frame's camera"));
+
+  const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kDisplay, *tools.meshes);
+  if (cache.scene != scene || !(cache.camera == rgbd.camera) || !(cache.X_WC == observation.X_WC)) {
+    PRESCENE_RETURN_IF_ERROR(render_depth(only(known, InstanceKind::kSupport), rgbd.camera, observation.X_WC,
+                                          *tools.renderer, &cache.supports));
+    cache.scene = scene;
+    cache.camera = rgbd.camera;
+    cache.X_WC = observation.X_WC;
+  }
+
+  frame->stamp_ns = observation.stamp_ns;
+  frame->X_WC = observation.X_WC;
+  frame->X_CW = observation.X_WC.inverse();
+  frame->X_WG.assign(X_WG.begin(), X_WG.end());
+  frame->color_models.clear();
+  std::vector<rendering::ColorModel> color_models;
+  for (const auto& [name, model] : colors) {
+    frame->color_models.push_back(name);
+    color_models.push_back(model);
+  }
+  rendering::FrameTermsInput input;
+  input.camera = rgbd.camera;
+  input.depth = rgbd.depth->view();
+  if (rgbd.color && !color_models.empty()) input.color = rgbd.color->view();
+  if (!scene->supports.empty()) input.background = cache.supports.view();
+  input.color_models = color_models;
+  if (!rgbd.color) frame->color_models.clear();
+  PRESCENE_RETURN_IF_ERROR(
+      make_frame_terms(input, options.terms, rendering::SensorModel(options.sensor), &frame->terms));
+  // Only where supports are known is a missing return there evidence; elsewhere the view is open.
+  for (int y = 0; y < frame->terms.camera.height; ++y)
+    for (int x = 0; x < frame->terms.camera.width; ++x)
+      if (!(frame->terms.absent_peak(x, y) > 0.0f)) frame->terms.absent_missing(x, y) = -1.0f;
+  frame->supports = sampled_like(cache.supports, frame->terms);
+  return render_depth(only(known, InstanceKind::kRobot), frame->terms.camera, observation.X_WC, *tools.renderer,
+                      &frame->robot);
+}
+
+SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& frame, const FilterTools& tools) {
+  SearchTarget target;
+  target.mesh = tools.meshes->get(model.visual, model.collision, MeshDetail::kLikelihood);
+  target.material = material_of(model.surface, model.color);
+  const auto color = std::find(frame.color_models.begin(), frame.color_models.end(), model.name);
+  if (color != frame.color_models.end()) target.color_model = static_cast<int>(color - frame.color_models.begin());
+  return target;
+}
+
+geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
+                              rendering::Renderer& renderer) {
+  rendering::RenderScene scene;
+  scene.instances.push_back({target.mesh, X_CO, target.material, false});
+  geometry::DepthImage depth;
+  // The camera was checked when the frame was prepared, so a failure is a lost device: the object then hides nothing.
+  if (!render_depth(scene, camera, Pose::identity(), renderer, &depth).ok())
+    depth = geometry::DepthImage(camera.width, camera.height);
+  return depth;
+}
+
+void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth) {
+  PRESCENE_CHECK(other.width() == depth->width() && other.height() == depth->height());
+  for (std::size_t i = 0; i < depth->size(); ++i) {
+    const float a = depth->data()[i], b = other.data()[i];
+    if (b > 0.0f && (a == 0.0f || b < a)) depth->data()[i] = b;
+  }
+}
+
+rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,
+                                       const Vector3d& p_CQ, double radius) {
+  geometry::DepthImage known = frame.robot;
+  for (const geometry::DepthImage* other : others) merge_nearest(*other, &known);
+  const auto front = static_cast<float>(p_CQ.z() - radius - kClearlyInFront);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const float support = frame.supports.data()[i];
+    if (support > 0.0f && support < front && (known.data()[i] == 0.0f || support < known.data()[i]))
+      known.data()[i] = support;
+  }
+  rendering::FrameTerms terms;
+  with_known_surfaces(frame.terms, known, &terms);
+  return terms;
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// One frame as the operators see it: what was measured at the likelihood's resolution, and what is known about the
+// surroundings without looking.
+//
+//   FrameCache cache;                                        // once
+//   FilterFrame frame;
+//   PRESCENE_RETURN_IF_ERROR(prepare_frame(scene, observation, robot, options, tools, cache, &frame));
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/observation.h"
+#include "prescene/filter/pose_search.h"
+#include "prescene/filter/render_scene.h"
+#include "prescene/filter/segmentation.h"
+#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/renderer.h"
+
+namespace prescene::filter {
+
+/// What the operators work with. Everything outlives the filter.
+struct FilterTools {
+  PoseSearch* search = nullptr;
+  rendering::Renderer* renderer = nullptr;
+  MeshCache* meshes = nullptr;
+};
+
+struct FrameOptions {
+  rendering::FrameTermsOptions terms;
+  rendering::SensorModelOptions sensor;
+};
+
+/// A frame, prepared.
+struct FilterFrame {
+  core::TimeNs stamp_ns = 0;
+  Pose X_WC;
+  Pose X_CW;
+  std::vector<Pose> X_WG;             ///< Of the robot's bodies, in the order of Scene::robot.
+  rendering::FrameTerms terms;        ///< With the supports as what is seen where no object is.
+  geometry::DepthImage supports;      ///< Their depth in terms.camera, 0 = none.
+  geometry::DepthImage robot;         ///< The same of the robot's bodies.
+  std::vector<std::string> color_models;  ///< Model names, in the order of terms.color_ratio.
+};
+
+/// The rendering of the supports alone, kept while camera and supports stay where they are.
+struct FrameCache {
+  std::shared_ptr<const belief::Scene> scene;
+  geometry::PinholeCamera camera;
+  Pose X_WC;
+  geometry::DepthImage supports;
+};
+
+/// Colour models by the name of the object model; none for a model means depth only.
+using ColorModels = std::map<std::string, rendering::ColorModel>;
+
+/// Fails with kInvalidInput when the frame's sizes don't fit its camera, a pose is not finite, or there is no depth.
+/// X_WG.size() == scene->robot.size().
+core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
+                           std::span<const Pose> X_WG, const ColorModels& colors, const FrameOptions& options,
+                           const FilterTools& tools, FrameCache& cache, FilterFrame* frame);
+
+/// The target to look for, of a model of the scene.
+SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& frame, const FilterTools& tools);
+
+/// Depth of one object in the frame's reduced camera, 0 where it is not.
+geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
+                              rendering::Renderer& renderer);
+
+/// Nearest of both, 0 = nothing; sizes equal.
+void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth);
+
+/// The frame for one object: robot, neighbours (`others`, one depth image each) and those supports that stand clearly in
+/// front of it (nearer than the sphere of `radius` about p_CQ) explain what they show.
+rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,
+                                       const Vector3d& p_CQ, double radius);
+
+}  // namespace prescene::filter

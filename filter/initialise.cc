@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/initialise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "prescene/core/check.h"
+
+namespace prescene::filter {
+namespace {
+
+using belief::ObjectBelief;
+using belief::Particle;
+
+constexpr int kSpreadDraws = 64;  // enough to tell a wide prior from a narrow one
+
+std::vector<double> uniforms(int count, core::RandomStream& stream) {
+  std::vector<double> u(static_cast<std::size_t>(count));
+  for (double& value : u) value = stream.uniform();
+  return u;
+}
+
+/// Second moment of the prior's poses about its mean, box_plus coordinates.
+Matrix6d prior_covariance(const belief::SceneObject& object) {
+  const Pose centre = belief::mean(object.pose);
+  core::RandomStream stream(0, core::Purpose::kStartBelief);
+  Matrix6d covariance = Matrix6d::Zero();
+  for (int i = 0; i < kSpreadDraws; ++i) {
+    const std::vector<double> u = uniforms(belief::dimensions(object.pose), stream);
+    const Vector6d d = geometry::box_minus(belief::draw(object.pose, u), centre);
+    covariance += d * d.transpose() / kSpreadDraws;
+  }
+  return covariance;
+}
+
+Matrix6d first_covariance(const InitialiseOptions& options) {
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(options.first_turn * options.first_turn);
+  covariance.diagonal().tail<3>().setConstant(options.first_shift * options.first_shift);
+  return covariance;
+}
+
+bool inside_prior(const belief::SceneObject& object, const Pose& X_WO, const InitialiseOptions& options) {
+  const auto* box = std::get_if<belief::BoxPose>(&object.pose);
+  if (box == nullptr) return true;
+  const belief::ScalarDistribution* axes[] = {&box->position.x, &box->position.y, &box->position.z};
+  for (int i = 0; i < 3; ++i) {
+    const auto* range = std::get_if<belief::UniformScalar>(axes[i]);
+    if (range == nullptr) continue;
+    if (X_WO.translation[i] < range->low - options.box_margin || X_WO.translation[i] > range->high + options.box_margin)
+      return false;
+  }
+  return true;
+}
+
+void place(const Pose& X_WO, core::TimeNs stamp_ns, const rendering::PoseEvidence& evidence,
+           const InitialiseOptions& options, const core::RandomStream& stream, ObjectBelief& object) {
+  const belief::PhysicalParameters physical = object.particles.front().physical;
+  object.particles = particles_about(X_WO, physical, belief::MotionMode::kResting,
+                                     static_cast<int>(object.particles.size()), options, stream);
+  object.existence = options.found_existence;
+  object.state = belief::TrackState::kTracked;
+  object.evidence_per_pixel = evidence.log_ratio_per_visible_pixel();
+  object.visible_share = evidence.visible_share();
+  object.frames_unseen = 0;
+  object.last_seen_ns = stamp_ns;
+}
+
+}  // namespace
+
+bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& options) {
+  if (object.held_by) return false;
+  const Matrix6d covariance = prior_covariance(object);
+  return std::sqrt(covariance.diagonal().head<3>().maxCoeff()) > options.wide_turn ||
+         std::sqrt(covariance.diagonal().tail<3>().maxCoeff()) > options.wide_shift;
+}
+
+std::vector<Particle> particles_about(const Pose& X_WO, const belief::PhysicalParameters& physical,
+                                      belief::MotionMode mode, int count, const InitialiseOptions& options,
+                                      core::RandomStream stream) {
+  std::vector<Particle> particles;
+  for (int i = 0; i < count; ++i) {
+    Particle particle;
+    particle.log_weight = -std::log(static_cast<double>(count));
+    Vector6d d = Vector6d::Zero();
+    if (i > 0)
+      for (int k = 0; k < 6; ++k) d[k] = stream.normal() * (k < 3 ? options.first_turn : options.first_shift);
+    particle.X_WO = geometry::normalized(geometry::box_plus(X_WO, d));
+    particle.covariance.topLeftCorner<6, 6>() = first_covariance(options);
+    particle.mode = mode;
+    particle.physical = physical;
+    particles.push_back(particle);
+  }
+  return particles;
+}
+
+belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed,
+                                  core::TimeNs stamp_ns, const InitialiseOptions& options) {
+  PRESCENE_CHECK(options.particles > 0);
+  belief::Belief belief;
+  belief.seed = seed;
+  belief.stamp_ns = stamp_ns;
+  for (const belief::KinematicBody& body : scene->robot) belief.robot.push_back(belief::pose_at(body, 0.0));
+  if (scene->camera) belief.X_WC = scene->camera->X_WC;
+  const core::RandomStream stream(seed, core::Purpose::kStartBelief);
+  const belief::WorldState middle = belief::mean_start(*scene);
+  for (const belief::SceneObject& object : scene->objects) {
+    ObjectBelief start;
+    start.name = object.name;
+    start.model = object.model;
+    start.existence = options.prior_existence;
+    start.last_seen_ns = stamp_ns;
+    start.state = belief::TrackState::kDoubtful;
+    start.island = static_cast<int>(belief.objects.size());
+    belief.objects.push_back(std::move(start));
+  }
+  for (int k = 0; k < options.particles; ++k) {
+    core::RandomStream mine = stream.at(0, static_cast<std::uint32_t>(k));
+    const belief::WorldState state =
+        k == 0 ? middle : belief::draw_start(*scene, uniforms(belief::start_dimensions(*scene), mine));
+    for (std::size_t i = 0; i < state.objects.size(); ++i) {
+      Particle particle;
+      particle.log_weight = -std::log(static_cast<double>(options.particles));
+      particle.X_WO = state.objects[i].X_WO;
+      particle.V_WO = state.objects[i].V_WO;
+      particle.mode = state.objects[i].mode;
+      particle.physical = state.objects[i].physical;
+      particle.covariance.topLeftCorner<6, 6>() = first_covariance(options) + 0.25 * prior_covariance(scene->objects[i]);
+      belief.objects[i].particles.push_back(particle);
+    }
+  }
+  belief.scene = std::move(scene);
+  return belief;
+}
+
+std::optional<rendering::SupportRegion> region_of(const SampledDepth& sampled, const Pose& X_CW,
+                                                  const Vector3d& gravity_W, const SegmentationOptions& options,
+                                                  const core::RandomStream& stream) {
+  std::optional<Vector3d> up_C;
+  if (gravity_W.norm() > 1e-9) up_C = X_CW.rotation * -gravity_W.normalized();
+  const std::optional<SupportPlane> plane = find_support_plane(sampled, options, stream, up_C);
+  if (!plane) return std::nullopt;
+  return plane->region;
+}
+
+std::optional<belief::Support> support_from_frame(const belief::Observation& observation, const Vector3d& gravity_W,
+                                                  const InitialiseOptions& options, const core::RandomStream& stream) {
+  const SampledDepth sampled =
+      sample_depth(*observation.frame.depth, observation.frame.camera, options.detection.segmentation);
+  const auto region =
+      region_of(sampled, observation.X_WC.inverse(), gravity_W, options.detection.segmentation, stream);
+  if (!region || region->outline_C.size() < 3) return std::nullopt;
+  // A frame on the plane, z along its normal, x along the outline's longest edge.
+  const Vector3d z = observation.X_WC.rotation * region->plane_C.normal;
+  std::vector<Vector3d> corners;
+  for (const Vector3d& p : region->outline_C) corners.push_back(observation.X_WC * p);
+  Vector3d x = Vector3d::Zero();
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vector3d edge = corners[(i + 1) % corners.size()] - corners[i];
+    if (edge.norm() > x.norm()) x = edge;
+  }
+  x = (x - z * z.dot(x)).normalized();
+  geometry::Matrix3d R_WS;
+  R_WS << x, z.cross(x), z;
+  geometry::Box extent;
+  for (const Vector3d& p : corners) extent.extend(Vector3d(R_WS.transpose() * p));
+  const Vector3d size(extent.sizes().x(), extent.sizes().y(), options.support_thickness);
+  belief::Support support;
+  support.name = "support_plane";
+  support.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{size}, Pose::identity()});
+  support.X_WS.rotation = geometry::Quaterniond(R_WS).normalized();
+  support.X_WS.translation = R_WS * extent.center() - 0.5 * options.support_thickness * z;
+  return support;
+}
+
+FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& observation,
+                         const InitialiseOptions& options, const FilterTools& tools, const core::RandomStream& stream,
+                         belief::Belief& belief) {
+  FindReport report;
+  const belief::Scene& scene = *belief.scene;
+  std::vector<std::size_t> wide;
+  geometry::DepthImage known = frame.robot;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const belief::ObjectModel& model = scene.model_of(scene.objects[i]);
+    if (has_wide_prior(scene.objects[i], options)) {
+      wide.push_back(i);
+    } else {
+      const SearchTarget target = target_of(model, frame, tools);
+      merge_nearest(depth_of(target, frame.X_CW * belief.objects[i].particles.front().X_WO, frame.terms.camera,
+                             *tools.renderer),
+                    &known);
+    }
+  }
+  report.looked_for = static_cast<int>(wide.size());
+  if (wide.empty()) return report;
+
+  const SegmentationOptions& segmentation = options.detection.segmentation;
+  const SampledDepth sampled = sample_depth(*observation.frame.depth, observation.frame.camera, segmentation);
+  const auto region = region_of(sampled, frame.X_CW, scene.gravity_W, segmentation, stream);
+  std::vector<Detection> found;
+  std::vector<WantedModel> wanted;
+  std::vector<int> model_of_wanted;
+  if (region) {
+    for (const std::size_t i : wide) {
+      const auto known_model = std::find(model_of_wanted.begin(), model_of_wanted.end(), scene.objects[i].model);
+      if (known_model != model_of_wanted.end()) {
+        ++wanted[static_cast<std::size_t>(known_model - model_of_wanted.begin())].count;
+        continue;
+      }
+      model_of_wanted.push_back(scene.objects[i].model);
+      wanted.push_back({target_of(scene.model_of(scene.objects[i]), frame, tools), 1});
+    }
+    rendering::FrameTerms terms;
+    with_known_surfaces(frame.terms, known, &terms);
+    found = detect(terms, known, sampled, *region, wanted, options.detection, tools, stream);
+  } else {
+    report.no_support = true;
+  }
+  std::vector<bool> used(found.size(), false);
+  for (const std::size_t i : wide) {
+    ObjectBelief& object = belief.objects[i];
+    object.state = belief::TrackState::kLost;
+    object.existence = options.missing_existence;
+    object.frames_unseen = 1000;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const Pose X_WO = frame.X_WC * found[k].X_CO;
+      if (used[k] || model_of_wanted[static_cast<std::size_t>(found[k].model)] != object.model ||
+          !inside_prior(scene.objects[i], X_WO, options))
+        continue;
+      used[k] = true;
+      ++report.found;
+      place(X_WO, frame.stamp_ns, found[k].evidence, options, stream.at(1, static_cast<std::uint32_t>(i)), object);
+      break;
+    }
+  }
+  return report;
+}
+
+}  // namespace prescene::filter

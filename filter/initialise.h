@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Operator 1, initialise: the first belief, from what the scene says of each object's start or, where it says too little,
+// from the first frame alone: support plane, clusters above it, poses proposed per model, refined.
+//
+//   Belief belief = belief_from_priors(scene, seed, options);          // no frame needed
+//   find_in_frame(observation, options, ..., belief);                  // objects whose place the scene leaves open
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/observation.h"
+#include "prescene/filter/detection.h"
+#include "prescene/filter/frame.h"
+
+namespace prescene::filter {
+
+struct InitialiseOptions {
+  int particles = 16;               ///< Per object.
+  double wide_shift = 0.06;         ///< m; an object whose start is known worse than this ...
+  double wide_turn = 0.5;           ///< rad; ... or this (standard deviations) is looked for in the frame.
+  double first_shift = 0.006;       ///< m, standard deviation of a particle about its mean after a find.
+  double first_turn = 0.06;         ///< rad
+  double prior_existence = 0.95;    ///< Of an object that the scene names and places.
+  double missing_existence = 0.2;   ///< Of one that was looked for and not found.
+  double found_existence = 0.9;
+  double box_margin = 0.05;         ///< m that a find may lie outside of where the scene says.
+  bool add_support = true;          ///< A scene without supports gets the plane of the first frame as one.
+  double support_thickness = 0.02;  ///< m
+  DetectionOptions detection;
+};
+
+/// Draws each object's particles from the scene's priors; one set a scene object, in its order. Step 0.
+belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed,
+                                  core::TimeNs stamp_ns, const InitialiseOptions& options);
+
+/// Whether the scene leaves the object's place or rotation too open to start from.
+bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& options);
+
+/// The support that the frame shows, as a box of the plane's extent; nothing if there is none. Gravity says what is up.
+std::optional<belief::Support> support_from_frame(const belief::Observation& observation, const Vector3d& gravity_W,
+                                                  const InitialiseOptions& options, const core::RandomStream& stream);
+
+struct FindReport {
+  int looked_for = 0;
+  int found = 0;
+  bool no_support = false;  ///< Nothing to stand on was seen, so nothing could be looked for.
+};
+/// Looks for the objects with wide priors. Those found get particles there, the others are lost until they are seen.
+FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& observation,
+                         const InitialiseOptions& options, const FilterTools& tools, const core::RandomStream& stream,
+                         belief::Belief& belief);
+
+/// The support region to cluster above, in C: the largest plane of the frame that faces up.
+std::optional<rendering::SupportRegion> region_of(const SampledDepth& sampled, const Pose& X_CW,
+                                                  const Vector3d& gravity_W, const SegmentationOptions& options,
+                                                  const core::RandomStream& stream);
+
+/// `count` particles about a pose of known spread: the first at the pose itself, at rest.
+std::vector<belief::Particle> particles_about(const Pose& X_WO, const belief::PhysicalParameters& physical,
+                                              belief::MotionMode mode, int count, const InitialiseOptions& options,
+                                              core::RandomStream stream);
+
+}  // namespace prescene::filter

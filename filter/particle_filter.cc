@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/particle_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/belief/robot_motion.h"
+#include "prescene/core/check.h"
+
+namespace prescene::filter {
+namespace {
+
+using belief::Belief;
+using belief::ObjectBelief;
+using belief::Particle;
+using belief::TrackState;
+
+const Particle& heaviest(const ObjectBelief& object) {
+  return *std::max_element(object.particles.begin(), object.particles.end(),
+                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
+}
+
+const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
+  return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
+}
+
+/// Whether others may take the object's surface for granted.
+bool hides_others(const ObjectBelief& object) {
+  return object.existence >= 0.5 && (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful);
+}
+
+void note(const char* stage, StepResult& result) {
+  result.trace.emplace_back(stage, belief::content_hash(result.belief));
+}
+
+}  // namespace
+
+std::string degraded_text(std::uint32_t bits) {
+  static constexpr std::pair<Degraded, const char*> kNames[] = {
+      {kFrameRejected, "frame rejected"},       {kClockWentBack, "clock went back"},
+      {kLongGap, "long gap"},                   {kNoSupportFound, "no support found"},
+      {kObjectsMissing, "objects missing"},     {kImpossibleWeights, "impossible weights"},
+      {kRobotPoseAssumed, "robot pose assumed"}};
+  std::string text;
+  for (const auto& [bit, name] : kNames) {
+    if ((bits & bit) == 0) continue;
+    if (!text.empty()) text += ", ";
+    text += name;
+  }
+  return text;
+}
+
+ParticleFilter::ParticleFilter(const rendering::LikelihoodBatch& likelihood, rendering::Renderer& renderer,
+                               core::ThreadPool& threads, FilterSettings settings, SimulatorSource simulators)
+    : settings_(std::move(settings)),
+      simulators_(std::move(simulators)),
+      search_(likelihood, threads),
+      tools_{&search_, &renderer, &meshes_} {}
+
+Belief ParticleFilter::start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const {
+  return belief_from_priors(std::move(scene), seed, 0, settings_.initialise);
+}
+
+std::vector<Pose> ParticleFilter::robot_poses(const belief::Scene& scene, const belief::Observation& observation,
+                                              std::uint32_t* degraded) const {
+  const double time = 1e-9 * static_cast<double>(observation.stamp_ns - settings_.scene_start_ns);
+  std::vector<Pose> X_WG;
+  for (std::size_t i = 0; i < scene.robot.size(); ++i) {
+    const auto named = observation.robot.find(scene.robot[i].name);
+    if (named != observation.robot.end()) {
+      X_WG.push_back(named->second);
+    } else {
+      X_WG.push_back(belief::robot_pose_at(scene, scene.actions, static_cast<int>(i), time));
+      // A body that stands still is where it stands, told or not.
+      if (scene.robot[i].timeline.size() > 1) *degraded |= kRobotPoseAssumed;
+    }
+  }
+  return X_WG;
+}
+
+void ParticleFilter::first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result) {
+  const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0);
+  const FindReport report =
+      find_in_frame(frame, observation, settings_.initialise, tools_, stream, result.belief);
+  result.counters.looked_for = report.looked_for;
+  result.counters.found = report.found;
+  if (report.no_support) result.degraded |= kNoSupportFound;
+  if (report.found < report.looked_for) result.degraded |= kObjectsMissing;
+}
+
+rendering::FrameTerms ParticleFilter::terms_of(const FilterFrame& frame, const Belief& belief, std::size_t object,
+                                               const SearchTarget& target,
+                                               const std::vector<geometry::DepthImage>& depths) const {
+  std::vector<const geometry::DepthImage*> others;
+  for (std::size_t j = 0; j < depths.size(); ++j)
+    if (j != object && hides_others(belief.objects[j])) others.push_back(&depths[j]);
+  const Pose X_CO = frame.X_CW * heaviest(belief.objects[object]).X_WO;
+  return terms_for_object(frame, others, X_CO * target.centre(), static_cast<double>(target.mesh->radius));
+}
+
+void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& result,
+                               std::vector<geometry::DepthImage>& depths, std::vector<WeightReport>& reports) {
+  Belief& belief = result.belief;
+  const core::RandomStream stream(belief.seed, core::Purpose::kProposal);
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    ObjectBelief& object = belief.objects[i];
+    const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
+    const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
+    reports[i] = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
+                        stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles);
+    if (reports[i].all_impossible) result.degraded |= kImpossibleWeights;
+    for (const ParticleWeight& particle : reports[i].particles) result.counters.hidden_particles += particle.hidden;
+    update_track(reports[i], frame.stamp_ns, settings_.track, object);
+    depths[i] = depth_of(target, frame.X_CW * heaviest(object).X_WO, frame.terms.camera, *tools_.renderer);
+  }
+}
+
+void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports,
+                                 StepResult& result, std::vector<geometry::DepthImage>& depths) {
+  Belief& belief = result.belief;
+  const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    ObjectBelief& object = belief.objects[i];
+    if (object.frames_unseen < settings_.augment.recover_after_frames ||
+        (belief.step + i) % static_cast<std::uint64_t>(std::max(1, settings_.augment.recover_every)) != 0)
+      continue;
+    const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
+    const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
+    const WeightReport& report = reports[i];
+    const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
+    ++result.counters.recoveries_tried;
+    if (!recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise, tools_,
+                 stream.at(belief.step, static_cast<std::uint32_t>(i)), object))
+      continue;
+    ++result.counters.recoveries;
+    object.state = TrackState::kDoubtful;  // the next frame decides
+    object.existence = std::max(object.existence, 0.5);
+    object.frames_unseen = 0;
+    depths[i] = depth_of(target, frame.X_CW * heaviest(object).X_WO, frame.terms.camera, *tools_.renderer);
+  }
+}
+
+void ParticleFilter::look_for_more(const FilterFrame& frame, const belief::Observation& observation,
+                                   const std::vector<geometry::DepthImage>& depths, StepResult& result) {
+  const AugmentOptions& options = settings_.augment;
+  if (!options.new_objects ||
+      result.belief.step % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0)
+    return;
+  geometry::DepthImage known = frame.robot;
+  for (std::size_t i = 0; i < depths.size(); ++i)
+    if (hides_others(result.belief.objects[i])) merge_nearest(depths[i], &known);
+  const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, result.belief.step);
+  result.counters.new_objects =
+      filter::new_objects(frame, observation, known, options, settings_.initialise, tools_, stream, result.belief);
+}
+
+StepResult ParticleFilter::step(const Belief& previous, const belief::Observation& observation,
+                                const belief::Control& control) {
+  PRESCENE_CHECK(previous.scene != nullptr);
+  PRESCENE_CHECK(previous.objects.size() == previous.scene->objects.size());
+  StepResult result;
+  result.belief = previous;
+  Belief& belief = result.belief;
+  const bool first = previous.step == 0;
+  const double elapsed = first ? 0.0 : 1e-9 * static_cast<double>(observation.stamp_ns - previous.stamp_ns);
+  if (!first && !(elapsed > 0.0)) {
+    result.degraded |= kClockWentBack;
+    return result;
+  }
+  if (elapsed > settings_.max_gap) result.degraded |= kLongGap;
+  const double dt = std::min(elapsed, settings_.max_gap);
+  ++belief.step;
+  belief.stamp_ns = observation.stamp_ns;
+  if (first)
+    for (ObjectBelief& object : belief.objects) object.last_seen_ns = observation.stamp_ns;
+
+  const bool has_depth = observation.frame.depth && !observation.frame.depth->empty() &&
+                         observation.frame.depth->width() == observation.frame.camera.width &&
+                         observation.frame.depth->height() == observation.frame.camera.height;
+  if (belief.scene->supports.empty() && settings_.initialise.add_support && has_depth && observation.X_WC.is_finite()) {
+    const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
+    if (auto support = support_from_frame(observation, belief.scene->gravity_W, settings_.initialise, stream)) {
+      auto scene = std::make_shared<belief::Scene>(*belief.scene);
+      scene->supports.push_back(*std::move(support));
+      belief.scene = std::move(scene);
+    }
+  }
+
+  const std::vector<Pose> X_WG = robot_poses(*belief.scene, observation, &result.degraded);
+  if (!first)
+    predict(belief, control, X_WG, dt, settings_.predict, simulators_,
+            core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads());
+  belief.robot = X_WG;
+  note("predict", result);
+
+  FilterFrame frame;
+  result.frame_status = prepare_frame(belief.scene, observation, X_WG, settings_.colors, settings_.frame, tools_,
+                                      frame_cache_, &frame);
+  if (!result.frame_status.ok()) {
+    result.degraded |= kFrameRejected;
+    if (first) belief.step = 0;  // the first look is still to be taken
+    for (ObjectBelief& object : belief.objects) mark_unseen(observation.stamp_ns, settings_.track, object);
+    return result;
+  }
+  belief.X_WC = observation.X_WC;
+  if (first) first_look(frame, observation, result);
+  note("initialise", result);
+
+  std::vector<geometry::DepthImage> depths;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    depths.push_back(depth_of(target_of(model_of(belief, i), frame, tools_),
+                              frame.X_CW * heaviest(belief.objects[i]).X_WO, frame.terms.camera, *tools_.renderer));
+  std::vector<WeightReport> reports(belief.objects.size());
+  weigh_all(frame, first ? settings_.max_gap : dt, result, depths, reports);
+  note("weight", result);
+
+  const core::RandomStream stream(belief.seed, core::Purpose::kResample);
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    result.counters.resampled += resample(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
+                                          belief.objects[i].particles);
+  note("filter", result);
+
+  if (settings_.recover) recover_all(frame, reports, result, depths);
+  look_for_more(frame, observation, depths, result);
+  number_islands(settings_.island_gap, meshes_, belief);
+  note("augment", result);
+  return result;
+}
+
+void number_islands(double gap, MeshCache& meshes, Belief& belief) {
+  struct Body {
+    rendering::MeshHandle mesh;
+    Pose X_WO;
+    geometry::Box box;
+  };
+  std::vector<Body> bodies;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    const belief::ObjectModel& model = model_of(belief, i);
+    Body body{meshes.get(model.visual, model.collision, MeshDetail::kLikelihood), heaviest(belief.objects[i]).X_WO, {}};
+    for (const auto& vertex : body.mesh->vertices) body.box.extend(vertex.cast<double>());
+    body.box.extend((body.box.max().array() + gap).matrix());
+    body.box.extend((body.box.min().array() - gap).matrix());
+    bodies.push_back(std::move(body));
+  }
+  // Near enough for what shares a set of particles: a vertex of one inside the other's box.
+  const auto reaches_into = [](const Body& a, const Body& b) {
+    const Pose X_BA = b.X_WO.inverse() * a.X_WO;
+    return std::any_of(a.mesh->vertices.begin(), a.mesh->vertices.end(),
+                       [&](const auto& vertex) { return b.box.contains(X_BA * vertex.template cast<double>()); });
+  };
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) belief.objects[i].island = static_cast<int>(i);
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    for (std::size_t j = i + 1; j < bodies.size(); ++j) {
+      const double reach = static_cast<double>(bodies[i].mesh->radius) + static_cast<double>(bodies[j].mesh->radius) + gap;
+      const Vector3d between = bodies[i].X_WO * bodies[i].mesh->centre.cast<double>() -
+                               bodies[j].X_WO * bodies[j].mesh->centre.cast<double>();
+      if (between.norm() > reach) continue;
+      if (!reaches_into(bodies[i], bodies[j]) && !reaches_into(bodies[j], bodies[i])) continue;
+      const int a = belief.objects[i].island, b = belief.objects[j].island;
+      for (ObjectBelief& object : belief.objects)
+        if (object.island == std::max(a, b)) object.island = std::min(a, b);
+    }
+}
+
+Belief present_objects(const Belief& belief, double min_existence) {
+  Belief present = belief;
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  present.objects.clear();
+  scene->objects.clear();
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    if (belief.objects[i].existence < min_existence || belief.objects[i].state == TrackState::kLost) continue;
+    present.objects.push_back(belief.objects[i]);
+    scene->objects.push_back(belief.scene->objects[i]);
+  }
+  if (present.objects.size() == belief.objects.size()) return belief;
+  present.scene = std::move(scene);
+  return present;
+}
+
+}  // namespace prescene::filter

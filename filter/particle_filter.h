@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// The particle filter: five operators in a row, one frame after the other.
+//
+//   ParticleFilter filter(likelihood, renderer, threads, settings);
+//   Belief belief = filter.start(scene, seed);
+//   for (;;) {
+//     StepResult result = filter.step(belief, observation, control);
+//     belief = std::move(result.belief);
+//   }
+//
+// A belief is all that is carried from frame to frame: a filter may be thrown away and made anew between two steps, and
+// any step may be repeated. The same belief, observation, control and settings give the same bits, for any number of
+// threads, if likelihood and renderer promise theirs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/observation.h"
+#include "prescene/filter/augment.h"
+#include "prescene/filter/frame.h"
+#include "prescene/filter/initialise.h"
+#include "prescene/filter/predict.h"
+#include "prescene/filter/resample.h"
+#include "prescene/filter/track_state.h"
+#include "prescene/filter/weight.h"
+
+namespace prescene::filter {
+
+struct FilterSettings {
+  FrameOptions frame;
+  InitialiseOptions initialise;
+  PredictOptions predict;
+  AugmentOptions augment;
+  WeightOptions weight;
+  ResampleOptions resample;
+  TrackStateOptions track;
+  ColorModels colors;          ///< By model name; a model without one is tracked by depth alone.
+  bool recover = true;         ///< Look for objects that are not tracked.
+  double max_gap = 1.0;        ///< s; a longer pause between frames is predicted as one of this length.
+  double island_gap = 0.005;   ///< m; objects nearer than this form an island.
+  /// Time of Scene timelines and actions: s between their start and the stamp 0 (robot bodies that no observation names).
+  core::TimeNs scene_start_ns = 0;
+};
+
+/// Bits of StepResult::degraded.
+enum Degraded : std::uint32_t {
+  kFrameRejected = 1u << 0,        ///< The frame could not be used (see frame_status): predicted only.
+  kClockWentBack = 1u << 1,        ///< The stamp is not after the belief's: nothing was done.
+  kLongGap = 1u << 2,              ///< More than max_gap since the last frame.
+  kNoSupportFound = 1u << 3,       ///< Objects had to be looked for, but nothing that they could stand on was seen.
+  kObjectsMissing = 1u << 4,       ///< Some that were looked for at the start were not found.
+  kImpossibleWeights = 1u << 5,    ///< A set's weights were all zero or not finite and were made equal.
+  kRobotPoseAssumed = 1u << 6,     ///< A robot body was put where its timeline says: the observation did not name it.
+};
+std::string degraded_text(std::uint32_t bits);
+
+struct StepCounters {
+  int resampled = 0;         ///< Particle sets.
+  int recoveries_tried = 0;
+  int recoveries = 0;        ///< That succeeded.
+  int new_objects = 0;
+  int hidden_particles = 0;  ///< That stayed hidden.
+  int looked_for = 0;        ///< At the start.
+  int found = 0;
+};
+
+/// A hash of the belief after each stage, for finding where two runs part.
+using HashTrace = std::vector<std::pair<std::string, std::uint64_t>>;
+
+struct StepResult {
+  belief::Belief belief;
+  std::uint32_t degraded = 0;
+  core::Status frame_status;  ///< Why the frame was rejected; ok otherwise.
+  StepCounters counters;
+  HashTrace trace;
+};
+
+class ParticleFilter {
+ public:
+  /// All must outlive the filter.
+  ParticleFilter(const rendering::LikelihoodBatch& likelihood, rendering::Renderer& renderer, core::ThreadPool& threads,
+                 FilterSettings settings, SimulatorSource simulators = {});
+
+  const FilterSettings& settings() const { return settings_; }
+  MeshCache& meshes() { return meshes_; }
+
+  /// The belief before any frame: the scene's priors, step 0.
+  belief::Belief start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const;
+
+  /// The next belief. The first step (belief.step == 0) looks for what the scene's priors leave open.
+  StepResult step(const belief::Belief& belief, const belief::Observation& observation, const belief::Control& control);
+
+ private:
+  struct Work;
+  std::vector<Pose> robot_poses(const belief::Scene& scene, const belief::Observation& observation,
+                                std::uint32_t* degraded) const;
+  void first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result);
+  void weigh_all(const FilterFrame& frame, double dt, StepResult& result, std::vector<geometry::DepthImage>& depths,
+                 std::vector<WeightReport>& reports);
+  void recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports, StepResult& result,
+                   std::vector<geometry::DepthImage>& depths);
+  void look_for_more(const FilterFrame& frame, const belief::Observation& observation,
+                     const std::vector<geometry::DepthImage>& depths, StepResult& result);
+  rendering::FrameTerms terms_of(const FilterFrame& frame, const belief::Belief& belief, std::size_t object,
+                                 const SearchTarget& target, const std::vector<geometry::DepthImage>& depths) const;
+
+  FilterSettings settings_;
+  SimulatorSource simulators_;
+  MeshCache meshes_;
+  PoseSearch search_;
+  FilterTools tools_;
+  FrameCache frame_cache_;
+};
+
+/// Numbers the islands: objects whose surfaces are nearer than `gap` share the number of the first of them.
+void number_islands(double gap, MeshCache& meshes, belief::Belief& belief);
+
+/// The belief without objects that are not believed to be there (existence below `min_existence`, or lost), and a scene
+/// to match: what questions about the future start from.
+belief::Belief present_objects(const belief::Belief& belief, double min_existence = 0.5);
+
+}  // namespace prescene::filter

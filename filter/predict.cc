@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/predict.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/core/check.h"
+#include "prescene/geometry/sampling.h"
+
+namespace prescene::filter {
+namespace {
+
+using belief::MotionMode;
+using belief::ObjectBelief;
+using belief::Particle;
+using geometry::Matrix3d;
+using geometry::Twist;
+
+/// Adds the noise of dt, in the error coordinates (rotation, translation, angular, linear).
+void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covariance) {
+  const double shares[] = {noise.turn, noise.shift, noise.rate, noise.speed};
+  for (int block = 0; block < 4; ++block)
+    covariance.diagonal().segment<3>(3 * block).array() += shares[block] * shares[block] * dt;
+}
+
+/// Scales rows and columns so that no standard deviation exceeds its limit; correlations stay.
+void limit_spread(const PredictOptions& options, belief::Matrix12d& covariance) {
+  const double limits[] = {options.max_turn_deviation, options.max_shift_deviation, options.max_rate_deviation,
+                           options.max_speed_deviation};
+  Eigen::Matrix<double, 12, 1> scale = Eigen::Matrix<double, 12, 1>::Ones();
+  for (int i = 0; i < 12; ++i) {
+    const double deviation = std::sqrt(std::max(0.0, covariance(i, i)));
+    if (deviation > limits[i / 3]) scale[i] = limits[i / 3] / deviation;
+  }
+  covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
+}
+
+void clear_twist(Particle& particle) {
+  particle.V_WO = {};
+  particle.covariance.bottomRows<6>().setZero();
+  particle.covariance.rightCols<6>().setZero();
+}
+
+/// Starts to move: at its velocity, with room for more.
+void wake(const PredictOptions& options, Particle& particle) {
+  particle.mode = MotionMode::kMoving;
+  particle.covariance.diagonal().segment<3>(6).array() += options.wake_rate * options.wake_rate;
+  particle.covariance.diagonal().segment<3>(9).array() += options.wake_speed * options.wake_speed;
+}
+
+/// The motion of a body between two poses as a twist.
+Twist twist_between(const Pose& X_from, const Pose& X_to, double dt) {
+  Twist V;
+  V.angular = geometry::log_rotation(X_to.rotation * X_from.rotation.conjugate()) / dt;
+  V.linear = (X_to.translation - X_from.translation) / dt;
+  return V;
+}
+
+/// Rigidly with the hand from one of its poses to another; the twist is that of the motion.
+void carry(Particle& particle, const Pose& X_WG_from, const Pose& X_WG_to, double dt) {
+  const Pose before = particle.X_WO;
+  const Pose motion = X_WG_to * X_WG_from.inverse();
+  particle.X_WO = geometry::normalized(motion * before);
+  clear_twist(particle);
+  particle.V_WO = twist_between(before, particle.X_WO, dt);
+  // Rotation errors are the body's own and stay; translation errors turn with the hand.
+  belief::Matrix12d turn = belief::Matrix12d::Identity();
+  turn.block<3, 3>(3, 3) = motion.rotation.toRotationMatrix();
+  particle.covariance = turn * particle.covariance * turn.transpose();
+}
+
+/// When within the step (s from its start) the object is let go of, if it is.
+std::optional<double> release_time(const belief::Control& control, const std::string& object, double dt) {
+  for (const belief::Action& action : control.actions) {
+    const auto* release = std::get_if<belief::Release>(&action.what);
+    if (release != nullptr && release->object == object) return std::clamp(action.time, 0.0, dt);
+  }
+  return std::nullopt;
+}
+
+/// Puts a grasp of the control into the scene (a copy: the context of earlier beliefs stays as it was).
+void apply_grasps(const belief::Control& control, belief::Belief& belief) {
+  for (const belief::Action& action : control.actions) {
+    const auto* grasp = std::get_if<belief::Grasp>(&action.what);
+    if (grasp == nullptr) continue;
+    const auto object = belief::find_object(*belief.scene, grasp->object);
+    if (!object || !belief::find_robot_body(*belief.scene, grasp->hand)) continue;
+    const auto index = static_cast<std::size_t>(*object);
+    if (belief.scene->objects[index].held_by != grasp->hand) {
+      auto scene = std::make_shared<belief::Scene>(*belief.scene);
+      scene->objects[index].held_by = grasp->hand;
+      belief.scene = std::move(scene);
+    }
+    for (Particle& particle : belief.objects[index].particles) {
+      particle.mode = MotionMode::kHeld;
+      clear_twist(particle);
+    }
+  }
+}
+
+bool present(const ObjectBelief& object) {
+  return object.existence >= 0.5 && object.state != belief::TrackState::kLost;
+}
+
+/// One particle that physics moves on.
+struct Falling {
+  std::size_t object;
+  std::size_t particle;
+  double duration;  ///< s
+};
+
+/// The scene of one step: robot bodies go from where they were to where they are, absent objects are left out.
+belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_WG, double dt,
+                         const std::vector<std::size_t>& objects) {
+  belief::Scene scene = *belief.scene;
+  for (std::size_t i = 0; i < scene.robot.size(); ++i)
+    scene.robot[i].timeline = {{0.0, belief.robot[i]}, {dt, X_WG[i]}};
+  std::vector<belief::SceneObject> kept;
+  for (const std::size_t i : objects) kept.push_back(belief.scene->objects[i]);
+  scene.objects = std::move(kept);
+  scene.actions.clear();
+  scene.outcomes.clear();
+  scene.exclusive_outcomes.clear();
+  return scene;
+}
+
+const Particle& heaviest(const ObjectBelief& object) {
+  return *std::max_element(object.particles.begin(), object.particles.end(),
+                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
+}
+
+/// Moves the falling particles by the simulator, each with the other objects where they most likely are.
+void simulate(belief::Belief& belief, std::span<const Falling> falling, std::span<const Pose> X_WG, double dt,
+              const SimulatorSource& simulators, const core::RandomStream& stream, core::ThreadPool& threads) {
+  std::vector<std::size_t> objects;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    if (present(belief.objects[i])) objects.push_back(i);
+  const belief::Scene scene = step_scene(belief, X_WG, dt, objects);
+  const std::unique_ptr<simulation::Simulator> simulator = simulators(scene);
+  if (!simulator) return;
+  belief::WorldState common;
+  for (const std::size_t i : objects) {
+    const Particle& particle = heaviest(belief.objects[i]);
+    common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, particle.physical});
+  }
+  std::vector<belief::WorldState> starts;
+  for (const Falling& f : falling) {
+    belief::WorldState start = common;
+    start.time = dt - f.duration;
+    const Particle& particle = belief.objects[f.object].particles[f.particle];
+    const auto place = static_cast<std::size_t>(std::find(objects.begin(), objects.end(), f.object) - objects.begin());
+    start.objects[place] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, particle.physical};
+    starts.push_back(std::move(start));
+  }
+  simulation::RunRequest request;
+  request.stop.duration = falling.front().duration;
+  request.stop.stop_at_rest = false;
+  std::vector<belief::Trajectory> runs(starts.size());
+  simulator->run(starts, request, stream, 0, threads, runs);
+  for (std::size_t i = 0; i < falling.size(); ++i) {
+    if (runs[i].end != belief::TrajectoryEnd::kDuration || runs[i].states.empty()) continue;
+    const auto place =
+        static_cast<std::size_t>(std::find(objects.begin(), objects.end(), falling[i].object) - objects.begin());
+    const belief::ObjectState& end = runs[i].final().objects[place];
+    Particle& particle = belief.objects[falling[i].object].particles[falling[i].particle];
+    particle.X_WO = geometry::normalized(end.X_WO);
+    particle.V_WO = end.V_WO;
+  }
+}
+
+Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
+  const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
+  return model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
+}
+
+/// The modes of one object's particles for this step.
+void change_modes(const PredictOptions& options, bool tracked, core::RandomStream& stream, ObjectBelief& object) {
+  for (Particle& particle : object.particles) {
+    const double draw = stream.uniform();
+    if (particle.mode != MotionMode::kMoving) {
+      // What is hidden gives no reason to think that it moves.
+      if (tracked && draw < options.wake_probability) wake(options, particle);
+    } else if (draw < options.settle_probability && particle.V_WO.linear.norm() < options.settle_speed &&
+               particle.V_WO.angular.norm() < options.settle_rate) {
+      particle.mode = MotionMode::kResting;
+      clear_twist(particle);
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<int> holder_of(const belief::Scene& scene, int object) {
+  const auto& held_by = scene.objects[static_cast<std::size_t>(object)].held_by;
+  return held_by ? belief::find_robot_body(scene, *held_by) : std::nullopt;
+}
+
+void drift(Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise) {
+  const Vector3d p_OQ_W = particle.X_WO.rotation * p_OQ;
+  const Twist V_Q = geometry::shifted(particle.V_WO, p_OQ_W);
+  const Vector3d p_WQ = particle.X_WO.translation + p_OQ_W + dt * V_Q.linear;
+  const Matrix3d R_OW = particle.X_WO.rotation.toRotationMatrix().transpose();
+  Pose moved;
+  moved.rotation = (geometry::exp_rotation(dt * V_Q.angular) * particle.X_WO.rotation).normalized();
+  moved.translation = p_WQ - moved.rotation * p_OQ;
+  particle.X_WO = geometry::normalized(moved);
+
+  const double keep = std::pow(velocity_keep, dt);
+  Twist kept;
+  kept.angular = keep * V_Q.angular;
+  kept.linear = keep * V_Q.linear;
+  particle.V_WO = geometry::shifted(kept, -(particle.X_WO.rotation * p_OQ));
+
+  // To first order: a rate turns the body (in its own axes), a velocity moves it.
+  belief::Matrix12d F = belief::Matrix12d::Identity();
+  F.block<3, 3>(0, 6) = dt * R_OW;
+  F.block<3, 3>(3, 9) = dt * Matrix3d::Identity();
+  F.diagonal().tail<6>().setConstant(keep);
+  particle.covariance = F * particle.covariance * F.transpose();
+  add_noise(noise, dt, particle.covariance);
+}
+
+void predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
+             const PredictOptions& options, const SimulatorSource& simulators, const core::RandomStream& stream,
+             core::ThreadPool& threads) {
+  PRESCENE_CHECK(belief.objects.size() == belief.scene->objects.size());
+  PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
+  PRESCENE_CHECK(dt > 0.0);
+  apply_grasps(control, belief);
+
+  std::vector<Falling> falling;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    ObjectBelief& object = belief.objects[i];
+    const bool tracked = object.state == belief::TrackState::kTracked;
+    const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
+    const std::optional<double> released = release_time(control, object.name, dt);
+    core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
+    change_modes(options, tracked, draws, object);
+    const Vector3d centre = centre_of(*belief.scene, object);
+    for (std::size_t k = 0; k < object.particles.size(); ++k) {
+      Particle& particle = object.particles[k];
+      double left = dt;
+      const double physics_draw = draws.uniform();
+      double physics_share = options.physics_share;
+      if (particle.mode == MotionMode::kHeld && hand) {
+        const Pose& X_from = belief.robot[static_cast<std::size_t>(*hand)];
+        const Pose& X_to = X_WG[static_cast<std::size_t>(*hand)];
+        const double held = released.value_or(dt);
+        if (held > 0.0)
+          carry(particle, X_from, geometry::interpolate(X_from, X_to, held / dt), held);
+        add_noise(options.held, dt, particle.covariance);
+        if (!released) continue;
+        wake(options, particle);
+        left = dt - held;
+        physics_share = options.physics_after_release;
+      } else if (particle.mode == MotionMode::kHeld) {
+        wake(options, particle);  // nobody holds it
+      }
+      if (particle.mode == MotionMode::kResting) {
+        add_noise(options.resting, dt, particle.covariance);
+      } else if (left > 0.0) {
+        const Particle before = particle;
+        drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep, options.moving);
+        if (simulators && present(object) && physics_draw < physics_share) {
+          particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike
+          particle.V_WO = before.V_WO;
+          falling.push_back({i, k, left});
+        }
+      }
+      limit_spread(options, particle.covariance);
+    }
+  }
+  // Runs of one call share a duration.
+  std::stable_sort(falling.begin(), falling.end(), [](const auto& a, const auto& b) { return a.duration < b.duration; });
+  for (std::size_t begin = 0; begin < falling.size();) {
+    std::size_t end = begin;
+    while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
+    simulate(belief, std::span(falling).subspan(begin, end - begin), X_WG, dt, simulators, stream, threads);
+    begin = end;
+  }
+  belief.robot.assign(X_WG.begin(), X_WG.end());
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Operator 5, filter: systematic resampling when the weights have become uneven, keeping the best particle as it is and
+// spreading the copies of the others so that the mixture's moments stay.
+#pragma once
+
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/core/random.h"
+
+namespace prescene::filter {
+
+struct ResampleOptions {
+  double min_effective_share = 0.5;  ///< Resample when the effective sample size is below this share of the particles.
+  /// Copies are drawn from their particle's Gaussian times this, and keep the rest as their covariance: between 0 (copies
+  /// are equal) and 1 (copies are points).
+  double spread = 0.4;
+};
+
+/// Returns whether it resampled; then all weights are equal but that the best particle, unmoved, is first. Weights must
+/// be normalised. Systematic resampling [Kitagawa 1996], one uniform draw.
+bool resample(const ResampleOptions& options, core::RandomStream stream, std::vector<belief::Particle>& particles);
+
+/// Indices of the particles chosen by systematic resampling from normalised weights, ascending, as many as there are
+/// particles; `u` in (0, 1).
+std::vector<int> systematic_indices(const std::vector<belief::Particle>& particles, double u);
+
+}  // namespace prescene::filter

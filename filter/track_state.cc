@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/track_state.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace prescene::filter {
+namespace {
+
+using belief::ObjectBelief;
+using belief::TrackState;
+
+void change_existence(double nats, const TrackStateOptions& options, ObjectBelief& object) {
+  const double p = std::clamp(object.existence, 1e-6, 1.0 - 1e-6);
+  const double odds = std::log(p / (1.0 - p)) + std::clamp(nats, -options.existence_rate, options.existence_rate);
+  const double kept = std::clamp(odds, options.min_existence_odds, options.max_existence_odds);
+  object.existence = 1.0 / (1.0 + std::exp(-kept));
+}
+
+}  // namespace
+
+void mark_unseen(core::TimeNs stamp_ns, const TrackStateOptions& options, ObjectBelief& object) {
+  ++object.frames_unseen;
+  object.evidence_per_pixel = 0.0;
+  object.visible_share = 0.0;
+  const double unseen = 1e-9 * static_cast<double>(stamp_ns - object.last_seen_ns);
+  if (object.state != TrackState::kLost)
+    object.state = unseen > options.unseen_lost_after ? TrackState::kLost : TrackState::kUnseen;
+}
+
+void update_track(const WeightReport& report, core::TimeNs stamp_ns, const TrackStateOptions& options,
+                  ObjectBelief& object) {
+  if (report.hidden_weight > 0.5 || report.visible_share < options.min_visible_share) {
+    mark_unseen(stamp_ns, options, object);
+    object.visible_share = report.visible_share;
+    return;
+  }
+  object.evidence_per_pixel = report.evidence_per_pixel;
+  object.visible_share = report.visible_share;
+  change_existence(report.evidence_per_pixel - options.lost_evidence, options, object);
+  if (report.evidence_per_pixel >= options.tracked_evidence) {
+    object.state = TrackState::kTracked;
+    object.frames_unseen = 0;
+    object.last_seen_ns = stamp_ns;
+    return;
+  }
+  ++object.frames_unseen;
+  if (report.evidence_per_pixel >= options.lost_evidence) {
+    object.state = TrackState::kDoubtful;
+  } else if (object.frames_unseen >= options.lost_after_frames) {
+    object.state = TrackState::kLost;
+  } else if (object.state != TrackState::kLost) {
+    object.state = TrackState::kDoubtful;
+  }
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Operator 4, weight: each particle moves to its own refined mode, its Gaussian is updated there, and its weight grows by
+// the Laplace evidence of the frame. A particle whose pose is hidden may stay hidden instead of moving onto what hides it.
+//
+//   WeightReport report = weight(terms, target, X_WC, options, tools, stream, object.particles);
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/filter/frame.h"
+
+namespace prescene::filter {
+
+struct WeightOptions {
+  int steps = 5;                  ///< Gauss-Newton steps per particle.
+  double first_gate = 0.03;       ///< m
+  double last_gate = 0.012;       ///< m
+  double start_spread = 0.8;      ///< Standard deviation of the random starts, of the predicted one.
+  double max_start_shift = 0.03;  ///< m; a start is never further off, however wide the prediction is.
+  double max_start_turn = 0.35;   ///< rad
+  double min_pixels = 12;         ///< The tempering's pixel count is at least this.
+  /// A pose is hidden when less than this share of the pixels that it should show is not behind something else; then
+  /// staying hidden competes with moving to where something is seen.
+  double hidden_share = 0.35;
+  double log_hidden = -4.0;       ///< log prior odds of staying hidden.
+  double max_jump_speed = 2.0;    ///< m/s; a mode further from the prediction than this and its spread allow is refused.
+  double outline_step = 0.02;     ///< m; where the measured surface goes on past the outline within this, there is no edge.
+  double min_outline = 0.35;      ///< Share of the outline with an edge below which a match is no evidence at all ...
+  double full_outline = 0.6;      ///< ... and from which it is full evidence.
+};
+
+/// What became of one particle.
+struct ParticleWeight {
+  rendering::PoseEvidence evidence;  ///< At its new mean.
+  double outline = 1.0;              ///< Share of its outline with an edge, see outline_support.
+  bool hidden = false;
+};
+
+struct WeightReport {
+  std::vector<ParticleWeight> particles;
+  int heaviest = 0;
+  double hidden_weight = 0.0;        ///< Of the particles that stayed hidden.
+  bool all_impossible = false;       ///< No particle had finite evidence: weights were left as they were.
+  /// Nats per visible pixel of the heaviest particle, worth less where the outline has no edge.
+  double evidence_per_pixel = 0.0;
+  double visible_share = 0.0;        ///< Of the pixels that it covers in view.
+};
+
+/// `terms`: the frame with what else is known put in (terms_for_object); `dt` since the last frame, s. Particles' means,
+/// covariances and weights (normalised) change. Source: Rao-Blackwellised particle filter [Doucet et al. 2000] with
+/// Laplace's approximation about each particle's mode.
+WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
+                    const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
+                    std::vector<belief::Particle>& particles);
+
+/// Share of the outline of an object at `X_CO` (its rendered depth in terms.camera) at which the measured surface ends:
+/// just outside, it is further away, or known to be something else. What goes on past the outline is not the object, be
+/// the match inside ever so good. 1 when no outline pixel can tell (hidden by nearer things, or missing).
+double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step);
+
+/// Evidence per visible pixel, scaled by what the outline is worth.
+double supported_evidence(const rendering::PoseEvidence& evidence, double outline, const WeightOptions& options);
+
+/// The likelihood's information about a pose in W (box_plus coordinates) from that in C.
+geometry::Matrix6d information_in_world(const geometry::Matrix6d& H_C, const geometry::Quaterniond& R_CW);
+
+}  // namespace prescene::filter
