@@ -23,7 +23,8 @@ std::vector<Pose> recovery_starts(const Pose& X_CO, const SearchTarget& target, 
   core::RandomStream draws = stream.for_purpose(core::Purpose::kDetection);
   while (static_cast<int>(starts.size()) < options.recover_starts) {
     const Vector3d& seen = points[draws.uniform_below(points.size())];
-    const Vector3d centre = seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
+    const Vector3d centre =
+        seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
     Pose start;
     // Half of them keep the rotation that it had: things are moved more often than turned over.
     start.rotation = draws.uniform() < 0.5
@@ -41,8 +42,8 @@ void inject(const Pose& X_WO, const AugmentOptions& options, const InitialiseOpt
   std::stable_sort(object.particles.begin(), object.particles.end(), lighter);
   const auto total = static_cast<int>(object.particles.size());
   const int count = std::clamp(static_cast<int>(std::lround(options.injected_share * total)), 1, total);
-  const std::vector<Particle> fresh = particles_about(X_WO, object.particles.back().physical,
-                                                      belief::MotionMode::kMoving, count, spread, stream);
+  const std::vector<Particle> fresh =
+      particles_about(X_WO, object.particles.back().physical, belief::MotionMode::kMoving, count, spread, stream);
   const double share = count == total ? 1.0 : 0.9;
   for (int i = 0; i < total; ++i) {
     Particle& particle = object.particles[static_cast<std::size_t>(i)];
@@ -88,8 +89,8 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
   if (e.log_ratio < options.accept_log_ratio || e.log_ratio < current.log_ratio + options.min_gain) return false;
   if (shown < options.accept_visible_share || e.hit_share() < options.accept_hit_share) return false;
-  const double outline = outline_support(
-      terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer), weighting.outline_step);
+  const double outline =
+      outline_support(terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer), weighting.outline_step);
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;

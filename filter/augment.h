@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operator 3, augment: what the belief does not explain yet. Objects that are not supported by the frame are looked for in
-// the whole image; clusters that no object explains may be new objects.
+// Operator 3, augment: what the belief does not explain yet. Objects that are not supported by the frame are looked for
+// in the whole image; clusters that no object explains may be new objects.
 //
 //   if (recover(...)) ...           // an object that was unseen, doubtful or lost
 //   new_objects(...)                // clusters that nobody explains
@@ -18,28 +18,28 @@
 namespace prescene::filter {
 
 struct AugmentOptions {
-  int recover_after_frames = 4;      ///< An object not supported for so many frames is looked for ...
-  int recover_every = 3;             ///< ... every so many frames.
+  int recover_after_frames = 4;  ///< An object not supported for so many frames is looked for ...
+  int recover_every = 3;         ///< ... every so many frames.
   int recover_starts = 48;
-  double near_share = 0.33;          ///< Of the starts are near the last pose; the others at unexplained pixels.
-  double near_shift = 0.08;          ///< m, standard deviation
-  double near_turn = 0.8;            ///< rad
+  double near_share = 0.33;  ///< Of the starts are near the last pose; the others at unexplained pixels.
+  double near_shift = 0.08;  ///< m, standard deviation
+  double near_turn = 0.8;    ///< rad
   SearchOptions search = {.refine = {.steps = 10}, .polish_candidates = 1, .polish_draws = 12};
-  double accept_evidence = 3.0;      ///< Nats per visible pixel, outline considered.
-  double accept_log_ratio = 40.0;    ///< nats
+  double accept_evidence = 3.0;    ///< Nats per visible pixel, outline considered.
+  double accept_log_ratio = 40.0;  ///< nats
   double accept_visible_share = 0.08;
-  double accept_hit_share = 0.5;     ///< Of the visible pixels.
-  double min_gain = 10.0;            ///< nats more than where it was thought to be.
-  /// Where motion could not have carried it since it was seen last (at this speed, m/s, and not less than 10 cm), a find
-  /// needs this much more evidence per pixel.
+  double accept_hit_share = 0.5;  ///< Of the visible pixels.
+  double min_gain = 10.0;         ///< nats more than where it was thought to be.
+  /// Where motion could not have carried it since it was seen last (at this speed, m/s, and not less than 10 cm), a
+  /// find needs this much more evidence per pixel.
   double reach_speed = 0.7;
   double far_evidence = 1.0;
-  double injected_share = 0.5;       ///< Of the particles are put at the find, the least probable ones.
-  double explained = 0.015;          ///< m; measurements so near to a known surface are explained.
+  double injected_share = 0.5;  ///< Of the particles are put at the find, the least probable ones.
+  double explained = 0.015;     ///< m; measurements so near to a known surface are explained.
 
-  bool new_objects = false;          ///< Look for more objects of the scene's models than it names.
-  int new_every = 15;                ///< frames
-  double new_log_ratio = 250.0;      ///< nats; smaller finds are remnants more often than objects.
+  bool new_objects = false;      ///< Look for more objects of the scene's models than it names.
+  int new_every = 15;            ///< frames
+  double new_log_ratio = 250.0;  ///< nats; smaller finds are remnants more often than objects.
   DetectionOptions detection;
 };
 

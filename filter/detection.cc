@@ -53,8 +53,8 @@ std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, st
                                             const geometry::PinholeCamera& camera, const FilterTools& tools) {
   std::vector<geometry::DepthImage> depths;
   for (const Detection& detection : found)
-    depths.push_back(depth_of(wanted[static_cast<std::size_t>(detection.model)].target, detection.X_CO, camera,
-                              *tools.renderer));
+    depths.push_back(
+        depth_of(wanted[static_cast<std::size_t>(detection.model)].target, detection.X_CO, camera, *tools.renderer));
   return depths;
 }
 
@@ -117,7 +117,8 @@ std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& tar
   for (int i = 0; i < count; ++i) {
     const Vector3d& seen = cluster.points_C[draws.uniform_below(cluster.points_C.size())];
     // The centre lies behind the seen surface by up to the radius.
-    const Vector3d centre = seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
+    const Vector3d centre =
+        seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
     Pose X_CO;
     X_CO.rotation = geometry::uniform_rotation(draws);
     X_CO.translation = centre - X_CO.rotation * target.centre();
@@ -134,7 +135,8 @@ geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, cons
     for (int x = 0; x < explained.width(); ++x) {
       const double z = sampled.depth(x, y);
       if (z == 0.0) continue;
-      const Eigen::Vector2d pixel = camera.project(sampled.points_C[static_cast<std::size_t>(y * explained.width() + x)]);
+      const Eigen::Vector2d pixel =
+          camera.project(sampled.points_C[static_cast<std::size_t>(y * explained.width() + x)]);
       const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
       // The neighbours' surfaces count too: outlines are no sharper than a reduced pixel.
       for (int dv = -1; dv <= 1; ++dv)
@@ -162,8 +164,8 @@ std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry
     std::vector<Cluster> clusters = find_clusters(sampled, support, mask, options.segmentation);
     if (static_cast<int>(clusters.size()) > options.max_clusters)
       clusters.resize(static_cast<std::size_t>(options.max_clusters));
-    std::vector<Proposal> proposals = propose(explained_terms, clusters, wanted, left, options, tools, stream,
-                                              static_cast<std::uint64_t>(round));
+    std::vector<Proposal> proposals =
+        propose(explained_terms, clusters, wanted, left, options, tools, stream, static_cast<std::uint64_t>(round));
     if (proposals.empty()) continue;
     accept_greedily(std::move(proposals), wanted, options, tools, explained_terms, explained_depth, left, found);
     settle(terms, wanted, options, tools, stream, found);

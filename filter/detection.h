@@ -16,15 +16,16 @@ namespace prescene::filter {
 
 struct DetectionOptions {
   SegmentationOptions segmentation;
-  int starts = 64;                 ///< Random poses tried per cluster and model.
+  int starts = 64;  ///< Random poses tried per cluster and model.
   SearchOptions search;
-  int keep = 3;                    ///< Best poses per cluster and model that compete.
-  int rounds = 2;                  ///< The second round looks at what the first left unexplained.
-  int max_clusters = 12;           ///< Largest ones only.
-  double min_hit_share = 0.6;      ///< Of the visible pixels.
-  double min_log_ratio = 40.0;     ///< nats, untempered, at the likelihood's resolution.
-  double explained = 0.015;        ///< m; a measurement so near to a known surface (or behind it) is explained.
-  RefineOptions settle = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};  ///< Joint refinement of what is accepted.
+  int keep = 3;                 ///< Best poses per cluster and model that compete.
+  int rounds = 2;               ///< The second round looks at what the first left unexplained.
+  int max_clusters = 12;        ///< Largest ones only.
+  double min_hit_share = 0.6;   ///< Of the visible pixels.
+  double min_log_ratio = 40.0;  ///< nats, untempered, at the likelihood's resolution.
+  double explained = 0.015;     ///< m; a measurement so near to a known surface (or behind it) is explained.
+  RefineOptions settle = {
+      .steps = 8, .first_gate = 0.02, .last_gate = 0.008};  ///< Joint refinement of what is accepted.
 };
 
 /// A model that is looked for, and how many of it may be found.
@@ -34,7 +35,7 @@ struct WantedModel {
 };
 
 struct Detection {
-  int model = 0;          ///< Index into the wanted models.
+  int model = 0;  ///< Index into the wanted models.
   Pose X_CO;
   rendering::PoseEvidence evidence;  ///< With the other detections as known surfaces.
 };

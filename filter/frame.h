@@ -41,10 +41,10 @@ struct FilterFrame {
   core::TimeNs stamp_ns = 0;
   Pose X_WC;
   Pose X_CW;
-  std::vector<Pose> X_WG;             ///< Of the robot's bodies, in the order of Scene::robot.
-  rendering::FrameTerms terms;        ///< With the supports as what is seen where no object is.
-  geometry::DepthImage supports;      ///< Their depth in terms.camera, 0 = none.
-  geometry::DepthImage robot;         ///< The same of the robot's bodies.
+  std::vector<Pose> X_WG;                 ///< Of the robot's bodies, in the order of Scene::robot.
+  rendering::FrameTerms terms;            ///< With the supports as what is seen where no object is.
+  geometry::DepthImage supports;          ///< Their depth in terms.camera, 0 = none.
+  geometry::DepthImage robot;             ///< The same of the robot's bodies.
   std::vector<std::string> color_models;  ///< Model names, in the order of terms.color_ratio.
 };
 
@@ -75,8 +75,8 @@ geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, cons
 /// Nearest of both, 0 = nothing; sizes equal.
 void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth);
 
-/// The frame for one object: robot, neighbours (`others`, one depth image each) and those supports that stand clearly in
-/// front of it (nearer than the sphere of `radius` about p_CQ) explain what they show.
+/// The frame for one object: robot, neighbours (`others`, one depth image each) and those supports that stand clearly
+/// in front of it (nearer than the sphere of `radius` about p_CQ) explain what they show.
 rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,
                                        const Vector3d& p_CQ, double radius);
 

@@ -95,8 +95,8 @@ std::vector<Particle> particles_about(const Pose& X_WO, const belief::PhysicalPa
   return particles;
 }
 
-belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed,
-                                  core::TimeNs stamp_ns, const InitialiseOptions& options) {
+belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed, core::TimeNs stamp_ns,
+                                  const InitialiseOptions& options) {
   PRESCENE_CHECK(options.particles > 0);
   belief::Belief belief;
   belief.seed = seed;
@@ -126,7 +126,8 @@ belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, st
       particle.V_WO = state.objects[i].V_WO;
       particle.mode = state.objects[i].mode;
       particle.physical = state.objects[i].physical;
-      particle.covariance.topLeftCorner<6, 6>() = first_covariance(options) + 0.25 * prior_covariance(scene->objects[i]);
+      particle.covariance.topLeftCorner<6, 6>() =
+          first_covariance(options) + 0.25 * prior_covariance(scene->objects[i]);
       belief.objects[i].particles.push_back(particle);
     }
   }
@@ -148,8 +149,7 @@ std::optional<belief::Support> support_from_frame(const belief::Observation& obs
                                                   const InitialiseOptions& options, const core::RandomStream& stream) {
   const SampledDepth sampled =
       sample_depth(*observation.frame.depth, observation.frame.camera, options.detection.segmentation);
-  const auto region =
-      region_of(sampled, observation.X_WC.inverse(), gravity_W, options.detection.segmentation, stream);
+  const auto region = region_of(sampled, observation.X_WC.inverse(), gravity_W, options.detection.segmentation, stream);
   if (!region || region->outline_C.size() < 3) return std::nullopt;
   // A frame on the plane, z along its normal, x along the outline's longest edge.
   const Vector3d z = observation.X_WC.rotation * region->plane_C.normal;
@@ -187,9 +187,9 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
       wide.push_back(i);
     } else {
       const SearchTarget target = target_of(model, frame, tools);
-      merge_nearest(depth_of(target, frame.X_CW * belief.objects[i].particles.front().X_WO, frame.terms.camera,
-                             *tools.renderer),
-                    &known);
+      merge_nearest(
+          depth_of(target, frame.X_CW * belief.objects[i].particles.front().X_WO, frame.terms.camera, *tools.renderer),
+          &known);
     }
   }
   report.looked_for = static_cast<int>(wide.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operator 1, initialise: the first belief, from what the scene says of each object's start or, where it says too little,
-// from the first frame alone: support plane, clusters above it, poses proposed per model, refined.
+// Operator 1, initialise: the first belief, from what the scene says of each object's start or, where it says too
+// little, from the first frame alone: support plane, clusters above it, poses proposed per model, refined.
 //
 //   Belief belief = belief_from_priors(scene, seed, options);          // no frame needed
 //   find_in_frame(observation, options, ..., belief);                  // objects whose place the scene leaves open
@@ -17,13 +17,13 @@
 namespace prescene::filter {
 
 struct InitialiseOptions {
-  int particles = 16;               ///< Per object.
-  double wide_shift = 0.06;         ///< m; an object whose start is known worse than this ...
-  double wide_turn = 0.5;           ///< rad; ... or this (standard deviations) is looked for in the frame.
-  double first_shift = 0.006;       ///< m, standard deviation of a particle about its mean after a find.
-  double first_turn = 0.06;         ///< rad
-  double prior_existence = 0.95;    ///< Of an object that the scene names and places.
-  double missing_existence = 0.2;   ///< Of one that was looked for and not found.
+  int particles = 16;              ///< Per object.
+  double wide_shift = 0.06;        ///< m; an object whose start is known worse than this ...
+  double wide_turn = 0.5;          ///< rad; ... or this (standard deviations) is looked for in the frame.
+  double first_shift = 0.006;      ///< m, standard deviation of a particle about its mean after a find.
+  double first_turn = 0.06;        ///< rad
+  double prior_existence = 0.95;   ///< Of an object that the scene names and places.
+  double missing_existence = 0.2;  ///< Of one that was looked for and not found.
   double found_existence = 0.9;
   double box_margin = 0.05;         ///< m that a find may lie outside of where the scene says.
   bool add_support = true;          ///< A scene without supports gets the plane of the first frame as one.
@@ -32,8 +32,8 @@ struct InitialiseOptions {
 };
 
 /// Draws each object's particles from the scene's priors; one set a scene object, in its order. Step 0.
-belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed,
-                                  core::TimeNs stamp_ns, const InitialiseOptions& options);
+belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed, core::TimeNs stamp_ns,
+                                  const InitialiseOptions& options);
 
 /// Whether the scene leaves the object's place or rotation too open to start from.
 bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& options);

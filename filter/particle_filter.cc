@@ -36,11 +36,13 @@ void note(const char* stage, StepResult& result) {
 }  // namespace
 
 std::string degraded_text(std::uint32_t bits) {
-  static constexpr std::pair<Degraded, const char*> kNames[] = {
-      {kFrameRejected, "frame rejected"},       {kClockWentBack, "clock went back"},
-      {kLongGap, "long gap"},                   {kNoSupportFound, "no support found"},
-      {kObjectsMissing, "objects missing"},     {kImpossibleWeights, "impossible weights"},
-      {kRobotPoseAssumed, "robot pose assumed"}};
+  static constexpr std::pair<Degraded, const char*> kNames[] = {{kFrameRejected, "frame rejected"},
+                                                                {kClockWentBack, "clock went back"},
+                                                                {kLongGap, "long gap"},
+                                                                {kNoSupportFound, "no support found"},
+                                                                {kObjectsMissing, "objects missing"},
+                                                                {kImpossibleWeights, "impossible weights"},
+                                                                {kRobotPoseAssumed, "robot pose assumed"}};
   std::string text;
   for (const auto& [bit, name] : kNames) {
     if ((bits & bit) == 0) continue;
@@ -80,8 +82,7 @@ std::vector<Pose> ParticleFilter::robot_poses(const belief::Scene& scene, const 
 
 void ParticleFilter::first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result) {
   const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0);
-  const FindReport report =
-      find_in_frame(frame, observation, settings_.initialise, tools_, stream, result.belief);
+  const FindReport report = find_in_frame(frame, observation, settings_.initialise, tools_, stream, result.belief);
   result.counters.looked_for = report.looked_for;
   result.counters.found = report.found;
   if (report.no_support) result.degraded |= kNoSupportFound;
@@ -115,8 +116,8 @@ void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& 
   }
 }
 
-void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports,
-                                 StepResult& result, std::vector<geometry::DepthImage>& depths) {
+void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports, StepResult& result,
+                                 std::vector<geometry::DepthImage>& depths) {
   Belief& belief = result.belief;
   const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
@@ -143,8 +144,7 @@ void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<Wei
 void ParticleFilter::look_for_more(const FilterFrame& frame, const belief::Observation& observation,
                                    const std::vector<geometry::DepthImage>& depths, StepResult& result) {
   const AugmentOptions& options = settings_.augment;
-  if (!options.new_objects ||
-      result.belief.step % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0)
+  if (!options.new_objects || result.belief.step % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0)
     return;
   geometry::DepthImage known = frame.robot;
   for (std::size_t i = 0; i < depths.size(); ++i)
@@ -194,8 +194,8 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("predict", result);
 
   FilterFrame frame;
-  result.frame_status = prepare_frame(belief.scene, observation, X_WG, settings_.colors, settings_.frame, tools_,
-                                      frame_cache_, &frame);
+  result.frame_status =
+      prepare_frame(belief.scene, observation, X_WG, settings_.colors, settings_.frame, tools_, frame_cache_, &frame);
   if (!result.frame_status.ok()) {
     result.degraded |= kFrameRejected;
     if (first) belief.step = 0;  // the first look is still to be taken
@@ -251,7 +251,8 @@ void number_islands(double gap, MeshCache& meshes, Belief& belief) {
   for (std::size_t i = 0; i < belief.objects.size(); ++i) belief.objects[i].island = static_cast<int>(i);
   for (std::size_t i = 0; i < bodies.size(); ++i)
     for (std::size_t j = i + 1; j < bodies.size(); ++j) {
-      const double reach = static_cast<double>(bodies[i].mesh->radius) + static_cast<double>(bodies[j].mesh->radius) + gap;
+      const double reach =
+          static_cast<double>(bodies[i].mesh->radius) + static_cast<double>(bodies[j].mesh->radius) + gap;
       const Vector3d between = bodies[i].X_WO * bodies[i].mesh->centre.cast<double>() -
                                bodies[j].X_WO * bodies[j].mesh->centre.cast<double>();
       if (between.norm() > reach) continue;

@@ -38,30 +38,31 @@ struct FilterSettings {
   WeightOptions weight;
   ResampleOptions resample;
   TrackStateOptions track;
-  ColorModels colors;          ///< By model name; a model without one is tracked by depth alone.
-  bool recover = true;         ///< Look for objects that are not tracked.
-  double max_gap = 1.0;        ///< s; a longer pause between frames is predicted as one of this length.
-  double island_gap = 0.005;   ///< m; objects nearer than this form an island.
-  /// Time of Scene timelines and actions: s between their start and the stamp 0 (robot bodies that no observation names).
+  ColorModels colors;         ///< By model name; a model without one is tracked by depth alone.
+  bool recover = true;        ///< Look for objects that are not tracked.
+  double max_gap = 1.0;       ///< s; a longer pause between frames is predicted as one of this length.
+  double island_gap = 0.005;  ///< m; objects nearer than this form an island.
+  /// Time of Scene timelines and actions: s between their start and the stamp 0 (robot bodies that no observation
+  /// names).
   core::TimeNs scene_start_ns = 0;
 };
 
 /// Bits of StepResult::degraded.
 enum Degraded : std::uint32_t {
-  kFrameRejected = 1u << 0,        ///< The frame could not be used (see frame_status): predicted only.
-  kClockWentBack = 1u << 1,        ///< The stamp is not after the belief's: nothing was done.
-  kLongGap = 1u << 2,              ///< More than max_gap since the last frame.
-  kNoSupportFound = 1u << 3,       ///< Objects had to be looked for, but nothing that they could stand on was seen.
-  kObjectsMissing = 1u << 4,       ///< Some that were looked for at the start were not found.
-  kImpossibleWeights = 1u << 5,    ///< A set's weights were all zero or not finite and were made equal.
-  kRobotPoseAssumed = 1u << 6,     ///< A robot body was put where its timeline says: the observation did not name it.
+  kFrameRejected = 1u << 0,      ///< The frame could not be used (see frame_status): predicted only.
+  kClockWentBack = 1u << 1,      ///< The stamp is not after the belief's: nothing was done.
+  kLongGap = 1u << 2,            ///< More than max_gap since the last frame.
+  kNoSupportFound = 1u << 3,     ///< Objects had to be looked for, but nothing that they could stand on was seen.
+  kObjectsMissing = 1u << 4,     ///< Some that were looked for at the start were not found.
+  kImpossibleWeights = 1u << 5,  ///< A set's weights were all zero or not finite and were made equal.
+  kRobotPoseAssumed = 1u << 6,   ///< A robot body was put where its timeline says: the observation did not name it.
 };
 std::string degraded_text(std::uint32_t bits);
 
 struct StepCounters {
-  int resampled = 0;         ///< Particle sets.
+  int resampled = 0;  ///< Particle sets.
   int recoveries_tried = 0;
-  int recoveries = 0;        ///< That succeeded.
+  int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
   int hidden_particles = 0;  ///< That stayed hidden.
   int looked_for = 0;        ///< At the start.

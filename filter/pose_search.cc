@@ -39,7 +39,8 @@ Vector6d bounded_step(const rendering::PoseLinearisation& equations, const Matri
   Vector6d d = H.ldlt().solve(g);
   if (!d.allFinite()) return Vector6d::Zero();
   const double turn = d.head<3>().norm(), shift = d.tail<3>().norm();
-  const double factor = std::min({1.0, options.max_turn / std::max(turn, 1e-12), options.max_shift / std::max(shift, 1e-12)});
+  const double factor =
+      std::min({1.0, options.max_turn / std::max(turn, 1e-12), options.max_shift / std::max(shift, 1e-12)});
   return factor * d;
 }
 
@@ -119,8 +120,7 @@ void PoseSearch::refine(const rendering::FrameTerms& terms, const SearchTarget& 
     for (std::size_t k = 0; k < active.size(); ++k) {
       if (equations[k].pixels < kMinPixels) continue;
       Pose& pose = poses_CO[active[k]];
-      const Vector6d d =
-          bounded_step(equations[k], from_point_coordinates(pose.rotation, centre), options, radius);
+      const Vector6d d = bounded_step(equations[k], from_point_coordinates(pose.rotation, centre), options, radius);
       pose = moved_about(pose, centre, d);
       const bool settled = linearise.gate <= options.last_gate * 1.0001 && d.head<3>().norm() < options.settled_turn &&
                            d.tail<3>().norm() < options.settled_shift;

@@ -69,7 +69,8 @@ class PoseSearch {
   core::ThreadPool& threads() { return *threads_; }
   rendering::WorkspacePool& workspaces() { return workspaces_; }
 
-  /// Gauss-Newton from each start, then evidence, then polish; sorted by log ratio, best first (ties: by index of start).
+  /// Gauss-Newton from each start, then evidence, then polish; sorted by log ratio, best first (ties: by index of
+  /// start).
   std::vector<PoseCandidate> run(const rendering::FrameTerms& terms, const SearchTarget& target,
                                  std::span<const Pose> starts_CO, const SearchOptions& options,
                                  const core::RandomStream& stream);

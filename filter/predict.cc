@@ -246,8 +246,7 @@ void predict(belief::Belief& belief, const belief::Control& control, std::span<c
         const Pose& X_from = belief.robot[static_cast<std::size_t>(*hand)];
         const Pose& X_to = X_WG[static_cast<std::size_t>(*hand)];
         const double held = released.value_or(dt);
-        if (held > 0.0)
-          carry(particle, X_from, geometry::interpolate(X_from, X_to, held / dt), held);
+        if (held > 0.0) carry(particle, X_from, geometry::interpolate(X_from, X_to, held / dt), held);
         add_noise(options.held, dt, particle.covariance);
         if (!released) continue;
         wake(options, particle);
@@ -271,7 +270,8 @@ void predict(belief::Belief& belief, const belief::Control& control, std::span<c
     }
   }
   // Runs of one call share a duration.
-  std::stable_sort(falling.begin(), falling.end(), [](const auto& a, const auto& b) { return a.duration < b.duration; });
+  std::stable_sort(falling.begin(), falling.end(),
+                   [](const auto& a, const auto& b) { return a.duration < b.duration; });
   for (std::size_t begin = 0; begin < falling.size();) {
     std::size_t end = begin;
     while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;

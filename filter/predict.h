@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operator 2, predict: what each particle does until the next frame. Resting stays, held moves with its hand, moving goes
-// on at constant velocity or falls by the laws of physics (a part of the particles each, the frame decides); some
+// Operator 2, predict: what each particle does until the next frame. Resting stays, held moves with its hand, moving
+// goes on at constant velocity or falls by the laws of physics (a part of the particles each, the frame decides); some
 // particles change their mode.
 //
 //   predict(belief, control, X_WG_now, dt, options, simulators, stream, pool);
@@ -26,10 +26,10 @@ using SimulatorSource = std::function<std::unique_ptr<simulation::Simulator>(con
 
 /// Standard deviations that are added within one second, as random walks: rates in m, rad per square root of a second.
 struct MotionNoise {
-  double shift;         ///< m / sqrt(s)
-  double turn;          ///< rad / sqrt(s)
-  double speed;         ///< m/s / sqrt(s)
-  double rate;          ///< rad/s / sqrt(s)
+  double shift;  ///< m / sqrt(s)
+  double turn;   ///< rad / sqrt(s)
+  double speed;  ///< m/s / sqrt(s)
+  double rate;   ///< rad/s / sqrt(s)
 };
 
 struct PredictOptions {
@@ -37,20 +37,20 @@ struct PredictOptions {
   MotionNoise held = {.shift = 0.010, .turn = 0.08, .speed = 0.0, .rate = 0.0};
   /// Per frame at 30 Hz: 3 mm, 0.03 rad, 0.10 m/s, 0.8 rad/s.
   MotionNoise moving = {.shift = 0.0164, .turn = 0.164, .speed = 0.55, .rate = 4.4};
-  double velocity_keep = 0.55;          ///< Share of a seen object's velocity that is left after one second.
-  double unseen_velocity_keep = 2e-4;   ///< The same of an object that is not tracked: it would drift away.
-  double max_shift_deviation = 0.15;    ///< m; covariances grow no further.
-  double max_turn_deviation = 1.0;      ///< rad
-  double max_speed_deviation = 1.0;     ///< m/s
-  double max_rate_deviation = 8.0;      ///< rad/s
-  double wake_probability = 0.12;       ///< Per frame and particle: resting or held becomes moving.
-  double settle_probability = 0.15;     ///< Per frame and particle: moving slower than the next two becomes resting.
-  double settle_speed = 0.04;           ///< m/s
-  double settle_rate = 0.5;             ///< rad/s
-  double wake_speed = 0.15;             ///< m/s, standard deviation of the velocity of what starts to move.
-  double wake_rate = 1.0;               ///< rad/s
-  double physics_share = 0.5;           ///< Of the moving particles, simulated in place of constant velocity.
-  double physics_after_release = 1.0;   ///< The same in the step in which an object was released.
+  double velocity_keep = 0.55;         ///< Share of a seen object's velocity that is left after one second.
+  double unseen_velocity_keep = 2e-4;  ///< The same of an object that is not tracked: it would drift away.
+  double max_shift_deviation = 0.15;   ///< m; covariances grow no further.
+  double max_turn_deviation = 1.0;     ///< rad
+  double max_speed_deviation = 1.0;    ///< m/s
+  double max_rate_deviation = 8.0;     ///< rad/s
+  double wake_probability = 0.12;      ///< Per frame and particle: resting or held becomes moving.
+  double settle_probability = 0.15;    ///< Per frame and particle: moving slower than the next two becomes resting.
+  double settle_speed = 0.04;          ///< m/s
+  double settle_rate = 0.5;            ///< rad/s
+  double wake_speed = 0.15;            ///< m/s, standard deviation of the velocity of what starts to move.
+  double wake_rate = 1.0;              ///< rad/s
+  double physics_share = 0.5;          ///< Of the moving particles, simulated in place of constant velocity.
+  double physics_after_release = 1.0;  ///< The same in the step in which an object was released.
 };
 
 /// Steps `belief` from its robot poses and stamp to `X_WG` and `dt` later (s, > 0). Actions of the control act at their
@@ -60,8 +60,7 @@ void predict(belief::Belief& belief, const belief::Control& control, std::span<c
              core::ThreadPool& threads);
 
 /// One particle at constant velocity about the centre p_OQ for dt, its covariance grown by the noise.
-void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep,
-           const MotionNoise& noise);
+void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise);
 
 /// The body that holds an object now: held_by of its scene object.
 std::optional<int> holder_of(const belief::Scene& scene, int object);

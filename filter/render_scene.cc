@@ -33,8 +33,8 @@ void add_surroundings(BeliefView& view, const belief::Scene& scene, std::span<co
                       MeshDetail detail, MeshCache& meshes) {
   PRESCENE_CHECK(X_WG.size() == scene.robot.size());
   for (const belief::Support& support : scene.supports)
-    add(view, support.name, InstanceKind::kSupport, meshes.get(support.visual, support.collision, detail),
-        support.X_WS, material_of(belief::SurfaceKind::kOpaque, support.color));
+    add(view, support.name, InstanceKind::kSupport, meshes.get(support.visual, support.collision, detail), support.X_WS,
+        material_of(belief::SurfaceKind::kOpaque, support.color));
   for (std::size_t i = 0; i < scene.robot.size(); ++i) {
     const belief::KinematicBody& body = scene.robot[i];
     add(view, body.name, InstanceKind::kRobot, meshes.get(body.visual, body.collision, detail), X_WG[i],
@@ -58,8 +58,9 @@ rendering::MeshHandle MeshCache::get(const belief::MeshPtr& mesh, MeshDetail det
   entry.source = mesh;
   rendering::MeshHandle& handle = by_content_[{geometry::content_hash(*mesh), detail}];
   if (!handle) {
-    handle = detail == MeshDetail::kDisplay ? rendering::make_render_mesh(*mesh)
-                                            : rendering::make_render_mesh(geometry::simplified(*mesh, likelihood_triangles_));
+    handle = detail == MeshDetail::kDisplay
+                 ? rendering::make_render_mesh(*mesh)
+                 : rendering::make_render_mesh(geometry::simplified(*mesh, likelihood_triangles_));
   }
   entry.mesh = handle;
   return handle;
@@ -80,9 +81,12 @@ rendering::MeshHandle MeshCache::get(const belief::MeshPtr& visual,
 
 rendering::SurfaceMaterial material_of(belief::SurfaceKind kind, const belief::Color& color) {
   switch (kind) {
-    case belief::SurfaceKind::kTransparent: return rendering::SurfaceMaterial::transparent(rgb_of(color));
-    case belief::SurfaceKind::kMirror: return rendering::SurfaceMaterial::mirror(rgb_of(color));
-    case belief::SurfaceKind::kOpaque: break;
+    case belief::SurfaceKind::kTransparent:
+      return rendering::SurfaceMaterial::transparent(rgb_of(color));
+    case belief::SurfaceKind::kMirror:
+      return rendering::SurfaceMaterial::mirror(rgb_of(color));
+    case belief::SurfaceKind::kOpaque:
+      break;
   }
   return rendering::SurfaceMaterial::opaque(rgb_of(color));
 }
@@ -107,8 +111,8 @@ BeliefView render_scene(const belief::Belief& belief, MeshDetail detail, MeshCac
   const belief::Scene& scene = *belief.scene;
   for (const belief::ObjectBelief& object : belief.objects) {
     if (object.existence < min_existence || object.state == belief::TrackState::kLost) continue;
-    add_object(view, object.name, scene.models[static_cast<std::size_t>(object.model)],
-               heaviest(object.particles).X_WO, detail, meshes);
+    add_object(view, object.name, scene.models[static_cast<std::size_t>(object.model)], heaviest(object.particles).X_WO,
+               detail, meshes);
   }
   add_surroundings(view, scene, belief.robot, detail, meshes);
   return view;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one conversion from beliefs and world states to what renderers draw: meshes made once and kept by content, looks of
-// surfaces, and the order of instances.
+// The one conversion from beliefs and world states to what renderers draw: meshes made once and kept by content, looks
+// of surfaces, and the order of instances.
 //
 //   MeshCache meshes;
 //   BeliefView view = render_scene(belief, MeshDetail::kDisplay, meshes);

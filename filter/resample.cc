@@ -53,8 +53,10 @@ bool resample(const ResampleOptions& options, core::RandomStream stream, std::ve
   std::vector<int> chosen = systematic_indices(particles, stream.uniform());
   // The best comes first, once; its place among the chosen is taken from its own copies.
   const auto place = std::find(chosen.begin(), chosen.end(), best);
-  if (place != chosen.end()) chosen.erase(place);
-  else chosen.pop_back();
+  if (place != chosen.end())
+    chosen.erase(place);
+  else
+    chosen.pop_back();
   std::vector<Particle> resampled;
   resampled.push_back(particles[static_cast<std::size_t>(best)]);
   int previous = best;

@@ -12,8 +12,8 @@ namespace prescene::filter {
 
 struct ResampleOptions {
   double min_effective_share = 0.5;  ///< Resample when the effective sample size is below this share of the particles.
-  /// Copies are drawn from their particle's Gaussian times this, and keep the rest as their covariance: between 0 (copies
-  /// are equal) and 1 (copies are points).
+  /// Copies are drawn from their particle's Gaussian times this, and keep the rest as their covariance: between 0
+  /// (copies are equal) and 1 (copies are points).
   double spread = 0.4;
 };
 

@@ -53,8 +53,8 @@ geometry::Plane fitted(std::span<const Vector3d> points) {
   return plane;
 }
 
-/// Labels of 4-connected pixels for which `inside` holds and `joined` holds between neighbours; pixels of each component
-/// in ascending order, components in the order of their first pixel.
+/// Labels of 4-connected pixels for which `inside` holds and `joined` holds between neighbours; pixels of each
+/// component in ascending order, components in the order of their first pixel.
 template <class Inside, class Joined>
 std::vector<std::vector<int>> components(int width, int height, const Inside& inside, const Joined& joined) {
   std::vector<std::uint8_t> seen(static_cast<std::size_t>(width * height), 0);
@@ -110,9 +110,8 @@ double cross(const Vector2d& o, const Vector2d& a, const Vector2d& b) {
 
 /// Andrew's monotone chain; counter-clockwise.
 std::vector<Vector2d> hull_of(std::vector<Vector2d> points) {
-  std::sort(points.begin(), points.end(), [](const Vector2d& a, const Vector2d& b) {
-    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-  });
+  std::sort(points.begin(), points.end(),
+            [](const Vector2d& a, const Vector2d& b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
   if (points.size() < 3) return points;
   std::vector<Vector2d> hull;
   const auto extend = [&](const Vector2d& p, std::size_t floor) {

@@ -21,25 +21,25 @@ using geometry::Pose;
 using geometry::Vector3d;
 
 struct SegmentationOptions {
-  int target_width = 160;            ///< The image is sampled to about this width.
-  double min_depth = 0.2;            ///< m; measurements outside the range are not looked at.
-  double max_depth = 2.5;            ///< m
-  int plane_draws = 400;             ///< Triples of points tried.
-  double plane_inlier = 0.008;       ///< m
-  double min_plane_share = 0.08;     ///< Of the measured points; less is no support.
-  double max_plane_tilt = 0.6;       ///< rad from up, where up is known.
-  double outline_margin = 0.01;      ///< m that the outline is widened by.
-  double min_height = 0.008;         ///< m above the plane: nearer points are the plane's.
-  double max_height = 0.4;           ///< m above the plane: further points are not on it.
-  double depth_step = 0.02;          ///< m between neighbouring pixels of one cluster.
-  int min_cluster_pixels = 25;       ///< At the sampled width.
+  int target_width = 160;         ///< The image is sampled to about this width.
+  double min_depth = 0.2;         ///< m; measurements outside the range are not looked at.
+  double max_depth = 2.5;         ///< m
+  int plane_draws = 400;          ///< Triples of points tried.
+  double plane_inlier = 0.008;    ///< m
+  double min_plane_share = 0.08;  ///< Of the measured points; less is no support.
+  double max_plane_tilt = 0.6;    ///< rad from up, where up is known.
+  double outline_margin = 0.01;   ///< m that the outline is widened by.
+  double min_height = 0.008;      ///< m above the plane: nearer points are the plane's.
+  double max_height = 0.4;        ///< m above the plane: further points are not on it.
+  double depth_step = 0.02;       ///< m between neighbouring pixels of one cluster.
+  int min_cluster_pixels = 25;    ///< At the sampled width.
 };
 
 /// A depth image sampled to a smaller camera, with its points.
 struct SampledDepth {
   geometry::PinholeCamera camera;
-  geometry::DepthImage depth;            ///< 0 = missing or out of range.
-  std::vector<Vector3d> points_C;        ///< One a pixel, row-major; zero where missing.
+  geometry::DepthImage depth;      ///< 0 = missing or out of range.
+  std::vector<Vector3d> points_C;  ///< One a pixel, row-major; zero where missing.
 };
 SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                           const SegmentationOptions& options);
@@ -49,8 +49,8 @@ SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::Pin
 /// only planes within max_plane_tilt of facing up count.
 struct SupportPlane {
   rendering::SupportRegion region;
-  int inliers = 0;              ///< Sampled pixels on it.
-  double rms = 0.0;             ///< m, of the inliers.
+  int inliers = 0;   ///< Sampled pixels on it.
+  double rms = 0.0;  ///< m, of the inliers.
 };
 std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, const SegmentationOptions& options,
                                                const core::RandomStream& stream,
@@ -58,8 +58,8 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
 
 /// Connected measured pixels that stand on a support and are explained by nothing else.
 struct Cluster {
-  std::vector<int> pixels;               ///< y * width + x of the sampled camera, ascending.
-  std::vector<Vector3d> points_C;        ///< Of these pixels.
+  std::vector<int> pixels;         ///< y * width + x of the sampled camera, ascending.
+  std::vector<Vector3d> points_C;  ///< Of these pixels.
 };
 /// Pixels min_height to max_height above the support and inside its outline, largest cluster first. Pixels where
 /// `explained` (sampled camera's size; empty = nothing) is not zero are left out.

@@ -9,13 +9,13 @@
 namespace prescene::filter {
 
 struct TrackStateOptions {
-  double tracked_evidence = 3.0;    ///< Nats per visible pixel from which a pose counts as tracked.
-  double lost_evidence = 1.0;       ///< Below this for `lost_after_frames` it is lost; between, it is doubtful.
+  double tracked_evidence = 3.0;  ///< Nats per visible pixel from which a pose counts as tracked.
+  double lost_evidence = 1.0;     ///< Below this for `lost_after_frames` it is lost; between, it is doubtful.
   int lost_after_frames = 4;
-  double min_visible_share = 0.08;  ///< Of the covered pixels: with less, nothing can be said.
-  double unseen_lost_after = 10.0;  ///< s
-  double existence_rate = 0.5;      ///< Largest change of the log odds of existence by one frame.
-  double min_existence_odds = -5.0; ///< Log odds are kept between these.
+  double min_visible_share = 0.08;   ///< Of the covered pixels: with less, nothing can be said.
+  double unseen_lost_after = 10.0;   ///< s
+  double existence_rate = 0.5;       ///< Largest change of the log odds of existence by one frame.
+  double min_existence_odds = -5.0;  ///< Log odds are kept between these.
   double max_existence_odds = 7.0;
 };
 

@@ -19,7 +19,7 @@ constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10
 struct Gaussian {
   Matrix6d covariance;
   Matrix6d information;
-  Matrix6d root;        ///< Lower Cholesky factor of the covariance.
+  Matrix6d root;  ///< Lower Cholesky factor of the covariance.
   double log_determinant = 0.0;
 };
 
@@ -81,8 +81,7 @@ class ParticleUpdate {
       const rendering::PoseHypothesis h = hypothesis(target_, X_CW_ * mode.X_WO, pixels_);
       rendering::PoseLinearisation equations;
       tools_.search->batch().linearise(terms_, std::span(&h, 1), linearise, workspace_, std::span(&equations, 1));
-      information = predicted.information +
-                    information_share_ * information_in_world(equations.H, X_CW_.rotation);
+      information = predicted.information + information_share_ * information_in_world(equations.H, X_CW_.rotation);
       if (step == options_.steps) break;  // the last pass is for the information at the mode
       Vector6d gradient = equations.g;
       gradient.tail<3>() = X_CW_.rotation.conjugate() * equations.g.tail<3>();
@@ -176,8 +175,8 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
     log_stay = options.log_hidden + frame.weight_share() * std::min(0.0, stay.evidence.visible_log_ratio);
   }
 
-  const Mode mode = frame.climb(particle.X_WO, predicted,
-                                first ? Vector6d::Zero() : random_start(predicted, options, stream));
+  const Mode mode =
+      frame.climb(particle.X_WO, predicted, first ? Vector6d::Zero() : random_start(predicted, options, stream));
   ParticleWeight moved;
   moved.evidence = frame.evidence(mode.X_WO);
   moved.outline = frame.outline(mode.X_WO);
@@ -261,11 +260,11 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
     const ParticleUpdate frame(terms, target, X_CW, pixels, options, tools, *workspace);
     core::RandomStream draws = stream;
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kProposal, i);
-    report.particles[i] =
-        update(frame, dt, static_cast<std::ptrdiff_t>(i) == best, options, mine, particles[i]);
+    report.particles[i] = update(frame, dt, static_cast<std::ptrdiff_t>(i) == best, options, mine, particles[i]);
   });
   report.all_impossible = !belief::normalize(particles);
-  report.heaviest = static_cast<int>(std::max_element(particles.begin(), particles.end(), by_weight) - particles.begin());
+  report.heaviest =
+      static_cast<int>(std::max_element(particles.begin(), particles.end(), by_weight) - particles.begin());
   for (std::size_t i = 0; i < particles.size(); ++i)
     if (report.particles[i].hidden) report.hidden_weight += std::exp(particles[i].log_weight);
   const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];

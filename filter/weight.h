@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operator 4, weight: each particle moves to its own refined mode, its Gaussian is updated there, and its weight grows by
-// the Laplace evidence of the frame. A particle whose pose is hidden may stay hidden instead of moving onto what hides it.
+// Operator 4, weight: each particle moves to its own refined mode, its Gaussian is updated there, and its weight grows
+// by the Laplace evidence of the frame. A particle whose pose is hidden may stay hidden instead of moving onto what
+// hides it.
 //
 //   WeightReport report = weight(terms, target, X_WC, options, tools, stream, object.particles);
 #pragma once
@@ -24,11 +25,12 @@ struct WeightOptions {
   /// A pose is hidden when less than this share of the pixels that it should show is not behind something else; then
   /// staying hidden competes with moving to where something is seen.
   double hidden_share = 0.35;
-  double log_hidden = -4.0;       ///< log prior odds of staying hidden.
-  double max_jump_speed = 2.0;    ///< m/s; a mode further from the prediction than this and its spread allow is refused.
-  double outline_step = 0.02;     ///< m; where the measured surface goes on past the outline within this, there is no edge.
-  double min_outline = 0.35;      ///< Share of the outline with an edge below which a match is no evidence at all ...
-  double full_outline = 0.6;      ///< ... and from which it is full evidence.
+  double log_hidden = -4.0;     ///< log prior odds of staying hidden.
+  double max_jump_speed = 2.0;  ///< m/s; a mode further from the prediction than this and its spread allow is refused.
+  double outline_step =
+      0.02;                   ///< m; where the measured surface goes on past the outline within this, there is no edge.
+  double min_outline = 0.35;  ///< Share of the outline with an edge below which a match is no evidence at all ...
+  double full_outline = 0.6;  ///< ... and from which it is full evidence.
 };
 
 /// What became of one particle.
@@ -41,16 +43,16 @@ struct ParticleWeight {
 struct WeightReport {
   std::vector<ParticleWeight> particles;
   int heaviest = 0;
-  double hidden_weight = 0.0;        ///< Of the particles that stayed hidden.
-  bool all_impossible = false;       ///< No particle had finite evidence: weights were left as they were.
+  double hidden_weight = 0.0;   ///< Of the particles that stayed hidden.
+  bool all_impossible = false;  ///< No particle had finite evidence: weights were left as they were.
   /// Nats per visible pixel of the heaviest particle, worth less where the outline has no edge.
   double evidence_per_pixel = 0.0;
-  double visible_share = 0.0;        ///< Of the pixels that it covers in view.
+  double visible_share = 0.0;  ///< Of the pixels that it covers in view.
 };
 
-/// `terms`: the frame with what else is known put in (terms_for_object); `dt` since the last frame, s. Particles' means,
-/// covariances and weights (normalised) change. Source: Rao-Blackwellised particle filter [Doucet et al. 2000] with
-/// Laplace's approximation about each particle's mode.
+/// `terms`: the frame with what else is known put in (terms_for_object); `dt` since the last frame, s. Particles'
+/// means, covariances and weights (normalised) change. Source: Rao-Blackwellised particle filter [Doucet et al. 2000]
+/// with Laplace's approximation about each particle's mode.
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
                     std::vector<belief::Particle>& particles);
