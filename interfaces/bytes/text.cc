@@ -20,7 +20,7 @@ bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' |
 
 }  // namespace
 
-std::string quoted(std::string_view text, std::size_t max_characters) {
+std::string quote(std::string_view text, std::size_t max_characters) {
   std::string out = "'";
   for (const char c : text.substr(0, max_characters)) {
     const auto byte = static_cast<unsigned char>(c);

@@ -55,7 +55,7 @@ Result<Columns> parse_columns(std::string_view line) {
   const std::vector<std::string_view> names = split(line, ',');
   std::map<std::string_view, std::size_t> place;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (!place.emplace(names[i], i).second) return core::invalid_input("column " + quoted(names[i]) + " stands twice");
+    if (!place.emplace(names[i], i).second) return core::invalid_input("column " + quote(names[i]) + " stands twice");
   }
   std::string missing;
   const auto find = [&](const std::string& name) {
@@ -81,7 +81,7 @@ Status check_file_name(std::string_view name) {
   const bool leaves = path.empty() || path.is_absolute() ||
                       std::any_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
   if (!leaves) return core::ok_status();
-  return core::invalid_input("the file name " + quoted(name) +
+  return core::invalid_input("the file name " + quote(name) +
                              " does not lie in the folder; give it relative, without ..");
 }
 
@@ -99,7 +99,7 @@ Result<FolderFrame> parse_row(const std::vector<std::string_view>& cells, const 
   if (columns.stamp_ns) {
     long long stamp = 0;
     if (!parse_integer(cells[*columns.stamp_ns], &stamp) || stamp < 0) {
-      return core::invalid_input("stamp_ns " + quoted(cells[*columns.stamp_ns]) + " is no whole number of nanoseconds");
+      return core::invalid_input("stamp_ns " + quote(cells[*columns.stamp_ns]) + " is no whole number of nanoseconds");
     }
     frame.stamp_ns = stamp;
   }
@@ -107,7 +107,7 @@ Result<FolderFrame> parse_row(const std::vector<std::string_view>& cells, const 
   for (std::size_t i = 0; i < 16; ++i) {
     const std::string_view cell = cells[columns.matrix[i]];
     if (!parse_number(cell, &matrix(static_cast<int>(i / 4), static_cast<int>(i % 4)))) {
-      return core::invalid_input("m" + std::to_string(i / 4) + std::to_string(i % 4) + " " + quoted(cell) +
+      return core::invalid_input("m" + std::to_string(i / 4) + std::to_string(i % 4) + " " + quote(cell) +
                                  " is no number");
     }
   }
@@ -170,7 +170,7 @@ Result<PinholeCamera> parse_intrinsics(std::string_view text) {
     for (int column = 0; column < 3; ++column) {
       const std::string_view cell = cells[static_cast<std::size_t>(column)];
       if (parse_number(cell, &K(row, column)) && std::isfinite(K(row, column))) continue;
-      return core::invalid_input(line_place(line) + ": " + quoted(cell) + " is no finite number");
+      return core::invalid_input(line_place(line) + ": " + quote(cell) + " is no finite number");
     }
     ++row;
   }

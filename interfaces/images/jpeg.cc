@@ -71,7 +71,7 @@ class Decoder {
     }
     if (error_code_ == JERR_NO_SOI)
       return core::invalid_input("is no JPEG (its first bytes are others); give a JPEG file");
-    return core::data_loss("is a broken or cut JPEG: " + quoted(message_.data()) + "; copy or write the file again");
+    return core::data_loss("is a broken or cut JPEG: " + quote(message_.data()) + "; copy or write the file again");
   }
 
  private:

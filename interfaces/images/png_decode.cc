@@ -132,7 +132,7 @@ class Decoder {
 
   Status error() const {
     if (cut_) return core::data_loss("is cut; copy the file again");
-    return core::data_loss("is broken: " + quoted(message_.data()) + " at about byte " + std::to_string(position_) +
+    return core::data_loss("is broken: " + quote(message_.data()) + " at about byte " + std::to_string(position_) +
                            "; copy or write the file again");
   }
 

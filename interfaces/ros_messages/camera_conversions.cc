@@ -78,7 +78,7 @@ void report_distortion(const RosCameraInfo& info, const PinholeCamera& camera, C
       double dx = 0.0;
       double dy = 0.0;
       if (!distortion_shift(info, (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, &dx, &dy)) {
-        report->warnings.push_back("distortion_model: " + quoted(info.distortion_model) + " with " +
+        report->warnings.push_back("distortion_model: " + quote(info.distortion_model) + " with " +
                                    std::to_string(info.d.size()) +
                                    " coefficients is unknown, the distortion is ignored; send plumb_bob with 5, "
                                    "rational_polynomial with 8 or equidistant with 4, or rectified images");

@@ -73,12 +73,12 @@ Result<FrameTransform> to_transform(const RosTransformStamped& message, const Po
   const Result<std::string> child = to_frame_id(message.child_frame_id);
   if (!child) return child.status().at("child_frame_id");
   if (*parent == *child) {
-    return core::invalid_input("frame " + quoted(*child) + " is its own parent; name two different frames");
+    return core::invalid_input("frame " + quote(*child) + " is its own parent; name two different frames");
   }
   const Result<std::int64_t> stamp_ns = to_stamp_ns(message.header.stamp);
   if (!stamp_ns) return stamp_ns.status().at("header.stamp");
   const Result<Pose> pose = to_pose(message.transform, rules);
-  if (!pose) return pose.status().at(quoted(*parent) + " to " + quoted(*child));
+  if (!pose) return pose.status().at(quote(*parent) + " to " + quote(*child));
   return FrameTransform{*parent, *child, *stamp_ns, *pose};
 }
 
@@ -104,11 +104,11 @@ Result<std::string> to_frame_id(std::string_view frame_id) {
   if (name.starts_with('/')) name.remove_prefix(1);
   if (name.empty()) return core::invalid_input("the frame id is empty; name the frame that the data are measured in");
   if (name.size() > kMaxFrameIdBytes) {
-    return core::invalid_input("the frame id " + quoted(name, 24) + " has " + std::to_string(name.size()) +
+    return core::invalid_input("the frame id " + quote(name, 24) + " has " + std::to_string(name.size()) +
                                " bytes; use at most " + std::to_string(kMaxFrameIdBytes));
   }
   if (has_control_bytes(name)) {
-    return core::invalid_input("the frame id " + quoted(name) + " has control bytes; use letters, digits, _ and /");
+    return core::invalid_input("the frame id " + quote(name) + " has control bytes; use letters, digits, _ and /");
   }
   return std::string(name);
 }
@@ -223,7 +223,7 @@ Result<std::vector<JointSample>> to_joint_samples(const RosJointState& state) {
     }
     for (std::size_t i = 0; i < values->size(); ++i) {
       if (std::isfinite((*values)[i])) continue;
-      return core::invalid_input(std::string(field) + ": that of joint " + quoted(state.name[i]) + " is " +
+      return core::invalid_input(std::string(field) + ": that of joint " + quote(state.name[i]) + " is " +
                                  number_text((*values)[i]) + "; leave the joint out when it is unknown");
     }
   }
@@ -232,7 +232,7 @@ Result<std::vector<JointSample>> to_joint_samples(const RosJointState& state) {
   for (std::size_t i = 0; i < count; ++i) {
     if (state.name[i].empty()) return core::invalid_input("name[" + std::to_string(i) + "]: is empty; name the joint");
     if (!seen.insert(state.name[i]).second) {
-      return core::invalid_input("name: joint " + quoted(state.name[i]) + " stands twice; send each joint once");
+      return core::invalid_input("name: joint " + quote(state.name[i]) + " stands twice; send each joint once");
     }
     if (state.position.empty()) continue;
     JointSample sample{state.name[i], state.position[i], std::nullopt, std::nullopt};

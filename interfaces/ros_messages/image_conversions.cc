@@ -37,7 +37,7 @@ constexpr std::array<Encoding, 9> kColorEncodings = {{{"rgb8", 3, 0, 1, 2},
                                                       {"mono16", 2, 1, 1, 1}}};
 
 Status check_layout(const RosImage& image, std::uint32_t bytes_per_pixel, const ImageRules& rules) {
-  const std::string encoding = quoted(image.encoding);
+  const std::string encoding = quote(image.encoding);
   if (image.width == 0 || image.height == 0) {
     return core::invalid_input("width x height: is " + std::to_string(image.width) + " x " +
                                std::to_string(image.height) + "; send nothing instead of an empty image");
@@ -202,7 +202,7 @@ Result<DepthImage> to_depth_image(const RosImage& image, const ImageRules& rules
   }
   const std::string remedy = image.encoding == "mono16" ? "allow it with the setting mono16_is_depth, or send 16UC1"
                                                         : "send 16UC1 (millimetres) or 32FC1 (metres)";
-  return core::unsupported("encoding: " + quoted(image.encoding) + " is no depth image; " + remedy);
+  return core::unsupported("encoding: " + quote(image.encoding) + " is no depth image; " + remedy);
 }
 
 Result<ColorImage> to_color_image(const RosImage& image, const ImageRules& rules) {
@@ -211,7 +211,7 @@ Result<ColorImage> to_color_image(const RosImage& image, const ImageRules& rules
   if (encoding == kColorEncodings.end()) {
     std::string names;
     for (const Encoding& e : kColorEncodings) names += (names.empty() ? "" : ", ") + std::string(e.name);
-    return core::unsupported("encoding: " + quoted(image.encoding) +
+    return core::unsupported("encoding: " + quote(image.encoding) +
                              " is no colour image that can be read; send one of " + names);
   }
   PRESCENE_RETURN_IF_ERROR(check_layout(image, encoding->bytes_per_pixel, rules));

@@ -120,7 +120,8 @@ struct MinWireSize<std::array<T, n>> {
 #define PRESCENE_FOR_EACH_MESSAGE(DO)                                                                                 \
   DO(RosTime)                                                                                                         \
   DO(RosDuration)                                                                                                     \
-  DO(RosClock) DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) DO(RosPoint) DO(RosQuaternion) DO(RosPose) \
+  DO(RosClock)                                                                                                        \
+  DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) DO(RosPoint) DO(RosQuaternion) DO(RosPose)              \
       DO(RosPoseStamped) DO(RosPoseWithCovariance) DO(RosPoseWithCovarianceStamped) DO(RosPoseArray) DO(RosTransform) \
           DO(RosTransformStamped) DO(RosTfMessage) DO(RosTwist) DO(RosTwistStamped) DO(RosImage)                      \
               DO(RosCompressedImage) DO(RosRegionOfInterest) DO(RosCameraInfo) DO(RosJointState)                      \

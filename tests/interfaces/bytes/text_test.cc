@@ -10,13 +10,13 @@
 namespace prescene::interfaces {
 namespace {
 
-TEST(Quoted, HidesTerminalEscapesAndCutsLongText) {
-  EXPECT_EQ(quoted("cup"), "'cup'");
-  EXPECT_EQ(quoted("a\x1b[31m"), "'a\\x1b[31m'");
-  EXPECT_EQ(quoted("it's\\"), "'it\\'s\\\\'");
-  EXPECT_EQ(quoted("\xff"), "'\\xff'");
-  EXPECT_EQ(quoted("abcdef", 3), "'abc...'");
-  EXPECT_EQ(quoted("abc", 3), "'abc'");
+TEST(Quote, HidesTerminalEscapesAndCutsLongText) {
+  EXPECT_EQ(quote("cup"), "'cup'");
+  EXPECT_EQ(quote("a\x1b[31m"), "'a\\x1b[31m'");
+  EXPECT_EQ(quote("it's\\"), "'it\\'s\\\\'");
+  EXPECT_EQ(quote("\xff"), "'\\xff'");
+  EXPECT_EQ(quote("abcdef", 3), "'abc...'");
+  EXPECT_EQ(quote("abc", 3), "'abc'");
 }
 
 TEST(NumberText, ReadsBackAsTheSameNumber) {
