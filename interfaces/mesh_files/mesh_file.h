@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Triangle meshes from and to files: PLY, OBJ and STL by small readers of our own that expect hostile bytes; glTF and
+// COLLADA through assimp, behind a size cap, for files that you trust. Whatever is read is repaired, with a report.
+//
+//   PRESCENE_TRY(LoadedMesh cup, read_mesh("cup.stl", {.metres_per_unit = 0.001}));
+//   for (const std::string& warning : cup.warnings) log(sink, LogLevel::kWarning, warning);
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "prescene/core/status.h"
+#include "prescene/geometry/image.h"
+#include "prescene/geometry/triangle_mesh.h"
+
+namespace prescene::interfaces {
+
+/// Which axis of the file points up; it is turned to z, the other axes with it.
+enum class UpAxis {
+  kDeclared,  ///< What the format or the file says: glTF y, COLLADA its up_axis; PLY, OBJ and STL stay as they are.
+  kX,
+  kY,
+  kZ,
+};
+
+enum class MeshFormat { kPly, kObj, kStl, kGltf, kCollada };
+
+struct MeshReadOptions {
+  double metres_per_unit = 1.0;  ///< For PLY, OBJ and STL, and on top of the unit that glTF and COLLADA declare.
+  UpAxis up_axis = UpAxis::kDeclared;
+  std::size_t max_file_bytes = std::size_t{256} << 20;
+  std::size_t max_assimp_file_bytes = std::size_t{64} << 20;  ///< For glTF and COLLADA.
+  std::size_t max_triangles = 20'000'000;                     ///< Also of vertices.
+};
+
+struct LoadedMesh {
+  geometry::TriangleMesh mesh;        ///< Metres, z up, repaired.
+  std::vector<geometry::Rgb> colors;  ///< One a vertex, or empty: PLY and OBJ may have them.
+  geometry::MeshRepairReport repair;
+  std::vector<std::string> warnings;  ///< Sentences for a person: what was repaired, a doubtful unit.
+};
+
+/// By the extension, in either case; nothing for an unknown one.
+std::optional<MeshFormat> mesh_format(const std::filesystem::path& path);
+
+/// The format goes by the extension: .ply .obj .stl .gltf .glb .dae. Errors of read_file(); kUnsupported for another
+/// extension; kDataLoss for a file that is cut; kInvalidInput for wrong content, no triangles, and a scale that is not
+/// positive; kResourceExhausted above a limit. The text names the path, the line or byte, and the remedy.
+core::Result<LoadedMesh> read_mesh(const std::filesystem::path& path, const MeshReadOptions& options = {});
+/// The same for PLY, OBJ and STL in memory (other formats are bugs of the caller: they need a path).
+core::Result<LoadedMesh> decode_mesh(MeshFormat format, std::span<const std::uint8_t> bytes,
+                                     const MeshReadOptions& options = {});
+
+/// A sentence when an object of this size (m) is hardly meant in metres: above 10 m "millimetres?", below 1 mm "scaled
+/// twice?"; nothing otherwise.
+std::optional<std::string> scale_hint(const geometry::Box& box);
+
+enum class MeshEncoding { kBinary, kText };
+
+/// PLY with double coordinates (reading gives the same bits) and, if given, one colour a vertex (checked).
+core::Status write_ply(const std::filesystem::path& path, const geometry::TriangleMesh& mesh,
+                       MeshEncoding encoding = MeshEncoding::kBinary, const std::vector<geometry::Rgb>& colors = {});
+/// OBJ; reading gives the same bits.
+core::Status write_obj(const std::filesystem::path& path, const geometry::TriangleMesh& mesh);
+/// STL: coordinates are rounded to float when binary.
+core::Status write_stl(const std::filesystem::path& path, const geometry::TriangleMesh& mesh,
+                       MeshEncoding encoding = MeshEncoding::kBinary);
+
+std::string encode_ply(const geometry::TriangleMesh& mesh, MeshEncoding encoding = MeshEncoding::kBinary,
+                       const std::vector<geometry::Rgb>& colors = {});
+std::string encode_obj(const geometry::TriangleMesh& mesh);
+std::string encode_stl(const geometry::TriangleMesh& mesh, MeshEncoding encoding = MeshEncoding::kBinary);
+
+}  // namespace prescene::interfaces
