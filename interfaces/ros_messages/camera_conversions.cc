@@ -9,7 +9,6 @@ namespace prescene::interfaces {
 namespace {
 
 using core::Result;
-using core::Status;
 using geometry::PinholeCamera;
 
 /// The part of the full image that arrives, in pixels of the full image, and how many of them make one.

@@ -13,7 +13,6 @@ namespace prescene::interfaces {
 namespace {
 
 using core::Result;
-using core::Status;
 using geometry::Matrix3d;
 using geometry::Matrix6d;
 using geometry::Pose;
