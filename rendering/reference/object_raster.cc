@@ -13,19 +13,22 @@ ProjectedPoint projected(const Vector3f& p_C, const geometry::PinholeCamera& cam
           inverse_depth};
 }
 
-/// A rotation in columns: the compiler inlines this, but not the product of two matrices.
-struct Rotation {
-  Vector3f x;
-  Vector3f y;
-  Vector3f z;
-
+/// A rotation that the compiler inlines where it is used; it does not do that with products of fixed matrices.
+class Rotation {
+ public:
   explicit Rotation(const geometry::Pose& X) {
-    const Eigen::Matrix3f R = X.rotation.toRotationMatrix().cast<float>();
-    x = R.col(0);
-    y = R.col(1);
-    z = R.col(2);
+    const geometry::Matrix3d R = X.rotation.toRotationMatrix();
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column) entries_[row][column] = static_cast<float>(R(row, column));
   }
-  Vector3f operator*(const Vector3f& p) const { return x * p.x() + y * p.y() + z * p.z(); }
+  Vector3f operator*(const Vector3f& p) const { return {dot(0, p), dot(1, p), dot(2, p)}; }
+
+ private:
+  float dot(int row, const Vector3f& p) const {
+    return entries_[row][0] * p.x() + entries_[row][1] * p.y() + entries_[row][2] * p.z();
+  }
+
+  float entries_[3][3];
 };
 
 }  // namespace
@@ -143,9 +146,13 @@ void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, cons
 }
 
 bool ObjectRaster::at_outline(int x, int y) const {
+  // A neighbour beyond the image's border is the pixel itself.
   const float* pixel = &inverse_depth_[index(x, y)];
-  return (x > 0 && pixel[-1] == 0.0f) || (x + 1 < width_ && pixel[1] == 0.0f) || (y > 0 && pixel[-width_] == 0.0f) ||
-         (y + 1 < height_ && pixel[width_] == 0.0f);
+  const int left = x > 0 ? 1 : 0;
+  const int right = x + 1 < width_ ? 1 : 0;
+  const int up = y > 0 ? width_ : 0;
+  const int down = y + 1 < height_ ? width_ : 0;
+  return std::min(std::min(pixel[-left], pixel[right]), std::min(pixel[-up], pixel[down])) == 0.0f;
 }
 
 }  // namespace prescene::rendering

@@ -54,7 +54,7 @@ class PixelClasses {
 
   const PixelClass& at(float cosine, bool outline) const {
     std::size_t i = 0;
-    while (i < bounds_.size() && cosine > bounds_[i]) ++i;
+    for (const float bound : bounds_) i += cosine > bound ? 1 : 0;
     return classes_[2 * i + (outline ? 1 : 0)];
   }
 
@@ -149,7 +149,8 @@ class EvidenceSum {
       const float hit = c.hit / sigma * portable_exp(-0.5f * deviation * deviation);
       density += color_ratio_ != nullptr ? hit * (*color_ratio_)(pixel.x, pixel.y) : hit;
     }
-    if (deviation < 0.0f) density += c.occluder / (pixel.depth - min_depth_);
+    const float occluder = c.occluder / (pixel.depth - min_depth_);
+    density += deviation < 0.0f ? occluder : 0.0f;
     const float returned = absent_missing < 0.0f ? c.returned_ratio : c.returned / (1.0f - absent_missing);
     const float ratio = std::max(returned * (density / frame_.absent(pixel.x, pixel.y) + c.behind), kMinRatio);
     ++evidence_.measured;

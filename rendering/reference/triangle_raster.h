@@ -32,34 +32,29 @@ template <class Scalar>
 class EdgeFunction {
  public:
   EdgeFunction(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b) {
-    const Scalar dx = b.x - a.x;
-    const Scalar dy = b.y - a.y;
-    owns_line_ = dy < 0 || (dy == 0 && dx > 0);  // a left edge, or a top edge, of a triangle on its right side
-    const bool swap = b.x < a.x || (b.x == a.x && b.y < a.y);
-    origin_ = swap ? b : a;
-    dx_ = swap ? a.x - b.x : dx;
-    dy_ = swap ? a.y - b.y : dy;
-    sign_ = swap ? Scalar(-1) : Scalar(1);
+    dx_ = b.x - a.x;
+    dy_ = b.y - a.y;
+    owns_line_ = dy_ < 0 || (dy_ == 0 && dx_ > 0);  // a left edge, or a top edge, of a triangle on its right side
+    origin_ = b.x < a.x || (b.x == a.x && b.y < a.y) ? b : a;
   }
-
-  /// Whether the pixels inside lie to the right of the line along each row, or to its left.
-  bool bounds_left() const { return sign_ * dy_ < 0; }
-  bool bounds_right() const { return sign_ * dy_ > 0; }
-  /// About where the line crosses the current row; for lines that are not along it.
-  Scalar crossing() const { return origin_.x + row_ / dy_; }
 
   void set_row(int y) { row_ = dx_ * (static_cast<Scalar>(y) - origin_.y); }
-  /// Whether the pixel of the current row is on the right side.
+  /// Whether the pixel of the current row is on the right side. Without a branch: near small triangles nothing could
+  /// predict it.
   bool inside(int x) const {
-    const Scalar value = sign_ * (row_ - dy_ * (static_cast<Scalar>(x) - origin_.x));
-    return value > 0 || (value == 0 && owns_line_);
+    const Scalar value = row_ - dy_ * (static_cast<Scalar>(x) - origin_.x);
+    return (value > 0) | ((value == 0) & owns_line_);
   }
+  /// Whether the pixels inside lie to the right of the line along each row, or to its left.
+  bool bounds_left() const { return dy_ < 0; }
+  bool bounds_right() const { return dy_ > 0; }
+  /// About where the line crosses the current row; for lines that are not along it.
+  Scalar crossing() const { return origin_.x + row_ / dy_; }
 
  private:
   ScreenPoint<Scalar> origin_;
   Scalar dx_;
   Scalar dy_;
-  Scalar sign_;
   Scalar row_ = 0;
   bool owns_line_;
 };
@@ -115,7 +110,7 @@ void for_each_covered_pixel(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b, Screen
       if (edge->bounds_right()) x_end = floor_to(edge->crossing() + 1, x_end);
     }
     for (int x = x_begin; x <= x_end; ++x)
-      if (ab.inside(x) && bc.inside(x) && ca.inside(x)) fill(x, y);
+      if (ab.inside(x) & bc.inside(x) & ca.inside(x)) fill(x, y);
   }
 }
 
