@@ -27,7 +27,4 @@ geometry::PinholeCamera camera_of_width(int width);
 geometry::Pose random_view_pose(const geometry::PinholeCamera& camera, double near, double far,
                                 core::RandomStream& stream);
 
-/// The table that an object of the tests stands on or before: seen obliquely, plane and mesh.
-inline constexpr double kTableDepth = 1.05;
-
 }  // namespace prescene::tests
