@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/simulation/uncertain/outcome_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "instance_plan.h"
+#include "prescene/core/check.h"
+#include "prescene/core/clock.h"
+
+namespace prescene::simulation {
+namespace {
+
+/// Instances run between two looks at the clock. Does not change results.
+std::size_t chunk_size(const core::ThreadPool& pool) {
+  return std::max<std::size_t>(32, 8 * static_cast<std::size_t>(pool.threads()));
+}
+
+std::vector<StartSampler> samplers_of(const StartDistribution& starts, const core::RandomStream& stream) {
+  core::RandomStream seeds = stream.for_purpose(core::Purpose::kSobolScramble);
+  std::vector<StartSampler> samplers;
+  for (const StartComponent& component : starts.components) samplers.emplace_back(component, seeds.next_u64());
+  return samplers;
+}
+
+/// Foretells how many instances the stop rule will take, from how the widest interval shrank so far.
+class Forecast {
+ public:
+  Forecast(const EstimatorOptions& options, core::ProgressSink sink) : options_(options), sink_(std::move(sink)) {
+    expected_ = options.exact_instances ? *options.exact_instances : options.max_instances;
+  }
+
+  void stage_done(double count, double widest) {
+    if (options_.exact_instances) return;
+    // Between the rates of independent draws (1/2) and of nets in smooth problems (1); 0.6 until two stages are known.
+    double rate = 0.6;
+    if (first_count_ == 0.0) {
+      first_count_ = count;
+      first_widest_ = widest;
+    } else if (widest > 0.0 && count > first_count_) {
+      rate = std::clamp(std::log(first_widest_ / widest) / std::log(count / first_count_), 0.5, 1.0);
+    }
+    const double wanted = count * std::pow(std::max(1.0, widest / options_.tolerance), 1.0 / rate);
+    const double limit = options_.max_instances;
+    expected_ =
+        wanted >= limit ? limit : std::min(limit, static_cast<double>(next_net_size(static_cast<int>(wanted) - 1)));
+  }
+
+  void tell(double done) {
+    if (!sink_) return;
+    const double elapsed = watch_.seconds();
+    const double total = std::max(done, expected_);
+    double left = done > 0.0 ? elapsed * (total - done) / done : 0.0;
+    double fraction = done / total;
+    if (options_.max_seconds && *options_.max_seconds < elapsed + left) {
+      left = std::max(0.0, *options_.max_seconds - elapsed);
+      fraction = std::max(fraction, elapsed / (elapsed + left));
+    }
+    shown_ = std::clamp(fraction, shown_, 1.0);  // a bar never runs backwards
+    sink_({shown_, left,
+           std::to_string(static_cast<int>(done)) + " of about " + std::to_string(static_cast<int>(total)) +
+               " instances"});
+  }
+
+ private:
+  EstimatorOptions options_;
+  core::ProgressSink sink_;
+  core::Stopwatch watch_;
+  double expected_;
+  double first_count_ = 0.0, first_widest_ = 0.0;
+  double shown_ = 0.0;
+};
+
+/// Runs `planned` (numbers first, first + 1, ... of the order) and appends the records of those that were finished
+/// before any that was cancelled. Returns false when one was.
+bool run_chunk(const Simulator& simulator, const std::vector<StartSampler>& samplers,
+               std::span<const PlannedInstance> planned, std::span<const Variable> variables, const RunRequest& request,
+               const core::RandomStream& stream, core::ThreadPool& pool, const core::Cancellation* cancellation,
+               std::vector<InstanceRecord>& records) {
+  const std::size_t first = records.size();
+  std::vector<belief::WorldState> starts(planned.size());
+  pool.for_each_index(planned.size(), [&](std::size_t i) {
+    starts[i] = samplers[static_cast<std::size_t>(planned[i].component)].draw(planned[i].point);
+  });
+  std::vector<belief::Trajectory> runs(planned.size());
+  simulator.run(starts, request, stream, static_cast<std::uint32_t>(first), pool, runs, cancellation);
+
+  std::size_t finished = 0;
+  while (finished < runs.size() && runs[finished].end != belief::TrajectoryEnd::kCancelled) ++finished;
+  records.resize(first + finished);
+  pool.for_each_index(finished, [&](std::size_t i) {
+    InstanceRecord& record = records[first + i];
+    record.component = planned[i].component;
+    record.point = planned[i].point;
+    for (const Variable& variable : variables) {
+      const int found = variable.classify(runs[i]);
+      PRESCENE_CHECK(found >= 0 && static_cast<std::size_t>(found) < variable.classes.size());
+      record.classes.push_back(found);
+    }
+    record.final = std::move(runs[i].states.back());
+    record.end = runs[i].end;
+    record.simulated_seconds = runs[i].simulated_seconds;
+  });
+  return finished == runs.size();
+}
+
+/// Fills in weights, intervals and the total from the records.
+void evaluate(const StartDistribution& starts, std::span<const Variable> variables, const EstimatorOptions& options,
+              OutcomeEstimate& estimate) {
+  estimate.simulated_seconds = 0.0;
+  estimate.variables.clear();
+  estimate.converged = false;
+  if (estimate.instances.empty()) return;
+
+  std::vector<ComponentClasses> components(starts.components.size());
+  for (std::size_t k = 0; k < components.size(); ++k) components[k].weight = starts.components[k].weight;
+  estimate.converged = true;
+  for (std::size_t v = 0; v < variables.size(); ++v) {
+    for (ComponentClasses& component : components) component.classes.clear();
+    for (const InstanceRecord& record : estimate.instances)
+      components[static_cast<std::size_t>(record.component)].classes.push_back(record.classes[v]);
+    VariableEstimate& variable = estimate.variables.emplace_back();
+    for (std::size_t c = 0; c < variables[v].classes.size(); ++c) {
+      variable.classes.push_back(class_estimate(components, static_cast<int>(c), options.confidence));
+      estimate.converged = estimate.converged && variable.classes.back().half_width <= options.tolerance;
+    }
+  }
+
+  std::vector<double> counts(starts.components.size(), 0.0);
+  for (const InstanceRecord& record : estimate.instances) {
+    counts[static_cast<std::size_t>(record.component)] += 1.0;
+    estimate.simulated_seconds += record.simulated_seconds;
+  }
+  double weight_sum = 0.0;
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    if (counts[k] > 0.0) weight_sum += starts.components[k].weight;
+  for (InstanceRecord& record : estimate.instances) {
+    const std::size_t k = static_cast<std::size_t>(record.component);
+    record.weight = starts.components[k].weight / (weight_sum * counts[k]);
+  }
+}
+
+double widest_half(const OutcomeEstimate& estimate) {
+  double widest = 0.0;
+  for (const VariableEstimate& variable : estimate.variables)
+    for (const ClassEstimate& one : variable.classes) widest = std::max(widest, one.half_width);
+  return widest;
+}
+
+}  // namespace
+
+std::string to_string(EstimateStop stop) {
+  switch (stop) {
+    case EstimateStop::kConverged:
+      return "converged";
+    case EstimateStop::kMaxInstances:
+      return "max_instances";
+    case EstimateStop::kExact:
+      return "exact";
+    case EstimateStop::kTimeLimit:
+      return "time_limit";
+    case EstimateStop::kCancelled:
+      return "cancelled";
+  }
+  return "unknown";
+}
+
+OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistribution& starts,
+                                  std::span<const Variable> variables, const RunRequest& request,
+                                  const core::RandomStream& stream, const EstimatorOptions& options,
+                                  core::ThreadPool& pool, const core::Cancellation* cancellation,
+                                  const core::ProgressSink& progress) {
+  PRESCENE_CHECK(!starts.components.empty());
+  PRESCENE_CHECK(options.tolerance > 0.0 && options.confidence > 0.0 && options.confidence < 1.0);
+  PRESCENE_CHECK(options.max_instances > 0 && (!options.exact_instances || *options.exact_instances > 0));
+  const core::Stopwatch watch;
+  const std::vector<StartSampler> samplers = samplers_of(starts, stream);
+  std::vector<double> weights;
+  for (const StartComponent& component : starts.components) weights.push_back(component.weight);
+  InstancePlan plan(weights);
+  const std::size_t limit =
+      static_cast<std::size_t>(options.exact_instances ? *options.exact_instances : options.max_instances);
+
+  OutcomeEstimate estimate;
+  Forecast forecast(options, progress);
+  std::optional<EstimateStop> stop;
+  while (!stop) {
+    plan.grow();
+    const std::size_t target = std::min(limit, plan.order().size());
+    while (!stop && estimate.instances.size() < target) {
+      const std::size_t done = estimate.instances.size();
+      const auto planned = std::span(plan.order()).subspan(done, std::min(chunk_size(pool), target - done));
+      if (!run_chunk(simulator, samplers, planned, variables, request, stream, pool, cancellation,
+                     estimate.instances) ||
+          (cancellation && cancellation->requested()))
+        stop = EstimateStop::kCancelled;
+      else if (options.max_seconds && !options.exact_instances && watch.seconds() >= *options.max_seconds)
+        stop = EstimateStop::kTimeLimit;
+      forecast.tell(static_cast<double>(estimate.instances.size()));
+    }
+    evaluate(starts, variables, options, estimate);
+    forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate));
+    if (stop) break;
+    if (options.exact_instances) {
+      if (target == limit) stop = EstimateStop::kExact;
+    } else if (estimate.converged && target >= static_cast<std::size_t>(std::max(0, options.min_instances))) {
+      stop = EstimateStop::kConverged;
+    } else if (target == limit) {
+      stop = EstimateStop::kMaxInstances;
+    }
+  }
+  estimate.stop = *stop;
+  estimate.wall_seconds = watch.seconds();
+  return estimate;
+}
+
+belief::Trajectory run_instance(const Simulator& simulator, const StartDistribution& starts,
+                                const OutcomeEstimate& estimate, std::size_t index, const RunRequest& request,
+                                const core::RandomStream& stream, core::ThreadPool& pool) {
+  PRESCENE_CHECK(index < estimate.instances.size());
+  const InstanceRecord& record = estimate.instances[index];
+  const std::vector<StartSampler> samplers = samplers_of(starts, stream);
+  const belief::WorldState start = samplers[static_cast<std::size_t>(record.component)].draw(record.point);
+  belief::Trajectory trajectory;
+  simulator.run(std::span(&start, 1), request, stream, static_cast<std::uint32_t>(index), pool,
+                std::span(&trajectory, 1));
+  return trajectory;
+}
+
+}  // namespace prescene::simulation

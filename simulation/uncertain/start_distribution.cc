@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/simulation/uncertain/start_distribution.h"
+
+#include <algorithm>
+
+namespace prescene::simulation {
+
+StartSampler::StartSampler(const StartComponent& component, std::uint64_t seed)
+    : component_(&component),
+      net_(std::clamp(component.dimensions, 1, core::SobolNet::kMaxDimensions), seed),
+      padding_(seed, core::Purpose::kStartBelief) {}
+
+belief::WorldState StartSampler::draw(std::uint32_t index) const {
+  std::vector<double> uniforms(static_cast<std::size_t>(component_->dimensions));
+  const std::size_t netted = std::min(uniforms.size(), static_cast<std::size_t>(net_.dimensions()));
+  if (netted > 0) net_.point(index, std::span(uniforms).first(netted));
+  core::RandomStream stream = padding_.at(index);
+  for (std::size_t i = netted; i < uniforms.size(); ++i) uniforms[i] = stream.uniform();
+  return component_->draw(uniforms);
+}
+
+}  // namespace prescene::simulation
