@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prior.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace prescene::queries {
+namespace {
+
+/// The robot body that holds an object: the one that the scene names, else the nearest.
+std::optional<std::string> holder_of(const belief::Scene& scene, const belief::ObjectBelief& object,
+                                     const std::vector<belief::Pose>& X_WG) {
+  const bool held = std::any_of(object.particles.begin(), object.particles.end(), [](const belief::Particle& particle) {
+    return particle.mode == belief::MotionMode::kHeld;
+  });
+  if (!held) return std::nullopt;
+  const std::optional<int> known = belief::find_object(scene, object.name);
+  if (known && scene.objects[static_cast<std::size_t>(*known)].held_by)
+    return scene.objects[static_cast<std::size_t>(*known)].held_by;
+  const geometry::Vector3d& p_WO = object.particles.front().X_WO.translation;
+  std::optional<std::string> nearest;
+  double least = 1e300;
+  for (std::size_t i = 0; i < X_WG.size(); ++i) {
+    const double distance = (X_WG[i].translation - p_WO).norm();
+    if (distance >= least) continue;
+    least = distance;
+    nearest = scene.robot[i].name;
+  }
+  return nearest;
+}
+
+/// Outcomes about objects that are not there can't be judged.
+void drop_outcomes_of_absent_objects(belief::Scene& scene) {
+  const auto absent = [&](const belief::Outcome& outcome) {
+    return !belief::find_object(scene, outcome.object).has_value();
+  };
+  std::erase_if(scene.outcomes, absent);
+  std::erase_if(scene.exclusive_outcomes, [&](const belief::ExclusiveOutcomes& group) {
+    return std::any_of(group.outcomes.begin(), group.outcomes.end(), absent);
+  });
+}
+
+std::shared_ptr<const belief::Scene> scene_of(const belief::Belief& belief) {
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  std::vector<belief::Pose> X_WG = belief.robot;
+  if (X_WG.size() != scene->robot.size()) {
+    X_WG.clear();
+    for (const belief::KinematicBody& body : scene->robot) X_WG.push_back(belief::pose_at(body, 0.0));
+  }
+  scene->objects.clear();
+  for (const belief::ObjectBelief& object : belief.objects) {
+    belief::SceneObject& known = scene->objects.emplace_back();
+    known.name = object.name;
+    known.model = object.model;
+    known.pose = belief::FixedPose{belief::estimate(object).mean};
+    known.held_by = holder_of(*belief.scene, object, X_WG);
+  }
+  for (std::size_t i = 0; i < X_WG.size(); ++i) scene->robot[i].timeline = {{0.0, X_WG[i]}};
+  if (scene->camera) scene->camera->X_WC = belief.X_WC;
+  scene->actions.clear();
+  drop_outcomes_of_absent_objects(*scene);
+  return scene;
+}
+
+}  // namespace
+
+bool is_present(const belief::ObjectBelief& object) {
+  return object.state != belief::TrackState::kLost && object.existence >= 0.5 && !object.particles.empty();
+}
+
+Prior prior_of(const belief::Belief& belief) {
+  auto present = std::make_shared<belief::Belief>(belief);
+  std::erase_if(present->objects, [](const belief::ObjectBelief& object) { return !is_present(object); });
+  Prior prior{scene_of(*present),
+              {},
+              belief::most_likely_state(*present),
+              core::RandomStream(belief.seed, core::Purpose::kStartBelief, belief.step),
+              belief.X_WC,
+              true};
+  prior.starts = simulation::start_of(std::shared_ptr<const belief::Belief>(std::move(present)));
+  return prior;
+}
+
+Prior prior_of(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) {
+  Prior prior{scene,
+              simulation::start_of(scene),
+              belief::mean_start(*scene),
+              core::RandomStream(seed, core::Purpose::kStartBelief),
+              scene->camera ? scene->camera->X_WC : belief::Pose{},
+              false};
+  return prior;
+}
+
+core::Result<std::shared_ptr<const belief::Scene>> with_question(const belief::Scene& scene,
+                                                                 std::vector<belief::Action> actions,
+                                                                 std::vector<belief::Outcome> outcomes,
+                                                                 std::vector<belief::ExclusiveOutcomes> exclusive) {
+  auto asked = std::make_shared<belief::Scene>(scene);
+  asked->actions = std::move(actions);
+  asked->outcomes = std::move(outcomes);
+  asked->exclusive_outcomes = std::move(exclusive);
+  PRESCENE_RETURN_IF_ERROR(belief::validate(*asked));
+  return std::shared_ptr<const belief::Scene>(std::move(asked));
+}
+
+}  // namespace prescene::queries

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a query starts from, whether it is a belief or a scene's priors: a scene with exactly the objects that take
+// part, and the distribution of its start.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/query.h"
+#include "prescene/simulation/uncertain/start_distribution.h"
+
+namespace prescene::queries {
+
+struct Prior {
+  std::shared_ptr<const belief::Scene> scene;
+  simulation::StartDistribution starts;
+  belief::WorldState likeliest;
+  core::RandomStream stream;
+  belief::Pose X_WC;
+  bool seen = false;  ///< From a belief: the scene's own actions are past.
+};
+
+/// Whether the object takes part in what is foreseen.
+bool is_present(const belief::ObjectBelief& object);
+
+/// Objects as the belief has them; robot bodies stand where they stood at the belief's step, times count from there.
+Prior prior_of(const belief::Belief& belief);
+Prior prior_of(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed);
+
+/// The prior's scene with other actions and outcomes; fails with the reason when a name or value in them is wrong.
+core::Result<std::shared_ptr<const belief::Scene>> with_question(const belief::Scene& scene,
+                                                                 std::vector<belief::Action> actions,
+                                                                 std::vector<belief::Outcome> outcomes,
+                                                                 std::vector<belief::ExclusiveOutcomes> exclusive);
+
+}  // namespace prescene::queries

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Answers questions about a belief, or about a scene of which nothing has been seen yet.
+//
+//   QueryContext context;
+//   context.make_simulator = [&](auto scene) { return simulation::make_bullet_simulator(scene, shapes, {}); };
+//   context.pool = &pool;
+//   belief::Answer answer = queries::answer(*snapshot, query, context);
+//   if (!answer.error.empty()) ...
+//
+// Four questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
+// what will the camera see (observation anticipation). docs/queries.md says what the answers mean.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "prescene/belief/query.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/progress.h"
+#include "prescene/filter/render_scene.h"
+#include "prescene/rendering/renderer.h"
+#include "prescene/simulation/simulator.h"
+
+namespace prescene::queries {
+
+/// What answering takes; made by whoever chooses backends.
+struct QueryContext {
+  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where`.
+  std::function<core::Result<std::unique_ptr<simulation::Simulator>>(std::shared_ptr<const belief::Scene>)>
+      make_simulator;
+  /// Needed by `view`; called once a query.
+  std::function<core::Result<std::unique_ptr<rendering::Renderer>>()> make_renderer;
+  /// Never null. Its number of threads does not change answers.
+  core::ThreadPool* pool = nullptr;
+  /// Meshes to draw, kept over queries; may be null.
+  filter::MeshCache* meshes = nullptr;
+  /// May be null. A cancelled query is answered from the instances that were finished.
+  const core::Cancellation* cancellation = nullptr;
+  /// Called from the calling thread; may be empty.
+  core::ProgressSink progress;
+};
+
+/// Answers from a snapshot. Objects that are lost or probably not there (existence below 1/2) take no part. The same
+/// snapshot and query give the same answer (wall times aside), unless time ran out: then the answer's number of
+/// instances, given as Effort::exact_instances, gives it again. What can't be answered has its reason in Answer::error.
+belief::Answer answer(const belief::Belief& snapshot, const belief::Query& query, const QueryContext& context);
+
+/// Answers from a scene's priors: the distributions of its file. Without actions in the query, the scene's are taken.
+belief::Answer answer(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed, const belief::Query& query,
+                      const QueryContext& context);
+
+}  // namespace prescene::queries

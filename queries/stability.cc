@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Object stability: does it stay as it is, or as it is when it is let go now?
+#include <utility>
+
+#include "prescene/queries/typical_runs.h"
+#include "tasks.h"
+
+namespace prescene::queries {
+namespace {
+
+/// How far a hand backs off when nothing says how, m and s.
+constexpr double kRetreat = 0.1, kRetreatDuration = 0.3;
+
+/// Lets go of the object now. The hand leaves as the scene's own release says, else straight away from the object.
+belief::Action release_now(const Prior& prior, std::size_t object) {
+  const belief::SceneObject& held = prior.scene->objects[object];
+  for (const belief::Action& action : prior.scene->actions) {
+    const auto* release = std::get_if<belief::Release>(&action.what);
+    if (release != nullptr && release->object == held.name) return {0.0, *release};
+  }
+  belief::Release release;
+  release.object = held.name;
+  release.retreat_duration = kRetreatDuration;
+  release.retreat = kRetreat * geometry::Vector3d::UnitZ();
+  const std::optional<int> hand = belief::find_robot_body(*prior.scene, *held.held_by);
+  if (hand) {
+    const belief::Pose X_WG = belief::pose_at(prior.scene->robot[static_cast<std::size_t>(*hand)], 0.0);
+    const geometry::Vector3d away = X_WG.translation - prior.likeliest.objects[object].X_WO.translation;
+    if (away.norm() > 1e-3) release.retreat = kRetreat * away.normalized();
+  }
+  return {0.0, release};
+}
+
+}  // namespace
+
+core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief::StabilityQuery& query,
+                                                const QueryContext& context) {
+  if (!(query.max_move > 0.0) || !(query.max_turn > 0.0))
+    return core::invalid_input("max_move and max_turn have to be more than 0");
+  const std::optional<int> object = belief::find_object(*prior.scene, query.object);
+  if (!object) {
+    return core::not_found("there is no object '" + query.object +
+                           "' now (it may be lost or not there at all): ask 'where' for those that are");
+  }
+  const auto index = static_cast<std::size_t>(*object);
+  std::vector<belief::Action> actions;
+  if (prior.scene->objects[index].held_by) actions.push_back(release_now(prior, index));
+
+  const auto ever = [&](const char* name, belief::Predicate predicate) {
+    return belief::Outcome{name, query.object, {belief::Condition{std::move(predicate), belief::When::kEver, false}}};
+  };
+  belief::ExclusiveOutcomes group{
+      "stability",
+      {ever("moves", belief::MovedMoreThan{query.max_move}), ever("turns", belief::TurnedMoreThan{query.max_turn})}};
+  PRESCENE_TRY(auto scene, with_question(*prior.scene, std::move(actions), {}, {std::move(group)}));
+  PRESCENE_TRY(const Foresight foresight, foresee(prior, std::move(scene), query.duration, query.effort, context));
+
+  const simulation::ClassEstimate& stays = foresight.estimate.variables[0].classes[2];  // neither moves nor turns
+  belief::StabilityAnswer answer;
+  answer.object = query.object;
+  answer.stable = {"stable", "", stays.probability, stays.low, stays.high};
+  if (const std::optional<std::size_t> unstable = typical_instance(foresight, 0, {0, 1}, index)) {
+    answer.likely_event = event_text(*foresight.scene, run_again(foresight, prior, *unstable, context), *object,
+                                     query.max_move, query.max_turn);
+  }
+  answer.instances = static_cast<int>(foresight.estimate.instances.size());
+  answer.simulated_seconds = foresight.estimate.simulated_seconds;
+  answer.wall_seconds = foresight.estimate.wall_seconds;
+  return answer;
+}
+
+}  // namespace prescene::queries

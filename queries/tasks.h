@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The inference tasks, each from a prior.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/query.h"
+#include "prescene/core/status.h"
+#include "prescene/queries/query_engine.h"
+#include "prescene/simulation/uncertain/outcome_estimator.h"
+#include "prior.h"
+
+namespace prescene::queries {
+
+core::Result<belief::WhereAnswer> where(const belief::Belief& belief, const belief::WhereQuery& query);
+core::Result<belief::WhereAnswer> where(const belief::Scene& scene, const belief::WhereQuery& query);
+core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::PredictQuery& query,
+                                            const QueryContext& context);
+core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief::StabilityQuery& query,
+                                                const QueryContext& context);
+core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuery& query, const QueryContext& context);
+
+/// A scene under a request, with what it was asked, simulated until the stop rule holds.
+struct Foresight {
+  std::shared_ptr<const belief::Scene> scene;
+  std::unique_ptr<simulation::Simulator> simulator;
+  simulation::RunRequest request;
+  std::vector<simulation::Variable> variables;
+  simulation::OutcomeEstimate estimate;
+};
+/// Fails when the effort or the duration is out of range, when no simulator can be made, or when the query was
+/// cancelled before an instance was finished. The scene's outcomes are what is judged, its actions what is done.
+core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
+                                const belief::Effort& effort, const QueryContext& context);
+
+/// The instance that stands for those of `class_index` of a variable, by where they left the object; nothing when none
+/// did.
+std::optional<std::size_t> typical_instance(const Foresight& foresight, std::size_t variable,
+                                            const std::set<int>& class_indices, std::size_t object);
+/// That instance again, with states every 1/30 s.
+belief::Trajectory run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
+                             const QueryContext& context);
+
+}  // namespace prescene::queries

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Observation anticipation: Z*_t+1 ~ P(Z_t+1 | X_t+1), as the noise-free view of the predicted belief.
+#include <algorithm>
+#include <utility>
+
+#include "prescene/belief/robot_motion.h"
+#include "tasks.h"
+
+namespace prescene::queries {
+namespace {
+
+/// Views that presence is averaged over: a share is good to 0.06 at worst, to 0.02 where the scene is smooth.
+constexpr int kViews = 64;
+
+std::vector<belief::Pose> robot_at(const belief::Scene& scene, double time) {
+  std::vector<belief::Pose> X_WG;
+  for (std::size_t i = 0; i < scene.robot.size(); ++i)
+    X_WG.push_back(belief::robot_pose_at(scene, scene.actions, static_cast<int>(i), time));
+  return X_WG;
+}
+
+}  // namespace
+
+core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuery& query, const QueryContext& context) {
+  if (!prior.scene->camera)
+    return core::not_found("the scene has no camera: give its intrinsics and pose in the scene file");
+  if (!(query.time > 0.0 && query.time <= 60.0))
+    return core::invalid_input("a time of " + std::to_string(query.time) + " s: give more than 0 and at most 60");
+  if (!context.make_renderer) return core::unavailable("no renderer: this service was set up without one");
+  PRESCENE_TRY(
+      auto scene,
+      with_question(*prior.scene, query.actions.empty() && !prior.seen ? prior.scene->actions : query.actions, {}, {}));
+  // The robot goes on moving when everything else is at rest.
+  auto moving = std::make_shared<belief::Scene>(*scene);
+  moving->stop_at_rest = false;
+  belief::Effort effort;
+  effort.exact_instances = kViews;
+  PRESCENE_TRY(const Foresight foresight, foresee(prior, std::move(moving), query.time, effort, context));
+
+  belief::Trajectory likeliest;
+  foresight.simulator->run(std::span(&prior.likeliest, 1), foresight.request, prior.stream, 0, *context.pool,
+                           std::span(&likeliest, 1));
+
+  PRESCENE_TRY(const std::unique_ptr<rendering::Renderer> renderer, context.make_renderer());
+  filter::MeshCache own_meshes;
+  filter::MeshCache& meshes = context.meshes != nullptr ? *context.meshes : own_meshes;
+  const geometry::PinholeCamera& camera = foresight.scene->camera->intrinsics;
+  const std::vector<belief::Pose> X_WG = robot_at(*foresight.scene, query.time);
+  const auto draw = [&](const belief::WorldState& state, rendering::RenderedView* images) {
+    filter::BeliefView drawn =
+        filter::render_scene(*foresight.scene, state, X_WG, filter::MeshDetail::kDisplay, meshes);
+    const core::Status status = renderer->render(drawn.scene, camera, prior.X_WC, {}, images);
+    return std::make_pair(std::move(drawn), status);
+  };
+
+  belief::ViewAnswer answer;
+  answer.presence = geometry::Image<float>(camera.width, camera.height, 0.0f);
+  rendering::RenderedView images;
+  for (const simulation::InstanceRecord& record : foresight.estimate.instances) {
+    const auto [drawn, status] = draw(record.final, &images);
+    PRESCENE_RETURN_IF_ERROR(status);
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const std::uint16_t label = images.labels(x, y);
+        if (label != 0 && drawn.kinds[label - 1u] == filter::InstanceKind::kObject)
+          answer.presence(x, y) += static_cast<float>(record.weight);
+      }
+    }
+  }
+  const auto [drawn, status] = draw(likeliest.final(), &images);
+  PRESCENE_RETURN_IF_ERROR(status);
+  answer.label_names = drawn.names;
+  answer.depth = std::move(images.depth);
+  answer.labels = std::move(images.labels);
+  return answer;
+}
+
+}  // namespace prescene::queries

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/queries/query_engine.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "prescene/rendering/reference/reference_renderer.h"
+#include "sliding_scene.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::Answer;
+using belief::PredictAnswer;
+using belief::PredictQuery;
+using belief::StabilityAnswer;
+using belief::StabilityQuery;
+using belief::ViewAnswer;
+using belief::ViewQuery;
+using belief::WhereAnswer;
+using belief::WhereQuery;
+using geometry::Pose;
+using testing::HasSubstr;
+using tests::context_with;
+using tests::slide;
+using tests::sliding_scene;
+using tests::two_hypotheses;
+
+const belief::OutcomeProbability& named(const PredictAnswer& answer, const std::string& name) {
+  for (const belief::OutcomeProbability& outcome : answer.outcomes)
+    if (outcome.name == name) return outcome;
+  ADD_FAILURE() << "no outcome " << name;
+  return answer.outcomes.front();
+}
+
+StabilityQuery stability_of(const std::string& object) {
+  StabilityQuery query;
+  query.object = object;
+  return query;
+}
+
+TEST(Predict, AScenesPriorsGiveTheProbabilityOfTheirOutcomes) {
+  core::ThreadPool pool(2);
+  const Answer answer = queries::answer(sliding_scene(), 1, {"q1", PredictQuery{}}, context_with(slide, pool));
+  ASSERT_EQ(answer.error, "");
+  EXPECT_EQ(answer.id, "q1");
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  ASSERT_EQ(predicted.outcomes.size(), 3u);
+  const belief::OutcomeProbability& slides = named(predicted, "slides");
+  EXPECT_EQ(slides.group, "end");
+  EXPECT_LE(slides.low, tests::slide_probability());
+  EXPECT_GE(slides.high, tests::slide_probability());
+  EXPECT_NEAR(slides.probability + named(predicted, "other").probability, 1.0, 1e-12);
+  EXPECT_EQ(named(predicted, "cup moves").probability, 0.0);
+  EXPECT_EQ(named(predicted, "cup moves").group, "");
+  EXPECT_TRUE(predicted.converged);
+  EXPECT_GE(predicted.instances, 64);
+  EXPECT_NEAR(predicted.simulated_seconds, 2.0 * predicted.instances, 1e-9);
+}
+
+TEST(Predict, TellsWhereThingsEndByOutcome) {
+  core::ThreadPool pool(2);
+  const Answer answer = queries::answer(sliding_scene(), 1, {"", PredictQuery{}}, context_with(slide, pool));
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  ASSERT_EQ(predicted.final_poses.size(), 2u);  // outcomes speak of both
+  const belief::FinalPoses& carton = predicted.final_poses[0];
+  EXPECT_EQ(carton.object, "carton");
+  EXPECT_NEAR(carton.mean_position.x(), named(predicted, "slides").probability, 0.01);
+  double sliding = 0.0;
+  for (const belief::PoseComponent& component : carton.components) {
+    EXPECT_NEAR(component.mean.translation.x(), component.outcome == "slides" ? 1.0 : 0.0, 0.06);
+    if (component.outcome == "slides") sliding += component.weight;
+  }
+  EXPECT_NEAR(sliding, named(predicted, "slides").probability, 1e-9);
+}
+
+TEST(Predict, ShowsATypicalRunOfEachOutcomeThatHappened) {
+  core::ThreadPool pool(1);
+  const Answer answer = queries::answer(sliding_scene(), 1, {"", PredictQuery{}}, context_with(slide, pool));
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  ASSERT_EQ(predicted.typical_runs.size(), 2u);
+  EXPECT_EQ(predicted.typical_runs[0].outcome, "other");  // the likelier first
+  EXPECT_EQ(predicted.typical_runs[1].outcome, "slides");
+  EXPECT_NEAR(predicted.typical_runs[1].share, named(predicted, "slides").probability, 1e-12);
+  const belief::Trajectory& run = predicted.typical_runs[1].trajectory;
+  EXPECT_GT(run.states.size(), 30u);
+  EXPECT_NEAR(run.final().objects[0].X_WO.translation.x(), 1.0, 0.01);  // the middle of those that slid
+  EXPECT_FALSE(predicted.typical_runs[1].timeline.empty());
+}
+
+TEST(Predict, SameBitsForAnyNumberOfThreads) {
+  core::ThreadPool one(1), many(5);
+  const Answer a = queries::answer(sliding_scene(), 9, {"", PredictQuery{}}, context_with(slide, one));
+  const Answer b = queries::answer(sliding_scene(), 9, {"", PredictQuery{}}, context_with(slide, many));
+  const auto& first = std::get<PredictAnswer>(a.what);
+  const auto& second = std::get<PredictAnswer>(b.what);
+  EXPECT_EQ(first.outcomes, second.outcomes);
+  EXPECT_EQ(first.final_poses, second.final_poses);
+  EXPECT_EQ(first.instances, second.instances);
+  ASSERT_EQ(first.typical_runs.size(), second.typical_runs.size());
+  for (std::size_t i = 0; i < first.typical_runs.size(); ++i) {
+    EXPECT_EQ(first.typical_runs[i].trajectory, second.typical_runs[i].trajectory);
+    EXPECT_EQ(first.typical_runs[i].timeline, second.typical_runs[i].timeline);
+  }
+}
+
+TEST(Predict, ABeliefsHypothesesKeepTheirMasses) {
+  core::ThreadPool pool(1);
+  const belief::Belief belief = two_hypotheses();
+  const Answer answer = queries::answer(belief, {"", PredictQuery{}}, context_with(slide, pool));
+  ASSERT_EQ(answer.error, "");
+  EXPECT_EQ(answer.step, 17u);
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  EXPECT_NEAR(named(predicted, "slides").probability, 0.25, 1e-12);
+  EXPECT_NEAR(predicted.final_poses[0].mean_position.x(), 0.25 * 1.1 + 0.75 * 0.12, 1e-3);
+}
+
+TEST(Predict, SimulatesTheBeliefsObjectsAndRobotAtTheSnapshot) {
+  core::ThreadPool pool(1);
+  std::shared_ptr<const belief::Scene> simulated;
+  QueryContext context = context_with(slide, pool);
+  const auto make = context.make_simulator;
+  context.make_simulator = [&](std::shared_ptr<const belief::Scene> scene) {
+    simulated = scene;
+    return make(scene);
+  };
+  belief::Belief belief = two_hypotheses();
+  belief.objects[0].particles[0].mode = belief.objects[0].particles[1].mode = belief::MotionMode::kHeld;
+  belief.objects[1].state = belief::TrackState::kLost;
+  ASSERT_EQ(queries::answer(belief, {"", PredictQuery{}}, context).error, "");
+  ASSERT_EQ(simulated->objects.size(), 1u);  // the cup is lost
+  EXPECT_EQ(simulated->objects[0].held_by, "hand");
+  EXPECT_EQ(belief::pose_at(simulated->robot[0], 1.0), belief.robot[0]);
+  EXPECT_TRUE(simulated->outcomes.empty());  // the one about the cup can't be judged
+  EXPECT_EQ(simulated->exclusive_outcomes.size(), 1u);
+}
+
+TEST(Predict, AnswersOtherOutcomesThanTheScenes) {
+  core::ThreadPool pool(1);
+  PredictQuery query;
+  query.outcomes.push_back({"far", "carton", {belief::Condition{belief::MovedMoreThan{5.0}}}});
+  query.duration = 0.5;
+  const Answer answer = queries::answer(two_hypotheses(), {"", query}, context_with(slide, pool));
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  ASSERT_EQ(predicted.outcomes.size(), 1u);
+  EXPECT_EQ(predicted.outcomes[0].probability, 0.0);
+  EXPECT_NEAR(predicted.simulated_seconds, 0.5 * predicted.instances, 1e-9);
+}
+
+TEST(Predict, ATimeLimitedAnswerComesAgainFromItsInstanceCount) {
+  core::ThreadPool pool(2);
+  PredictQuery query;
+  query.effort.tolerance = 1e-3;
+  query.effort.max_instances = 1 << 20;
+  query.effort.max_seconds = 0.002;
+  const Answer limited = queries::answer(sliding_scene(), 4, {"", query}, context_with(slide, pool));
+  query.effort.max_seconds.reset();
+  query.effort.exact_instances = std::get<PredictAnswer>(limited.what).instances;
+  const Answer again = queries::answer(sliding_scene(), 4, {"", query}, context_with(slide, pool));
+  EXPECT_EQ(std::get<PredictAnswer>(limited.what).outcomes, std::get<PredictAnswer>(again.what).outcomes);
+  EXPECT_EQ(std::get<PredictAnswer>(limited.what).final_poses, std::get<PredictAnswer>(again.what).final_poses);
+}
+
+TEST(Predict, WhatCannotBeAnsweredSaysWhy) {
+  core::ThreadPool pool(1);
+  const QueryContext context = context_with(slide, pool);
+  const auto error_of = [&](const PredictQuery& query) {
+    const Answer answer = queries::answer(two_hypotheses(), {"x", query}, context);
+    EXPECT_TRUE(std::holds_alternative<std::monostate>(answer.what));
+    EXPECT_EQ(answer.id, "x");
+    return answer.error;
+  };
+  PredictQuery unknown_object;
+  belief::Release release;
+  release.object = "milk";
+  unknown_object.actions.push_back({0.0, release});
+  EXPECT_THAT(error_of(unknown_object), HasSubstr("'milk'"));
+  PredictQuery unknown_outcome;
+  unknown_outcome.outcomes.push_back({"o", "bottle", {tests::moved()}});
+  EXPECT_THAT(error_of(unknown_outcome), HasSubstr("'bottle'"));
+  PredictQuery effort;
+  effort.effort.tolerance = 0.0;
+  EXPECT_THAT(error_of(effort), HasSubstr("tolerance"));
+  effort.effort.tolerance = std::nan("");
+  EXPECT_THAT(error_of(effort), HasSubstr("tolerance"));
+  PredictQuery endless;
+  endless.duration = 1e9;
+  EXPECT_THAT(error_of(endless), HasSubstr("duration"));
+  PredictQuery none;
+  none.effort.exact_instances = 0;
+  EXPECT_THAT(error_of(none), HasSubstr("exact_instances"));
+
+  QueryContext bare;
+  bare.pool = &pool;
+  EXPECT_THAT(queries::answer(two_hypotheses(), {"", PredictQuery{}}, bare).error, HasSubstr("no simulator"));
+  QueryContext broken = context;
+  broken.make_simulator = [](auto) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    return core::unsupported("carton: a surface can't move");
+  };
+  EXPECT_THAT(queries::answer(two_hypotheses(), {"", PredictQuery{}}, broken).error, HasSubstr("a surface can't move"));
+  QueryContext stopped = context;
+  core::Cancellation cancellation;
+  cancellation.request();
+  stopped.cancellation = &cancellation;
+  EXPECT_THAT(queries::answer(two_hypotheses(), {"", PredictQuery{}}, stopped).error, HasSubstr("cancelled"));
+}
+
+TEST(Where, TellsEachObjectsEstimate) {
+  core::ThreadPool pool(1);
+  const QueryContext context = context_with(slide, pool);
+  const Answer answer = queries::answer(two_hypotheses(), {"", WhereQuery{}}, context);
+  const auto& found = std::get<WhereAnswer>(answer.what);
+  ASSERT_EQ(found.items.size(), 2u);
+  EXPECT_EQ(found.items[0].object, "carton");
+  EXPECT_EQ(found.items[0].model, "carton");
+  EXPECT_NEAR(found.items[0].estimate.mean.translation.x(), 0.25 * 0.1 + 0.75 * 0.12, 1e-12);
+  const Answer one = queries::answer(two_hypotheses(), {"", WhereQuery{"cup"}}, context);
+  EXPECT_EQ(std::get<WhereAnswer>(one.what).items.size(), 1u);
+  const Answer none = queries::answer(two_hypotheses(), {"", WhereQuery{"mug"}}, context);
+  EXPECT_THAT(none.error, HasSubstr("carton, cup"));
+}
+
+TEST(Where, OfASceneIsItsPriors) {
+  core::ThreadPool pool(1);
+  const Answer answer = queries::answer(sliding_scene(), 1, {"", WhereQuery{"carton"}}, context_with(slide, pool));
+  const auto& found = std::get<WhereAnswer>(answer.what);
+  ASSERT_EQ(found.items.size(), 1u);
+  EXPECT_NEAR(found.items[0].estimate.covariance(4, 4), 4e-4, 1e-12);
+  EXPECT_EQ(found.items[0].state, belief::TrackState::kUnseen);
+}
+
+TEST(Stability, IsTheShareOfInstancesThatStay) {
+  core::ThreadPool pool(1);
+  const Answer answer = queries::answer(two_hypotheses(), {"", stability_of("carton")}, context_with(slide, pool));
+  ASSERT_EQ(answer.error, "");
+  const auto& told = std::get<StabilityAnswer>(answer.what);
+  EXPECT_EQ(told.stable.name, "stable");
+  EXPECT_NEAR(told.stable.probability, 0.75, 1e-12);
+  EXPECT_LE(told.stable.low, 0.75);
+  EXPECT_GE(told.stable.high, 0.75);
+  EXPECT_EQ(told.likely_event, "slides");
+}
+
+TEST(Stability, MovingThereAndBackIsNotStable) {
+  core::ThreadPool pool(1);
+  // Instances move in a straight line, so "there and back" is a start with a velocity that the samples show: here a
+  // turn beyond the limit at the end alone.
+  const auto turn = [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+    belief::WorldState end = start;
+    end.objects[1].X_WO.rotation = geometry::exp_rotation({0.0, 0.0, 0.2});
+    return end;
+  };
+  const Answer answer = queries::answer(two_hypotheses(), {"", stability_of("cup")}, context_with(turn, pool));
+  const auto& told = std::get<StabilityAnswer>(answer.what);
+  EXPECT_EQ(told.stable.probability, 0.0);
+  EXPECT_EQ(told.likely_event, "turns");
+  StabilityQuery lenient = stability_of("cup");
+  lenient.max_turn = 0.3;
+  const Answer calm = queries::answer(two_hypotheses(), {"", lenient}, context_with(turn, pool));
+  EXPECT_EQ(std::get<StabilityAnswer>(calm.what).stable.probability, 1.0);
+  EXPECT_EQ(std::get<StabilityAnswer>(calm.what).likely_event, "");
+}
+
+TEST(Stability, AHeldObjectIsLetGo) {
+  core::ThreadPool pool(1);
+  std::atomic<int> released{0};
+  geometry::Vector3d retreat = geometry::Vector3d::Zero();
+  const QueryContext context = context_with(
+      [&](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
+        if (request.actions.size() == 1) {
+          const auto& release = std::get<belief::Release>(request.actions[0].what);
+          if (release.object == "carton" && request.actions[0].time == 0.0) ++released;
+          retreat = release.retreat;
+        }
+        return start;
+      },
+      pool);
+  belief::Belief belief = two_hypotheses();
+  for (belief::Particle& particle : belief.objects[0].particles) particle.mode = belief::MotionMode::kHeld;
+  const Answer answer = queries::answer(belief, {"", stability_of("carton")}, context);
+  ASSERT_EQ(answer.error, "");
+  EXPECT_EQ(released, std::get<StabilityAnswer>(answer.what).instances);
+  // Straight away from the carton.
+  EXPECT_GT(retreat.normalized().dot(geometry::Vector3d(0.2 - 0.12, 0.0, 0.3 - 0.1).normalized()), 0.999);
+}
+
+TEST(Stability, OfAnObjectThatIsNotThereIsAnError) {
+  core::ThreadPool pool(1);
+  belief::Belief belief = two_hypotheses();
+  belief.objects[0].state = belief::TrackState::kLost;
+  const Answer answer = queries::answer(belief, {"", stability_of("carton")}, context_with(slide, pool));
+  EXPECT_THAT(answer.error, HasSubstr("'carton'"));
+}
+
+TEST(View, ShowsTheLikeliestAndWhereObjectsMayBe) {
+  core::ThreadPool pool(2);
+  QueryContext context = context_with(slide, pool);
+  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
+    return rendering::make_reference_renderer();
+  };
+  belief::Belief belief = two_hypotheses();
+  const Answer answer = queries::answer(belief, {"", ViewQuery{}}, context);
+  ASSERT_EQ(answer.error, "");
+  const auto& seen = std::get<ViewAnswer>(answer.what);
+  ASSERT_EQ(seen.label_names, (std::vector<std::string>{"carton", "cup", "table", "hand"}));
+  const geometry::PinholeCamera& camera = belief.scene->camera->intrinsics;
+  const auto pixel = [&](double x, double y, double z) {
+    const Eigen::Vector2d p = camera.project(belief.X_WC.inverse() * geometry::Vector3d(x, y, z));
+    return std::pair<int, int>(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())));
+  };
+  // The heavier hypothesis stays; top of the carton at z = 0.2, that of the cup at 0.05.
+  const auto [cx, cy] = pixel(0.12, 0.0, 0.2);
+  EXPECT_EQ(seen.labels(cx, cy), 1);
+  EXPECT_NEAR(seen.depth(cx, cy), 1.3, 1e-3);
+  EXPECT_NEAR(seen.presence(cx, cy), 0.75, 1e-5);
+  const auto [ux, uy] = pixel(0.3, 0.3, 0.05);
+  EXPECT_EQ(seen.labels(ux, uy), 2);
+  EXPECT_NEAR(seen.presence(ux, uy), 1.0, 1e-5);
+  // Slid out of the view at x = 1.1; the table is no object, and nor is the hand.
+  const auto [tx, ty] = pixel(-0.5, -0.4, 0.0);
+  EXPECT_EQ(seen.labels(tx, ty), 3);
+  EXPECT_EQ(seen.presence(tx, ty), 0.0f);
+  const auto [hx, hy] = pixel(0.2, 0.0, 0.3);
+  EXPECT_EQ(seen.labels(hx, hy), 4);
+}
+
+TEST(View, NeedsACamera) {
+  core::ThreadPool pool(1);
+  auto scene = sliding_scene();
+  scene->camera.reset();
+  EXPECT_THAT(queries::answer(scene, 1, {"", ViewQuery{}}, context_with(slide, pool)).error, HasSubstr("no camera"));
+  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", ViewQuery{}}, context_with(slide, pool)).error,
+              HasSubstr("no renderer"));
+}
+
+}  // namespace
+}  // namespace prescene::queries
