@@ -110,23 +110,29 @@ void count_edges(const std::vector<Triangle>& triangles, MeshTopology& topology)
   });
 }
 
+// The triangles by their own indices when these make them watertight, else by the indices of welded vertices. Scans and
+// convex parts that touch in a point are apart by their own indices; soups of triangles are one surface once welded.
+std::vector<Triangle> joined_triangles(const TriangleMesh& mesh, MeshTopology& topology) {
+  count_edges(mesh.triangles, topology);
+  if (topology.watertight()) return mesh.triangles;
+  std::vector<Triangle> welded = relabelled(mesh.triangles, welded_indices(mesh.vertices));
+  topology = {};
+  count_edges(welded, topology);
+  return welded;
+}
+
 }  // namespace
 
 MeshTopology mesh_topology(const TriangleMesh& mesh) {
-  const std::vector<Triangle> welded = relabelled(mesh.triangles, welded_indices(mesh.vertices));
   MeshTopology topology;
-  count_edges(mesh.triangles, topology);
-  if (!topology.watertight()) {
-    topology = {};
-    count_edges(welded, topology);
-  }
-  topology.components = component_numbers(welded, mesh.vertices.size()).second;
+  const std::vector<Triangle> triangles = joined_triangles(mesh, topology);
+  topology.components = component_numbers(triangles, mesh.vertices.size()).second;
   return topology;
 }
 
 std::vector<TriangleMesh> connected_components(const TriangleMesh& mesh) {
-  const std::vector<Triangle> welded = relabelled(mesh.triangles, welded_indices(mesh.vertices));
-  const auto [numbers, count] = component_numbers(welded, mesh.vertices.size());
+  MeshTopology topology;
+  const auto [numbers, count] = component_numbers(joined_triangles(mesh, topology), mesh.vertices.size());
   std::vector<std::vector<Triangle>> triangles(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     triangles[static_cast<std::size_t>(numbers[i])].push_back(mesh.triangles[i]);

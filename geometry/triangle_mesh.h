@@ -50,7 +50,7 @@ struct MeshTopology {
   int non_manifold_edges = 0;  ///< Edges with more than two.
   int inconsistent_edges = 0;  ///< Edges that both triangles run in the same direction.
   int unbalanced_edges = 0;    ///< Edges that triangles run more often in one direction than in the other.
-  int components = 0;          ///< Connected over shared vertices (welded by position).
+  int components = 0;          ///< Connected over shared vertices.
   bool watertight() const { return open_edges == 0 && non_manifold_edges == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
   /// The triangles enclose a volume, also where surfaces touch along an edge; watertight() && oriented() implies it.
@@ -68,7 +68,7 @@ TriangleMesh transformed(const TriangleMesh& mesh, const Pose& X_NM);
 TriangleMesh scaled(const TriangleMesh& mesh, double factor);
 /// One mesh holding both.
 TriangleMesh joined(const TriangleMesh& a, const TriangleMesh& b);
-/// Connected components, in the order of their first triangle.
+/// Connected components as mesh_topology counts them, in the order of their first triangle.
 std::vector<TriangleMesh> connected_components(const TriangleMesh& mesh);
 /// A coarser mesh of at most `max_triangles` (edge collapse by quadric error [Garland & Heckbert 1997], deterministic);
 /// the same mesh when it is small enough already. What bounds a volume still does so; tunnels and necks that are small

@@ -61,6 +61,8 @@ TEST(MeshTopology, CountsWhatIsWrong) {
   EXPECT_EQ(mesh_topology(soup_of(touching)).components, 1);
   // By their own indices they are two closed cubes.
   EXPECT_TRUE(mesh_topology(touching).watertight());
+  EXPECT_EQ(mesh_topology(touching).components, 2);
+  EXPECT_EQ(connected_components(touching).size(), 2U);
 
   const TriangleMesh apart = joined(unit_cube(), transformed(unit_cube(), Pose::from_translation({3.0, 0.0, 0.0})));
   EXPECT_EQ(mesh_topology(apart).components, 2);
