@@ -92,30 +92,36 @@ bool ContactFinder::nearest(const ConvexCore& a, const Frame& X_WA, const Convex
   return true;
 }
 
-void ContactFinder::clip_to_polygon(const Vector3d& axis, const Feature& polygon, Feature& clipped) {
-  const int corners = polygon.count;
-  for (int e = 0; e < corners && clipped.count > 0; ++e) {
-    const Vector3d& from = polygon[e];
-    const Vector3d inward = axis.cross(polygon[(e + 1) % corners] - from);
-    const double offset = inward.dot(from);
-    buffer_.clear();
-    // A segment is an open chain, a polygon a closed one.
-    const int edges = clipped.count == 2 ? 1 : clipped.count;
-    if (clipped.count == 1) {
-      if (inward.dot(clipped[0]) >= offset) buffer_.add(clipped[0]);
+const Feature& ContactFinder::clip_to_polygon(const Vector3d& axis, const Feature& polygon, const Feature& feature) {
+  const Feature* from = &feature;
+  for (int e = 0; e < polygon.count && from->count > 0; ++e) {
+    const Vector3d& corner = polygon[e];
+    const Vector3d inward = axis.cross(polygon[(e + 1) % polygon.count] - corner);
+    const double offset = inward.dot(corner);
+    Feature& to = buffers_[static_cast<std::size_t>(e & 1)];
+    to.clear();
+    const int count = from->count;
+    double height = inward.dot((*from)[0]) - offset;
+    if (count == 1) {
+      if (height >= 0.0) to.add((*from)[0]);
     } else {
+      // A segment is an open chain, a polygon a closed one.
+      const int edges = count == 2 ? 1 : count;
       for (int i = 0; i < edges; ++i) {
-        const Vector3d& p = clipped[i];
-        const Vector3d& q = clipped[(i + 1) % clipped.count];
-        const double hp = inward.dot(p) - offset;
-        const double hq = inward.dot(q) - offset;
-        if (hp >= 0.0) buffer_.add(p);
-        if ((hp > 0.0 && hq < 0.0) || (hp < 0.0 && hq > 0.0)) buffer_.add(p + (q - p) * (hp / (hp - hq)));
-        if (clipped.count == 2 && hq >= 0.0) buffer_.add(q);
+        const Vector3d& p = (*from)[i];
+        const Vector3d& q = (*from)[(i + 1) % count];
+        const double next = inward.dot(q) - offset;
+        if (height >= 0.0) to.add(p);
+        if ((height > 0.0 && next < 0.0) || (height < 0.0 && next > 0.0)) {
+          to.add(p + (q - p) * (height / (height - next)));
+        }
+        height = next;
       }
+      if (count == 2 && height >= 0.0) to.add((*from)[1]);
     }
-    std::swap(clipped, buffer_);
+    from = &to;
   }
+  return *from;
 }
 
 void ContactFinder::clip_features(const ConvexCore& a, const Frame& X_WA, const ConvexCore& b, const Frame& X_WB,
@@ -157,15 +163,15 @@ void ContactFinder::clip_features(const ConvexCore& a, const Frame& X_WA, const 
   const Feature& reference = reference_is_a ? feature_a_ : feature_b_;
   const double steep = reference.normal.dot(normal);
   if (std::abs(steep) < kSteepest) return;
-  clipped_ = reference_is_a ? feature_b_ : feature_a_;
-  clip_to_polygon(steep > 0.0 ? normal : Vector3d(-normal), reference, clipped_);
-  for (int i = 0; i < clipped_.count; ++i) {
-    const double t = reference.normal.dot(reference[0] - clipped_[i]) / steep;
-    const Vector3d opposite = clipped_[i] + t * normal;
+  const Feature& clipped =
+      clip_to_polygon(steep > 0.0 ? normal : Vector3d(-normal), reference, reference_is_a ? feature_b_ : feature_a_);
+  for (int i = 0; i < clipped.count; ++i) {
+    const double t = reference.normal.dot(reference[0] - clipped[i]) / steep;
+    const Vector3d opposite = clipped[i] + t * normal;
     if (reference_is_a) {
-      add(opposite, clipped_[i]);
+      add(opposite, clipped[i]);
     } else {
-      add(clipped_[i], opposite);
+      add(clipped[i], opposite);
     }
   }
 }

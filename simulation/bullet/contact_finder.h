@@ -7,6 +7,7 @@
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -75,12 +76,14 @@ class ContactFinder {
   /// Clips the facing features along `normal` and appends the points within range.
   void clip_features(const ConvexCore& a, const Frame& X_WA, const ConvexCore& b, const Frame& X_WB,
                      const Vector3d& normal, double range, std::vector<ContactPoint>& contacts);
-  void clip_to_polygon(const Vector3d& axis, const Feature& polygon, Feature& clipped);
+  /// Clips `feature` to a polygon's sides along `axis`; the result is one of the two buffers.
+  const Feature& clip_to_polygon(const Vector3d& axis, const Feature& polygon, const Feature& feature);
   /// Appends at most `limit` of found_, the deepest and then those that spread widest.
   void append_spread(std::size_t limit, std::vector<ContactPoint>& contacts);
 
   std::unique_ptr<ConvexCore> triangle_;
-  Feature feature_a_, feature_b_, clipped_, buffer_;
+  Feature feature_a_, feature_b_;
+  std::array<Feature, 2> buffers_;
   std::vector<ContactPoint> found_, surface_points_;
   std::vector<int> triangles_;
   std::vector<double> spread_;

@@ -16,6 +16,9 @@ btScalar relative_velocity(const btVector3& direction, const btVector3& torque_a
          torque_b.dot(b.m_angularVelocity + b.m_deltaAngularVelocity);
 }
 
+// std::hypot guards against overflow, which a step cannot meet, at ten times the cost.
+btScalar length_of(btScalar x, btScalar y) { return std::sqrt(x * x + y * y); }
+
 /// When gap + speed t + acceleration t^2 / 2 becomes zero, within [0, dt]; speed < 0 and it does close within dt.
 btScalar time_to_close(btScalar gap, btScalar speed, btScalar acceleration, btScalar dt) {
   const btScalar discriminant = speed * speed - 2.0 * acceleration * gap;
@@ -88,7 +91,7 @@ ContactSolver::Contact ContactSolver::make_contact(const SolverContact& given, b
   const btScalar k11 = c.tangent_1.response;
   const btScalar k22 = c.tangent_2.response;
   const btScalar k12 = c.tangent_1.turn_a.dot(c.tangent_2.torque_a) + c.tangent_1.turn_b.dot(c.tangent_2.torque_b);
-  c.slip_step = 1.0 / (0.5 * (k11 + k22) + std::hypot(0.5 * (k11 - k22), k12));
+  c.slip_step = 1.0 / (0.5 * (k11 + k22) + length_of(0.5 * (k11 - k22), k12));
   c.rolling_impulse.setZero();
   c.rolling_arm = given.rolling_arm;
   if (c.rolling_arm > 0.0) {
@@ -132,7 +135,7 @@ void ContactSolver::convertContacts(btPersistentManifold**, int, const btContact
     btScalar slip_1 = slip.dot(c.tangent_1.direction);
     btScalar slip_2 = slip.dot(c.tangent_2.direction);
     const btScalar limit = c.mu * c.normal.impulse;
-    const btScalar size = std::hypot(slip_1, slip_2);
+    const btScalar size = length_of(slip_1, slip_2);
     if (size > limit) {
       slip_1 *= limit / size;
       slip_2 *= limit / size;
@@ -169,7 +172,7 @@ btScalar ContactSolver::solve_slip(Contact& c) {
   const btScalar u2 = relative_velocity(c.tangent_2.direction, c.tangent_2.torque_a, c.tangent_2.torque_b, a, b);
   btScalar slip_1 = c.tangent_1.impulse - c.slip_step * u1;
   btScalar slip_2 = c.tangent_2.impulse - c.slip_step * u2;
-  const btScalar size = std::hypot(slip_1, slip_2);
+  const btScalar size = length_of(slip_1, slip_2);
   if (size > limit) {
     slip_1 *= limit / size;
     slip_2 *= limit / size;

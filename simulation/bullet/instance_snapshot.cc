@@ -42,6 +42,13 @@ void InstanceWorld::save(std::vector<std::uint8_t>& bytes) const {
     out.value(warm.impulse);
     out.vector(warm.friction_impulse);
   }
+  out.value(static_cast<std::uint32_t>(touches_.size()));
+  for (const Touch& touch : touches_) {
+    out.value(touch.first);
+    out.value(touch.second);
+    out.value(touch.impulse);
+    out.value(touch.normal_z);
+  }
 }
 
 bool InstanceWorld::restore(const std::vector<std::uint8_t>& bytes) {
@@ -75,32 +82,38 @@ bool InstanceWorld::restore(const std::vector<std::uint8_t>& bytes) {
     warm.impulse = in.value<double>();
     warm.friction_impulse = in.vector();
   }
-  contacts_.clear();
-  contact_keys_.clear();
-  touches_.clear();
+  const auto touch_count = in.value<std::uint32_t>();
+  if (!in.ok() || touch_count > bytes.size()) return false;
+  touches_.resize(touch_count);
+  for (Touch& touch : touches_) {
+    touch.first = in.value<int>();
+    touch.second = in.value<int>();
+    touch.impulse = in.value<double>();
+    touch.normal_z = in.value<double>();
+  }
   return in.ok() && in.at_end();
 }
 
-void InstanceWorld::footprint(int object, std::vector<Vector3d>& points, bool& others) const {
-  points.clear();
-  others = false;
+InstanceWorld::Footing InstanceWorld::footing(int object, const Vector3d& down) {
+  place_kinematic();
+  place_dynamic();
+  find_contacts();
+  Footing footing;
+  footprint_.clear();
   for (const SolverContact& c : contacts_) {
-    if (c.body_a != object && c.body_b != object) continue;
-    if (c.impulse <= 0.0 && c.gap > scene_->options.touching_distance) continue;
+    if ((c.body_a != object && c.body_b != object) || c.gap > scene_->options.touching_distance) continue;
     const int other = c.body_a == object ? c.body_b : c.body_a;
-    const bool fixed = other >= scene_->object_count && !moving_[static_cast<std::size_t>(other)].dynamic;
-    if (!fixed) {
-      others = true;
-      continue;
-    }
-    points.push_back(c.position);
+    footing.others = footing.others || other < scene_->object_count;
+    footing.height = std::max(footing.height, down.dot(c.position - center_of_mass(object)));
+    footprint_.push_back(c.position);
   }
+  footing.points = footprint_;
+  return footing;
 }
 
 void InstanceWorld::nudge(int index, const Vector3d& axis_W, double angle) {
   Object& object = objects_[static_cast<std::size_t>(index)];
   object.R_WO = (geometry::exp_rotation(angle * axis_W) * object.R_WO).normalized();
-  // Out of what it stands on: the solver pushes the rest of any overlap apart without adding energy.
   object.v_WCm.setZero();
   object.w_WO.setZero();
 }

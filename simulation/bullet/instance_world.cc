@@ -17,7 +17,9 @@ constexpr std::size_t kTypicalContacts = 64;
 
 std::unique_ptr<btRigidBody> make_rigid_body() {
   btRigidBody::btRigidBodyConstructionInfo info(0.0, nullptr, nullptr);
-  return std::make_unique<btRigidBody>(info);
+  auto body = std::make_unique<btRigidBody>(info);
+  body->setFlags(0);  // no gyroscopic term of Bullet's: place_dynamic() has a better one
+  return body;
 }
 
 Matrix3d world_inertia(const Quaterniond& R_WO, const CompiledBody& body, double mass) {

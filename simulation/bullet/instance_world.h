@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "action_player.h"
@@ -55,11 +56,16 @@ class InstanceWorld {
   /// Position of the centre of mass, W.
   Vector3d center_of_mass(int object) const { return objects_[static_cast<std::size_t>(object)].p_WCm; }
   Quaterniond rotation(int object) const { return objects_[static_cast<std::size_t>(object)].R_WO; }
-  /// Turns an object at rest about an axis through its centre of mass and lifts it by what keeps it out of its supports.
+  /// Turns an object about an axis through its centre of mass and stops it. Overlap that comes of it is pushed out by the
+  /// steps that follow, without energy.
   void nudge(int object, const Vector3d& axis_W, double angle);
-  /// Contact points of the last step that press on the object from a fixed body: positions in W, and whether any other
-  /// body touches it.
-  void footprint(int object, std::vector<Vector3d>& points, bool& others) const;
+  /// What an object stands on as it is now; a function of the state alone.
+  struct Footing {
+    std::span<const Vector3d> points;  ///< Where it touches others, W; valid until the next call or step.
+    bool others = false;               ///< Some of them is an object, which may move.
+    double height = 0.0;               ///< Of its centre of mass above the lowest point.
+  };
+  Footing footing(int object, const Vector3d& down);
 
   void save(std::vector<std::uint8_t>& bytes) const;
   bool restore(const std::vector<std::uint8_t>& bytes);
@@ -122,6 +128,7 @@ class InstanceWorld {
   double start_time_ = 0.0;
   std::int64_t steps_ = 0;
   std::vector<Warm> warm_;
+  std::vector<Touch> touches_;
 
   // Scratch of a step.
   ContactFinder finder_;
@@ -136,7 +143,7 @@ class InstanceWorld {
   std::vector<btCollisionObject*> rigid_pointers_;
   std::vector<BodyResult> results_;
   std::vector<double> first_hit_;  // per object: when in the step it first bounced, or the step's length
-  std::vector<Touch> touches_;
+  std::vector<Vector3d> footprint_;
   std::vector<Pose> poses_;
   std::vector<ActionPlayer::Released> released_;
   std::vector<CompiledBody> pushers_;

@@ -8,11 +8,18 @@
 namespace prescene::simulation {
 namespace {
 
-// rad. A body that a quarter of a degree topples is not at rest: tables shake more.
-constexpr double kNudge = 0.0044;
-// A balanced body of 10 cm turns 10 times as far in 0.25 s; a stable one rocks back within its nudge.
-constexpr double kNudgeTime = 0.25;
+// rad. A body that half a degree topples is not at rest: tables shake more.
+constexpr double kNudge = 0.0087;
+// A toppling body has turned this many nudges when the test ends, and its centre of mass is lower by at least this share
+// of what turning about a tip below it takes away. A body that rolls or rocks back is not lower.
 constexpr double kRunAway = 3.0;
+constexpr double kLeastDrop = 0.25;
+// Time constants of an upright rod on its tip: it turns 6 times as far, a fat body still more than kRunAway times.
+constexpr double kTimeConstants = 2.5;
+constexpr double kShortest = 0.1;  // s
+constexpr double kLongest = 1.0;
+// m: whatever sinks by this much did not rest.
+constexpr double kSunk = 2e-3;
 constexpr int kNudgeAxes = 4;
 // A footprint is a polygon when it is this wide (m) about the centre of mass at least.
 constexpr double kLeastMargin = 5e-4;
@@ -67,25 +74,19 @@ bool RestDetector::at_rest(InstanceWorld& world) {
   return stable_;
 }
 
-bool RestDetector::stands_firmly(const InstanceWorld& world, int object) {
-  bool others = false;
-  world.footprint(object, footprint_, others);
-  if (others) return false;
+bool RestDetector::stands_firmly(InstanceWorld& world, int object) {
   const Vector3d& gravity = world.scene().scene.gravity_W;
   if (gravity.isZero(0.0)) return true;
   const Vector3d down = gravity.normalized();
+  const InstanceWorld::Footing footing = world.footing(object, down);
+  if (footing.others) return false;
   const Vector3d u = down.unitOrthogonal();
   const Vector3d v = down.cross(u);
   const Vector3d center = world.center_of_mass(object);
-  double height = 0.0;
   std::vector<Eigen::Vector2d> points;
-  points.reserve(footprint_.size());
-  for (const Vector3d& p : footprint_) {
-    const Vector3d arm = p - center;
-    height = std::max(height, down.dot(arm));
-    points.emplace_back(u.dot(arm), v.dot(arm));
-  }
-  return margin_inside(points) > std::max(kLeastMargin, height * std::tan(kNudge));
+  points.reserve(footing.points.size());
+  for (const Vector3d& p : footing.points) points.emplace_back(u.dot(p - center), v.dot(p - center));
+  return margin_inside(points) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
 }
 
 bool RestDetector::returns_after_nudges(InstanceWorld& world, int object) {
@@ -94,24 +95,36 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object) {
   const Vector3d down = gravity.normalized();
   const Vector3d u = down.unitOrthogonal();
   const Vector3d v = down.cross(u);
+  before_.clear();
+  double tallest = 0.0;
+  for (int i = 0; i < world.object_count(); ++i) {
+    const Vector3d center = world.center_of_mass(i);
+    before_.push_back({world.rotation(i), center, world.footing(i, down).height});
+    if (i == object) tallest = before_.back().height;
+  }
+  const double time_constant = std::sqrt(4.0 / 3.0 * tallest / gravity.norm());
+  const double time = std::clamp(kTimeConstants * time_constant, kShortest, kLongest);
+  const int steps = static_cast<int>(std::ceil(time / world.dt()));
+
+  const auto runs_away = [&](int i) {
+    const Before& before = before_[static_cast<std::size_t>(i)];
+    const double drop = down.dot(world.center_of_mass(i) - before.center_of_mass);
+    if (drop > kSunk) return true;
+    const Vector3d turn = geometry::log_rotation(world.rotation(i) * before.rotation.conjugate());
+    // Turning about the vertical is no toppling.
+    const double toppled = (turn - down * down.dot(turn)).norm();
+    return toppled > kRunAway * kNudge && drop > kLeastDrop * 0.5 * before.height * toppled * toppled;
+  };
   world.save(saved_);
-  const int steps = static_cast<int>(std::ceil(kNudgeTime / world.dt()));
-  std::vector<Quaterniond> before;
-  for (int i = 0; i < world.object_count(); ++i) before.push_back(world.rotation(i));
   bool returns = true;
   for (int k = 0; k < kNudgeAxes && returns; ++k) {
-    // Axes between the body's likely edges, both senses of turning: 22.5, 112.5, 202.5 and 292.5 degrees.
+    // Axes between a body's likely edges, both senses of turning: 22.5, 112.5, 202.5 and 292.5 degrees.
     const double angle = (0.125 + 0.25 * k) * 2.0 * std::numbers::pi;
     world.nudge(object, std::cos(angle) * u + std::sin(angle) * v, kNudge);
     for (int s = 0; s < steps && returns; ++s) {
       world.step();
       ++nudge_steps_;
-      for (int i = 0; i < world.object_count(); ++i) {
-        if (!world.free(i)) continue;
-        const Vector3d turn = geometry::log_rotation(world.rotation(i) * before[static_cast<std::size_t>(i)].conjugate());
-        // Turning about the vertical is no toppling.
-        if ((turn - down * down.dot(turn)).norm() > kRunAway * kNudge) returns = false;
-      }
+      for (int i = 0; i < world.object_count() && returns; ++i) returns = !world.free(i) || !runs_away(i);
     }
     world.restore(saved_);
   }

@@ -4,7 +4,7 @@
 // Balance is tested twice. An object that only fixed bodies touch is stable when the vertical through its centre of mass
 // passes inside the polygon of its contacts, a nudge's reach or more from every side. All others (balanced on an edge or
 // tip, round, leaning, stacked) are nudged: in a copy of the instance each is turned by a small angle about horizontal axes
-// in turn, and a short simulation shows whether it stays near or runs away.
+// in turn, and a short simulation shows whether it comes back (or merely rolls), or turns away and sinks.
 #pragma once
 
 #include <vector>
@@ -24,14 +24,20 @@ class RestDetector {
   std::int64_t nudge_steps() const { return nudge_steps_; }
 
  private:
-  bool stands_firmly(const InstanceWorld& world, int object);
+  bool stands_firmly(InstanceWorld& world, int object);
   bool returns_after_nudges(InstanceWorld& world, int object);
+
+  struct Before {
+    Quaterniond rotation;
+    Vector3d center_of_mass;
+    double height;  // of the centre of mass above the lowest contact
+  };
 
   bool tested_ = false;
   bool stable_ = false;
   std::int64_t nudge_steps_ = 0;
-  std::vector<Vector3d> footprint_;
   std::vector<std::uint8_t> saved_;
+  std::vector<Before> before_;
 };
 
 }  // namespace prescene::simulation
