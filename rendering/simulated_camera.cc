@@ -55,8 +55,26 @@ struct EdgeMap {
   geometry::Image<float> other_depth;  ///< 0 = nothing there.
 };
 
+/// How far apart in depth two neighbouring pixels are, metres, less what the slope of either surface explains.
+double jump(const RenderedView& view, const geometry::PinholeCamera& camera, int x, int y, int other_x, int other_y) {
+  const double depth = view.depth(x, y);
+  const double other = view.depth(other_x, other_y);
+  if (depth == 0.0 || other == 0.0) return std::abs(depth - other);
+  const geometry::Vector3d ray = camera.unproject(x, y, 1.0);
+  const geometry::Vector3d other_ray = camera.unproject(other_x, other_y, 1.0);
+  const geometry::Vector3d normal = view.normals(x, y).cast<double>();
+  const geometry::Vector3d other_normal = view.normals(other_x, other_y).cast<double>();
+  // Where each pixel's plane meets the other's ray; edge-on planes say nothing (not finite, or far off).
+  const double continued = depth * normal.dot(ray) / normal.dot(other_ray);
+  const double other_continued = other * other_normal.dot(other_ray) / other_normal.dot(ray);
+  double smallest = std::abs(depth - other);
+  for (const double gap : {std::abs(other - continued), std::abs(depth - other_continued)})
+    if (gap < smallest) smallest = gap;
+  return smallest;
+}
+
 /// Distances by two sweeps over the eight neighbours (chamfer), exact along rows, columns and diagonals.
-EdgeMap find_edges(const RenderedView& view, double depth_edge) {
+EdgeMap find_edges(const RenderedView& view, const geometry::PinholeCamera& camera, double depth_edge) {
   constexpr float kFar = 1e6f;
   constexpr float kDiagonal = 1.41421356f;
   const int width = view.depth.width();
@@ -68,9 +86,8 @@ EdgeMap find_edges(const RenderedView& view, double depth_edge) {
       for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
         if (!inside(x + dx, y + dy)) continue;
         const float other = view.depth(x + dx, y + dy);
-        const bool jump = static_cast<double>(std::abs(other - view.depth(x, y))) > depth_edge;
-        // A change of label without a jump of depth is contact, not an edge.
-        if (!jump) continue;
+        // A change of label without a jump of depth is contact, not an edge; nor is the step down a steep surface.
+        if (!(jump(view, camera, x, y, x + dx, y + dy) > depth_edge)) continue;
         edges.distance_px(x, y) = 1.0f;
         edges.other_depth(x, y) = other;
       }
@@ -168,7 +185,7 @@ void SimulatedCamera::sample(const RenderScene& scene, const RenderedView& view,
   const double fixed_scale = std::sqrt(options_.fixed_pattern_share);
   const double correlated_scale = std::sqrt(options_.correlated_share);
   const double white_scale = std::sqrt(std::max(0.0, 1.0 - options_.fixed_pattern_share - options_.correlated_share));
-  const EdgeMap edges = find_edges(view, options_.depth_edge);
+  const EdgeMap edges = find_edges(view, camera, options_.depth_edge);
 
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
