@@ -18,10 +18,19 @@ bool acceptable(const rendering::PoseEvidence& evidence, const DetectionOptions&
   return evidence.log_ratio > options.min_log_ratio && evidence.hit_share() >= options.min_hit_share;
 }
 
+/// Whether an object at this pose can stand on the support: over it, and not sunk into it.
+bool possible(const SearchTarget& target, const Pose& X_CO, const rendering::SupportRegion& support,
+              const DetectionOptions& options) {
+  if (!stands_on(support, X_CO * target.centre())) return false;
+  return std::all_of(target.mesh->vertices.begin(), target.mesh->vertices.end(), [&](const auto& vertex) {
+    return support.plane_C.signed_distance(X_CO * vertex.template cast<double>()) > -options.max_sinking;
+  });
+}
+
 /// The best poses of each wanted model in each cluster, ordered by cluster, model, rank.
 std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<const Cluster> clusters,
-                              std::span<const WantedModel> wanted, std::span<const int> left,
-                              const DetectionOptions& options, const FilterTools& tools,
+                              const rendering::SupportRegion& support, std::span<const WantedModel> wanted,
+                              std::span<const int> left, const DetectionOptions& options, const FilterTools& tools,
                               const core::RandomStream& stream, std::uint64_t round) {
   struct Task {
     const Cluster* cluster;
@@ -40,6 +49,7 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<cons
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
     const std::vector<Pose> starts = cluster_starts(*task.cluster, target, options.starts, mine);
     task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
+    std::erase_if(task.found, [&](const PoseCandidate& c) { return !possible(target, c.X_CO, support, options); });
     task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(std::max(1, options.keep))));
   });
   std::vector<Proposal> proposals;
@@ -164,8 +174,8 @@ std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry
     std::vector<Cluster> clusters = find_clusters(sampled, support, mask, options.segmentation);
     if (static_cast<int>(clusters.size()) > options.max_clusters)
       clusters.resize(static_cast<std::size_t>(options.max_clusters));
-    std::vector<Proposal> proposals =
-        propose(explained_terms, clusters, wanted, left, options, tools, stream, static_cast<std::uint64_t>(round));
+    std::vector<Proposal> proposals = propose(explained_terms, clusters, support, wanted, left, options, tools, stream,
+                                              static_cast<std::uint64_t>(round));
     if (proposals.empty()) continue;
     accept_greedily(std::move(proposals), wanted, options, tools, explained_terms, explained_depth, left, found);
     settle(terms, wanted, options, tools, stream, found);

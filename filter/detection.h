@@ -23,7 +23,9 @@ struct DetectionOptions {
   int max_clusters = 12;        ///< Largest ones only.
   double min_hit_share = 0.6;   ///< Of the visible pixels.
   double min_log_ratio = 40.0;  ///< nats, untempered, at the likelihood's resolution.
-  double explained = 0.015;     ///< m; a measurement so near to a known surface (or behind it) is explained.
+  double max_sinking =
+      0.03;                  ///< m below the support's plane that a pose may reach: planes and meshes are off by 15 mm.
+  double explained = 0.015;  ///< m; a measurement so near to a known surface (or behind it) is explained.
   RefineOptions settle = {
       .steps = 8, .first_gate = 0.02, .last_gate = 0.008};  ///< Joint refinement of what is accepted.
 };
