@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/geometry/resting_poses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+namespace prescene::geometry {
+namespace {
+
+using Edge = std::pair<std::uint32_t, std::uint32_t>;
+
+/// A face of the hull: coplanar triangles together.
+struct Face {
+  Vector3d normal = Vector3d::Zero();  // outward, area-weighted while it is summed up
+  std::vector<std::size_t> triangles;
+  double solid_angle = 0.0;
+  double tip_angle = 0.0;  // negative: it does not carry the centre of mass
+  double height = 0.0;
+  int rolls_to = -1;       // the face beyond the edge over which it falls
+};
+
+/// Solid angle of a triangle from the origin [Van Oosterom & Strackee 1983].
+double solid_angle(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const double numerator = a.dot(b.cross(c));
+  const double denominator = a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() + b.dot(c) * a.norm() + c.dot(a) * b.norm();
+  return 2.0 * std::atan2(numerator, denominator);
+}
+
+Vector3d area_normal(const TriangleMesh& hull, std::size_t triangle) {
+  const auto& [a, b, c] = hull.triangles[triangle];
+  return (hull.vertices[b] - hull.vertices[a]).cross(hull.vertices[c] - hull.vertices[a]);
+}
+
+/// The face number of each triangle.
+std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, std::size_t>& triangle_of_edge, double flatness) {
+  std::vector<int> face_of(hull.triangles.size(), -1);
+  int faces = 0;
+  for (std::size_t seed = 0; seed < hull.triangles.size(); ++seed) {
+    if (face_of[seed] >= 0) continue;
+    // Compared with the seed, not the neighbour: a finely cut sphere must not become one face.
+    const Vector3d normal = area_normal(hull, seed).normalized();
+    std::vector<std::size_t> open{seed};
+    face_of[seed] = faces;
+    while (!open.empty()) {
+      const auto corners = hull.triangles[open.back()];
+      open.pop_back();
+      for (int k = 0; k < 3; ++k) {
+        const auto beyond = triangle_of_edge.find({corners[static_cast<std::size_t>((k + 1) % 3)], corners[static_cast<std::size_t>(k)]});
+        if (beyond == triangle_of_edge.end() || face_of[beyond->second] >= 0) continue;
+        if (area_normal(hull, beyond->second).normalized().dot(normal) < std::cos(flatness)) continue;
+        face_of[beyond->second] = faces;
+        open.push_back(beyond->second);
+      }
+    }
+    ++faces;
+  }
+  return face_of;
+}
+
+}  // namespace
+
+core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm, double flatness) {
+  PRESCENE_TRY(TriangleMesh hull, convex_hull(mesh.vertices));
+  for (Vector3d& vertex : hull.vertices) vertex -= p_BoBcm;  // from here on about the centre of mass
+  std::map<Edge, std::size_t> triangle_of_edge;
+  for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) triangle_of_edge[{hull.triangles[t][k], hull.triangles[t][(k + 1) % 3]}] = t;
+  }
+  const std::vector<int> face_of = merge_coplanar(hull, triangle_of_edge, flatness);
+
+  std::vector<Face> faces(static_cast<std::size_t>(*std::max_element(face_of.begin(), face_of.end())) + 1);
+  for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
+    Face& face = faces[static_cast<std::size_t>(face_of[t])];
+    const auto& [a, b, c] = hull.triangles[t];
+    face.triangles.push_back(t);
+    face.normal += area_normal(hull, t);
+    face.solid_angle += solid_angle(hull.vertices[a], hull.vertices[b], hull.vertices[c]);
+  }
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    Face& face = faces[f];
+    face.normal.normalize();
+    face.height = std::numeric_limits<double>::lowest();
+    for (const std::size_t t : face.triangles) {
+      for (const std::uint32_t v : hull.triangles[t]) face.height = std::max(face.height, face.normal.dot(hull.vertices[v]));
+    }
+    if (face.height <= 0.0) {
+      return core::invalid_input("the centre of mass is not inside of the convex hull: correct one of them");
+    }
+    double least = std::numeric_limits<double>::max();
+    for (const std::size_t t : face.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t from = hull.triangles[t][k];
+        const std::uint32_t to = hull.triangles[t][(k + 1) % 3];
+        const auto beyond = triangle_of_edge.find({to, from});
+        if (beyond == triangle_of_edge.end() || face_of[beyond->second] == static_cast<int>(f)) continue;
+        // How far inside of this edge the centre of mass stands.
+        const Vector3d outward = (hull.vertices[to] - hull.vertices[from]).cross(face.normal).normalized();
+        const double inside = outward.dot(hull.vertices[from]);
+        if (inside < least) {
+          least = inside;
+          face.rolls_to = face_of[beyond->second];
+        }
+      }
+    }
+    face.tip_angle = std::atan2(least, face.height);
+  }
+
+  // Each face's share goes to the face on which the body comes to lie; rolling lowers the centre of mass, so it ends.
+  std::vector<double> share(faces.size(), 0.0);
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    std::size_t at = f;
+    for (std::size_t rolls = 0; faces[at].tip_angle < 0.0 && rolls < faces.size(); ++rolls) {
+      at = static_cast<std::size_t>(faces[at].rolls_to);
+    }
+    share[at] += faces[f].solid_angle / (4.0 * std::numbers::pi);
+  }
+  std::vector<RestingPose> poses;
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (faces[f].tip_angle < 0.0) continue;
+    poses.push_back({Quaterniond::FromTwoVectors(faces[f].normal, -Vector3d::UnitZ()), faces[f].height, faces[f].tip_angle, share[f]});
+  }
+  std::stable_sort(poses.begin(), poses.end(), [](const RestingPose& a, const RestingPose& b) { return a.probability > b.probability; });
+  return poses;
+}
+
+}  // namespace prescene::geometry
