@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON of states, trajectories and beliefs; beliefs both ways.
+#include "json_values.h"
+#include "prescene/belief/body_names.h"
+#include "prescene/belief/json.h"
+#include "prescene/core/check.h"
+
+namespace prescene::belief {
+namespace {
+
+constexpr int kMostParticles = 1'000'000;
+
+Json physical_json(const PhysicalParameters& physical) {
+  return {{"mass", physical.mass},
+          {"center_of_mass", vector_json(physical.center_of_mass)},
+          {"friction", physical.friction},
+          {"impact_friction", physical.impact_friction},
+          {"restitution", physical.restitution}};
+}
+
+PhysicalParameters physical_from(const JsonAt& at) {
+  PhysicalParameters physical;
+  JsonObject fields(at);
+  const auto read = [&](const char* key, double& to) {
+    if (const auto number = fields.require(key)) to = number->number();
+  };
+  read("mass", physical.mass);
+  if (const auto center = fields.require("center_of_mass")) physical.center_of_mass = vector_from(*center);
+  read("friction", physical.friction);
+  read("impact_friction", physical.impact_friction);
+  read("restitution", physical.restitution);
+  return physical;
+}
+
+Json particle_json(const Particle& particle) {
+  Json json;
+  json["log_weight"] = std::isfinite(particle.log_weight) ? Json(particle.log_weight) : Json(nullptr);
+  json["X_WO"] = to_json(particle.X_WO);
+  json["V_WO"] = to_json(particle.V_WO);
+  json["covariance"] = matrix_json(particle.covariance);
+  json["mode"] = to_string(particle.mode);
+  json["physical"] = physical_json(particle.physical);
+  return json;
+}
+
+Particle particle_from(const JsonAt& at) {
+  Particle particle;
+  JsonObject fields(at);
+  if (const auto weight = fields.require("log_weight"))
+    particle.log_weight = weight->number_or_null(-std::numeric_limits<double>::infinity());
+  if (const auto pose = fields.require("X_WO")) particle.X_WO = pose_from(*pose);
+  if (const auto twist = fields.require("V_WO")) particle.V_WO = twist_from(*twist);
+  if (const auto covariance = fields.require("covariance")) particle.covariance = matrix_from(*covariance, 12);
+  if (const auto mode = fields.require("mode")) particle.mode = mode->word(motion_mode_words());
+  if (const auto physical = fields.require("physical")) particle.physical = physical_from(*physical);
+  return particle;
+}
+
+ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
+  ObjectBelief object;
+  JsonObject fields(at);
+  if (const auto name = fields.require("name")) object.name = name->text();
+  if (const auto model = fields.require("model"))
+    object.model = static_cast<int>(model->integer(0, std::max<std::int64_t>(0, std::ssize(scene.models) - 1)));
+  if (const auto particles = fields.require("particles")) {
+    const std::vector<JsonAt> items = particles->items();
+    if (items.empty() || items.size() > kMostParticles) particles->fail("1 to 1000000 particles are needed");
+    for (const JsonAt& item : items) object.particles.push_back(particle_from(item));
+  }
+  const auto read = [&](const char* key, double& to) {
+    if (const auto number = fields.require(key)) to = number->number();
+  };
+  read("existence", object.existence);
+  if (const auto state = fields.require("state")) object.state = state->word(track_state_words());
+  read("evidence_per_pixel", object.evidence_per_pixel);
+  read("visible_share", object.visible_share);
+  if (const auto frames = fields.require("frames_unseen"))
+    object.frames_unseen = static_cast<int>(frames->integer(0, std::numeric_limits<int>::max()));
+  if (const auto seen = fields.require("last_seen_ns")) object.last_seen_ns = seen->integer(INT64_MIN, INT64_MAX);
+  if (const auto island = fields.require("island"))
+    object.island = static_cast<int>(island->integer(0, std::numeric_limits<int>::max()));
+  return object;
+}
+
+std::string end_word(TrajectoryEnd end) {
+  switch (end) {
+    case TrajectoryEnd::kAtRest:
+      return "at_rest";
+    case TrajectoryEnd::kDuration:
+      return "duration";
+    case TrajectoryEnd::kLeftTheWorld:
+      return "left_the_world";
+    case TrajectoryEnd::kDiverged:
+      return "diverged";
+    case TrajectoryEnd::kCancelled:
+      return "cancelled";
+  }
+  PRESCENE_CHECK_MSG(false, "a TrajectoryEnd outside of its enumeration");
+}
+
+}  // namespace
+
+Json to_json(const WorldState& state) {
+  Json objects = Json::array();
+  for (const ObjectState& object : state.objects)
+    objects.push_back({{"X_WO", to_json(object.X_WO)},
+                       {"V_WO", to_json(object.V_WO)},
+                       {"mode", to_string(object.mode)},
+                       {"physical", physical_json(object.physical)}});
+  return {{"time", state.time}, {"objects", std::move(objects)}};
+}
+
+Json to_json(const Timeline& timeline) {
+  Json json = Json::array();
+  for (const Interval& interval : timeline) {
+    Json item{{"relation", to_string(interval.relation)}, {"subject", interval.subject}};
+    if (!interval.other.empty()) item["other"] = interval.other;
+    item["begin"] = interval.begin;
+    item["end"] = interval.end;
+    json.push_back(std::move(item));
+  }
+  return json;
+}
+
+Json to_json(const Trajectory& trajectory) {
+  Json states = Json::array(), contacts = Json::array(), final_contacts = Json::array();
+  for (const WorldState& state : trajectory.states) states.push_back(to_json(state));
+  for (const ContactInterval& contact : trajectory.contacts)
+    contacts.push_back({{"first", contact.first},
+                        {"second", contact.second},
+                        {"begin", contact.begin},
+                        {"end", contact.end},
+                        {"largest_impulse", contact.largest_impulse},
+                        {"normal_z", contact.normal_z}});
+  for (const auto& [first, second] : trajectory.final_contacts) final_contacts.push_back({first, second});
+  return {{"states", std::move(states)},
+          {"contacts", std::move(contacts)},
+          {"final_contacts", std::move(final_contacts)},
+          {"end", end_word(trajectory.end)},
+          {"simulated_seconds", trajectory.simulated_seconds}};
+}
+
+Json to_json(const ObjectBelief& object) {
+  Json particles = Json::array();
+  for (const Particle& particle : object.particles) particles.push_back(particle_json(particle));
+  return {{"name", object.name},
+          {"model", object.model},
+          {"particles", std::move(particles)},
+          {"existence", object.existence},
+          {"state", to_string(object.state)},
+          {"evidence_per_pixel", object.evidence_per_pixel},
+          {"visible_share", object.visible_share},
+          {"frames_unseen", object.frames_unseen},
+          {"last_seen_ns", object.last_seen_ns},
+          {"island", object.island}};
+}
+
+Json to_json(const Belief& belief) {
+  Json objects = Json::array(), robot = Json::array();
+  for (const ObjectBelief& object : belief.objects) objects.push_back(to_json(object));
+  for (const Pose& pose : belief.robot) robot.push_back(to_json(pose));
+  return {{"step", belief.step},         {"seed", belief.seed},        {"stamp_ns", belief.stamp_ns},
+          {"objects", std::move(objects)}, {"robot", std::move(robot)}, {"X_WC", to_json(belief.X_WC)}};
+}
+
+core::Result<Belief> belief_from_json(const Json& value, std::shared_ptr<const Scene> scene) {
+  PRESCENE_CHECK(scene != nullptr);
+  JsonErrors errors;
+  Belief belief;
+  belief.scene = std::move(scene);
+  {
+    JsonObject fields({value, "", errors});
+    if (const auto step = fields.require("step")) belief.step = step->unsigned_integer();
+    if (const auto seed = fields.require("seed")) belief.seed = seed->unsigned_integer();
+    if (const auto stamp = fields.require("stamp_ns")) belief.stamp_ns = stamp->integer(INT64_MIN, INT64_MAX);
+    if (const auto objects = fields.require("objects")) {
+      for (const JsonAt& item : objects->items()) belief.objects.push_back(object_from(item, *belief.scene));
+      if (!belief.objects.empty() && belief.scene->models.empty())
+        objects->fail("its objects have models, the scene has none: give the scene of that belief");
+    }
+    if (const auto robot = fields.require("robot"))
+      for (const JsonAt& item : robot->items()) belief.robot.push_back(pose_from(item));
+    if (const auto camera = fields.require("X_WC")) belief.X_WC = pose_from(*camera);
+  }
+  if (!errors.ok()) return errors.status();
+  return belief;
+}
+
+}  // namespace prescene::belief

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON of queries, both ways, and of answers.
+#include <array>
+
+#include "json_values.h"
+#include "prescene/belief/json.h"
+#include "prescene/core/check.h"
+
+namespace prescene::belief {
+namespace {
+
+constexpr std::size_t kLongestQuery = std::size_t{1} << 20;
+
+Json effort_json(const Effort& effort) {
+  Json json{{"tolerance", effort.tolerance}, {"confidence", effort.confidence}, {"max_instances", effort.max_instances}};
+  if (effort.max_seconds) json["max_seconds"] = *effort.max_seconds;
+  if (effort.exact_instances) json["exact_instances"] = *effort.exact_instances;
+  return json;
+}
+
+// A number of an open range; what is outside would make no sense to work on.
+void read_between(JsonObject& fields, const std::string& key, double low, double high, double& to) {
+  const auto at = fields.find(key);
+  if (!at) return;
+  const double number = at->number();
+  if (!(number > low) || !(number < high)) {
+    at->fail("the number has to be above " + std::to_string(low) + " and below " + std::to_string(high));
+    return;
+  }
+  to = number;
+}
+
+Effort effort_from(const JsonAt& at) {
+  constexpr int kMostInstances = 10'000'000;
+  Effort effort;
+  JsonObject fields(at);
+  read_between(fields, "tolerance", 0.0, 1.0, effort.tolerance);
+  read_between(fields, "confidence", 0.0, 1.0, effort.confidence);
+  if (const auto count = fields.find("max_instances"))
+    effort.max_instances = static_cast<int>(count->integer(1, kMostInstances));
+  double seconds = 0.0;
+  read_between(fields, "max_seconds", 0.0, 1e6, seconds);
+  if (seconds > 0.0) effort.max_seconds = seconds;
+  if (const auto count = fields.find("exact_instances"))
+    effort.exact_instances = static_cast<int>(count->integer(1, kMostInstances));
+  return effort;
+}
+
+Json actions_json(const std::vector<Action>& actions) {
+  Json json = Json::array();
+  for (const Action& action : actions) json.push_back(to_json(action));
+  return json;
+}
+
+std::vector<Action> actions_from(JsonObject& fields) {
+  std::vector<Action> actions;
+  if (const auto at = fields.find("actions"))
+    for (const JsonAt& item : at->items()) actions.push_back(action_from(item));
+  return actions;
+}
+
+struct QueryJson {
+  Json operator()(const WhereQuery& where) const {
+    Json json = Json::object();
+    if (where.object) json["object"] = *where.object;
+    return json;
+  }
+  Json operator()(const PredictQuery& predict) const {
+    Json outcomes = Json::array(), groups = Json::array();
+    for (const Outcome& outcome : predict.outcomes) outcomes.push_back(to_json(outcome));
+    for (const ExclusiveOutcomes& group : predict.exclusive_outcomes) groups.push_back(exclusive_json(group));
+    Json json{{"actions", actions_json(predict.actions)},
+              {"outcomes", std::move(outcomes)},
+              {"exclusive_outcomes", std::move(groups)}};
+    if (predict.duration) json["duration"] = *predict.duration;
+    json["effort"] = effort_json(predict.effort);
+    return json;
+  }
+  Json operator()(const StabilityQuery& stability) const {
+    return {{"object", stability.object},
+            {"max_move", stability.max_move},
+            {"max_turn", stability.max_turn},
+            {"duration", stability.duration},
+            {"effort", effort_json(stability.effort)}};
+  }
+  Json operator()(const ViewQuery& view) const { return {{"actions", actions_json(view.actions)}, {"time", view.time}}; }
+};
+
+const std::vector<std::string> kTasks{"where", "predict", "stability", "view"};
+
+PredictQuery predict_from(JsonObject& fields) {
+  PredictQuery predict;
+  predict.actions = actions_from(fields);
+  if (const auto at = fields.find("outcomes"))
+    for (const JsonAt& item : at->items()) predict.outcomes.push_back(outcome_from(item));
+  if (const auto at = fields.find("exclusive_outcomes"))
+    for (const JsonAt& item : at->items()) predict.exclusive_outcomes.push_back(exclusive_from(item));
+  double duration = 0.0;
+  read_between(fields, "duration", 0.0, 1e5, duration);
+  if (duration > 0.0) predict.duration = duration;
+  if (const auto at = fields.find("effort")) predict.effort = effort_from(*at);
+  return predict;
+}
+
+StabilityQuery stability_from(JsonObject& fields) {
+  StabilityQuery stability;
+  if (const auto at = fields.require("object")) stability.object = at->text();
+  read_between(fields, "max_move", 0.0, 1e3, stability.max_move);
+  read_between(fields, "max_turn", 0.0, 3.2, stability.max_turn);
+  read_between(fields, "duration", 0.0, 1e5, stability.duration);
+  if (const auto at = fields.find("effort")) stability.effort = effort_from(*at);
+  return stability;
+}
+
+ViewQuery view_from(JsonObject& fields) {
+  ViewQuery view;
+  view.actions = actions_from(fields);
+  if (const auto at = fields.find("time")) {
+    view.time = at->number();
+    if (view.time < 0.0 || view.time > 1e5) at->fail("seconds between 0 and 1e5 are needed");
+  }
+  return view;
+}
+
+std::string base64(const std::uint8_t* bytes, std::size_t size) {
+  static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((size + 2) / 3 * 4);
+  for (std::size_t i = 0; i < size; i += 3) {
+    const std::size_t rest = std::min<std::size_t>(3, size - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < rest ? bytes[i + k] : 0u);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= rest ? kDigits[group >> (18 - 6 * k) & 63u] : '=';
+  }
+  return text;
+}
+
+// Rows from the top without padding, little-endian, in base64; `encoding` as in ROS.
+template <class Pixel>
+Json image_json(const geometry::Image<Pixel>& image, const char* encoding) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(image.data());
+  return {{"width", image.width()},
+          {"height", image.height()},
+          {"encoding", encoding},
+          {"base64", base64(bytes, image.size() * sizeof(Pixel))}};
+}
+
+Json outcome_probability_json(const OutcomeProbability& outcome) {
+  Json json{{"name", outcome.name}};
+  if (!outcome.group.empty()) json["group"] = outcome.group;
+  json["probability"] = outcome.probability;
+  json["interval"] = {outcome.low, outcome.high};
+  return json;
+}
+
+Json estimate_json(const ObjectEstimate& estimate) {
+  return {{"mean", to_json(estimate.mean)},
+          {"covariance", matrix_json(estimate.covariance)},
+          {"twist", to_json(estimate.twist)},
+          {"mode", to_json(estimate.mode)},
+          {"motion", to_string(estimate.motion)},
+          {"confidence", estimate.confidence},
+          {"effective_sample_size", estimate.effective_sample_size}};
+}
+
+Json final_poses_json(const FinalPoses& poses) {
+  Json components = Json::array();
+  for (const PoseComponent& component : poses.components)
+    components.push_back({{"weight", component.weight},
+                          {"outcome", component.outcome},
+                          {"mean", to_json(component.mean)},
+                          {"covariance", matrix_json(component.covariance)}});
+  const HeatMap& map = poses.heat_map;
+  return {{"object", poses.object},
+          {"mean_position", vector_json(poses.mean_position)},
+          {"position_covariance", matrix_json(poses.position_covariance)},
+          {"components", std::move(components)},
+          {"heat_map",
+           {{"cell", map.cell}, {"x0", map.x0}, {"y0", map.y0}, {"nx", map.nx}, {"ny", map.ny}, {"mass", map.mass}}}};
+}
+
+struct AnswerJson {
+  Json operator()(const std::monostate&) const { return nullptr; }
+  Json operator()(const WhereAnswer& where) const {
+    Json items = Json::array();
+    for (const WhereAnswer::Item& item : where.items)
+      items.push_back({{"object", item.object},
+                       {"model", item.model},
+                       {"estimate", estimate_json(item.estimate)},
+                       {"state", to_string(item.state)},
+                       {"existence", item.existence}});
+    return {{"items", std::move(items)}};
+  }
+  Json operator()(const PredictAnswer& predict) const {
+    Json outcomes = Json::array(), poses = Json::array(), runs = Json::array();
+    for (const OutcomeProbability& outcome : predict.outcomes) outcomes.push_back(outcome_probability_json(outcome));
+    for (const FinalPoses& final_poses : predict.final_poses) poses.push_back(final_poses_json(final_poses));
+    for (const TypicalRun& run : predict.typical_runs)
+      runs.push_back({{"outcome", run.outcome},
+                      {"share", run.share},
+                      {"timeline", to_json(run.timeline)},
+                      {"trajectory", to_json(run.trajectory)}});
+    return {{"outcomes", std::move(outcomes)},
+            {"final_poses", std::move(poses)},
+            {"typical_runs", std::move(runs)},
+            {"instances", predict.instances},
+            {"simulated_seconds", predict.simulated_seconds},
+            {"wall_seconds", predict.wall_seconds},
+            {"converged", predict.converged}};
+  }
+  Json operator()(const StabilityAnswer& stability) const {
+    return {{"object", stability.object},
+            {"stable", outcome_probability_json(stability.stable)},
+            {"likely_event", stability.likely_event},
+            {"instances", stability.instances},
+            {"simulated_seconds", stability.simulated_seconds},
+            {"wall_seconds", stability.wall_seconds}};
+  }
+  Json operator()(const ViewAnswer& view) const {
+    return {{"depth", image_json(view.depth, "32FC1")},
+            {"labels", image_json(view.labels, "16UC1")},
+            {"label_names", view.label_names},
+            {"presence", image_json(view.presence, "32FC1")}};
+  }
+};
+
+}  // namespace
+
+Json to_json(const Query& query) {
+  return {{"id", query.id}, {kTasks[query.what.index()], std::visit(QueryJson{}, query.what)}};
+}
+
+core::Result<Query> query_from_json(std::string_view text) {
+  PRESCENE_TRY(const Json document, parse_json(text, kLongestQuery));
+  JsonErrors errors;
+  Query query;
+  {
+    JsonObject object({document, "", errors});
+    if (const auto id = object.find("id")) query.id = id->text();
+    if (const auto what = object.one_of(kTasks)) {
+      JsonObject fields(what->second);
+      if (what->first == "where") {
+        WhereQuery where;
+        if (const auto name = fields.find("object")) where.object = name->text();
+        query.what = where;
+      }
+      if (what->first == "predict") query.what = predict_from(fields);
+      if (what->first == "stability") query.what = stability_from(fields);
+      if (what->first == "view") query.what = view_from(fields);
+    }
+  }
+  if (!errors.ok()) return errors.status();
+  return query;
+}
+
+Json to_json(const Answer& answer) {
+  Json json{{"id", answer.id}, {"step", answer.step}};
+  if (!answer.error.empty()) json["error"] = answer.error;
+  if (answer.what.index() > 0) json[kTasks[answer.what.index() - 1]] = std::visit(AnswerJson{}, answer.what);
+  return json;
+}
+
+}  // namespace prescene::belief

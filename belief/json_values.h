@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON of the small values that the larger ones are made of, both ways. Numbers are written so that they read back as the
+// same bits; what JSON can't say (infinite, not a number) is null.
+#pragma once
+
+#include "json_reader.h"
+#include "prescene/belief/belief.h"
+
+namespace prescene::belief {
+
+Json vector_json(const Vector3d& vector);
+Vector3d vector_from(const JsonAt& at);
+/// Rows of numbers.
+Json matrix_json(const Eigen::MatrixXd& matrix);
+Eigen::MatrixXd matrix_from(const JsonAt& at, Eigen::Index size);
+Json scalar_json(const ScalarDistribution& distribution);
+ScalarDistribution scalar_from(const JsonAt& at);
+Json vector_distribution_json(const Vector3Distribution& distribution);
+Vector3Distribution vector_distribution_from(const JsonAt& at);
+Pose pose_from(const JsonAt& at);
+Json pose_distribution_json(const PoseDistribution& distribution);
+PoseDistribution pose_distribution_from(const JsonAt& at);
+Twist twist_from(const JsonAt& at);
+Json twist_distribution_json(const TwistDistribution& distribution);
+TwistDistribution twist_distribution_from(const JsonAt& at);
+
+const std::vector<std::pair<std::string, MotionMode>>& motion_mode_words();
+const std::vector<std::pair<std::string, TrackState>>& track_state_words();
+const std::vector<std::pair<std::string, When>>& when_words();
+template <class Enum>
+std::string word_of(const std::vector<std::pair<std::string, Enum>>& words, Enum value) {
+  for (const auto& [word, meaning] : words)
+    if (meaning == value) return word;
+  return {};
+}
+
+Action action_from(const JsonAt& at);
+Outcome outcome_from(const JsonAt& at);
+ExclusiveOutcomes exclusive_from(const JsonAt& at);
+Json exclusive_json(const ExclusiveOutcomes& group);
+
+/// The document, or where it stops being JSON.
+core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes);
+
+}  // namespace prescene::belief
