@@ -18,7 +18,7 @@ struct Release {
   Vector3d retreat = Vector3d::Zero();
   double retreat_duration = 0.2;
   /// What the opening hand adds to the object's velocity; drawn by whoever executes the action.
-  TwistDistribution disturbance;
+  TwistDistribution disturbance = {};
   friend bool operator==(const Release&, const Release&) = default;
 };
 /// The held object is carried in a straight line to X_WO within `duration` and released there at rest.

@@ -84,23 +84,14 @@ MotionMode likeliest_motion(const std::vector<Particle>& particles) {
   return static_cast<MotionMode>(std::max_element(mass.begin(), mass.end()) - mass.begin());
 }
 
-Eigen::Index rank_of(const ObjectBelief& object) {
-  Eigen::Index rank = 0;
-  for (const Particle& particle : object.particles)
-    rank = std::max(rank, covariance_square_root(particle.covariance).cols());
-  return rank;
-}
-
-bool has_choice(const ObjectBelief& object) { return object.particles.size() > 1; }
-
-// The particle at quantile u of the weights.
-const Particle& chosen(const ObjectBelief& object, double u) {
+// The index of the particle at quantile u of the weights.
+std::size_t chosen(const ObjectBelief& object, double u) {
   double sum = 0.0;
-  for (const Particle& particle : object.particles) {
-    sum += std::exp(particle.log_weight);
-    if (u < sum) return particle;
+  for (std::size_t i = 0; i < object.particles.size(); ++i) {
+    sum += std::exp(object.particles[i].log_weight);
+    if (u < sum) return i;
   }
-  return object.particles.back();
+  return object.particles.size() - 1;
 }
 
 ObjectState state_of(const Particle& particle, const Eigen::Matrix<double, 12, 1>& d) {
@@ -228,44 +219,45 @@ WorldState most_likely_state(const Belief& belief) {
   return state;
 }
 
-int start_dimensions(const Belief& belief) {
-  Eigen::Index sum = 0;
-  for (const ObjectBelief& object : belief.objects) sum += (has_choice(object) ? 1 : 0) + rank_of(object);
-  return static_cast<int>(sum);
-}
-
-WorldState draw_start(const Belief& belief, std::span<const double> uniforms) {
-  // First the choice of each object's particle, then the widest direction of each object, the next widest of each, ...
-  struct Draw {
-    const Particle* particle;
-    Eigen::MatrixXd root;
-    Eigen::Index rank;
-    Eigen::Matrix<double, 12, 1> d = Eigen::Matrix<double, 12, 1>::Zero();
-  };
-  std::size_t next = 0;
-  const auto deal = [&] {
-    PRESCENE_CHECK(next < uniforms.size());
-    return uniforms[next++];
-  };
-  std::vector<Draw> draws;
-  Eigen::Index widest_rank = 0;
+BeliefSampler::BeliefSampler(const Belief& belief) {
   for (const ObjectBelief& object : belief.objects) {
     PRESCENE_CHECK(!object.particles.empty());
-    const Particle& particle = has_choice(object) ? chosen(object, deal()) : object.particles.front();
-    draws.push_back({&particle, covariance_square_root(particle.covariance), rank_of(object)});
-    widest_rank = std::max(widest_rank, draws.back().rank);
+    Prepared prepared{&object, {}};
+    for (const Particle& particle : object.particles) {
+      prepared.roots.push_back(covariance_square_root(particle.covariance));
+      prepared.rank = std::max(prepared.rank, prepared.roots.back().cols());
+    }
+    dimensions_ += (object.particles.size() > 1 ? 1 : 0) + static_cast<int>(prepared.rank);
+    largest_rank_ = std::max(largest_rank_, prepared.rank);
+    objects_.push_back(std::move(prepared));
   }
-  for (Eigen::Index column = 0; column < widest_rank; ++column) {
-    for (Draw& draw : draws) {
-      if (column >= draw.rank) continue;
-      const double z = core::inverse_normal_cdf(deal());
-      if (column < draw.root.cols()) draw.d += z * draw.root.col(column);
+}
+
+WorldState BeliefSampler::draw(std::span<const double> uniforms) const {
+  PRESCENE_CHECK(std::ssize(uniforms) == dimensions_);
+  std::size_t next = 0;
+  std::vector<std::size_t> particles;
+  for (const Prepared& object : objects_)
+    particles.push_back(object.roots.size() > 1 ? chosen(*object.belief, uniforms[next++]) : 0);
+  std::vector<Eigen::Matrix<double, 12, 1>> errors(objects_.size(), Eigen::Matrix<double, 12, 1>::Zero());
+  for (Eigen::Index column = 0; column < largest_rank_; ++column) {
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+      if (column >= objects_[i].rank) continue;
+      const double z = core::inverse_normal_cdf(uniforms[next++]);
+      const Eigen::MatrixXd& root = objects_[i].roots[particles[i]];
+      if (column < root.cols()) errors[i] += z * root.col(column);
     }
   }
-  PRESCENE_CHECK(next == uniforms.size());
   WorldState state;
-  for (const Draw& draw : draws) state.objects.push_back(state_of(*draw.particle, draw.d));
+  for (std::size_t i = 0; i < objects_.size(); ++i)
+    state.objects.push_back(state_of(objects_[i].belief->particles[particles[i]], errors[i]));
   return state;
+}
+
+int start_dimensions(const Belief& belief) { return BeliefSampler(belief).dimensions(); }
+
+WorldState draw_start(const Belief& belief, std::span<const double> uniforms) {
+  return BeliefSampler(belief).draw(uniforms);
 }
 
 std::uint64_t content_hash(const Belief& belief) {

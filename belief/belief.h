@@ -89,10 +89,30 @@ double effective_sample_size(const std::vector<Particle>& particles);
 bool normalize(std::vector<Particle>& particles);
 /// The world state of the heaviest particle of each object.
 WorldState most_likely_state(const Belief& belief);
-/// How many uniform numbers a draw takes: one an object for the choice of its particle, and the rank of its covariance.
+/// Draws world states from a belief; prepared once, as the square roots of the covariances cost more than a draw.
+class BeliefSampler {
+ public:
+  /// Every object needs at least one particle (checked). The belief must outlive the sampler.
+  explicit BeliefSampler(const Belief& belief);
+  /// How many uniform numbers a draw takes: one an object for the choice of its particle (if it has several), and the
+  /// largest rank of its covariances.
+  int dimensions() const { return dimensions_; }
+  /// One world state, objects in the belief's order, drawn as if each existed; uniforms.size() == dimensions(). First
+  /// come the choices of the particles, then the widest direction of each object, the next widest, ...
+  WorldState draw(std::span<const double> uniforms) const;
+
+ private:
+  struct Prepared {
+    const ObjectBelief* belief;
+    std::vector<Eigen::MatrixXd> roots;  // of the particles' covariances
+    Eigen::Index rank = 0;
+  };
+  std::vector<Prepared> objects_;
+  Eigen::Index largest_rank_ = 0;
+  int dimensions_ = 0;
+};
+/// The same for a single draw.
 int start_dimensions(const Belief& belief);
-/// One world state drawn from the belief, objects in its order; takes start_dimensions(belief) uniforms. Objects are
-/// drawn as if each existed.
 WorldState draw_start(const Belief& belief, std::span<const double> uniforms);
 /// A hash over all bits, for determinism checks.
 std::uint64_t content_hash(const Belief& belief);

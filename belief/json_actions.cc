@@ -98,8 +98,9 @@ struct PredicateJson {
 };
 
 // In the order of the variant.
-const std::vector<std::string> kPredicates{"inside_volume", "resting_on",      "upright_within",   "face_up",     "below_height",
-                                           "moved_more_than", "turned_more_than", "touched", "still_moving"};
+const std::vector<std::string> kPredicates{"inside_volume",    "resting_on",   "upright_within",
+                                           "face_up",          "below_height", "moved_more_than",
+                                           "turned_more_than", "touched",      "still_moving"};
 static_assert(std::variant_size_v<Predicate> == 9);
 
 double required_number(JsonObject& fields, const std::string& key) {

@@ -159,7 +159,7 @@ Json to_json(const Belief& belief) {
   Json objects = Json::array(), robot = Json::array();
   for (const ObjectBelief& object : belief.objects) objects.push_back(to_json(object));
   for (const Pose& pose : belief.robot) robot.push_back(to_json(pose));
-  return {{"step", belief.step},         {"seed", belief.seed},        {"stamp_ns", belief.stamp_ns},
+  return {{"step", belief.step},           {"seed", belief.seed},       {"stamp_ns", belief.stamp_ns},
           {"objects", std::move(objects)}, {"robot", std::move(robot)}, {"X_WC", to_json(belief.X_WC)}};
 }
 

@@ -12,7 +12,8 @@ namespace {
 constexpr std::size_t kLongestQuery = std::size_t{1} << 20;
 
 Json effort_json(const Effort& effort) {
-  Json json{{"tolerance", effort.tolerance}, {"confidence", effort.confidence}, {"max_instances", effort.max_instances}};
+  Json json{
+      {"tolerance", effort.tolerance}, {"confidence", effort.confidence}, {"max_instances", effort.max_instances}};
   if (effort.max_seconds) json["max_seconds"] = *effort.max_seconds;
   if (effort.exact_instances) json["exact_instances"] = *effort.exact_instances;
   return json;
@@ -83,7 +84,9 @@ struct QueryJson {
             {"duration", stability.duration},
             {"effort", effort_json(stability.effort)}};
   }
-  Json operator()(const ViewQuery& view) const { return {{"actions", actions_json(view.actions)}, {"time", view.time}}; }
+  Json operator()(const ViewQuery& view) const {
+    return {{"actions", actions_json(view.actions)}, {"time", view.time}};
+  }
 };
 
 const std::vector<std::string> kTasks{"where", "predict", "stability", "view"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strict reading of JSON objects: every key has to be known and of the right type; the first thing that is wrong is kept
-// with its path. Readers go on with harmless values after it, and the caller looks at the status once at the end.
+// Strict reading of JSON objects: every key has to be known and of the right type; the first thing that is wrong is
+// kept with its path. Readers go on with harmless values after it, and the caller looks at the status once at the end.
 #pragma once
 
 #include <cmath>
@@ -23,7 +23,8 @@ using Json = nlohmann::ordered_json;
 class JsonErrors {
  public:
   void add(const std::string& path, const std::string& reason) {
-    if (status_.ok()) status_ = core::invalid_input((path.empty() ? std::string("the document") : path) + ": " + reason);
+    if (status_.ok())
+      status_ = core::invalid_input((path.empty() ? std::string("the document") : path) + ": " + reason);
   }
   bool ok() const { return status_.ok(); }
   const core::Status& status() const { return status_; }

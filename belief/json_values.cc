@@ -34,14 +34,16 @@ Eigen::MatrixXd matrix_from(const JsonAt& at, Eigen::Index size) {
   const std::vector<JsonAt> rows = at.items(static_cast<std::size_t>(size));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::vector<double> row = rows[i].numbers(static_cast<std::size_t>(size));
-    for (std::size_t j = 0; j < row.size(); ++j) matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[j];
+    for (std::size_t j = 0; j < row.size(); ++j)
+      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[j];
   }
   return matrix;
 }
 
 Json scalar_json(const ScalarDistribution& distribution) {
   if (const auto* fixed = std::get_if<FixedScalar>(&distribution)) return number_json(fixed->value);
-  if (const auto* uniform = std::get_if<UniformScalar>(&distribution)) return {{"uniform", {uniform->low, uniform->high}}};
+  if (const auto* uniform = std::get_if<UniformScalar>(&distribution))
+    return {{"uniform", {uniform->low, uniform->high}}};
   if (const auto* sampled = std::get_if<SampledScalar>(&distribution)) return {{"samples", sampled->samples}};
   const auto& normal = std::get<NormalScalar>(distribution);
   Json json{{"normal", {normal.mean, normal.standard_deviation}}};
@@ -152,7 +154,9 @@ PoseDistribution pose_distribution_from(const JsonAt& at) {
   return box;
 }
 
-Json to_json(const Twist& twist) { return {{"angular", vector_json(twist.angular)}, {"linear", vector_json(twist.linear)}}; }
+Json to_json(const Twist& twist) {
+  return {{"angular", vector_json(twist.angular)}, {"linear", vector_json(twist.linear)}};
+}
 
 Twist twist_from(const JsonAt& at) {
   Twist twist;
@@ -183,9 +187,9 @@ const std::vector<std::pair<std::string, MotionMode>>& motion_mode_words() {
 
 const std::vector<std::pair<std::string, TrackState>>& track_state_words() {
   static const std::vector<std::pair<std::string, TrackState>> kWords{{"tracked", TrackState::kTracked},
-                                                                     {"doubtful", TrackState::kDoubtful},
-                                                                     {"unseen", TrackState::kUnseen},
-                                                                     {"lost", TrackState::kLost}};
+                                                                      {"doubtful", TrackState::kDoubtful},
+                                                                      {"unseen", TrackState::kUnseen},
+                                                                      {"lost", TrackState::kLost}};
   return kWords;
 }
 

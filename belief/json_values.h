@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON of the small values that the larger ones are made of, both ways. Numbers are written so that they read back as the
-// same bits; what JSON can't say (infinite, not a number) is null.
+// JSON of the small values that the larger ones are made of, both ways. Numbers are written so that they read back as
+// the same bits; what JSON can't say (infinite, not a number) is null.
 #pragma once
 
 #include "json_reader.h"

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/belief/json.h"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "prescene/tests/belief/random_values.h"
+#include "prescene/tests/support/laws.h"
+
+namespace prescene::belief {
+namespace {
+
+using core::Purpose;
+using core::RandomStream;
+using Json = nlohmann::ordered_json;
+using testing::HasSubstr;
+
+TEST(JsonLaws, QueriesReadBackAsTheyWereWritten) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    RandomStream stream(seed, Purpose::kTest);
+    const Query query = tests::random_query(stream);
+    const auto read = query_from_json(to_json(query).dump());
+    RC_ASSERT(read.status() == core::ok_status());
+    RC_ASSERT(*read == query);
+  }));
+}
+
+TEST(JsonLaws, ActionsAndOutcomesReadBackAsTheyWereWritten) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    RandomStream stream(seed, Purpose::kTest);
+    const Action action = tests::random_action(stream);
+    const auto read_action = action_from_json(Json::parse(to_json(action).dump()));
+    RC_ASSERT(read_action.status() == core::ok_status());
+    RC_ASSERT(*read_action == action);
+    const Outcome outcome = tests::random_outcome(stream, "o");
+    const auto read_outcome = outcome_from_json(Json::parse(to_json(outcome).dump()));
+    RC_ASSERT(read_outcome.status() == core::ok_status());
+    RC_ASSERT(*read_outcome == outcome);
+  }));
+}
+
+TEST(JsonLaws, BeliefsReadBackWithTheSameBits) {
+  const auto scene = std::make_shared<const Scene>(tests::small_scene());
+  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+    RandomStream stream(seed, Purpose::kTest);
+    Belief belief = tests::random_belief(stream, scene);
+    if (!belief.objects.empty())
+      belief.objects[0].particles.back().log_weight = -std::numeric_limits<double>::infinity();
+    const auto read = belief_from_json(Json::parse(to_json(belief).dump()), scene);
+    RC_ASSERT(read.status() == core::ok_status());
+    RC_ASSERT(*read == belief);
+    RC_ASSERT(content_hash(*read) == content_hash(belief));
+  }));
+}
+
+// Every place of a document where a key stands, as a pointer to the object and the key.
+void for_each_key(Json& value, const std::function<void(Json&, const std::string&)>& visit) {
+  if (value.is_object()) {
+    std::vector<std::string> keys;
+    for (const auto& [key, item] : value.items()) keys.push_back(key);
+    for (const std::string& key : keys) {
+      visit(value, key);
+      for_each_key(value[key], visit);
+    }
+  } else if (value.is_array()) {
+    for (Json& item : value) for_each_key(item, visit);
+  }
+}
+
+TEST(JsonLaws, AMistypedKeyIsAnErrorThatNamesIt) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    RandomStream stream(seed, Purpose::kTest);
+    Json document = to_json(tests::random_query(stream));
+    for_each_key(document, [&](Json& object, const std::string& key) {
+      const Json original = object;
+      Json changed = Json::object();
+      for (const auto& [name, item] : original.items()) changed[name == key ? name + "x" : name] = item;
+      object = changed;
+      const auto read = query_from_json(document.dump());
+      RC_ASSERT(!read.ok());
+      RC_ASSERT(read.status().message().find(key) != std::string::npos);
+      object = original;
+    });
+  }));
+}
+
+TEST(JsonLaws, AValueOfAnotherTypeIsAnErrorOrStillRead) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    RandomStream stream(seed, Purpose::kTest);
+    Json document = to_json(tests::random_query(stream));
+    for_each_key(document, [&](Json& object, const std::string& key) {
+      for (const Json& other :
+           {Json(nullptr), Json("text"), Json::array({1, "x"}), Json::object(), Json(true), Json(-1e300)}) {
+        const Json original = object[key];
+        object[key] = other;
+        const auto read = query_from_json(document.dump());
+        if (!read.ok()) RC_ASSERT(!read.status().message().empty());
+        object[key] = original;
+      }
+    });
+  }));
+}
+
+TEST(QueryFromJson, NamesThePathOfWhatIsWrong) {
+  const auto message = [](const char* text) { return query_from_json(text).status().message(); };
+  EXPECT_THAT(message(R"({"predict": {"actions": [{"time": 0, "push": {"from": [0, 0], "to": [1, 0, 0]}}]}})"),
+              HasSubstr("predict.actions[0].push.from: a list of 3 is needed"));
+  EXPECT_THAT(message(R"({"stability": {"objekt": "cup"}})"), HasSubstr("object"));
+  EXPECT_THAT(message(R"({"where": {}, "view": {}})"), HasSubstr("view: 'where' is there already"));
+  EXPECT_THAT(message(R"({"where": )"), HasSubstr("this is not JSON"));
+  EXPECT_THAT(message(""), HasSubstr("this is not JSON"));
+  EXPECT_THAT(message("[]"), HasSubstr("an object {...} is needed"));
+  EXPECT_THAT(message(R"({"predict": {"effort": {"tolerance": 1e999}}})"), HasSubstr("JSON"));
+  EXPECT_THAT(message(R"({"stability": {"object": "cup", "max_move": -1}})"), HasSubstr("stability.max_move"));
+  EXPECT_EQ(query_from_json(std::string(2 << 20, ' ')).status().code(), core::StatusCode::kResourceExhausted);
+  EXPECT_EQ(query_from_json(std::string(100000, '[')).status().code(), core::StatusCode::kInvalidInput);
+}
+
+TEST(QueryFromJson, FillsInWhatIsNotSaid) {
+  const auto query = query_from_json(R"({"stability": {"object": "cup"}})");
+  ASSERT_TRUE(query.ok());
+  StabilityQuery expected;
+  expected.object = "cup";
+  EXPECT_EQ(std::get<StabilityQuery>(query->what), expected);
+  EXPECT_EQ(query->id, "");
+  const auto faces = query_from_json(R"({"predict": {"exclusive_outcomes": [{"name": "up", "face_up": "cup"}]}})");
+  ASSERT_TRUE(faces.ok());
+  EXPECT_EQ(std::get<PredictQuery>(faces->what).exclusive_outcomes[0], which_face_up("up", "cup"));
+}
+
+TEST(AnswerToJson, HasTheKeysThatTheCommandLinePromises) {
+  PredictAnswer predict;
+  predict.outcomes = {{"in", "where", 0.25, 0.2, 0.3}, {"touched", "", 1.0, 0.99, 1.0}};
+  predict.instances = 512;
+  predict.simulated_seconds = 3.5;
+  predict.wall_seconds = 0.1;
+  const Json json = to_json(Answer{"7", 3, "", predict});
+  EXPECT_EQ(json["id"], "7");
+  EXPECT_EQ(json["predict"]["outcomes"][0]["name"], "in");
+  EXPECT_EQ(json["predict"]["outcomes"][0]["group"], "where");
+  EXPECT_EQ(json["predict"]["outcomes"][0]["probability"], 0.25);
+  EXPECT_EQ(json["predict"]["outcomes"][0]["interval"], Json::array({0.2, 0.3}));
+  EXPECT_FALSE(json["predict"]["outcomes"][1].contains("group"));
+  EXPECT_EQ(json["predict"]["instances"], 512);
+  EXPECT_FALSE(json.contains("error"));
+  EXPECT_EQ(to_json(Answer{"8", 0, "no such object", {}})["error"], "no such object");
+}
+
+TEST(AnswerToJson, WritesImagesInBase64) {
+  ViewAnswer view;
+  view.depth = geometry::DepthImage(2, 1, 1.0F);  // 00 00 80 3f twice
+  view.labels = geometry::LabelImage(1, 1, std::uint16_t{0x0102});
+  const Json json = to_json(Answer{"", 0, "", view})["view"];
+  EXPECT_EQ(json["depth"]["base64"], "AACAPwAAgD8=");
+  EXPECT_EQ(json["labels"]["base64"], "AgE=");
+  EXPECT_EQ(json["depth"]["encoding"], "32FC1");
+}
+
+}  // namespace
+}  // namespace prescene::belief

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/tests/belief/random_values.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "prescene/geometry/sampling.h"
+
+namespace prescene::tests {
+
+using namespace belief;  // NOLINT(google-build-using-namespace): this file is about nothing else
+using core::RandomStream;
+
+int random_below(RandomStream& stream, int bound) {
+  return static_cast<int>(stream.uniform_below(static_cast<std::uint64_t>(bound)));
+}
+
+Vector3d random_vector(RandomStream& stream, double reach) {
+  const double x = stream.uniform(-reach, reach), y = stream.uniform(-reach, reach);
+  return {x, y, stream.uniform(-reach, reach)};
+}
+
+Pose random_pose(RandomStream& stream) {
+  const geometry::Quaterniond rotation = geometry::uniform_rotation(stream);
+  return {rotation, random_vector(stream)};
+}
+
+Eigen::MatrixXd random_covariance(RandomStream& stream, int size, int rank) {
+  Eigen::MatrixXd root(size, rank);
+  for (Eigen::Index i = 0; i < root.size(); ++i) root.data()[i] = stream.uniform(-0.1, 0.1);
+  return root * root.transpose();
+}
+
+ScalarDistribution random_scalar(RandomStream& stream) {
+  const double a = stream.uniform(-1.0, 1.0), width = stream.uniform(0.01, 0.5);
+  switch (random_below(stream, 5)) {
+    case 0:
+      return FixedScalar{a};
+    case 1:
+      return NormalScalar{a, width};
+    case 2:
+      return NormalScalar{a, width, a - stream.uniform(-0.5, 2.0) * width, a + 2.5 * width};
+    case 3:
+      return UniformScalar{a, a + width};
+    default:
+      return SampledScalar{{a, a + width, a - width, a}};
+  }
+}
+
+Vector3Distribution random_vector_distribution(RandomStream& stream) {
+  ScalarDistribution x = random_scalar(stream), y = random_scalar(stream);
+  return {std::move(x), std::move(y), random_scalar(stream)};
+}
+
+PoseDistribution random_pose_distribution(RandomStream& stream) {
+  switch (random_below(stream, 4)) {
+    case 0:
+      return FixedPose{random_pose(stream)};
+    case 1: {
+      const Pose mean = random_pose(stream);
+      return NormalPose{mean, random_covariance(stream, 6, random_below(stream, 7))};
+    }
+    case 2: {
+      Vector3Distribution position = random_vector_distribution(stream);
+      return BoxPose{std::move(position), geometry::uniform_rotation(stream), random_below(stream, 2) == 1};
+    }
+    default: {
+      SampledPose sampled;
+      for (int i = random_below(stream, 4); i >= 0; --i) sampled.samples.push_back(random_pose(stream));
+      return sampled;
+    }
+  }
+}
+
+Action random_action(RandomStream& stream) {
+  Action action;
+  action.time = stream.uniform(0.0, 2.0);
+  const double duration = stream.uniform(0.1, 2.0);
+  switch (random_below(stream, 6)) {
+    case 0: {
+      Release release{"block", random_vector(stream), duration, {}};
+      release.disturbance.linear = random_vector_distribution(stream);
+      action.what = release;
+      break;
+    }
+    case 1:
+      action.what = Place{"block", random_pose_distribution(stream), duration};
+      break;
+    case 2: {
+      const Vector3d from = random_vector(stream), to = random_vector(stream);
+      action.what = Push{from, to, duration, 0.013, random_scalar(stream)};
+      break;
+    }
+    case 3:
+      action.what = Pour{"block", geometry::uniform_direction(stream), stream.uniform(-3.0, 3.0), duration};
+      break;
+    case 4:
+      action.what = Grasp{"block", "hand"};
+      break;
+    default:
+      action.what = Transport{"block", random_pose_distribution(stream), duration};
+  }
+  return action;
+}
+
+Predicate random_predicate(RandomStream& stream) {
+  switch (random_below(stream, 9)) {
+    case 0: {
+      const Pose X_WV = random_pose(stream);
+      return InsideVolume{X_WV, random_vector(stream).cwiseAbs() + Vector3d::Constant(0.5),
+                          random_below(stream, 2) == 1};
+    }
+    case 1:
+      return RestingOn{random_below(stream, 2) == 1 ? "table" : "ball"};
+    case 2: {
+      const Vector3d axis = geometry::uniform_direction(stream);
+      return UprightWithin{axis, stream.uniform(0.1, 2.5)};
+    }
+    case 3: {
+      const double sign = random_below(stream, 2) == 1 ? 1.0 : -1.0;
+      return FaceUp{sign * Vector3d::Unit(random_below(stream, 3))};
+    }
+    case 4:
+      return BelowHeight{stream.uniform(-1.0, 1.0)};
+    case 5:
+      return MovedMoreThan{stream.uniform(0.0, 2.0)};
+    case 6:
+      return TurnedMoreThan{stream.uniform(0.0, 3.0)};
+    case 7:
+      return Touched{random_below(stream, 2) == 1 ? "table" : "hand"};
+    default:
+      return StillMoving{};
+  }
+}
+
+Outcome random_outcome(RandomStream& stream, const std::string& name) {
+  Outcome outcome{name, "block", {}};
+  for (int i = random_below(stream, 2); i >= 0; --i) {
+    Condition condition{random_predicate(stream), When::kAtEnd, false};
+    condition.when = static_cast<When>(random_below(stream, 3));
+    condition.negated = random_below(stream, 2) == 1;
+    outcome.all_of.push_back(condition);
+  }
+  return outcome;
+}
+
+Query random_query(RandomStream& stream) {
+  Query query;
+  query.id = "query \"" + std::to_string(random_below(stream, 1000)) + "\"\n";
+  Effort effort{stream.uniform(0.001, 0.1), stream.uniform(0.5, 0.999), 1 + random_below(stream, 9999), {}, {}};
+  if (random_below(stream, 2) == 1) effort.max_seconds = stream.uniform(0.1, 10.0);
+  if (random_below(stream, 2) == 1) effort.exact_instances = 1 + random_below(stream, 1000);
+  switch (random_below(stream, 4)) {
+    case 0: {
+      WhereQuery where;
+      if (random_below(stream, 2) == 1) where.object = "block";
+      query.what = where;
+      break;
+    }
+    case 1: {
+      PredictQuery predict;
+      for (int i = random_below(stream, 3); i > 0; --i) predict.actions.push_back(random_action(stream));
+      for (int i = random_below(stream, 3); i > 0; --i)
+        predict.outcomes.push_back(random_outcome(stream, "o" + std::to_string(i)));
+      if (random_below(stream, 2) == 1)
+        predict.exclusive_outcomes.push_back({"group", {random_outcome(stream, "a"), random_outcome(stream, "b")}});
+      if (random_below(stream, 2) == 1) predict.duration = stream.uniform(0.1, 9.0);
+      predict.effort = effort;
+      query.what = predict;
+      break;
+    }
+    case 2: {
+      const double move = stream.uniform(0.001, 0.1);
+      query.what = StabilityQuery{"block", move, stream.uniform(0.01, 1.0), stream.uniform(0.1, 9.0), effort};
+      break;
+    }
+    default: {
+      ViewQuery view;
+      for (int i = random_below(stream, 3); i > 0; --i) view.actions.push_back(random_action(stream));
+      view.time = stream.uniform(0.0, 3.0);
+      query.what = view;
+    }
+  }
+  return query;
+}
+
+ObjectBelief random_object_belief(RandomStream& stream, const std::string& name) {
+  ObjectBelief object;
+  object.name = name;
+  object.model = random_below(stream, 2);
+  object.existence = stream.uniform();
+  object.state = static_cast<TrackState>(random_below(stream, 4));
+  object.evidence_per_pixel = stream.uniform(-1.0, 1.0);
+  object.visible_share = stream.uniform();
+  object.frames_unseen = random_below(stream, 100);
+  object.last_seen_ns = static_cast<core::TimeNs>(stream.next_u64() >> 2);
+  object.island = random_below(stream, 5);
+  const Pose middle = random_pose(stream);
+  for (int i = random_below(stream, 6); i >= 0; --i) {
+    Particle particle;
+    particle.log_weight = stream.uniform(-5.0, 0.0);
+    geometry::Vector6d d;
+    for (int k = 0; k < 6; ++k) d[k] = stream.uniform(-0.3, 0.3);
+    particle.X_WO = geometry::box_plus(middle, d);
+    particle.V_WO = {random_vector(stream), random_vector(stream)};
+    particle.covariance = random_covariance(stream, 12, random_below(stream, 13));
+    particle.mode = static_cast<MotionMode>(random_below(stream, 3));
+    particle.physical = {stream.uniform(0.1, 2.0), random_vector(stream, 0.1), stream.uniform(), stream.uniform(),
+                         stream.uniform()};
+    object.particles.push_back(particle);
+  }
+  normalize(object.particles);
+  return object;
+}
+
+Belief random_belief(RandomStream& stream, std::shared_ptr<const Scene> scene) {
+  Belief belief;
+  belief.step = stream.next_u64() >> 1;
+  belief.seed = stream.next_u64();
+  belief.stamp_ns = static_cast<core::TimeNs>(stream.next_u64() >> 2);
+  belief.scene = std::move(scene);
+  for (int i = random_below(stream, 4); i > 0; --i)
+    belief.objects.push_back(random_object_belief(stream, "object_" + std::to_string(i)));
+  for (int i = random_below(stream, 3); i > 0; --i) belief.robot.push_back(random_pose(stream));
+  belief.X_WC = random_pose(stream);
+  return belief;
+}
+
+Scene small_scene() {
+  const auto model = [](const std::string& name, const geometry::Primitive& primitive) {
+    ObjectModel shape;
+    shape.name = name;
+    shape.collision.emplace_back(PrimitiveShape{primitive, {}});
+    return *with_derived_properties(shape);
+  };
+  Scene scene;
+  scene.name = "small";
+  scene.models = {model("block", geometry::BoxShape{{0.1, 0.2, 0.3}}), model("ball", geometry::Sphere{0.05})};
+  Support table;
+  table.name = "table";
+  table.collision.emplace_back(PrimitiveShape{geometry::BoxShape{{2.0, 2.0, 0.1}}, {}});
+  Support bin = table;
+  bin.name = "bin";
+  bin.X_WS.translation = {1.0, 0.0, 0.0};
+  bin.hollow = Hollow{Pose::from_translation({0.0, 0.0, 0.2}), {0.3, 0.3, 0.4}};
+  scene.supports = {table, bin};
+  KinematicBody hand;
+  hand.name = "hand";
+  hand.collision.emplace_back(PrimitiveShape{geometry::Sphere{0.02}, {}});
+  hand.timeline = {{0.0, Pose{}}};
+  scene.robot = {hand};
+  SceneObject block, ball;
+  block.name = "block";
+  block.held_by = "hand";
+  ball.name = "ball";
+  ball.model = 1;
+  scene.objects = {block, ball};
+  return scene;
+}
+
+Trajectory random_trajectory(RandomStream& stream) {
+  Trajectory trajectory;
+  const int count = 2 + random_below(stream, 6);
+  for (int i = 0; i < count; ++i) {
+    WorldState state;
+    state.time = 0.25 * i;
+    for (int k = 0; k < 2; ++k) {
+      ObjectState object;
+      object.X_WO = random_pose(stream);
+      const double speed = random_below(stream, 2) == 1 ? 1.0 : 0.005;
+      object.V_WO = {random_vector(stream, speed), random_vector(stream, speed)};
+      object.mode = random_below(stream, 4) == 0 ? MotionMode::kHeld : MotionMode::kMoving;
+      state.objects.push_back(object);
+    }
+    trajectory.states.push_back(state);
+  }
+  const double end = trajectory.final().time;
+  for (int i = random_below(stream, 5); i > 0; --i) {
+    ContactInterval contact;
+    contact.first = random_below(stream, 2);
+    contact.second = contact.first + 1 + random_below(stream, 4 - contact.first);
+    contact.begin = stream.uniform(0.0, end);
+    contact.end = random_below(stream, 2) == 1 ? end : stream.uniform(contact.begin, end);
+    contact.normal_z = stream.uniform(-1.0, 1.0);
+    trajectory.contacts.push_back(contact);
+  }
+  std::sort(trajectory.contacts.begin(), trajectory.contacts.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.begin, a.first, a.second) < std::tie(b.begin, b.first, b.second);
+  });
+  trajectory.simulated_seconds = end;
+  return trajectory;
+}
+
+}  // namespace prescene::tests
