@@ -13,22 +13,22 @@ enum class McapCompression { kNone, kLz4, kZstd };
 
 /// How the messages of a channel are to be understood.
 struct McapSchema {
-  std::string name;       ///< "sensor_msgs/msg/Image"
-  std::string encoding;   ///< "ros2msg", "jsonschema", ...
-  std::string data;       ///< The schema's text or bytes.
+  std::string name;      ///< "sensor_msgs/msg/Image"
+  std::string encoding;  ///< "ros2msg", "jsonschema", ...
+  std::string data;      ///< The schema's text or bytes.
   friend bool operator==(const McapSchema&, const McapSchema&) = default;
 };
 
 struct McapChannel {
   std::string topic;
-  std::string message_encoding;              ///< "cdr", "json"
-  McapSchema schema;                         ///< Empty name = none.
+  std::string message_encoding;  ///< "cdr", "json"
+  McapSchema schema;             ///< Empty name = none.
   std::map<std::string, std::string> metadata;
   friend bool operator==(const McapChannel&, const McapChannel&) = default;
 };
 
 struct McapMessage {
-  int channel = 0;               ///< As returned by add_channel, or index into McapReader::channels().
+  int channel = 0;  ///< As returned by add_channel, or index into McapReader::channels().
   std::uint32_t sequence = 0;
   std::int64_t log_time_ns = 0;      ///< When it was received.
   std::int64_t publish_time_ns = 0;  ///< When it was sent.

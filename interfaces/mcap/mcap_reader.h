@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads MCAP recordings: by their index when they have one, front to back when they were cut.
+// Reads MCAP recordings: by their index when they have one, front to back when they were cut. Damage costs what is
+// damaged and is told, never the rest; hostile lengths take no memory.
 //
 //   PRESCENE_TRY(auto reader, McapReader::open("run.mcap"));
 //   while (true) {
@@ -20,26 +21,37 @@
 namespace prescene::interfaces {
 
 struct McapReaderOptions {
-  std::set<std::string> topics;                        ///< Empty: all.
-  std::optional<std::int64_t> begin_ns;                ///< Log times in [begin_ns, end_ns).
-  std::optional<std::int64_t> end_ns;
+  std::set<std::string> topics = {};          ///< Empty: all.
+  std::optional<std::int64_t> begin_ns = {};  ///< Log times in [begin_ns, end_ns).
+  std::optional<std::int64_t> end_ns = {};
   std::size_t max_chunk_bytes = std::size_t{1} << 30;  ///< Larger (uncompressed) chunks are refused.
 };
 
 /// What could not be read.
 struct McapLoss {
   bool truncated = false;            ///< No footer: the file was cut or is still being written.
-  std::uint64_t lost_bytes = 0;      ///< At the end, after the last whole record.
-  std::uint64_t damaged_chunks = 0;  ///< Whose checksum or content is wrong; left out.
+  bool bad_index = false;            ///< There is an index, but it is wrong; read front to back instead.
+  std::uint64_t lost_bytes = 0;      ///< After the last whole record; of a cut chunk those of its unpacked content.
+  std::uint64_t damaged_chunks = 0;  ///< Left out for a wrong checksum, or read to their last sound record.
+  std::uint64_t refused_chunks = 0;  ///< Left out as larger than max_chunk_bytes.
+  std::uint64_t stray_messages = 0;  ///< Left out as their channel is not known.
+  std::string unknown_compression;   ///< Of damaged_chunks that were left out for it.
+  bool nothing() const { return *this == McapLoss{}; }
   /// One sentence for a person; empty when nothing was lost.
   std::string text() const;
+  friend bool operator==(const McapLoss&, const McapLoss&) = default;
 };
 
-/// Not thread-safe. Memory is bounded by the largest chunk, not by the file.
+/// Not thread-safe. Memory is bounded by the chunks that overlap in time, together at most max_chunk_bytes (then the
+/// order of time is given up before memory is), not by the file.
 class McapReader {
  public:
   /// Fails with kNotFound (no such file), kInvalidInput (not an MCAP file), kDataLoss (nothing readable).
-  static core::Result<std::unique_ptr<McapReader>> open(const std::filesystem::path& path, const McapReaderOptions& options = {});
+  static core::Result<std::unique_ptr<McapReader>> open(const std::filesystem::path& path,
+                                                        const McapReaderOptions& options = {});
+  /// The same from memory.
+  static core::Result<std::unique_ptr<McapReader>> open_bytes(std::vector<std::uint8_t> bytes,
+                                                              const McapReaderOptions& options = {});
   ~McapReader();
   McapReader(const McapReader&) = delete;
   McapReader& operator=(const McapReader&) = delete;
@@ -51,8 +63,8 @@ class McapReader {
   /// Messages in the file if it has statistics.
   std::optional<std::uint64_t> message_count() const;
 
-  /// The next message in the order of log time (of position in the file among equals, or throughout a cut file); empty at
-  /// the end. Damaged chunks are skipped and counted.
+  /// The next message in the order of log time (of position in the file among equals, or throughout a file without
+  /// index); empty at the end. Damage is passed over and counted. Times beyond 2^63 ns read as 2^63 - 1.
   core::Result<std::optional<McapMessage>> next();
   /// Complete once next() has returned the end.
   const McapLoss& loss() const;

@@ -20,13 +20,19 @@ struct McapWriterOptions {
   McapCompression compression = McapCompression::kZstd;
   /// A chunk is closed when it is this large; what is in closed chunks survives a crash.
   std::size_t chunk_bytes = std::size_t{1} << 20;
+  /// It is also closed when its log times span more than this, nanoseconds.
+  std::int64_t chunk_ns = 1'000'000'000;
+  /// Wait for the disk at the end of each chunk, so that closed chunks survive a power failure, too. Without it they
+  /// survive a crash of the program.
+  bool sync = false;
 };
 
-/// Not thread-safe. Every write to the file is checked: a full disk is kResourceExhausted, naming the file, and what was
-/// in closed chunks stays readable.
+/// Not thread-safe. Every write to the file is checked: a full disk is kResourceExhausted, naming the file, and what
+/// was in closed chunks stays readable.
 class McapWriter {
  public:
-  static core::Result<std::unique_ptr<McapWriter>> create(const std::filesystem::path& path, const McapWriterOptions& options);
+  static core::Result<std::unique_ptr<McapWriter>> create(const std::filesystem::path& path,
+                                                          const McapWriterOptions& options);
   /// Closes without telling of errors; call close() to hear of them.
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
@@ -34,6 +40,7 @@ class McapWriter {
 
   /// The number to give to messages. An equal channel gets the same number again.
   core::Result<int> add_channel(const McapChannel& channel);
+  /// The message's channel is one that add_channel returned (checked). kInvalidInput for negative times.
   core::Status write(const McapMessage& message);
   core::Status write_metadata(const McapMetadata& metadata);
   /// Ends the current chunk and hands everything to the operating system.
@@ -47,7 +54,7 @@ class McapWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The channel of a ROS 2 type of ros_messages/schemas.h, with rosbag2's metadata and the type's hash.
+/// The channel of a ROS 2 type of ros_messages/schemas.h (checked), with rosbag2's metadata and the type's hash.
 McapChannel ros_channel(const std::string& topic, const std::string& type);
 
 }  // namespace prescene::interfaces

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mcap_layout.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+
+#include "prescene/interfaces/bytes/byte_reader.h"
+#include "prescene/interfaces/bytes/crc32.h"
+#include "prescene/interfaces/bytes/text.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::Result;
+using core::Status;
+namespace records = mcap_records;
+using records::Op;
+
+constexpr std::size_t kMagicBytes = records::kMagic.size();
+constexpr std::size_t kFooterBytes = records::kFrameBytes + records::Footer::kContentBytes;
+constexpr std::uint64_t kMaxRunBytes = std::uint64_t{4} << 20;
+constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
+constexpr std::uint64_t kMaxMetadataBytes = std::uint64_t{64} << 20;
+
+struct Frame {
+  Op op{};
+  std::uint64_t length = 0;
+};
+
+class LayoutFinder {
+ public:
+  explicit LayoutFinder(McapSource* source) : source_(*source), limit_(source->size()) {}
+
+  Result<McapLayout> find() {
+    PRESCENE_RETURN_IF_ERROR(check_magic());
+    PRESCENE_RETURN_IF_ERROR(read_header());
+    PRESCENE_RETURN_IF_ERROR(read_summary());
+    PRESCENE_RETURN_IF_ERROR(walk());
+    out_.indexed = !out_.channels.empty();
+    return std::move(out_);
+  }
+
+ private:
+  Status check_magic() {
+    const auto available = static_cast<std::size_t>(std::min<std::uint64_t>(source_.size(), kMagicBytes));
+    PRESCENE_TRY(const std::span<const std::uint8_t> magic, source_.peek(0, available));
+    if (!std::equal(magic.begin(), magic.end(), records::kMagic.begin())) {
+      return core::invalid_input(source_.name() + ": is no MCAP file (its first bytes are others); give a recording");
+    }
+    if (available < kMagicBytes) return nothing_readable();
+    position_ = kMagicBytes;
+    return core::ok_status();
+  }
+
+  Status nothing_readable() const {
+    return core::data_loss(source_.name() + ": has " + size_text(static_cast<std::size_t>(source_.size())) +
+                           " and ends before the first message; record again");
+  }
+
+  Status read_header() {
+    const std::optional<Frame> frame = frame_at(position_);
+    if (!frame || frame->op != Op::kHeader || frame->length > limit_ - position_ - records::kFrameBytes) {
+      return nothing_readable();
+    }
+    if (frame->length > kMaxHeaderBytes) {
+      return core::invalid_input(source_.name() + ": has a header of " + size_text(frame->length) +
+                                 "; is it a recording?");
+    }
+    PRESCENE_TRY(const std::vector<std::uint8_t> content, content_at(position_, *frame));
+    if (!parse(content, &out_.header)) return nothing_readable();
+    position_ += records::kFrameBytes + frame->length;
+    return core::ok_status();
+  }
+
+  /// From the footer, if there is one, to the channels, statistics and chunk indexes.
+  Status read_summary() {
+    const std::uint64_t size = source_.size();
+    out_.loss.truncated = true;
+    if (size < position_ + kFooterBytes + kMagicBytes) return core::ok_status();
+    const std::uint64_t footer_at = size - kFooterBytes - kMagicBytes;
+    std::vector<std::uint8_t> tail(kFooterBytes + kMagicBytes);
+    PRESCENE_RETURN_IF_ERROR(source_.read(footer_at, tail));
+    ByteReader in(tail);
+    const auto op = static_cast<Op>(in.read<std::uint8_t>());
+    const auto length = in.read<std::uint64_t>();
+    const bool whole = op == Op::kFooter && length == records::Footer::kContentBytes &&
+                       std::equal(records::kMagic.begin(), records::kMagic.end(), tail.begin() + kFooterBytes);
+    if (!whole) return core::ok_status();
+    out_.loss.truncated = false;
+    limit_ = footer_at;
+    records::Footer footer;
+    parse(std::span(tail).subspan(records::kFrameBytes, records::Footer::kContentBytes), &footer);
+    if (footer.summary_start == 0) return core::ok_status();
+
+    bool good = footer.summary_start >= position_ && footer.summary_start <= footer_at;
+    if (good) {
+      std::vector<std::uint8_t> summary(static_cast<std::size_t>(footer_at - footer.summary_start));
+      PRESCENE_RETURN_IF_ERROR(source_.read(footer.summary_start, summary));
+      const std::span<const std::uint8_t> covered_footer(tail.data(), kFooterBytes - sizeof footer.summary_crc);
+      good = footer.summary_crc == 0 || footer.summary_crc == crc32(covered_footer, crc32(summary));
+      good = good && parse_summary(summary, footer.summary_start);
+    }
+    if (good) {
+      limit_ = footer.summary_start;
+      return core::ok_status();
+    }
+    out_.loss.bad_index = true;
+    out_.schemas.clear();
+    out_.channels.clear();
+    out_.statistics.reset();
+    chunk_indexes_.clear();
+    return core::ok_status();
+  }
+
+  bool parse_summary(std::span<const std::uint8_t> summary, std::uint64_t data_end) {
+    records::RecordWalk walk(summary);
+    while (walk.next()) {
+      bool good = true;
+      if (walk.op() == Op::kSchema) {
+        good = parse(walk.content(), &out_.schemas.emplace_back());
+      } else if (walk.op() == Op::kChannel) {
+        good = parse(walk.content(), &out_.channels.emplace_back());
+      } else if (walk.op() == Op::kStatistics) {
+        good = parse(walk.content(), &out_.statistics.emplace());
+      } else if (walk.op() == Op::kChunkIndex) {
+        records::ChunkIndex index;
+        good = parse(walk.content(), &index) && index.chunk_offset < data_end &&
+               index.chunk_length <= data_end - index.chunk_offset &&
+               index.message_index_length <= data_end - index.chunk_offset - index.chunk_length;
+        chunk_indexes_[index.chunk_offset] = std::move(index);
+      }
+      if (!good) return false;
+    }
+    return walk.whole();
+  }
+
+  /// Over the records of the data section. Where the index knows a chunk, its message indexes are passed over unread;
+  /// where a record is wrong, the walk goes on at the next chunk that the index knows.
+  Status walk() {
+    while (position_ < limit_) {
+      const std::optional<Frame> frame = frame_at(position_);
+      if (frame && (frame->op == Op::kDataEnd || frame->op == Op::kFooter)) return core::ok_status();
+      const bool fits = frame && frame->length <= limit_ - position_ - records::kFrameBytes;
+      if (frame && frame->op == Op::kChunk) {
+        PRESCENE_TRY(const bool good, add_chunk(*frame));
+        if (good) continue;
+      } else if (fits) {
+        PRESCENE_TRY(const bool good, add_record(*frame));
+        if (good) continue;
+      }
+      skip_damage();
+    }
+    return core::ok_status();
+  }
+
+  std::optional<Frame> frame_at(std::uint64_t offset) {
+    if (limit_ - offset < records::kFrameBytes) return std::nullopt;
+    const Result<std::span<const std::uint8_t>> bytes = source_.peek(offset, records::kFrameBytes);
+    if (!bytes) return std::nullopt;
+    ByteReader in(*bytes);
+    const auto op = in.read<std::uint8_t>();
+    if (op == 0) return std::nullopt;
+    return Frame{static_cast<Op>(op), in.read<std::uint64_t>()};
+  }
+
+  Result<std::vector<std::uint8_t>> content_at(std::uint64_t offset, const Frame& frame) const {
+    std::vector<std::uint8_t> content(static_cast<std::size_t>(frame.length));
+    PRESCENE_RETURN_IF_ERROR(source_.read(offset + records::kFrameBytes, content));
+    return content;
+  }
+
+  std::uint64_t next_known_chunk() const {
+    const auto next = chunk_indexes_.upper_bound(position_);
+    return next == chunk_indexes_.end() ? limit_ : next->first;
+  }
+
+  void skip_damage() {
+    const std::uint64_t next = next_known_chunk();
+    out_.loss.lost_bytes += next - position_;
+    position_ = next;
+  }
+
+  /// The chunk at the position, also when it is cut; false when there is not even its head.
+  Result<bool> add_chunk(const Frame& frame) {
+    const std::uint64_t content_begin = position_ + records::kFrameBytes;
+    const bool fits = frame.length <= limit_ - content_begin;
+    const std::uint64_t content_end = fits ? content_begin + frame.length : std::max(content_begin, next_known_chunk());
+    const auto head_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(
+        content_end - content_begin, records::ChunkHead::kBytesBeforeName + records::ChunkHead::kMaxNameBytes + 8));
+    PRESCENE_TRY(const std::span<const std::uint8_t> head, source_.peek(content_begin, head_bytes));
+    McapSegment segment;
+    segment.chunk = true;
+    if (!parse(head, &segment.head)) return false;
+    segment.offset = content_begin + segment.head.bytes();
+    const std::uint64_t available = content_end - segment.offset;
+    segment.cut = segment.head.records_size > available;
+    segment.length = std::min(segment.head.records_size, available);
+    segment.start_time = segment.head.start_time;
+    segment.end_time = segment.head.end_time;
+    const auto index = chunk_indexes_.find(position_);
+    position_ = content_end;
+    if (index != chunk_indexes_.end() && fits && index->second.chunk_length == records::kFrameBytes + frame.length) {
+      for (const auto& [id, offset] : index->second.message_index_offsets) segment.channel_ids.insert(id);
+      position_ += index->second.message_index_length;
+    }
+    out_.segments.push_back(std::move(segment));
+    return true;
+  }
+
+  /// A record that fits; false when its content is wrong.
+  Result<bool> add_record(const Frame& frame) {
+    const std::uint64_t bytes = records::kFrameBytes + frame.length;
+    switch (frame.op) {
+      case Op::kMessage: {
+        if (frame.length < records::MessageHead::kBytes) return false;
+        PRESCENE_TRY(const std::span<const std::uint8_t> content,
+                     source_.peek(position_ + records::kFrameBytes, records::MessageHead::kBytes));
+        records::MessageHead head;
+        parse(content, &head);
+        McapSegment& run = run_for(bytes);
+        run.start_time = std::min(run.start_time, head.log_time);
+        run.end_time = std::max(run.end_time, head.log_time);
+        run.length += bytes;
+        break;
+      }
+      case Op::kSchema:
+      case Op::kChannel:
+        run_for(bytes).length += bytes;
+        break;
+      case Op::kMetadata: {
+        metadata_bytes_ += frame.length;
+        if (metadata_bytes_ > kMaxMetadataBytes) break;
+        PRESCENE_TRY(const std::vector<std::uint8_t> content, content_at(position_, frame));
+        if (!records::parse(content, &out_.metadata.emplace_back())) {
+          out_.metadata.pop_back();
+          return false;
+        }
+        break;
+      }
+      default:
+        break;  // Attachments, indexes, and what later versions may add.
+    }
+    position_ += bytes;
+    return true;
+  }
+
+  /// The run of loose records that ends at the position, or a new one.
+  McapSegment& run_for(std::uint64_t bytes) {
+    const bool goes_on = !out_.segments.empty() && !out_.segments.back().chunk &&
+                         out_.segments.back().offset + out_.segments.back().length == position_ &&
+                         out_.segments.back().length + bytes <= kMaxRunBytes;
+    if (!goes_on) {
+      McapSegment& run = out_.segments.emplace_back();
+      run.offset = position_;
+      run.start_time = ~std::uint64_t{0};
+    }
+    return out_.segments.back();
+  }
+
+  McapSource& source_;
+  std::uint64_t limit_;  ///< Where the data section must have ended.
+  std::uint64_t position_ = 0;
+  std::map<std::uint64_t, records::ChunkIndex> chunk_indexes_;
+  std::uint64_t metadata_bytes_ = 0;
+  McapLayout out_;
+};
+
+}  // namespace
+
+Result<McapLayout> find_layout(McapSource* source) { return LayoutFinder(source).find(); }
+
+}  // namespace prescene::interfaces

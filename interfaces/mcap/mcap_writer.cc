@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/mcap/mcap_writer.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "mcap_compression.h"
+#include "mcap_records.h"
+#include "prescene/core/check.h"
+#include "prescene/interfaces/bytes/crc32.h"
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/ros_messages/schemas.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::Result;
+using core::Status;
+namespace records = mcap_records;
+
+constexpr std::size_t kMaxIds = 65535;
+
+void add_time(std::uint64_t time, std::uint64_t count_before, std::uint64_t* start, std::uint64_t* end) {
+  *start = count_before == 0 ? time : std::min(*start, time);
+  *end = count_before == 0 ? time : std::max(*end, time);
+}
+
+}  // namespace
+
+struct McapWriter::Impl {
+  McapWriterOptions options;
+  OutputFile file;
+  std::uint64_t position = 0;
+  std::uint32_t data_crc = 0;
+  Status failure;  ///< Stays once a write has failed.
+  bool closed = false;
+
+  std::vector<McapChannel> channels;
+  std::vector<records::Channel> channel_records;
+  std::vector<records::Schema> schemas;
+  std::vector<records::ChunkIndex> chunk_indexes;
+  std::vector<records::MetadataIndex> metadata_indexes;
+  records::Statistics statistics;
+
+  // The open chunk.
+  std::vector<std::uint8_t> chunk;
+  records::ChunkHead chunk_head;
+  std::uint64_t chunk_messages = 0;
+  std::map<std::uint16_t, records::MessageIndex> chunk_channels;
+  std::set<std::uint16_t> chunk_schemas;
+
+  Status write_bytes(std::span<const std::uint8_t> bytes);
+  void begin_message(const records::Channel& channel);
+  Status end_chunk();
+  Status write_summary();
+};
+
+Status McapWriter::Impl::write_bytes(std::span<const std::uint8_t> bytes) {
+  if (!failure.ok()) return failure;
+  failure = file.write(bytes);
+  position += bytes.size();
+  data_crc = crc32(bytes, data_crc);
+  return failure;
+}
+
+/// Each chunk repeats the schemas and channels that it uses, so that it can be understood when the others are lost.
+void McapWriter::Impl::begin_message(const records::Channel& channel) {
+  const auto [entry, is_new] = chunk_channels.try_emplace(channel.id);
+  if (!is_new) return;
+  entry->second.channel_id = channel.id;
+  if (channel.schema_id != 0 && chunk_schemas.insert(channel.schema_id).second) {
+    records::append(schemas[channel.schema_id - std::size_t{1}], &chunk);
+  }
+  records::append(channel, &chunk);
+}
+
+Status McapWriter::Impl::end_chunk() {
+  if (chunk_messages == 0) return failure;
+  const std::optional<std::vector<std::uint8_t>> compressed = compress(options.compression, chunk);
+  chunk_head.uncompressed_size = chunk.size();
+  chunk_head.uncompressed_crc = crc32(chunk);
+  chunk_head.compression = compressed ? compression_name(options.compression) : "";
+
+  records::ChunkIndex index;
+  index.start_time = chunk_head.start_time;
+  index.end_time = chunk_head.end_time;
+  index.chunk_offset = position;
+  index.compression = chunk_head.compression;
+  index.compressed_size = compressed ? compressed->size() : chunk.size();
+  index.uncompressed_size = chunk.size();
+
+  std::vector<std::uint8_t> out;
+  records::append(chunk_head, compressed ? *compressed : chunk, &out);
+  index.chunk_length = out.size();
+  for (const auto& [id, message_index] : chunk_channels) {
+    index.message_index_offsets[id] = position + out.size();
+    records::append(message_index, &out);
+  }
+  index.message_index_length = out.size() - index.chunk_length;
+  chunk_indexes.push_back(std::move(index));
+  ++statistics.chunk_count;
+
+  chunk.clear();
+  chunk_head = {};
+  chunk_messages = 0;
+  chunk_channels.clear();
+  chunk_schemas.clear();
+  PRESCENE_RETURN_IF_ERROR(write_bytes(out));
+  if (options.sync) failure = file.sync();
+  return failure;
+}
+
+Status McapWriter::Impl::write_summary() {
+  std::vector<std::uint8_t> out;
+  records::append_data_end(data_crc, &out);
+  const std::size_t summary_begin = out.size();
+  std::vector<std::uint8_t> offsets;
+  const auto group = [&](records::Op op, const auto& group_records) {
+    const std::size_t begin = out.size();
+    for (const auto& record : group_records) records::append(record, &out);
+    if (out.size() > begin) records::append_summary_offset(op, position + begin, out.size() - begin, &offsets);
+  };
+  statistics.schema_count = static_cast<std::uint16_t>(schemas.size());
+  statistics.channel_count = static_cast<std::uint32_t>(channels.size());
+  statistics.metadata_count = static_cast<std::uint32_t>(metadata_indexes.size());
+  group(records::Op::kSchema, schemas);
+  group(records::Op::kChannel, channel_records);
+  group(records::Op::kStatistics, std::span(&statistics, 1));
+  group(records::Op::kChunkIndex, chunk_indexes);
+  group(records::Op::kMetadataIndex, metadata_indexes);
+
+  records::Footer footer;
+  footer.summary_start = position + summary_begin;
+  footer.summary_offset_start = position + out.size();
+  out.insert(out.end(), offsets.begin(), offsets.end());
+  std::vector<std::uint8_t> footer_bytes;
+  records::append(footer, &footer_bytes);
+  // The checksum covers the summary and the footer up to the checksum itself.
+  const std::span<const std::uint8_t> covered_footer(footer_bytes.data(),
+                                                     footer_bytes.size() - sizeof footer.summary_crc);
+  footer.summary_crc = crc32(covered_footer, crc32(std::span(out).subspan(summary_begin)));
+  records::append(footer, &out);
+  out.insert(out.end(), records::kMagic.begin(), records::kMagic.end());
+  return write_bytes(out);
+}
+
+McapWriter::McapWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+McapWriter::~McapWriter() {
+  if (!impl_->closed) static_cast<void>(close());
+}
+
+Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::path& path,
+                                                       const McapWriterOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->options = options;
+  PRESCENE_TRY(impl->file, OutputFile::create(path));
+  std::unique_ptr<McapWriter> writer(new McapWriter(std::move(impl)));
+  std::vector<std::uint8_t> start(records::kMagic.begin(), records::kMagic.end());
+  records::append(records::Header{options.profile, "prescene"}, &start);
+  PRESCENE_RETURN_IF_ERROR(writer->impl_->write_bytes(start));
+  return writer;
+}
+
+Result<int> McapWriter::add_channel(const McapChannel& channel) {
+  Impl& impl = *impl_;
+  PRESCENE_CHECK(!impl.closed);
+  const auto known = std::find(impl.channels.begin(), impl.channels.end(), channel);
+  if (known != impl.channels.end()) return static_cast<int>(known - impl.channels.begin());
+  if (impl.channels.size() == kMaxIds) {
+    return core::resource_exhausted(impl.file.path().string() + ": a recording has at most 65535 channels");
+  }
+  records::Channel record{static_cast<std::uint16_t>(impl.channels.size() + 1), 0, channel.topic,
+                          channel.message_encoding, channel.metadata};
+  if (!channel.schema.name.empty()) {
+    auto schema = std::find_if(impl.schemas.begin(), impl.schemas.end(),
+                               [&](const records::Schema& s) { return s.schema == channel.schema; });
+    if (schema == impl.schemas.end()) {
+      schema = impl.schemas.insert(schema, {static_cast<std::uint16_t>(impl.schemas.size() + 1), channel.schema});
+    }
+    record.schema_id = schema->id;
+  }
+  impl.channels.push_back(channel);
+  impl.channel_records.push_back(std::move(record));
+  return static_cast<int>(impl.channels.size()) - 1;
+}
+
+Status McapWriter::write(const McapMessage& message) {
+  Impl& impl = *impl_;
+  PRESCENE_CHECK(!impl.closed);
+  PRESCENE_CHECK(message.channel >= 0 && message.channel < static_cast<int>(impl.channels.size()));
+  if (!impl.failure.ok()) return impl.failure;
+  const records::Channel& channel = impl.channel_records[static_cast<std::size_t>(message.channel)];
+  if (message.log_time_ns < 0 || message.publish_time_ns < 0) {
+    return core::invalid_input(impl.file.path().string() + ": a message on " + channel.topic + " has the time " +
+                               std::to_string(std::min(message.log_time_ns, message.publish_time_ns)) +
+                               " ns; times begin with 1970");
+  }
+  const records::MessageHead head{channel.id, message.sequence, static_cast<std::uint64_t>(message.log_time_ns),
+                                  static_cast<std::uint64_t>(message.publish_time_ns)};
+  const bool too_late = impl.chunk_messages > 0 && head.log_time > impl.chunk_head.start_time &&
+                        head.log_time - impl.chunk_head.start_time > static_cast<std::uint64_t>(impl.options.chunk_ns);
+  if (too_late) PRESCENE_RETURN_IF_ERROR(impl.end_chunk());
+
+  impl.begin_message(channel);
+  impl.chunk_channels[channel.id].entries.emplace_back(head.log_time, impl.chunk.size());
+  records::append(head, message.data, &impl.chunk);
+  add_time(head.log_time, impl.chunk_messages++, &impl.chunk_head.start_time, &impl.chunk_head.end_time);
+  add_time(head.log_time, impl.statistics.message_count++, &impl.statistics.start_time, &impl.statistics.end_time);
+  ++impl.statistics.channel_message_counts[channel.id];
+  if (impl.chunk.size() >= impl.options.chunk_bytes) return impl.end_chunk();
+  return core::ok_status();
+}
+
+Status McapWriter::write_metadata(const McapMetadata& metadata) {
+  Impl& impl = *impl_;
+  PRESCENE_CHECK(!impl.closed);
+  PRESCENE_RETURN_IF_ERROR(impl.end_chunk());
+  std::vector<std::uint8_t> out;
+  records::append(metadata, &out);
+  impl.metadata_indexes.push_back({impl.position, out.size(), metadata.name});
+  return impl.write_bytes(out);
+}
+
+Status McapWriter::flush() {
+  PRESCENE_CHECK(!impl_->closed);
+  return impl_->end_chunk();
+}
+
+Status McapWriter::close() {
+  Impl& impl = *impl_;
+  if (impl.closed) return impl.failure;
+  impl.closed = true;
+  static_cast<void>(impl.end_chunk());
+  if (impl.failure.ok()) static_cast<void>(impl.write_summary());
+  if (impl.failure.ok() && impl.options.sync) impl.failure = impl.file.sync();
+  const Status closed = impl.file.close();
+  if (impl.failure.ok()) impl.failure = closed;
+  return impl.failure;
+}
+
+McapChannel ros_channel(const std::string& topic, const std::string& type) {
+  const RosType* ros = find_ros_type(type);
+  PRESCENE_CHECK_MSG(ros != nullptr, type);
+  McapChannel channel;
+  channel.topic = topic;
+  channel.message_encoding = "cdr";
+  channel.schema = {std::string(ros->name), "ros2msg", ros2msg_schema(*ros)};
+  channel.metadata = {{"offered_qos_profiles", ""}, {"topic_type_hash", std::string(ros->type_hash)}};
+  return channel;
+}
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <algorithm>
+
+#include "recordings.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using tests::TopicMessage;
+
+constexpr McapCompression kCompressions[] = {McapCompression::kNone, McapCompression::kLz4, McapCompression::kZstd};
+
+std::vector<TopicMessage> by_time(std::vector<TopicMessage> messages) {
+  std::stable_sort(messages.begin(), messages.end(),
+                   [](const TopicMessage& a, const TopicMessage& b) { return a.log_time_ns < b.log_time_ns; });
+  return messages;
+}
+
+TEST(McapLaws, MessagesComeBackInTheOrderOfTime) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    core::RandomStream stream(seed, core::Purpose::kTest);
+    const auto messages = tests::random_messages(&stream, 60, 3000);
+    const std::size_t chunk_bytes = stream.uniform_below(20000);
+    for (const McapCompression compression : kCompressions) {
+      const auto bytes =
+          tests::record(messages, {.compression = compression, .chunk_bytes = chunk_bytes, .chunk_ns = 500});
+      auto reader = McapReader::open_bytes(bytes);
+      RC_ASSERT(reader.ok());
+      RC_ASSERT((*reader)->message_count() == messages.size());
+      RC_ASSERT(tests::read_all(reader->get()) == by_time(messages));
+      RC_ASSERT((*reader)->loss().nothing());
+      for (const McapChannel& channel : (*reader)->channels()) RC_ASSERT(channel == tests::channel_of(channel.topic));
+    }
+  }));
+}
+
+TEST(McapLaws, AFilterGivesWhatFilteringAllGives) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    core::RandomStream stream(seed, core::Purpose::kTest);
+    const auto messages = tests::random_messages(&stream, 80, 300);
+    auto bytes = tests::record(messages, {.chunk_bytes = 1000, .chunk_ns = 200});
+    McapReaderOptions options;
+    options.begin_ns = static_cast<std::int64_t>(stream.uniform_below(2000));
+    options.end_ns = *options.begin_ns + static_cast<std::int64_t>(stream.uniform_below(2000));
+    options.topics = {"/1", "/2", "/none"};
+    const auto keep = [&](const TopicMessage& m) {
+      return options.topics.contains(m.topic) && m.log_time_ns >= *options.begin_ns && m.log_time_ns < *options.end_ns;
+    };
+    std::vector<TopicMessage> expected;
+    std::copy_if(messages.begin(), messages.end(), std::back_inserter(expected), keep);
+    RC_ASSERT(tests::read_all(bytes, options) == by_time(expected));
+    bytes.resize(bytes.size() - 9);  // Without the footer: front to back.
+    RC_ASSERT(tests::read_all(bytes, options) == expected);
+  }));
+}
+
+TEST(McapLaws, LittleMemoryCostsTheOrderNotTheMessages) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    core::RandomStream stream(seed, core::Purpose::kTest);
+    auto messages = tests::random_messages(&stream, 60, 300);
+    for (auto& message : messages) message.log_time_ns = static_cast<std::int64_t>(stream.uniform_below(100));
+    const auto bytes = tests::record(messages, {.chunk_bytes = 500});
+    // 1200 holds any chunk with the message that made it full, but seldom two.
+    auto read = tests::read_all(bytes, {.max_chunk_bytes = 1200});
+    RC_ASSERT(read.size() == messages.size());
+    RC_ASSERT(by_time(read).size() == messages.size());
+    RC_ASSERT(std::is_permutation(read.begin(), read.end(), messages.begin()));
+  }));
+}
+
+}  // namespace
+}  // namespace prescene::interfaces

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/mcap/mcap_writer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/schemas.h"
+#include "prescene/tests/support/paths.h"
+#include "recordings.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::StatusCode;
+using testing::HasSubstr;
+using tests::Bytes;
+
+TEST(McapWriter, GivesEqualChannelsTheSameNumber) {
+  const tests::ScratchDir scratch;
+  auto writer = McapWriter::create(scratch.path() / "a.mcap", {});
+  ASSERT_TRUE(writer.ok());
+  const auto a = (*writer)->add_channel(tests::channel_of("/1"));
+  const auto b = (*writer)->add_channel(tests::channel_of("/2"));
+  EXPECT_NE(*a, *b);
+  EXPECT_EQ(*(*writer)->add_channel(tests::channel_of("/1")), *a);
+  EXPECT_THAT((*writer)->write({*a, 0, -1, 0, {}}).message(), HasSubstr("a message on /1 has the time -1 ns"));
+}
+
+TEST(McapWriter, ReportsAFullDiskAndKeepsSayingSo) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  const auto writer = McapWriter::create("/dev/full", {});
+  EXPECT_EQ(writer.status().code(), StatusCode::kResourceExhausted) << "the header does not fit already";
+  EXPECT_THAT(writer.status().message(), HasSubstr("/dev/full: cannot be written"));
+}
+
+TEST(McapWriter, WhatWasFlushedIsReadableWithoutClosing) {
+  const tests::ScratchDir scratch;
+  const auto path = scratch.path() / "a.mcap";
+  auto writer = McapWriter::create(path, {});
+  ASSERT_TRUE(writer.ok());
+  const int channel = *(*writer)->add_channel(tests::channel_of("/1"));
+  ASSERT_TRUE((*writer)->write({channel, 0, 5, 5, {1, 2, 3}}).ok());
+  ASSERT_TRUE((*writer)->flush().ok());
+  ASSERT_TRUE((*writer)->write({channel, 0, 6, 6, {4}}).ok());
+  auto reader = McapReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  EXPECT_EQ(tests::read_all(reader->get()).size(), 1U);
+  EXPECT_TRUE((*reader)->loss().truncated);
+  EXPECT_EQ((*reader)->loss().lost_bytes, 0U);
+  ASSERT_TRUE((*writer)->close().ok());
+  EXPECT_EQ(tests::read_all(*read_file(path, 100000)).size(), 2U);
+}
+
+TEST(McapWriter, EndsChunksByTheirTimeSpan) {
+  std::vector<tests::TopicMessage> messages;
+  for (int i = 0; i < 10; ++i) messages.push_back({"/1", 0, i * 400'000'000LL, 0, {}});
+  const auto chunks = [&](std::int64_t chunk_ns) {
+    const Bytes bytes = tests::record(messages, {.chunk_ns = chunk_ns});
+    // The statistics record: opcode 0x0b, its length, then counts; the chunks are counted at byte 22 of its content.
+    for (std::size_t i = bytes.size() - 40; i > 9; --i) {
+      if (bytes[i] == 0x0b && bytes[i + 1] == 46 + 10 && bytes[i + 2] == 0) return static_cast<int>(bytes[i + 9 + 22]);
+    }
+    return -1;
+  };
+  EXPECT_EQ(chunks(1'000'000'000), 4) << "0 to 0.8 s, 1.2 to 2.0, 2.4 to 3.2, 3.6";
+  EXPECT_EQ(chunks(100'000'000'000), 1);
+}
+
+TEST(McapWriter, RosChannelsCarrySchemaHashAndQos) {
+  const McapChannel channel = ros_channel("/camera/depth", "sensor_msgs/msg/Image");
+  EXPECT_EQ(channel.message_encoding, "cdr");
+  EXPECT_EQ(channel.schema.name, "sensor_msgs/msg/Image");
+  EXPECT_EQ(channel.schema.encoding, "ros2msg");
+  EXPECT_EQ(channel.schema.data, ros2msg_schema(ros_type<RosImage>()));
+  EXPECT_EQ(channel.metadata.at("topic_type_hash"), ros_type<RosImage>().type_hash);
+  EXPECT_EQ(channel.metadata.count("offered_qos_profiles"), 1U);
+}
+
+TEST(McapWriter, RosMessagesGoThroughARecording) {
+  const tests::ScratchDir scratch;
+  const auto path = scratch.path() / "a.mcap";
+  RosTfMessage message;
+  message.transforms = {{{{7, 9}, "world"}, "camera", {{1, 2, 3}, {0, 0, 0, 1}}}};
+  {
+    auto writer = McapWriter::create(path, {});
+    ASSERT_TRUE(writer.ok());
+    const int tf = *(*writer)->add_channel(ros_channel("/tf", "tf2_msgs/msg/TFMessage"));
+    ASSERT_TRUE((*writer)->write({tf, 0, 1, 1, encode_cdr(message)}).ok());
+  }  // The destructor closes.
+  auto reader = McapReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  const auto read = (*reader)->next();
+  ASSERT_TRUE(read.ok() && *read);
+  EXPECT_EQ(*decode_cdr<RosTfMessage>((*read)->data), message);
+  EXPECT_TRUE((*reader)->loss().nothing());
+}
+
+}  // namespace
+}  // namespace prescene::interfaces
