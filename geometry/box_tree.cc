@@ -2,6 +2,7 @@
 #include "box_tree.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "prescene/core/check.h"
@@ -12,16 +13,15 @@ BoxTree::BoxTree(const std::vector<ItemBox>& items, std::size_t leaf_size) : ord
   PRESCENE_CHECK(!items.empty() && leaf_size >= 1 && items.size() < (std::size_t{1} << 31));
   std::iota(order_.begin(), order_.end(), 0U);
   while ((items.size() + first_leaf_ - 1) / first_leaf_ > leaf_size) first_leaf_ *= 2;
-  boxes_.resize(2 * static_cast<std::size_t>(first_leaf_));
+  nodes_.resize(2 * static_cast<std::size_t>(first_leaf_));
   leaf_begin_.resize(first_leaf_ + 1);
   leaf_begin_.back() = static_cast<std::uint32_t>(items.size());
   build(items, 1, 0, items.size());
 }
 
 void BoxTree::build(const std::vector<ItemBox>& items, std::uint32_t node, std::size_t begin, std::size_t end) {
-  ItemBox& box = boxes_[node];
-  constexpr double kFar = 1e300;  // An empty node is farther from everything than any bound.
-  box = {Vector3d::Constant(kFar), Vector3d::Constant(-kFar)};
+  constexpr double kFar = std::numeric_limits<double>::infinity();  // An empty node is nearer to nothing.
+  ItemBox box{Vector3d::Constant(kFar), Vector3d::Constant(-kFar)};
   ItemBox centres = box;
   for (std::size_t i = begin; i < end; ++i) {
     const ItemBox& item = items[order_[i]];
@@ -30,6 +30,8 @@ void BoxTree::build(const std::vector<ItemBox>& items, std::uint32_t node, std::
     centres.low = centres.low.cwiseMin(item.low + item.high);
     centres.high = centres.high.cwiseMax(item.low + item.high);
   }
+  nodes_[node].low << box.low, 0.0;
+  nodes_[node].high << box.high, 0.0;
   if (node >= first_leaf_) {
     leaf_begin_[node - first_leaf_] = static_cast<std::uint32_t>(begin);
     return;

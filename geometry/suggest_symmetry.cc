@@ -49,8 +49,8 @@ class Surface {
   bool is_within(const Vector3d& q, double distance) const {
     double bound = distance * distance;
     bool found = false;
-    tree_.search(q, bound, [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end && !found; ++i) {
+    tree_.search(q, bound, [&](std::size_t leaf, std::uint32_t begin) {
+      for (std::uint32_t i = begin; i < tree_.leaf_begins()[leaf + 1] && !found; ++i) {
         const auto& t = mesh_.triangles[tree_.order()[i]];
         found = squared_distance(q, mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]) <= bound;
       }
