@@ -43,6 +43,7 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
   start_ = start.time;
   actions_ = actions;
   goals_.assign(actions_.size(), Pose{});
+  disturbances_.assign(actions_.size(), Twist{});
   steps_.assign(actions_.size(), Step{});
   pushers_.clear();
   for (std::size_t i = 0; i < actions_.size(); ++i) {
@@ -51,6 +52,8 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
       goals_[i] = draw_from(place->X_WO, stream);
     } else if (const auto* transport = std::get_if<belief::Transport>(&action.what)) {
       goals_[i] = draw_from(transport->X_WO, stream);
+    } else if (const auto* release = std::get_if<belief::Release>(&action.what)) {
+      disturbances_[i] = draw_from(release->disturbance, stream);
     } else if (const auto* push = std::get_if<belief::Push>(&action.what)) {
       const Vector3d shift = draw_from(push->lateral_error, stream) * left_of(push->to - push->from);
       pushers_.push_back({push->from + shift, push->to + shift, action.time, push->duration, push->radius});
@@ -182,6 +185,8 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
     Twist V_WO;
     V_WO.linear = (X_next.translation - X_now.translation) / dt;
     V_WO.angular = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt;
+    V_WO.linear += disturbances_[index].linear;
+    V_WO.angular += disturbances_[index].angular;
     if (hold.hand >= 0) {
       Hand& hand = hands_[static_cast<std::size_t>(hold.hand)];
       if (hand.carries == *object) {

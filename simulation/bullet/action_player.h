@@ -81,6 +81,7 @@ class ActionPlayer {
   double start_ = 0.0;
   std::vector<belief::Action> actions_;  // times from start_
   std::vector<Pose> goals_;              // of place and transport, by action
+  std::vector<Twist> disturbances_;      // of releases, by action
   std::vector<Pusher> pushers_;
   std::vector<Hold> objects_;
   std::vector<Hand> hands_;

@@ -106,15 +106,15 @@ ContactSolver::Contact ContactSolver::make_contact(const SolverContact& given, b
   const btScalar speed = relative_velocity(n, c.normal.torque_a, c.normal.torque_b, a, b);
   const bool closes = given.gap + 0.5 * dt * (given.speed_before + speed) < 0.0;
   c.target = given.gap > 0.0 ? -given.gap / dt : 0.0;
-  if (closes && given.restitution > 0.0 && given.speed_before < -settings_.restitution_speed) {
-    // The gap closes at hit_time with the speed it has then; the bounce goes on under gravity until the step ends. A
-    // bounce that ends within the step is none.
+  c.hit = closes && given.speed_before < -settings_.restitution_speed;
+  if (c.hit) {
+    // The gap closes at hit_time with the speed it has then; what bounces goes on under gravity until the step ends. A
+    // bounce that falls back within the step is none.
     const btScalar acceleration = (speed - given.speed_before) / dt;
     c.hit_time = given.gap > 0.0 ? time_to_close(given.gap, given.speed_before, acceleration, dt) : 0.0;
     const btScalar speed_at_hit = given.speed_before + acceleration * c.hit_time;
-    const btScalar speed_at_end = -given.restitution * speed_at_hit + acceleration * (dt - c.hit_time);
-    c.bounced = speed_at_end > 0.0;
-    if (c.bounced) c.target = speed_at_end;
+    c.target = std::max(0.0, -given.restitution * speed_at_hit + acceleration * (dt - c.hit_time));
+    c.bounced = c.target > 0.0;
   }
   c.push_target = given.gap > 0.0 ? -given.gap / dt : -given.gap * settings_.overlap_recovery / dt;
   const bool impact = closes && given.speed_before < -settings_.impact_speed;
@@ -254,7 +254,8 @@ btScalar ContactSolver::solveGroupCacheFriendlyFinish(btCollisionObject** bodies
     given.impulse = c.normal.impulse;
     given.friction_impulse = from_bullet(c.tangent_1.direction * c.tangent_1.impulse +
                                          c.tangent_2.direction * c.tangent_2.impulse);
-    given.bounced = c.bounced && c.normal.impulse > 0.0;
+    given.hit = c.hit && c.normal.impulse > 0.0;
+    given.bounced = c.bounced && given.hit;
     given.hit_time = c.hit_time;
     if (c.normal.impulse > 0.0) {
       results_[static_cast<std::size_t>(given.body_a)].touched = true;

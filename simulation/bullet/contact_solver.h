@@ -36,9 +36,10 @@ struct SolverContact {
   /// In: the impulses of the step before (N s). Out: this step's.
   double impulse = 0.0;
   Vector3d friction_impulse = Vector3d::Zero();
-  /// Out: the contact bounced, so its impulse says nothing about the next step.
+  /// Out: the contact closed in this step, so its impulse says nothing about the next step; and it bounced.
+  bool hit = false;
   bool bounced = false;
-  /// Out, of a bounce: when within the step the gap closed, s.
+  /// Out, of a hit: when within the step the gap closed, s.
   double hit_time = 0.0;
 };
 
@@ -46,7 +47,7 @@ struct SolverSettings {
   int iterations = 60;
   double converged = 1e-6;          ///< m/s: iterations end when no contact changes its velocity by more.
   double overlap_recovery = 0.2;    ///< Share of an overlap that is pushed out in a step, in (0, 1].
-  double restitution_speed = 0.02;  ///< m/s: contacts closing slower do not bounce.
+  double restitution_speed = 0.02;  ///< m/s: contacts closing slower neither hit nor bounce.
   double impact_speed = 0.2;        ///< m/s: contacts closing faster slide with the impact friction.
 };
 
@@ -99,6 +100,7 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
     btScalar rolling_arm = 0.0;    // m
     btScalar rolling_step = 0.0;
     btVector3 rolling_impulse;     // N m s
+    bool hit = false;
     bool bounced = false;
     btScalar hit_time = 0.0;
   };

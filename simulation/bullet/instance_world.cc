@@ -360,20 +360,22 @@ void InstanceWorld::solve() {
   warm_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const SolverContact& c = contacts_[i];
-    if (c.impulse <= 0.0 || c.bounced) continue;
+    if (c.impulse <= 0.0 || c.hit) continue;
     warm_.push_back({contact_keys_[i], moving_[static_cast<std::size_t>(c.body_b)].X_WO.inverse_times(c.position),
                      c.impulse, c.friction_impulse});
   }
 }
 
 void InstanceWorld::integrate() {
-  first_hit_.assign(objects_.size(), dt());
+  impacts_.assign(objects_.size(), Impact{});
   for (const SolverContact& c : contacts_) {
-    if (!c.bounced) continue;
+    if (c.impulse <= 0.0) continue;
     for (const int body : {c.body_a, c.body_b}) {
       if (body >= scene_->object_count) continue;
-      double& hit = first_hit_[static_cast<std::size_t>(body)];
-      hit = std::min(hit, c.hit_time);
+      Impact& impact = impacts_[static_cast<std::size_t>(body)];
+      impact.supported = impact.supported || !c.hit;
+      impact.bounced = impact.bounced || c.bounced;
+      if (c.hit) impact.time = std::min(impact.time.value_or(dt()), c.hit_time);
     }
   }
   for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -388,15 +390,19 @@ void InstanceWorld::integrate() {
     const BodyResult& result = results_[i];
     const Flight& flight = flights_[i];
     if (result.touched) {
-      // In flight until the first bounce within the step (at its start if there is none), then with what came out of it.
-      const double before = first_hit_[i] < dt() ? first_hit_[i] : 0.0;
+      // Up to the first hit within the step (its start if there is none) with the velocity of before, then with what came
+      // out. Gravity counts within the step only while nothing holds the body up.
+      const Impact& impact = impacts_[i];
+      const double before = impact.time.value_or(0.0);
       const double after = dt() - before;
-      const Vector3d gravity = first_hit_[i] < dt() ? scene_->scene.gravity_W : Vector3d(Vector3d::Zero());
-      const Vector3d flown = before * (object.v_WCm + 0.5 * before * gravity);
+      const Vector3d& gravity = scene_->scene.gravity_W;
+      const double falls_before = impact.supported ? 0.0 : 0.5 * before;
+      const double falls_after = impact.supported || !impact.bounced ? 0.0 : -0.5 * after;
+      const Vector3d flown = before * (object.v_WCm + falls_before * gravity);
       const Vector3d turn_flown = before * object.w_WO;
       object.v_WCm = from_bullet(rigid_[i]->getLinearVelocity());
       object.w_WO = from_bullet(rigid_[i]->getAngularVelocity());
-      object.p_WCm += flown + after * (object.v_WCm - 0.5 * after * gravity) + dt() * result.push;
+      object.p_WCm += flown + after * (object.v_WCm + falls_after * gravity) + dt() * result.push;
       if (before > 0.0) object.R_WO = turned(object.R_WO, turn_flown);
       object.R_WO = turned(object.R_WO, after * object.w_WO + dt() * result.turn);
     } else {

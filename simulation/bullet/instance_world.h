@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -100,6 +101,12 @@ class InstanceWorld {
     double impulse = 0.0;
     Vector3d friction_impulse;
   };
+  /// What a step's contacts did to an object, beside its velocity.
+  struct Impact {
+    std::optional<double> time;  // when in the step the first contact closed
+    bool supported = false;      // some contact held it all along
+    bool bounced = false;
+  };
   struct Flight {
     Vector3d p_WCm, v_WCm, w_WO;
     Quaterniond R_WO;
@@ -142,7 +149,7 @@ class InstanceWorld {
   std::vector<std::unique_ptr<btRigidBody>> rigid_;
   std::vector<btCollisionObject*> rigid_pointers_;
   std::vector<BodyResult> results_;
-  std::vector<double> first_hit_;  // per object: when in the step it first bounced, or the step's length
+  std::vector<Impact> impacts_;
   std::vector<Vector3d> footprint_;
   std::vector<Pose> poses_;
   std::vector<ActionPlayer::Released> released_;

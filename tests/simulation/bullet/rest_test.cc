@@ -54,7 +54,7 @@ TEST(Rest, UprightCoinAndPencilAreNot) {
   // A disc of foil balances on its rim and a pencil on its point; a pencil on its flat end stands (it takes 2 degrees to
   // topple it).
   const belief::Trajectory coin =
-      run_from(floor_scene(primitive_model("coin", Cylinder{0.012, 0.00015})), {Pose{on_rim, {0, 0, 0.012}}}, 1.0);
+      run_from(floor_scene(primitive_model("coin", Cylinder{0.012, 0.00015})), {Pose{on_rim, {0, 0, 0.012}}}, 0.5);
   EXPECT_NE(coin.end, TrajectoryEnd::kAtRest);
   ObjectModel pencil = model_of(
       "pencil", {belief::PrimitiveShape{Cylinder{0.0035, 0.16}, Pose::from_translation({0, 0, 0.02})},
