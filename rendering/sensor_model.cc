@@ -66,8 +66,6 @@ core::Status validate(const SensorModelOptions& o) {
     return wrong("incidence_cosine", o.incidence_cosine[0], "give the classes in ascending order");
   for (const double p : o.outline_missing)
     if (!share(p)) return wrong("outline_missing", p, kShare);
-  for (const double p : o.outline_outlier)
-    if (!share(p)) return wrong("outline_outlier", p, kShare);
   for (const double p : o.incidence_missing)
     if (!share(p)) return wrong("incidence_missing", p, kShare);
   return core::ok_status();
@@ -106,13 +104,10 @@ PixelMixture SensorModel::mixture(const SurfaceMaterial& material, const PixelGe
   PixelMixture m;
   m.depth = pixel.depth;
   m.sigma = hit_sigma(pixel.depth, pixel.cosine);
-  m.outlier =
-      std::max(material.outlier, class_value(options_.outline_px, options_.outline_outlier, pixel.outline_px, 0.0));
-  // What the outline adds to the outliers it takes from the other parts alike.
-  const double rest = (1.0 - m.outlier) / (1.0 - material.outlier);
-  m.hit = rest * material.hit;
-  m.occluder = rest * material.occluder;
-  m.behind = rest * material.behind;
+  m.hit = material.hit;
+  m.occluder = material.occluder;
+  m.behind = material.behind;
+  m.outlier = material.outlier;
   m.missing = missing_probability(material, pixel.cosine, pixel.outline_px);
   m.missing_opaque = missing_probability(SurfaceMaterial{}, pixel.cosine, pixel.outline_px);
   return m;

@@ -32,11 +32,10 @@ struct SensorModelOptions {
   double background_missing = 0.03;  ///< Probability that a pixel returns nothing where the known background did ...
   double background_missing_again = 0.7;  ///< ... and where the known background did not either.
   double color_exponent = 1.0;            ///< beta: the colour ratio is raised to it; 0 switches colour off.
-  /// Missing returns and outliers grow towards the object's outline: classes by the distance to it in pixels of the
+  /// Missing returns grow towards the object's outline: classes by the distance to it in pixels of the
   /// full image, up to and including outline_px[i].
   std::array<double, 4> outline_px = {1.5, 3.0, 6.0, 12.0};
   std::array<double, 4> outline_missing = {0.38, 0.35, 0.27, 0.12};
-  std::array<double, 4> outline_outlier = {0.24, 0.18, 0.08, 0.02};
   /// Missing returns grow with the incidence angle: classes by the cosine, below incidence_cosine[i].
   std::array<double, 3> incidence_cosine = {0.2, 0.4, 0.6};
   std::array<double, 3> incidence_missing = {0.47, 0.28, 0.10};

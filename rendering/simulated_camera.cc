@@ -136,6 +136,18 @@ struct PixelDraws {
   double value;    ///< Uniform, where an outlier lies.
 };
 
+/// Share of returns that are not from the surface or what is behind it. Opaque materials' own share is of a likelihood,
+/// which wants some robustness; here it is what was measured.
+double outlier_share(const SensorModel& model, const SimulatedCameraOptions& options, const SurfaceMaterial& material,
+                     double edge_px) {
+  const bool opaque = material == SurfaceMaterial::opaque(material.color);
+  const double share = opaque ? options.interior_outlier : material.outlier;
+  const auto& classes = model.options().outline_px;
+  for (std::size_t i = 0; i < classes.size(); ++i)
+    if (edge_px <= classes[i]) return std::max(share, options.edge_outlier[i]);
+  return share;
+}
+
 /// What one pixel of one surface returns.
 double sample_pixel(const SensorModel& model, const SimulatedCameraOptions& options, const SurfaceMaterial& material,
                     const PixelGeometry& pixel, double behind_depth, double other_depth, const PixelDraws& draws) {
@@ -144,17 +156,14 @@ double sample_pixel(const SensorModel& model, const SimulatedCameraOptions& opti
   if (options.missing && draws.missing < model.missing_probability(material, pixel.cosine, pixel.outline_px))
     return 0.0;
 
-  SurfaceMaterial plain = material;
-  plain.outlier = material == SurfaceMaterial::opaque(material.color) ? options.interior_outlier : material.outlier;
-  const PixelMixture mixture = model.mixture(plain, pixel);
-  const bool near_edge = pixel.outline_px <= sensor.outline_px.back();
-  if (draws.outlier < mixture.outlier) {
-    if (!near_edge || !(other_depth > 0.0)) return sensor.min_depth + model.range() * draws.value;
-    return options.flying_pixels ? pixel.depth + (other_depth - pixel.depth) * draws.value : pixel.depth;
+  if (draws.outlier < outlier_share(model, options, material, pixel.outline_px)) {
+    const bool at_edge = pixel.outline_px <= sensor.outline_px.back() && other_depth > 0.0;
+    if (at_edge) return pixel.depth + (other_depth - pixel.depth) * draws.value;
+    return sensor.min_depth + model.range() * draws.value;
   }
   const double see_through = material.behind / (material.behind + material.hit + material.occluder);
   double depth = pixel.depth;
-  double sigma = mixture.sigma;
+  double sigma = model.hit_sigma(pixel.depth, pixel.cosine);
   if (draws.part < see_through) {
     if (!(behind_depth > 0.0) || behind_depth > sensor.max_depth) return 0.0;
     depth = behind_depth;

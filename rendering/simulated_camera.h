@@ -6,6 +6,8 @@
 //   simulated.sample(scene, view, nullptr, camera, X_WC, stream, frame, &depth, &color);
 #pragma once
 
+#include <array>
+
 #include "prescene/core/random.h"
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
@@ -21,9 +23,11 @@ struct SimulatedCameraOptions {
   double correlated_share = 0.5;
   double correlation_px = 12.0;  ///< Cell of the correlated noise; half of its correlation is gone there.
   double quantisation_per_depth_squared = 0.0013;  ///< Step of the returned depth, 1/m: 1.3 mm at 1 m.
-  double depth_edge = 0.02;        ///< m; a jump that counts as an edge even between pixels of one object.
-  double interior_outlier = 0.01;  ///< Share of returns far from any edge that are anywhere in range.
-  bool flying_pixels = true;       ///< At edges, outliers lie between the two surfaces.
+  double depth_edge = 0.02;  ///< m; a jump that counts as an edge even between pixels of one object.
+  /// Shares of returns that are not from the surface: by the distance to the nearest edge, in the sensor model's
+  /// classes (flying pixels, between the two surfaces of the edge) ...
+  std::array<double, 4> edge_outlier = {0.24, 0.18, 0.08, 0.02};
+  double interior_outlier = 0.01;  ///< ... and further in (anywhere in range).
   bool missing = true;
   double color_noise = 2.0;                         ///< Standard deviation of each channel, of 255.
   geometry::Rgb background_low = {70, 74, 82};      ///< Colour of empty pixels at the bottom of the image ...

@@ -185,12 +185,8 @@ TEST(SensorModel, ReproducesTheMeasuredShares) {
   // frames.
   const SensorModel model;
   const SurfaceMaterial opaque;
-  for (const auto& [px, missing, outlier] :
-       {std::tuple{1.0, 0.38, 0.24}, {2.5, 0.35, 0.18}, {5.0, 0.27, 0.08}, {10.0, 0.12, 0.04}, {50.0, 0.03, 0.04}}) {
-    const PixelMixture m = model.mixture(opaque, {0.9, 0.9, px});
-    EXPECT_NEAR(m.missing, missing, 1e-9);
-    EXPECT_NEAR(m.outlier, outlier, 1e-9);
-  }
+  for (const auto& [px, missing] : {std::pair{1.0, 0.38}, {2.5, 0.35}, {5.0, 0.27}, {10.0, 0.12}, {50.0, 0.03}})
+    EXPECT_NEAR(model.mixture(opaque, {0.9, 0.9, px}).missing, missing, 1e-9);
   for (const auto& [cosine, missing] : {std::pair{0.1, 0.47}, {0.3, 0.28}, {0.5, 0.10}, {0.9, 0.03}})
     EXPECT_NEAR(model.mixture(opaque, {0.9, cosine}).missing, missing, 1e-9);
   // Standard deviations at 0.9 m: 31, 5.7, 4.0, 2.2 mm measured; the steepest class is held lower, so that it still

@@ -200,7 +200,7 @@ TEST_F(SimulatedCameraTest, RepeatsAFrameAndVariesBetweenFrames) {
   fixed.correlated_share = 0.0;
   fixed.missing = false;
   fixed.interior_outlier = 0.0;
-  fixed.flying_pixels = false;
+  fixed.edge_outlier = {};
   const geometry::DepthImage a = sample(scene, view, 1, fixed);
   const geometry::DepthImage b = sample(scene, view, 2, fixed);
   EXPECT_EQ(a(160, 120), b(160, 120));
