@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// Answers as sections of a report.
+#include <algorithm>
+#include <cmath>
+
+#include "html_text.h"
+#include "prescene/geometry/triangle_mesh.h"
+#include "prescene/interfaces/reports/overlay.h"
+#include "prescene/interfaces/reports/report.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using Corner = std::pair<double, double>;
+
+/// Corners of the convex hull, counter-clockwise [Andrew 1979].
+std::vector<Corner> convex_outline(std::vector<Corner> points) {
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  if (points.size() < 3) return points;
+  const auto turns_left = [](const Corner& a, const Corner& b, const Corner& c) {
+    return (b.first - a.first) * (c.second - a.second) - (b.second - a.second) * (c.first - a.first) > 0.0;
+  };
+  std::vector<Corner> hull;
+  const auto run = [&](auto begin, auto end) {
+    const std::size_t kept = hull.size();
+    for (auto it = begin; it != end; ++it) {
+      while (hull.size() >= kept + 2 && !turns_left(hull[hull.size() - 2], hull.back(), *it)) hull.pop_back();
+      hull.push_back(*it);
+    }
+    hull.pop_back();
+  };
+  run(points.begin(), points.end());
+  run(points.rbegin(), points.rend());
+  return hull;
+}
+
+std::string in_millimetres(double metres) { return decimal(1000.0 * metres, 1); }
+std::string in_degrees(double radians) { return decimal(radians * 180.0 / M_PI, 1); }
+
+std::string position_text(const geometry::Vector3d& p) {
+  return decimal(p.x(), 3) + ", " + decimal(p.y(), 3) + ", " + decimal(p.z(), 3);
+}
+
+/// Tilt and heading of the body's z and x axes, as a person would tell them.
+std::string orientation_text(const geometry::Quaterniond& rotation) {
+  const geometry::Vector3d z = rotation * geometry::Vector3d::UnitZ(), x = rotation * geometry::Vector3d::UnitX();
+  return in_degrees(std::acos(std::clamp(z.z(), -1.0, 1.0))) + ", " + in_degrees(std::atan2(x.y(), x.x()));
+}
+
+TableBlock final_poses_table(const belief::FinalPoses& poses) {
+  constexpr std::size_t kShown = 8;
+  TableBlock table;
+  table.caption = "Where " + poses.object + " ends: the heaviest of " + std::to_string(poses.components.size()) +
+                  " Gaussian components";
+  table.columns = {"share", "outcome", "x, y, z (m)", "spread x, y (mm)", "tilt, heading (°)"};
+  for (std::size_t i = 0; i < std::min(kShown, poses.components.size()); ++i) {
+    const belief::PoseComponent& c = poses.components[i];
+    table.rows.push_back(
+        {percent(c.weight), c.outcome, position_text(c.mean.translation),
+         in_millimetres(std::sqrt(c.covariance(3, 3))) + ", " + in_millimetres(std::sqrt(c.covariance(4, 4))),
+         orientation_text(c.mean.rotation)});
+  }
+  return table;
+}
+
+std::vector<ReportSection> sections_of(const belief::PredictAnswer& answer, const belief::Scene& scene) {
+  std::vector<ReportSection> sections;
+  ReportSection& outcomes = sections.emplace_back();
+  outcomes.title = "What will happen";
+  if (!answer.outcomes.empty()) outcomes.blocks.push_back(OutcomeBlock{"", answer.outcomes});
+  outcomes.blocks.push_back(TextBlock{
+      "From " + std::to_string(answer.instances) + " simulated instances, " + decimal(answer.simulated_seconds, 0) +
+      " simulated seconds in " + decimal(answer.wall_seconds, 1) + " s." +
+      (answer.converged ? "" : " The intervals are wider than asked for: the limit of the work came first.")});
+  for (const belief::FinalPoses& poses : answer.final_poses) {
+    ReportSection& section = sections.emplace_back();
+    section.title = "Where " + poses.object + " ends";
+    section.blocks.push_back(HeatMapBlock{
+        "Probability per " + decimal(100.0 * poses.heat_map.cell, 0) + " cm cell, seen from above; lines: supports",
+        poses.heat_map, support_outlines(scene)});
+    section.blocks.push_back(final_poses_table(poses));
+  }
+  if (!answer.typical_runs.empty()) {
+    ReportSection& section = sections.emplace_back();
+    section.title = "Typical runs";
+    for (const belief::TypicalRun& run : answer.typical_runs) {
+      TimelineBlock block;
+      block.caption = run.outcome + " (" + percent(run.share) + ")";
+      block.timeline = run.timeline;
+      if (!run.trajectory.states.empty()) {
+        block.begin = run.trajectory.start().time;
+        block.end = run.trajectory.final().time;
+      }
+      section.blocks.push_back(std::move(block));
+    }
+  }
+  return sections;
+}
+
+std::vector<ReportSection> sections_of(const belief::WhereAnswer& answer, const belief::Scene&) {
+  TableBlock table;
+  table.columns = {"object",         "state",         "moves",  "x, y, z (m)",
+                   "deviation (mm)", "deviation (°)", "exists", "confidence"};
+  for (const belief::WhereAnswer::Item& item : answer.items) {
+    const geometry::Matrix6d& P = item.estimate.covariance;
+    table.rows.push_back({item.object, belief::to_string(item.state), belief::to_string(item.estimate.motion),
+                          position_text(item.estimate.mean.translation),
+                          in_millimetres(std::sqrt(P.bottomRightCorner<3, 3>().trace())),
+                          in_degrees(std::sqrt(P.topLeftCorner<3, 3>().trace())), percent(item.existence),
+                          percent(item.estimate.confidence)});
+  }
+  return {{"Where everything is", {std::move(table)}}};
+}
+
+std::vector<ReportSection> sections_of(const belief::StabilityAnswer& answer, const belief::Scene&) {
+  ReportSection section{"Does " + answer.object + " stay?", {OutcomeBlock{"", {answer.stable}}}};
+  std::string text = "From " + std::to_string(answer.instances) + " simulated instances, " +
+                     decimal(answer.simulated_seconds, 0) + " simulated seconds in " + decimal(answer.wall_seconds, 1) +
+                     " s.";
+  if (!answer.likely_event.empty()) text += " When it does not stay, it typically " + answer.likely_event + ".";
+  section.blocks.push_back(TextBlock{std::move(text)});
+  return {std::move(section)};
+}
+
+std::vector<ReportSection> sections_of(const belief::ViewAnswer& answer, const belief::Scene&) {
+  PictureBlock pictures;
+  float near_depth = 1e9f, far_depth = 0.0f;
+  for (int y = 0; y < answer.depth.height(); ++y) {
+    for (int x = 0; x < answer.depth.width(); ++x) {
+      const float z = answer.depth(x, y);
+      if (!(z > 0.0f)) continue;
+      near_depth = std::min(near_depth, z);
+      far_depth = std::max(far_depth, z);
+    }
+  }
+  geometry::ColorImage depth = depth_picture(answer.depth, near_depth, far_depth);
+  std::vector<std::optional<geometry::Rgb>> colors;
+  for (std::size_t i = 0; i < answer.label_names.size(); ++i) colors.emplace_back(series_color(i));
+  geometry::ColorImage labelled = depth;
+  draw_outlines(answer.labels, colors, 2, labelled);
+  geometry::ColorImage presence = depth;
+  tint(answer.presence, 0.9, presence);
+  pictures.pictures.push_back({"The likeliest depth image, with outlines", std::move(labelled)});
+  pictures.pictures.push_back({"Probability that an object is seen at a pixel", std::move(presence)});
+  return {{"What the camera will see", {std::move(pictures)}}};
+}
+
+std::vector<ReportSection> sections_of(const std::monostate&, const belief::Scene&) { return {}; }
+
+}  // namespace
+
+std::vector<HeatMapBlock::Outline> support_outlines(const belief::Scene& scene) {
+  std::vector<HeatMapBlock::Outline> outlines;
+  for (const belief::Support& support : scene.supports) {
+    // Shape by shape and part by part, so that separate walls are seen as walls.
+    for (const belief::CollisionShape& shape : support.collision) {
+      for (const geometry::TriangleMesh& part : geometry::connected_components(belief::collision_mesh({shape}))) {
+        std::vector<Corner> points;
+        for (const geometry::Vector3d& p_SQ : part.vertices) {
+          const geometry::Vector3d p_WQ = support.X_WS * p_SQ;
+          points.push_back({p_WQ.x(), p_WQ.y()});
+        }
+        outlines.push_back({support.name, convex_outline(std::move(points))});
+      }
+    }
+    if (!support.hollow) continue;
+    std::vector<Corner> corners;
+    for (int i = 0; i < 8; ++i) {
+      const geometry::Vector3d sign(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0);
+      const geometry::Vector3d p_WQ =
+          support.X_WS * (support.hollow->X_OV * geometry::Vector3d(0.5 * sign.cwiseProduct(support.hollow->size)));
+      corners.push_back({p_WQ.x(), p_WQ.y()});
+    }
+    outlines.push_back({support.name + " (inside)", convex_outline(std::move(corners))});
+  }
+  return outlines;
+}
+
+std::vector<ReportSection> answer_sections(const belief::Answer& answer, const belief::Scene& scene) {
+  if (!answer.error.empty()) return {{"No answer", {TextBlock{answer.error}}}};
+  return std::visit([&](const auto& what) { return sections_of(what, scene); }, answer.what);
+}
+
+}  // namespace prescene::interfaces
