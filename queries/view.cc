@@ -11,6 +11,8 @@ namespace {
 
 /// Views that presence is averaged over: a share is good to 0.06 at worst, to 0.02 where the scene is smooth.
 constexpr int kViews = 64;
+/// What the duration of standing still is called, s.
+constexpr double kNow = 1e-3;
 
 std::vector<belief::Pose> robot_at(const belief::Scene& scene, double time) {
   std::vector<belief::Pose> X_WG;
@@ -19,13 +21,30 @@ std::vector<belief::Pose> robot_at(const belief::Scene& scene, double time) {
   return X_WG;
 }
 
+/// The view of now: nothing moves.
+class StandingStill final : public simulation::Simulator {
+ public:
+  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest&, const core::RandomStream&,
+           std::uint32_t, core::ThreadPool&, std::span<belief::Trajectory> trajectories,
+           const core::Cancellation*) const override {
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      trajectories[i] = {};
+      trajectories[i].states = {starts[i]};
+    }
+  }
+  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>&,
+                                                      const core::RandomStream&) const override {
+    return nullptr;  // nothing here steps
+  }
+};
+
 }  // namespace
 
 core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuery& query, const QueryContext& context) {
   if (!prior.scene->camera)
     return core::not_found("the scene has no camera: give its intrinsics and pose in the scene file");
-  if (!(query.time > 0.0 && query.time <= 60.0))
-    return core::invalid_input("a time of " + std::to_string(query.time) + " s: give more than 0 and at most 60");
+  if (!(query.time >= 0.0 && query.time <= 3600.0))
+    return core::invalid_input("a time of " + std::to_string(query.time) + " s: give between 0 and 3600");
   if (!context.make_renderer) return core::unavailable("no renderer: this service was set up without one");
   PRESCENE_TRY(
       auto scene,
@@ -35,7 +54,10 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   moving->stop_at_rest = false;
   belief::Effort effort;
   effort.exact_instances = kViews;
-  PRESCENE_TRY(const Foresight foresight, foresee(prior, std::move(moving), query.time, effort, context));
+  QueryContext foreseen = context;
+  if (query.time == 0.0) foreseen.make_simulator = [](auto) { return std::make_unique<StandingStill>(); };
+  PRESCENE_TRY(const Foresight foresight,
+               foresee(prior, std::move(moving), std::max(query.time, kNow), effort, foreseen));
 
   belief::Trajectory likeliest;
   foresight.simulator->run(std::span(&prior.likeliest, 1), foresight.request, prior.stream, 0, *context.pool,

@@ -5,8 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <fstream>
+#include <iterator>
 
+#include "prescene/belief/json.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/tests/support/paths.h"
 #include "sliding_scene.h"
 
 namespace prescene::queries {
@@ -324,6 +328,43 @@ TEST(View, ShowsTheLikeliestAndWhereObjectsMayBe) {
   EXPECT_EQ(seen.presence(tx, ty), 0.0f);
   const auto [hx, hy] = pixel(0.2, 0.0, 0.3);
   EXPECT_EQ(seen.labels(hx, hy), 4);
+}
+
+TEST(Documentation, ItsQuestionsAreUnderstood) {
+  std::ifstream page(tests::source_dir() / "docs" / "queries.md");
+  ASSERT_TRUE(page) << "docs/queries.md is missing";
+  const std::string text{std::istreambuf_iterator<char>(page), {}};
+  // Blocks marked `json` that begin with an id and a task are questions, but for those with a step: answers.
+  int questions = 0;
+  static const std::string kBegin = "```json\n", kEnd = "```";
+  for (std::size_t at = text.find(kBegin); at != std::string::npos; at = text.find(kBegin, at)) {
+    at += kBegin.size();
+    const std::string block = text.substr(at, text.find(kEnd, at) - at);
+    if (block.find("\"step\"") != std::string::npos) continue;
+    const auto query = belief::query_from_json(block);
+    EXPECT_TRUE(query) << block << core::to_string(query.status());
+    ++questions;
+  }
+  EXPECT_GE(questions, 4);
+}
+
+TEST(View, OfNowNeedsNoSimulator) {
+  core::ThreadPool pool(1);
+  QueryContext context;
+  context.pool = &pool;
+  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
+    return rendering::make_reference_renderer();
+  };
+  ViewQuery now;
+  now.time = 0.0;
+  const belief::Belief belief = two_hypotheses();
+  const Answer answer = queries::answer(belief, {"", now}, context);
+  ASSERT_EQ(answer.error, "");
+  const auto& seen = std::get<ViewAnswer>(answer.what);
+  const Eigen::Vector2d p =
+      belief.scene->camera->intrinsics.project(belief.X_WC.inverse() * geometry::Vector3d(0.11, 0.0, 0.2));
+  // Both hypotheses cover it.
+  EXPECT_NEAR(seen.presence(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))), 1.0, 1e-5);
 }
 
 TEST(View, NeedsACamera) {
