@@ -55,7 +55,11 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   belief::Effort effort;
   effort.exact_instances = kViews;
   QueryContext foreseen = context;
-  if (query.time == 0.0) foreseen.make_simulator = [](auto) { return std::make_unique<StandingStill>(); };
+  if (query.time == 0.0) {
+    foreseen.make_simulator = [](auto) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+      return std::unique_ptr<simulation::Simulator>(std::make_unique<StandingStill>());
+    };
+  }
   PRESCENE_TRY(const Foresight foresight,
                foresee(prior, std::move(moving), std::max(query.time, kNow), effort, foreseen));
 
