@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fits the cube's model to recorded tosses.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "prescene/service/evaluate/cube_tosses.h"
+
+namespace prescene::service {
+
+/// Read off the recordings themselves, without simulation.
+struct CubeMeasurements {
+  double half_edge = 0.0;  ///< m, median height of the middle at rest.
+  double gravity = 0.0;    ///< m/s^2, pooled from the flights before contact.
+  double gravity_standard_error = 0.0;
+};
+/// From tosses of at least eight frames before contact; `model` gives the centre of mass. Fails with kInvalidInput when
+/// there is none.
+core::Result<CubeMeasurements> measure_cube(const std::vector<CubeToss>& tosses, const CubeModel& model);
+
+/// What is made small: mean Brier score of the face + kPlaceWeight times the mean energy score of the place.
+inline constexpr double kPlaceWeight = 5.0;  // per m
+double calibration_cost(const std::vector<CubeForecast>& forecasts);
+
+struct CubeCalibration {
+  CubeModel model;
+  double cost = 0.0;
+  int evaluations = 0;
+};
+/// Called after each round of the search with a line about the best so far; false stops it.
+using CalibrationProgress = std::function<bool(const std::string& line)>;
+
+/// Measures lengths, then searches frictions, restitution, inertia, rounding, centre of mass and the size of the start's
+/// noise (its four parts keep their ratios) with `samples` starts a toss, the same ones in each evaluation.
+core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses, CubeModel start, std::uint64_t seed,
+                                             int samples, int max_evaluations, core::ThreadPool& threads,
+                                             const CalibrationProgress& progress = {});
+
+}  // namespace prescene::service

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/evaluate/cube_model.h"
+
+namespace prescene::service {
+
+CubeModel shipped_cube_model() {
+  CubeModel model;
+  model.provenance = "read off the recorded tosses by hand; the search has not been run yet";
+  return model;
+}
+
+CubeModel described_cube_model() {
+  CubeModel model;
+  model.half_edge = 0.0524;
+  model.gravity = 9.81;
+  model.edge_radius = 0.0;
+  model.center_of_mass_z = 0.0;
+  model.unit_inertia = 0.00081 / 0.37;
+  model.unit_inertia_z_ratio = 1.0;
+  model.sliding_friction = 0.18;
+  model.impact_friction = 0.18;
+  model.restitution = 0.125;
+  model.step = 1.0 / 240.0;
+  model.position_noise = 0.0005;
+  model.rotation_noise = 0.0052;
+  model.velocity_noise = 0.01;
+  model.spin_noise = 0.05;
+  model.provenance = "README of the data set";
+  return model;
+}
+
+belief::Scene make_cube_scene(const CubeModel& model) {
+  belief::Scene scene;
+  scene.name = "cube toss";
+  scene.gravity_W = {0.0, 0.0, -model.gravity};
+
+  belief::ObjectModel cube;
+  cube.name = "cube";
+  const double edge = 2.0 * model.half_edge;
+  cube.collision = {belief::PrimitiveShape{geometry::BoxShape{{edge, edge, edge}}, geometry::Pose{}}};
+  cube.mass = belief::FixedScalar{model.mass};
+  cube.center_of_mass = belief::Vector3Distribution::fixed({0.0, 0.0, model.center_of_mass_z});
+  cube.unit_inertia = geometry::Vector3d(model.unit_inertia, model.unit_inertia,
+                                         model.unit_inertia * model.unit_inertia_z_ratio)
+                          .asDiagonal();
+  cube.contact.friction = belief::FixedScalar{model.sliding_friction};
+  cube.contact.impact_friction = belief::FixedScalar{model.impact_friction};
+  cube.contact.restitution = belief::FixedScalar{model.restitution};
+  cube.contact.edge_radius = model.edge_radius;
+  scene.models.push_back(cube);
+
+  belief::SceneObject object;
+  object.name = "cube";
+  scene.objects.push_back(object);
+
+  belief::Support board;
+  board.name = "board";
+  board.collision = {belief::PrimitiveShape{geometry::BoxShape{{4.0, 4.0, 0.2}}, geometry::Pose{}}};
+  board.X_WS = geometry::Pose::from_translation({0.0, 0.0, -0.1});
+  // Frictions and restitutions combine by product: the cube's are the pair's.
+  board.contact.friction = belief::FixedScalar{1.0};
+  board.contact.restitution = belief::FixedScalar{1.0};
+  scene.supports.push_back(board);
+  return scene;
+}
+
+simulation::BulletOptions make_cube_options(const CubeModel& model) {
+  simulation::BulletOptions options;
+  options.step = model.step;
+  options.impact_speed = model.impact_speed;
+  return options;
+}
+
+int face_up(const geometry::Quaterniond& R_WO) {
+  const geometry::Vector3d up_O = R_WO.conjugate() * geometry::Vector3d::UnitZ();
+  int axis = 0;
+  up_O.cwiseAbs().maxCoeff(&axis);
+  return 2 * axis + (up_O[axis] > 0.0 ? 0 : 1);
+}
+
+}  // namespace prescene::service
