@@ -140,6 +140,10 @@ std::vector<ReportSection> sections_of(const belief::ViewAnswer& answer, const b
   geometry::ColorImage labelled = depth;
   draw_outlines(answer.labels, colors, 2, labelled);
   geometry::ColorImage presence = depth;
+  // Darker, so that light colours stand out.
+  for (int y = 0; y < presence.height(); ++y)
+    for (int x = 0; x < presence.width(); ++x)
+      for (std::uint8_t& channel : presence(x, y)) channel = static_cast<std::uint8_t>(channel / 2);
   tint(answer.presence, 0.9, presence);
   pictures.pictures.push_back({"The likeliest depth image, with outlines", std::move(labelled)});
   pictures.pictures.push_back({"Probability that an object is seen at a pixel", std::move(presence)});

@@ -93,6 +93,25 @@ std::string curve_path(const ChartBlock::Curve& curve, const Axis& x, const Axis
 
 constexpr std::size_t kMostLanes = 40;
 
+/// "carton inside bin", "carton falls".
+std::string lane_name(belief::Relation relation, const std::string& subject, const std::string& other) {
+  switch (relation) {
+    case belief::Relation::kContact:
+      return subject + " touches " + other;
+    case belief::Relation::kMoving:
+      return subject + " moves";
+    case belief::Relation::kFalling:
+      return subject + " falls";
+    default:
+      return subject + " " + belief::to_string(relation) + (other.empty() ? "" : " " + other);
+  }
+}
+
+/// At most `most` characters (of one byte), the last of them dots.
+std::string shortened(const std::string& text, std::size_t most) {
+  return text.size() <= most ? text : text.substr(0, most - 3) + "...";
+}
+
 }  // namespace
 
 std::vector<double> round_ticks(double low, double high, int count) {
@@ -194,9 +213,9 @@ std::string timeline_svg(const TimelineBlock& block) {
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const auto& [key, intervals] = lanes[i];
     const auto& [relation, subject, other] = key;
-    const std::string name = subject + " " + belief::to_string(relation) + (other.empty() ? "" : " " + other);
+    const std::string name = lane_name(relation, subject, other);
     const double top = kTop + kLane * static_cast<double>(i);
-    out += text_at(kLeft - 10.0, top + 16.0, name, "lane end");
+    out += text_at(kLeft - 10.0, top + 16.0, shortened(name, 38), "lane end");
     out += line(kLeft, top + kLane, kWidth - kRight, top + kLane, "grid");
     for (const belief::Interval* interval : intervals) {
       const double from = x(std::clamp(interval->begin, begin, end)), to = x(std::clamp(interval->end, begin, end));

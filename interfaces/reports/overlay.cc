@@ -123,7 +123,8 @@ void tint(const geometry::Image<float>& probability, double opacity, ColorImage&
   for (int y = 0; y < picture.height(); ++y) {
     for (int x = 0; x < picture.width(); ++x) {
       const double p = std::clamp(static_cast<double>(probability_at(x, y)), 0.0, 1.0);
-      if (p > 0.0) mix(picture(x, y), heat_color(p), std::clamp(opacity, 0.0, 1.0) * std::sqrt(p));
+      if (p > 0.0)
+        mix(picture(x, y), heat_color(std::sqrt(p)), std::clamp(opacity, 0.0, 1.0) * (0.3 + 0.7 * std::sqrt(p)));
     }
   }
 }

@@ -29,7 +29,8 @@ void draw_outlines(const geometry::LabelImage& labels, std::span<const std::opti
 void tint(const geometry::LabelImage& labels, std::span<const std::optional<geometry::Rgb>> colors, double opacity,
           geometry::ColorImage& picture);
 
-/// Mixes heat colours into the picture where the probability (in [0, 1]) is not 0, the more the higher it is.
+/// Mixes the heat colour of its square root into the picture where the probability (in [0, 1]) is not 0, the more the
+/// higher it is.
 void tint(const geometry::Image<float>& probability, double opacity, geometry::ColorImage& picture);
 
 /// A heat map as a picture, one pixel a cell, y upwards; the largest mass is the brightest, and colours follow its

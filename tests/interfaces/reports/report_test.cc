@@ -272,7 +272,7 @@ TEST(AnswerSections, ShowEveryKindOfAnswer) {
   answer.what = predict;
   const std::string predicted = page_of(answer);
   for (const char* shown :
-       {"in_bin", "60.0 %", "384 simulated instances", "Where carton ends", "carton falling", "wider than asked"})
+       {"in_bin", "60.0 %", "384 simulated instances", "Where carton ends", "carton falls", "wider than asked"})
     EXPECT_THAT(predicted, HasSubstr(shown));
 
   belief::StabilityAnswer stability;
