@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes the seeds of the fuzz targets: make_fuzz_seeds FOLDER. Small, sound inputs of every kind that the decoders
+// know.
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "prescene/core/check.h"
+#include "prescene/geometry/primitives.h"
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/images/jpeg.h"
+#include "prescene/interfaces/images/png.h"
+#include "prescene/interfaces/mcap/mcap_writer.h"
+#include "prescene/interfaces/mesh_files/mesh_file.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/interfaces/ros_messages/schemas.h"
+#include "prescene/tests/interfaces/ros_messages/schema_walk.h"
+#include "prescene/tests/support/paths.h"
+
+using namespace prescene;              // NOLINT(google-build-using-namespace)
+using namespace prescene::interfaces;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+std::filesystem::path corpus;
+
+void write_seed(const std::string& target, const std::string& name, std::span<const std::uint8_t> bytes) {
+  std::filesystem::create_directories(corpus / target);
+  PRESCENE_CHECK(write_file(corpus / target / ("seed_" + name), bytes).ok());
+}
+
+void write_seed(const std::string& target, const std::string& name, const std::string& text) {
+  write_seed(target, name, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+void write_image_seeds() {
+  geometry::ColorImage color(9, 7);
+  geometry::DepthImage depth(9, 7);
+  geometry::Image<std::uint8_t> label(9, 7);
+  for (int y = 0; y < 7; ++y) {
+    for (int x = 0; x < 9; ++x) {
+      color(x, y) = {static_cast<std::uint8_t>(20 * x), static_cast<std::uint8_t>(30 * y), 99};
+      depth(x, y) = 0.5F + 0.01F * static_cast<float>(x * y);
+      label(x, y) = static_cast<std::uint8_t>(x / 3);
+    }
+  }
+  write_seed("png", "color", encode_png(std::as_const(color).view()));
+  write_seed("png", "depth", encode_png_depth(std::as_const(depth).view(), 0.001));
+  write_seed("png", "label", encode_png(std::as_const(label).view()));
+  write_seed("jpeg", "quality_50", encode_jpeg(std::as_const(color).view(), 50));
+  write_seed("jpeg", "quality_95", encode_jpeg(std::as_const(color).view(), 95));
+
+  const std::string columns = "frame,color,depth,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33";
+  const std::string pose = "a,a.color.png,a.depth.png,0,-1,0,0.5,1,0,0,-0.25,0,0,1,2,0,0,0,1";
+  const std::string camera = std::string(1, '\0') + "10 0 1.5\n0 10 1\n0 0 1\n";
+  write_seed("frame_folder", "rate", columns + "\n" + pose + "\n" + pose + "\n" + camera);
+  write_seed("frame_folder", "stamps", columns + ",stamp_ns\r\n" + pose + ",5\r\n" + pose + ",9\r\n" + camera);
+}
+
+void write_mesh_seeds() {
+  const geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{0.1, 0.2, 0.3}});
+  write_seed("ply", "binary", encode_ply(box));
+  write_seed("ply", "text", encode_ply(box, MeshEncoding::kText, std::vector<geometry::Rgb>(8, {1, 2, 3})));
+  write_seed(
+      "ply", "lists",
+      std::string(
+          "ply\nformat ascii 1.0\nelement a 1\nproperty list uchar float l\nelement vertex 4\nproperty double x\n"
+          "property float y\nproperty short z\nelement face 1\nproperty uchar f\nproperty list int uint "
+          "vertex_index\nend_header\n2 1 2\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n9 4 0 1 2 3\n"));
+  write_seed("ply", "big_endian",
+             std::string(
+                 "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty char x\nproperty char y\nproperty char "
+                 "z\nelement face 1\nproperty list uchar uchar vertex_indices\nend_header\n") +
+                 std::string("\0\0\0\1\0\0\0\1\0\3\0\1\2", 13));
+  write_seed("obj", "box", encode_obj(box));
+  write_seed("obj", "forms",
+             std::string("# x\nv 0 0 0 1 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1/1/1 2//2 -2 \\\n 4\n"));
+  write_seed("stl", "binary", encode_stl(box));
+  write_seed("stl", "text", encode_stl(box, MeshEncoding::kText));
+}
+
+void write_recording_seed(const std::string& name, McapCompression compression, std::size_t chunk_bytes) {
+  const tests::ScratchDir scratch;
+  auto writer = McapWriter::create(scratch.path() / "a", {.compression = compression, .chunk_bytes = chunk_bytes});
+  PRESCENE_CHECK(writer.ok());
+  const int a = *(*writer)->add_channel({"/1", "cdr", {"pkg/msg/T", "ros2msg", "uint8[] d\n"}, {{"k", "v"}}});
+  const int b = *(*writer)->add_channel({"/2", "json", {}, {}});
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    const std::vector<std::uint8_t> data(200, static_cast<std::uint8_t>(i));
+    PRESCENE_CHECK((*writer)->write({i % 3 == 0 ? b : a, i, i * 10, i, data}).ok());
+    if (i == 5) PRESCENE_CHECK((*writer)->write_metadata({"m", {{"k", "v"}}}).ok());
+  }
+  PRESCENE_CHECK((*writer)->close().ok());
+  write_seed("mcap", name, *read_file(scratch.path() / "a", 1 << 20));
+}
+
+template <class Message>
+void write_message_seeds(const std::string& target) {
+  const RosType& type = ros_type<Message>();
+  const tests::Schema schema = tests::parse_schema(type.name, ros2msg_schema(type));
+  const core::RandomStream stream(1, core::Purpose::kTest);
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    const std::endian order = i == 3 ? std::endian::big : std::endian::little;
+    write_seed("cdr_" + target, std::to_string(i), tests::random_cdr(schema, stream.at(i), order));
+  }
+}
+
+void write_sound_messages() {
+  const geometry::PinholeCamera camera{6, 4, 5.0, 5.0, 2.5, 1.5};
+  const geometry::DepthImage depth(6, 4, 0.75F);
+  const geometry::ColorImage color(6, 4, {1, 2, 3});
+  const RosHeader header{{1, 2}, "camera"};
+  write_seed("cdr_image", "16uc1", encode_cdr(to_ros_image_16uc1(depth, header)));
+  write_seed("cdr_image", "32fc1", encode_cdr(to_ros_image_32fc1(depth, header)));
+  write_seed("cdr_image", "rgb8", encode_cdr(to_ros_image(color, header)));
+  write_seed("cdr_camera_info", "plain", encode_cdr(to_ros_camera_info(camera, header)));
+  const geometry::Pose X = geometry::Pose::from_translation({1, 2, 3});
+  write_seed("cdr_tf", "plain", encode_cdr(RosTfMessage{{to_ros_transform(FrameTransform{"world", "camera", 5, X})}}));
+  write_seed("cdr_pose_stamped", "plain", encode_cdr(RosPoseStamped{header, to_ros_pose(X)}));
+  write_seed("cdr_pose_with_covariance", "plain",
+             encode_cdr(RosPoseWithCovarianceStamped{header, to_ros_pose(X, 0.01 * geometry::Matrix6d::Identity())}));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: make_fuzz_seeds FOLDER\n");
+    return 2;
+  }
+  corpus = argv[1];
+  write_image_seeds();
+  write_mesh_seeds();
+  write_recording_seed("none", McapCompression::kNone, 600);
+  write_recording_seed("lz4", McapCompression::kLz4, 1500);
+  write_recording_seed("zstd", McapCompression::kZstd, 1500);
+  write_message_seeds<RosImage>("image");
+  write_message_seeds<RosCompressedImage>("compressed_image");
+  write_message_seeds<RosCameraInfo>("camera_info");
+  write_message_seeds<RosJointState>("joint_state");
+  write_message_seeds<RosTfMessage>("tf");
+  write_message_seeds<RosString>("string");
+  write_message_seeds<RosClock>("clock");
+  write_message_seeds<RosPoseStamped>("pose_stamped");
+  write_message_seeds<RosPoseWithCovarianceStamped>("pose_with_covariance");
+  write_message_seeds<RosPoseArray>("pose_array");
+  write_message_seeds<RosTwistStamped>("twist");
+  write_message_seeds<RosDetection3dArray>("detections");
+  write_message_seeds<RosMarkerArray>("markers");
+  write_message_seeds<RosDiagnosticArray>("diagnostics");
+  write_sound_messages();
+  return 0;
+}
