@@ -11,10 +11,6 @@ namespace prescene::interfaces {
 /// 'text' in single quotes: bytes outside printable ASCII as \xNN, quotes and backslashes escaped, "..." after
 /// `max_characters` of the text.
 std::string quote(std::string_view text, std::size_t max_characters = 64);
-/// The old name, which std::quoted hides for a std::string where <iomanip> is included.
-inline std::string quoted(std::string_view text, std::size_t max_characters = 64) {
-  return quote(text, max_characters);
-}
 
 /// "3", "0.25", "1e-09": a short text that reads back as the same number; "nan", "inf", "-inf".
 std::string number_text(double value);

@@ -73,7 +73,7 @@ std::string description(const LocatedValue& value) {
     case LocatedValue::Kind::kNothing:
       return "there is nothing here";
     case LocatedValue::Kind::kScalar:
-      return interfaces::quoted(value.text, 40) + (value.quoted ? " is quoted text" : "");
+      return interfaces::quote(value.text, 40) + (value.quoted ? " is quoted text" : "");
     case LocatedValue::Kind::kList:
       return "this is a list of " + std::to_string(value.items.size());
     case LocatedValue::Kind::kMap:
@@ -95,7 +95,7 @@ std::optional<double> read_number(const LocatedValue& value, Problems& problems,
       const std::optional<std::string> better = converted(value.text, range.unit);
       problems.add(
           value.place, value.path,
-          interfaces::quoted(value.text, 40) + (value.quoted ? " is quoted text, not a number" : " is not a number"),
+          interfaces::quote(value.text, 40) + (value.quoted ? " is quoted text, not a number" : " is not a number"),
           better ? *better : std::string(range.remedy));
     } else {
       report_type(value, problems, range.remedy);
@@ -103,7 +103,7 @@ std::optional<double> read_number(const LocatedValue& value, Problems& problems,
     return std::nullopt;
   }
   if (!std::isfinite(number)) {
-    problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + " is not a finite number",
+    problems.add(value.place, value.path, interfaces::quote(value.text, 40) + " is not a finite number",
                  std::string(range.remedy));
     return std::nullopt;
   }
@@ -163,7 +163,7 @@ std::optional<std::size_t> read_word(const LocatedValue& value, Problems& proble
   if (value.kind == LocatedValue::Kind::kScalar) {
     const auto found = std::find(words.begin(), words.end(), value.text);
     if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-    problems.add(value.place, value.path, interfaces::quoted(value.text, 40) + " is not known here",
+    problems.add(value.place, value.path, interfaces::quote(value.text, 40) + " is not known here",
                  suggestion(value.text, words));
     return std::nullopt;
   }
@@ -196,7 +196,7 @@ const LocatedValue* Binder::one_of(const std::vector<std::string>& keys, std::st
     if (!value) continue;
     if (found) {
       problems_.add(value->place, value->path,
-                    interfaces::quoted(key) + " and " + interfaces::quoted(first) + " exclude each other",
+                    interfaces::quote(key) + " and " + interfaces::quote(first) + " exclude each other",
                     "remove one of them");
       continue;
     }
@@ -266,7 +266,7 @@ void Binder::finish() {
     });
     if (is_explained) continue;
     problems_.add(value_.place, value_.path,
-                  missing.keys.size() == 1 ? "the key " + interfaces::quoted(missing.keys[0]) + " is missing"
+                  missing.keys.size() == 1 ? "the key " + interfaces::quote(missing.keys[0]) + " is missing"
                                            : "a key is missing",
                   missing.remedy);
   }

@@ -159,7 +159,7 @@ class TreeBuilder final : public YAML::EventHandler {
                                    [&](const LocatedValue::Key& other) { return other.name == key.text; });
     if (same != map.value.keys.end())
       stop(key.place,
-           "the key " + interfaces::quoted(key.text) + " is here twice, first on line " +
+           "the key " + interfaces::quote(key.text) + " is here twice, first on line " +
                std::to_string(same->place.line),
            "remove or rename one");
     map.value.keys.push_back({key.text, key.place});
@@ -167,7 +167,7 @@ class TreeBuilder final : public YAML::EventHandler {
   }
 
   static std::string shown(const std::string& key) {
-    const std::string safe = interfaces::quoted(key, 40);
+    const std::string safe = interfaces::quote(key, 40);
     return safe.substr(1, safe.size() - 2);
   }
 

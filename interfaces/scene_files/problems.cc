@@ -25,7 +25,7 @@ std::string joined(const std::vector<std::string>& words, std::string_view last_
   std::string text;
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (i > 0) text.append(i + 1 == words.size() ? last_separator : std::string_view(", "));
-    text.append(interfaces::quoted(words[i]));
+    text.append(interfaces::quote(words[i]));
   }
   return text;
 }

@@ -52,7 +52,7 @@ class ActionReader {
     const std::string name = object_name(fields, key);
     if (!name.empty() && !held_.count(name)) {
       const LocatedValue& at = *fields.find(key);
-      problems_.add(at.place, at.path, interfaces::quoted(name) + " is not held at that time",
+      problems_.add(at.place, at.path, interfaces::quote(name) + " is not held at that time",
                     "give the object 'held_by', or grasp it before");
     }
     return name;

@@ -128,7 +128,7 @@ class ConditionReader {
     if (!index) return;
     const belief::Support& support = context_.scene.supports[static_cast<std::size_t>(*index)];
     if (!support.hollow) {
-      problems_.add(value.place, value.path, interfaces::quoted(name) + " has no hollow",
+      problems_.add(value.place, value.path, interfaces::quote(name) + " has no hollow",
                     "make it an open_bin, give it 'hollow: {size: ...}', or give a box {position, size}");
       return;
     }

@@ -26,7 +26,7 @@ std::vector<std::string> read_names(const LocatedValue* map, Problems& problems)
     const std::string& name = map->keys[i].name;
     if (!belief::check_name(name).ok())
       problems.add(map->keys[i].place, map->items[i].path,
-                   "the name " + interfaces::quoted(name) + " has characters that names can't have",
+                   "the name " + interfaces::quote(name) + " has characters that names can't have",
                    "use letters, digits, '_', '-' and '.', at most 128");
     names.push_back(name);
   }
@@ -133,7 +133,7 @@ std::string SceneContext::read_name(const LocatedValue& value, const std::vector
   if (!name) return {};
   if (std::find(names.begin(), names.end(), *name) != names.end()) return *name;
   std::string remedy = suggestion(*name, names);
-  problems.add(value.place, value.path, interfaces::quoted(*name) + " is not " + what + " of this file",
+  problems.add(value.place, value.path, interfaces::quote(*name) + " is not " + what + " of this file",
                remedy.empty() ? "define it first" : std::move(remedy));
   return {};
 }
