@@ -21,13 +21,14 @@ struct Face {
   double solid_angle = 0.0;
   double tip_angle = 0.0;  // negative: it does not carry the centre of mass
   double height = 0.0;
-  int rolls_to = -1;       // the face beyond the edge over which it falls
+  int rolls_to = -1;  // the face beyond the edge over which it falls
 };
 
 /// Solid angle of a triangle from the origin [Van Oosterom & Strackee 1983].
 double solid_angle(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
   const double numerator = a.dot(b.cross(c));
-  const double denominator = a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() + b.dot(c) * a.norm() + c.dot(a) * b.norm();
+  const double denominator =
+      a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() + b.dot(c) * a.norm() + c.dot(a) * b.norm();
   return 2.0 * std::atan2(numerator, denominator);
 }
 
@@ -37,7 +38,8 @@ Vector3d area_normal(const TriangleMesh& hull, std::size_t triangle) {
 }
 
 /// The face number of each triangle.
-std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, std::size_t>& triangle_of_edge, double flatness) {
+std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, std::size_t>& triangle_of_edge,
+                                double flatness) {
   std::vector<int> face_of(hull.triangles.size(), -1);
   int faces = 0;
   for (std::size_t seed = 0; seed < hull.triangles.size(); ++seed) {
@@ -50,7 +52,8 @@ std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, s
       const auto corners = hull.triangles[open.back()];
       open.pop_back();
       for (int k = 0; k < 3; ++k) {
-        const auto beyond = triangle_of_edge.find({corners[static_cast<std::size_t>((k + 1) % 3)], corners[static_cast<std::size_t>(k)]});
+        const auto beyond = triangle_of_edge.find(
+            {corners[static_cast<std::size_t>((k + 1) % 3)], corners[static_cast<std::size_t>(k)]});
         if (beyond == triangle_of_edge.end() || face_of[beyond->second] >= 0) continue;
         if (area_normal(hull, beyond->second).normalized().dot(normal) < std::cos(flatness)) continue;
         face_of[beyond->second] = faces;
@@ -64,7 +67,8 @@ std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, s
 
 }  // namespace
 
-core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm, double flatness) {
+core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm,
+                                                     double flatness) {
   PRESCENE_TRY(TriangleMesh hull, convex_hull(mesh.vertices));
   for (Vector3d& vertex : hull.vertices) vertex -= p_BoBcm;  // from here on about the centre of mass
   std::map<Edge, std::size_t> triangle_of_edge;
@@ -86,7 +90,8 @@ core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, c
     face.normal.normalize();
     face.height = std::numeric_limits<double>::lowest();
     for (const std::size_t t : face.triangles) {
-      for (const std::uint32_t v : hull.triangles[t]) face.height = std::max(face.height, face.normal.dot(hull.vertices[v]));
+      for (const std::uint32_t v : hull.triangles[t])
+        face.height = std::max(face.height, face.normal.dot(hull.vertices[v]));
     }
     if (face.height <= 0.0) {
       return core::invalid_input("the centre of mass is not inside of the convex hull: correct one of them");
@@ -122,9 +127,11 @@ core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, c
   std::vector<RestingPose> poses;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (faces[f].tip_angle < 0.0) continue;
-    poses.push_back({Quaterniond::FromTwoVectors(faces[f].normal, -Vector3d::UnitZ()), faces[f].height, faces[f].tip_angle, share[f]});
+    poses.push_back({Quaterniond::FromTwoVectors(faces[f].normal, -Vector3d::UnitZ()), faces[f].height,
+                     faces[f].tip_angle, share[f]});
   }
-  std::stable_sort(poses.begin(), poses.end(), [](const RestingPose& a, const RestingPose& b) { return a.probability > b.probability; });
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const RestingPose& a, const RestingPose& b) { return a.probability > b.probability; });
   return poses;
 }
 

@@ -10,17 +10,18 @@ namespace prescene::geometry {
 
 /// One way to lie: on a face of the convex hull that carries the centre of mass.
 struct RestingPose {
-  Quaterniond R_WB;           ///< Turns the body so that the face lies down (its outward normal along -z of W).
-  double height = 0.0;        ///< Of the centre of mass above the plane, m.
+  Quaterniond R_WB;     ///< Turns the body so that the face lies down (its outward normal along -z of W).
+  double height = 0.0;  ///< Of the centre of mass above the plane, m.
   /// Least angle that the body must be tipped by to fall off the face, rad; small = it hardly stands.
   double tip_angle = 0.0;
-  /// Share of uniformly random rotations that end here when the body is put down slowly: the face's solid angle from the
-  /// centre of mass and that of the faces from which it rolls here [Goldberg et al. 1999, quasi-static].
+  /// Share of uniformly random rotations that end here when the body is put down slowly: the face's solid angle from
+  /// the centre of mass and that of the faces from which it rolls here [Goldberg et al. 1999, quasi-static].
   double probability = 0.0;
 };
 
 /// Likeliest first; probabilities sum to one. Hull faces within `flatness` (rad) of each other count as one. Fails with
 /// kInvalidInput when the vertices lie in a plane or the centre of mass is outside of the hull.
-core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm, double flatness = 0.02);
+core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm,
+                                                     double flatness = 0.02);
 
 }  // namespace prescene::geometry

@@ -33,7 +33,8 @@ TEST(RestingPoses, ABoxLiesOnItsSixFaces) {
 }
 
 TEST(RestingPoses, AnOffCentreMassRollsOffTheFarFaces) {
-  // The mass sits so near to one end that the body can't stand on the other end's slanted sides; it always has a way to lie.
+  // The mass sits so near to one end that the body can't stand on the other end's slanted sides; it always has a way to
+  // lie.
   const TriangleMesh cone = make_mesh(Cone{0.05, 0.2}, 24);
   const MassProperties mass = *mass_properties(cone, 1000.0);
   const auto poses = resting_poses(cone, mass.p_BoBcm);
@@ -51,7 +52,8 @@ TEST(RestingPoses, AnOffCentreMassRollsOffTheFarFaces) {
 TEST(RestingPoses, AThinStickDoesNotStandOnASlantedEnd) {
   TriangleMesh stick = make_mesh(BoxShape{{0.02, 0.02, 0.3}});
   for (Vector3d& vertex : stick.vertices) {
-    if (vertex.z() > 0.0) vertex.x() += 0.2;  // a sheared box: its ends are level, but the middle is far off to the side
+    if (vertex.z() > 0.0)
+      vertex.x() += 0.2;  // a sheared box: its ends are level, but the middle is far off to the side
   }
   const auto poses = resting_poses(stick, Vector3d(0.1, 0.0, 0.0));
   ASSERT_TRUE(poses.ok());

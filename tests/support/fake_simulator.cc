@@ -34,7 +34,7 @@ void FakeSimulator::run(std::span<const belief::WorldState> starts, const simula
       for (double t = request.sample_interval; t < duration; t += request.sample_interval)
         trajectory.states.push_back(between(starts[i], end, t / duration));
     trajectory.states.push_back(std::move(end));
-    trajectory.end = belief::TrajectoryEnd::kAtRest;
+    trajectory.end = request.stop.stop_at_rest ? belief::TrajectoryEnd::kAtRest : belief::TrajectoryEnd::kDuration;
     trajectory.simulated_seconds = duration;
   });
 }

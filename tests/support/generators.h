@@ -35,12 +35,14 @@ rc::Gen<geometry::TriangleMesh> closed_meshes();
 
 }  // namespace prescene::tests
 
-// Found by RapidCheck and GoogleTest when they print a counter-example.
+// Found by RapidCheck when it prints a counter-example.
 namespace prescene::geometry {
 
+// NOLINTBEGIN(readability-identifier-naming): the name that RapidCheck looks up.
 void showValue(const Pose& X, std::ostream& out);
 void showValue(const Primitive& primitive, std::ostream& out);
 /// Numbers of vertices and triangles, and the vertices when they are few.
 void showValue(const TriangleMesh& mesh, std::ostream& out);
+// NOLINTEND(readability-identifier-naming)
 
 }  // namespace prescene::geometry

@@ -101,6 +101,6 @@ testing::Matcher<const geometry::Image<Pixel>&> is_near(const geometry::Image<Pi
 // Found by GoogleTest when it prints a value.
 namespace prescene::geometry {
 
-void PrintTo(const Pose& X, std::ostream* out);
+void PrintTo(const Pose& X, std::ostream* out);  // NOLINT(readability-identifier-naming)
 
 }  // namespace prescene::geometry
