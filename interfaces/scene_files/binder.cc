@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "prescene/interfaces/bytes/text.h"
@@ -41,7 +42,8 @@ std::optional<std::string> converted(std::string_view text, std::string_view bas
   if (!parse_number(trimmed(text.substr(0, end)), &number)) return std::nullopt;
   const std::string_view name = trimmed(text.substr(end));
   for (const Unit& unit : kUnits)
-    if (unit.name == name && unit.base == base) return "write " + number_text(number * unit.factor) + " without a unit";
+    if (unit.name == name && unit.base == base)
+      return "write " + rounded_text(number * unit.factor) + " without a unit";
   return std::nullopt;
 }
 
@@ -57,7 +59,7 @@ std::string unit_guess(double number, const NumberRange& range) {
   for (const Guess& guess : kGuesses) {
     const double meant = number * guess.factor;
     if (guess.base == range.unit && std::abs(number) > std::abs(meant) && meant >= range.low && meant <= range.high)
-      return std::string(guess.name) + "? then write " + number_text(meant) + "; ";
+      return std::string(guess.name) + "? then write " + rounded_text(meant) + "; ";
   }
   return {};
 }
@@ -67,6 +69,12 @@ std::string_view without_plus(std::string_view text) {
 }
 
 }  // namespace
+
+std::string rounded_text(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", number);
+  return text;
+}
 
 std::string description(const LocatedValue& value) {
   switch (value.kind) {

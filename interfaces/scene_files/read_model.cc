@@ -30,30 +30,78 @@ void read_contact(Binder& binder, ContactProperties& contact) {
   binder.read("edge_radius", contact.edge_radius, kLever);
 }
 
-SymmetryGroup read_symmetry(const LocatedValue& value, Problems& problems) {
-  if (value.kind == LocatedValue::Kind::kScalar) {
-    const auto word = read_word(value, problems, {"none", "cuboid"});
-    return word == 1 ? SymmetryGroup::cuboid() : SymmetryGroup::none();
+// Whether the product of any two of the rotations is one of them or the identity.
+bool is_group(const std::vector<geometry::Quaterniond>& rotations) {
+  constexpr double kSame = 0.02;  // rad: hand-written digits
+  for (const geometry::Quaterniond& a : rotations) {
+    for (const geometry::Quaterniond& b : rotations) {
+      const geometry::Quaterniond product = a * b;
+      const bool known = geometry::angle_between(product, geometry::Quaterniond::Identity()) < kSame ||
+                         std::any_of(rotations.begin(), rotations.end(), [&](const geometry::Quaterniond& c) {
+                           return geometry::angle_between(product, c) < kSame;
+                         });
+      if (!known) return false;
+    }
   }
-  Binder binder(value, problems);
-  const LocatedValue* axis_at = binder.require("axis", "give x, y, z or a direction [x, y, z]");
-  const Vector3d axis = axis_at ? read_axis(*axis_at, problems) : Vector3d(Vector3d::UnitZ());
-  Vector3d center = Vector3d::Zero();
-  if (const LocatedValue* at = binder.find("center")) center = read_vector(*at, problems, kPosition);
+  return true;
+}
+
+SymmetryGroup read_rotations(const LocatedValue& value, Problems& problems) {
+  SymmetryGroup group;
+  if (value.kind != LocatedValue::Kind::kList || value.items.empty() || value.items.size() > 64) {
+    report_type(value, problems, "give a list of 1 to 64 unit quaternions [w, x, y, z], without the identity");
+    return group;
+  }
+  const std::size_t before = problems.errors().size();
+  for (const LocatedValue& item : value.items) group.rotations.push_back(read_quaternion(item, problems));
+  if (problems.errors().size() == before && !is_group(group.rotations))
+    problems.add(value.place, value.path, "the rotations are no group", "add the product of any two of them");
+  return group;
+}
+
+SymmetryGroup read_turns(Binder& binder, const LocatedValue& axis_at, const Vector3d& center) {
+  Problems& problems = binder.problems();
+  const Vector3d axis = read_axis(axis_at, problems);
   bool continuous = false, flip = false;
   int order = 0;
   binder.read("continuous", continuous);
   binder.read("flip", flip);
   binder.read("order", order, 2, 64, "give the number of equal turns");
   if (continuous == (order > 0)) {
-    problems.add(value.place, value.path,
-                 continuous ? "'order' and 'continuous' exclude each other" : "the turns are missing",
+    problems.add(axis_at.place, axis_at.path,
+                 continuous ? "'order' and 'continuous' exclude each other" : "the turns about the axis are missing",
                  "give either 'order: 4' (turns of 90 degrees) or 'continuous: true'");
     return {};
   }
   if (flip && !continuous)
-    problems.add(value.place, value.path, "'flip' goes with 'continuous: true' only", "remove it");
+    problems.add(axis_at.place, axis_at.path, "'flip' goes with 'continuous: true' only", "remove it");
   return continuous ? SymmetryGroup::continuous(axis, flip, center) : SymmetryGroup::cyclic(axis, order, center);
+}
+
+SymmetryGroup read_symmetry(const LocatedValue& value, Problems& problems) {
+  if (value.kind == LocatedValue::Kind::kScalar) {
+    const auto word = read_word(value, problems, {"none", "cuboid", "ball"});
+    if (word == 2) return SymmetryGroup::every_rotation();
+    return word == 1 ? SymmetryGroup::cuboid() : SymmetryGroup::none();
+  }
+  Binder binder(value, problems);
+  Vector3d center = Vector3d::Zero();
+  if (const LocatedValue* at = binder.find("center")) center = read_vector(*at, problems, kPosition);
+  std::string which;
+  const LocatedValue* form =
+      binder.one_of({"axis", "cuboid", "ball", "rotations"},
+                    "give none, cuboid, ball, {axis: z, order: 4} or {axis: z, continuous: true}", false, &which);
+  for (const char* key : {"continuous", "flip", "order"})
+    if (which == "axis" || !form) binder.note_known(key);
+  if (!form) return {};
+  if (which == "axis") return read_turns(binder, *form, center);
+  if (which == "cuboid" || which == "ball") {
+    if (!read_bool(*form, problems).value_or(true)) return SymmetryGroup::none();
+    return which == "ball" ? SymmetryGroup::every_rotation(center) : SymmetryGroup::cuboid(center);
+  }
+  SymmetryGroup group = read_rotations(*form, problems);
+  group.p_BoC = center;
+  return group;
 }
 
 // [xx, yy, zz], or three rows.
@@ -95,12 +143,12 @@ void check_density(const LocatedValue& at, double mass, double volume, Problems&
   if (density > kDensity.high) {
     const double grams = density * 1e-3;
     problems.add(at.place, at.path,
-                 number_text(mass) + " kg in this volume of " + number_text(volume) + " m^3 is denser than any metal",
-                 grams > kDensity.low && grams < kDensity.high ? "grams? then write " + number_text(mass * 1e-3)
+                 number_text(mass) + " kg in this volume of " + rounded_text(volume) + " m^3 is denser than any metal",
+                 grams > kDensity.low && grams < kDensity.high ? "grams? then write " + rounded_text(mass * 1e-3)
                                                                : std::string("check the mass (kg) and the sizes (m)"));
   } else if (density < kDensity.low) {
     problems.add(at.place, at.path,
-                 number_text(mass) + " kg in this volume of " + number_text(volume) + " m^3 is lighter than air",
+                 number_text(mass) + " kg in this volume of " + rounded_text(volume) + " m^3 is lighter than air",
                  "check the sizes (metres, not millimetres or centimetres) and the mass (kg)");
   }
 }

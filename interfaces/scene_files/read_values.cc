@@ -202,7 +202,21 @@ Vector3d read_axis(const LocatedValue& value, Problems& problems) {
                  "give x, -x, y, ... or [x, y, z] of some length");
     return Vector3d::UnitZ();
   }
-  return axis.normalized();
+  return std::abs(axis.norm() - 1.0) < 1e-12 ? axis : Vector3d(axis.normalized());
+}
+
+Quaterniond read_quaternion(const LocatedValue& value, Problems& problems) {
+  constexpr const char* kRemedy = "give a unit quaternion [w, x, y, z]";
+  const auto q = read_numbers(value, problems, 4, {-2.0, 2.0, kRemedy});
+  if (!q) return Quaterniond::Identity();
+  const Quaterniond rotation((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
+  // Hand-written digits are rounded to about three places; more is a mistake (order, sign, a missing number).
+  const double error = std::abs(rotation.norm() - 1.0);
+  if (error > 0.01) {
+    problems.add(value.place, value.path, "the quaternion has length " + rounded_text(rotation.norm()), kRemedy);
+    return Quaterniond::Identity();
+  }
+  return error < 1e-9 ? rotation : rotation.normalized();  // what we wrote ourselves keeps its bits
 }
 
 Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
@@ -213,18 +227,7 @@ Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
       "give {quaternion: [w, x, y, z]}, {euler_deg: [roll, pitch, yaw]} or {axis_angle_deg: [x, y, z, angle]}", false,
       &which);
   if (!form) return Quaterniond::Identity();
-  if (which == "quaternion") {
-    const auto q = read_numbers(*form, problems, 4, {-2.0, 2.0, "give a unit quaternion [w, x, y, z]"});
-    if (!q) return Quaterniond::Identity();
-    const Quaterniond rotation((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
-    // Hand-written digits are rounded to about three places; more is a mistake (order, sign, a missing number).
-    if (std::abs(rotation.norm() - 1.0) > 0.01) {
-      problems.add(form->place, form->path, "the quaternion has length " + number_text(rotation.norm()),
-                   "give a unit quaternion [w, x, y, z]");
-      return Quaterniond::Identity();
-    }
-    return rotation.normalized();
-  }
+  if (which == "quaternion") return read_quaternion(*form, problems);
   if (which == "euler_deg") {
     const Vector3d angles = kDegree * read_vector(*form, problems, kAngleDeg);
     return Quaterniond(Eigen::AngleAxisd(angles.z(), Vector3d::UnitZ()) *

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/scene_files/model_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/bytes/text.h"
+#include "read_scene_parts.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using belief::ScalarDistribution;
+using geometry::Vector3d;
+
+std::string list(std::initializer_list<std::string> items) {
+  std::string text = "[";
+  for (const std::string& item : items) text.append(text.size() > 1 ? ", " : "").append(item);
+  return text + "]";
+}
+
+std::string text_of(const Vector3d& v) { return list({number_text(v.x()), number_text(v.y()), number_text(v.z())}); }
+
+std::string text_of(const ScalarDistribution& distribution) {
+  if (const auto* fixed = std::get_if<belief::FixedScalar>(&distribution)) return number_text(fixed->value);
+  if (const auto* uniform = std::get_if<belief::UniformScalar>(&distribution))
+    return "{uniform: " + list({number_text(uniform->low), number_text(uniform->high)}) + "}";
+  if (const auto* sampled = std::get_if<belief::SampledScalar>(&distribution)) {
+    std::string samples;
+    for (const double sample : sampled->samples)
+      samples.append(samples.empty() ? "" : ", ").append(number_text(sample));
+    return "{samples: [" + samples + "]}";
+  }
+  const auto& normal = std::get<belief::NormalScalar>(distribution);
+  std::string text = "{normal: " + list({number_text(normal.mean), number_text(normal.standard_deviation)});
+  if (std::isfinite(normal.low)) text += ", min: " + number_text(normal.low);
+  if (std::isfinite(normal.high)) text += ", max: " + number_text(normal.high);
+  return text + "}";
+}
+
+std::string text_of(const belief::Vector3Distribution& v) { return list({text_of(v.x), text_of(v.y), text_of(v.z)}); }
+
+std::string text_of(const geometry::Quaterniond& q) {
+  return list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())});
+}
+
+std::string text_of(const geometry::Matrix3d& m) {
+  return list({text_of(Vector3d(m.row(0))), text_of(Vector3d(m.row(1))), text_of(Vector3d(m.row(2)))});
+}
+
+// The shortest form that reads back as the same group.
+std::string text_of(const geometry::SymmetryGroup& group) {
+  if (group.trivial()) return "none";
+  const std::string center = group.p_BoC.isZero(0.0) ? "" : ", center: " + text_of(group.p_BoC);
+  if (group.ball) return center.empty() ? "ball" : "{ball: true" + center + "}";
+  if (group.axis)
+    return "{axis: " + text_of(*group.axis) + ", continuous: true" + (group.rotations.empty() ? "" : ", flip: true") +
+           center + "}";
+  if (geometry::SymmetryGroup::cuboid(group.p_BoC) == group)
+    return center.empty() ? "cuboid" : "{cuboid: true" + center + "}";
+  const auto order = static_cast<int>(group.rotations.size()) + 1;
+  for (const Vector3d& axis : {Vector3d(Vector3d::UnitX()), Vector3d(Vector3d::UnitY()), Vector3d(Vector3d::UnitZ())})
+    if (geometry::SymmetryGroup::cyclic(axis, order, group.p_BoC) == group)
+      return "{axis: " + text_of(axis) + ", order: " + std::to_string(order) + center + "}";
+  std::string rotations;
+  for (const geometry::Quaterniond& rotation : group.rotations)
+    rotations.append(rotations.empty() ? "" : ", ").append(text_of(rotation));
+  return "{rotations: [" + rotations + "]" + center + "}";
+}
+
+const char* word_of(belief::MeshUse use) {
+  switch (use) {
+    case belief::MeshUse::kConvexHull:
+      return "convex_hull";
+    case belief::MeshUse::kConvexParts:
+      return "convex_parts";
+    case belief::MeshUse::kDecompose:
+      return "decompose";
+    case belief::MeshUse::kSurface:
+      return "surface";
+  }
+  return "convex_hull";
+}
+
+// In double quotes, with what YAML takes as something else escaped.
+std::string quoted_yaml(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    if (c >= ' ' || c < 0) result += c;
+  }
+  return result + "\"";
+}
+
+// Of a remark only what fits into a comment.
+std::string comment(const std::string& text) {
+  std::string line = "# " + text;
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  return line + "\n";
+}
+
+}  // namespace
+
+std::string model_yaml(const ModelFile& file) {
+  const belief::ObjectModel& model = file.model;
+  std::string text;
+  for (const std::string& remark : file.remarks) text += comment(remark);
+  text += "model:\n";
+  const auto line = [&](const char* key, const std::string& value) {
+    text.append("  ").append(key).append(": ").append(value).append("\n");
+  };
+  line("mesh", "{file: " + quoted_yaml(file.mesh_file) + ", scale: " + number_text(file.scale) +
+                   ", up: " + (file.y_up ? "y" : "z") + ", use: " + word_of(file.use) + "}");
+  line("mass", text_of(model.mass) + "  # kg");
+  line("center_of_mass", text_of(model.center_of_mass) + "  # m");
+  line("unit_inertia", text_of(model.unit_inertia) + "  # m^2, of 1 kg about the centre of mass");
+  line("friction", text_of(model.contact.friction));
+  if (model.contact.impact_friction) line("impact_friction", text_of(*model.contact.impact_friction));
+  line("restitution", text_of(model.contact.restitution));
+  if (model.contact.rolling_friction != 0.0)
+    line("rolling_friction", number_text(model.contact.rolling_friction) + "  # m");
+  if (model.contact.edge_radius != 0.0) line("edge_radius", number_text(model.contact.edge_radius) + "  # m");
+  line("symmetry", text_of(model.symmetry));
+  line("color", text_of(Vector3d(model.color.r, model.color.g, model.color.b)));
+  if (model.surface != belief::SurfaceKind::kOpaque)
+    line("surface", model.surface == belief::SurfaceKind::kMirror ? "mirror" : "transparent");
+  if (model.hollow)
+    line("hollow", "{size: " + text_of(model.hollow->size) + ", position: " + text_of(model.hollow->X_OV.translation) +
+                       ", rotation: {quaternion: " + text_of(model.hollow->X_OV.rotation) + "}}");
+  return text;
+}
+
+core::Status write_model(const std::filesystem::path& path, const ModelFile& file) {
+  return write_file(path, std::string_view(model_yaml(file)));
+}
+
+core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
+                                             const SceneFileOptions& options, FileReport* report) {
+  const core::Result<LocatedValue> document = read_yaml(path, options.limits);
+  if (!document) {
+    if (report) report->errors.push_back({path.string(), 0, 0, "", document.status().message(), ""});
+    return document.status();
+  }
+  Problems problems;
+  belief::Scene scene;
+  SceneContext context{problems, options, scene, {}, {}, {}, {}, {}};
+  belief::ObjectModel model;
+  {
+    Binder binder(*document, problems);
+    if (const LocatedValue* value = binder.require("model", "a model file holds one key 'model' with the model's keys"))
+      model = read_object_model(*value, name, context);
+  }
+  if (problems.empty())
+    if (const core::Status status = belief::validate(model); !status.ok())
+      problems.add({document->place.file, 0, 0}, "model", status.message(), "correct it");
+  if (report) *report = {problems.errors(), problems.warnings()};
+  if (!problems.empty()) return problems.status();
+  return model;
+}
+
+}  // namespace prescene::interfaces

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Model files: one object model in YAML beside its mesh, as `prescene inspect MESH -o model.yaml` writes it and a
+// scene's `carton: {file: model.yaml}` refers to it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/object_model.h"
+#include "prescene/core/status.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
+
+namespace prescene::interfaces {
+
+/// A model whose shape is one mesh file.
+struct ModelFile {
+  std::string mesh_file;  ///< As it is to stand in the file: relative to the model file's folder.
+  double scale = 1.0;     ///< Metres per unit of the mesh file.
+  bool y_up = false;
+  belief::MeshUse use = belief::MeshUse::kConvexHull;
+  belief::ObjectModel model;         ///< Its name, collision and visual are not written: the mesh stands for them.
+  std::vector<std::string> remarks;  ///< Written as comments at the top.
+};
+
+/// The text of the file. What is read back from it equals what was written, to the bit (a symmetry's axis to the last).
+std::string model_yaml(const ModelFile& file);
+/// Writes it; fails as write_file does.
+core::Status write_model(const std::filesystem::path& path, const ModelFile& file);
+/// Reads a model file on its own and gives the model a name.
+core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
+                                             const SceneFileOptions& options = {}, FileReport* report = nullptr);
+
+}  // namespace prescene::interfaces

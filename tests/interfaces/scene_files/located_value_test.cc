@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/scene_files/located_value.h"
+
+#include <gmock/gmock.h>
+
+#include "prescene/tests/support/paths.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using core::StatusCode;
+using testing::HasSubstr;
+using Kind = LocatedValue::Kind;
+
+core::Status status_of(const std::string& text, const YamlLimits& limits = {}) {
+  return parse_yaml(text, "f.yaml", limits).status();
+}
+
+TEST(ParseYaml, KeepsLineColumnAndPathOfEveryValue) {
+  const auto tree = parse_yaml("a: 1\nb:\n  c: [x, \"7\"]\n  d: ~\n", "f.yaml");
+  ASSERT_TRUE(tree.ok());
+  ASSERT_EQ(tree->keys.size(), 2U);
+  EXPECT_EQ(tree->find("a")->text, "1");
+  const LocatedValue& b = *tree->find("b");
+  const LocatedValue& c = *b.find("c");
+  EXPECT_EQ(b.keys[0].place.line, 3);
+  EXPECT_EQ(b.keys[0].place.column, 3);
+  EXPECT_EQ(c.path, "b.c");
+  EXPECT_EQ(c.items[1].path, "b.c[1]");
+  EXPECT_EQ(c.items[1].place.line, 3);
+  EXPECT_EQ(c.items[1].place.column, 10);
+  EXPECT_FALSE(c.items[0].quoted);
+  EXPECT_TRUE(c.items[1].quoted);
+  EXPECT_EQ(b.find("d")->kind, Kind::kNothing);
+  EXPECT_EQ(*c.place.file, "f.yaml");
+  EXPECT_EQ(tree->find("zzz"), nullptr);
+}
+
+TEST(ParseYaml, ExpandsAliases) {
+  const auto tree = parse_yaml("a: &x {p: 1}\nb: *x\n", "f.yaml");
+  ASSERT_TRUE(tree.ok());
+  EXPECT_EQ(tree->find("b")->find("p")->text, "1");
+  EXPECT_EQ(tree->find("b")->find("p")->path, "b.p");
+}
+
+TEST(ParseYaml, NamesTheLineOfAMistakeInYaml) {
+  EXPECT_THAT(status_of("a: 1\nb: [1, 2\nc: 3\n").message(), HasSubstr("f.yaml:"));
+  EXPECT_THAT(status_of("a: 1\n\tb: 2\n").message(), HasSubstr("f.yaml:2"));
+  EXPECT_THAT(status_of("a: 1\nb: 2\na: 3\n").message(),
+              HasSubstr("f.yaml:3: the key 'a' is here twice, first on line 1"));
+  EXPECT_THAT(status_of("? [1, 2]\n: 3\n").message(), HasSubstr("a key is not a word"));
+  EXPECT_THAT(status_of("a: 1\n---\nb: 2\n").message(), HasSubstr("second document"));
+  EXPECT_THAT(status_of("").message(), HasSubstr("empty"));
+  EXPECT_THAT(status_of("# nothing\n").message(), HasSubstr("empty"));
+  EXPECT_THAT(status_of("a: *b\n").message(), HasSubstr("f.yaml:1"));
+  EXPECT_THAT(status_of("a: &b [1, *b]\n").message(), HasSubstr("not complete"));
+}
+
+TEST(ParseYaml, StopsBombs) {
+  std::string laughs = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 12; ++i) {
+    const std::string before = "*a" + std::to_string(i - 1);
+    std::string list = before;
+    for (int k = 0; k < 9; ++k) list.append(", ").append(before);
+    const std::string name = "a" + std::to_string(i);
+    laughs.append(name).append(": &").append(name).append(" [").append(list).append("]\n");
+  }
+  EXPECT_EQ(status_of(laughs).code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(status_of(laughs).message(), HasSubstr("aliases"));
+  // Anchors within anchors are copied, too.
+  std::string nested;
+  for (int i = 0; i < 40; ++i) nested.append("&a").append(std::to_string(i)).append(" [");
+  nested.append(20000, ' ');
+  for (int i = 0; i < 20000; ++i) nested.append("1,");
+  nested.append(40, ']');
+  EXPECT_EQ(status_of(nested).code(), StatusCode::kResourceExhausted);
+}
+
+TEST(ParseYaml, StopsDepthSizeAndTooManyKeys) {
+  EXPECT_EQ(status_of(std::string(100, '[') + std::string(100, ']')).code(), StatusCode::kResourceExhausted);
+  EXPECT_FALSE(status_of(std::string(100000, '[')).ok());
+  EXPECT_FALSE(status_of(std::string(100000, '{')).ok());
+  std::string dashes;
+  for (int i = 0; i < 50000; ++i) dashes += "- ";
+  EXPECT_FALSE(status_of(dashes).ok());
+  YamlLimits small;
+  small.max_bytes = 10;
+  EXPECT_EQ(status_of("a: 0123456789", small).code(), StatusCode::kResourceExhausted);
+  YamlLimits few;
+  few.max_values = 5;
+  EXPECT_EQ(status_of("[1, 2, 3, 4, 5, 6]", few).code(), StatusCode::kResourceExhausted);
+  EXPECT_TRUE(status_of("[1, 2, 3]", few).ok());
+  std::string keys;
+  for (int i = 0; i < 2000; ++i) keys += "k" + std::to_string(i) + ": 1\n";
+  EXPECT_EQ(status_of(keys).code(), StatusCode::kResourceExhausted);
+  // An alias puts its copy deeper than it was written.
+  std::string deep = "a: &a " + std::string(30, '[') + std::string(30, ']') + "\nb: " + std::string(30, '[') + "*a" +
+                     std::string(30, ']');
+  EXPECT_EQ(status_of(deep).code(), StatusCode::kResourceExhausted);
+}
+
+TEST(ParseYaml, DoesNotPrintWhatCouldHarmATerminal) {
+  const auto status = status_of("\"\\e[31mred\": 1\n\"\\e[31mred\": 2\n");
+  EXPECT_EQ(status.message().find('\x1b'), std::string::npos);
+}
+
+TEST(ReadYaml, SaysWhatIsWrongWithTheFile) {
+  const tests::ScratchDir folder;
+  EXPECT_EQ(read_yaml(folder.path() / "none.yaml").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(read_yaml(folder.path()).status().code(), StatusCode::kInvalidInput);
+}
+
+}  // namespace
+}  // namespace prescene::interfaces

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/interfaces/scene_files/scene_file.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <set>
+
+#include "prescene/tests/interfaces/scene_files/scene_texts.h"
+#include "prescene/tests/interfaces/scene_files/yaml_edits.h"
+#include "prescene/tests/support/matchers.h"
+#include "prescene/tests/support/paths.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using belief::Scene;
+using geometry::Pose;
+using geometry::Vector3d;
+using testing::HasSubstr;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// A scene of one box on a table; `more` goes behind it, `model`, `object` into the maps.
+std::string small(const std::string& more = "", const std::string& model = "", const std::string& object = "") {
+  return "models:\n  block:\n    box: [0.1, 0.2, 0.3]\n" +
+         (model.find("mass") + 1 || model.find("density") + 1 ? "" : std::string("    mass: 1\n")) + model +
+         "supports:\n  table: {box: [1, 1, 0.1]}\n  bin: {open_bin: {inner: [0.2, 0.3, 0.4], wall: 0.01}}\n" +
+         "objects:\n  block:\n    model: block\n" +
+         (object.find("pose") + 1 ? "" : std::string("    pose: {position: [0, 0, 0.2]}\n")) + object + more;
+}
+
+Scene scene_of(const std::string& text) {
+  const auto scene = parse_scene(text, "s.yaml", tests::options_with_meshes());
+  EXPECT_TRUE(scene.ok()) << scene.status().message() << "\n" << text;
+  return scene.ok() ? *scene : Scene{};
+}
+std::string error_of(const std::string& text) {
+  return parse_scene(text, "s.yaml", tests::options_with_meshes()).status().message();
+}
+belief::PoseDistribution pose_of(const std::string& pose) {
+  return scene_of(small("", "", "    pose: " + pose + "\n")).objects.at(0).pose;
+}
+
+TEST(SceneFile, OfThePageHasAllThatThePageSays) {
+  const Scene scene = scene_of(tests::code_blocks(tests::text_of_file("docs/scene_files.md"), "yaml"));
+  EXPECT_EQ(scene.models.size(), 8U);
+  EXPECT_EQ(scene.supports.size(), 4U);
+  EXPECT_EQ(scene.robot.size(), 2U);
+  EXPECT_EQ(scene.objects.size(), 6U);
+  EXPECT_EQ(scene.actions.size(), 6U);
+  EXPECT_EQ(scene.exclusive_outcomes[1].outcomes.size(), 6U);
+  EXPECT_EQ(scene.objects[0].held_by, "gripper");
+  EXPECT_EQ(core::ok_status(), belief::validate(scene));
+}
+
+// What `unknown` in each map is answered with lists the keys that the map knows; each has to stand on the page.
+TEST(SceneFile, ThePageNamesEveryKey) {
+  const std::string page = tests::text_of_file("docs/scene_files.md");
+  const std::string text = tests::code_blocks(page, "yaml");
+  std::set<std::string> known;
+  for (const tests::YamlKey& key : tests::all_keys(*parse_yaml(text, "page.yaml"))) {
+    FileReport report;
+    const auto damaged = tests::replaced(text, key.line, key.column, key.name.size(), "zzzzzzzzzzzzzzzz");
+    EXPECT_TRUE(parse_scene(damaged, "page.yaml", tests::options_with_meshes(), &report).ok() ||
+                !report.errors.empty());
+    for (const Problem& problem : report.errors) {
+      if (problem.reason != "unknown key") continue;
+      std::string rest = problem.remedy;
+      for (std::size_t at = rest.find('\''); at != std::string::npos; at = rest.find('\'')) {
+        const std::size_t end = rest.find('\'', at + 1);
+        known.insert(rest.substr(at + 1, end - at - 1));
+        rest = rest.substr(end + 1);
+      }
+    }
+  }
+  EXPECT_GT(known.size(), 80U);
+  for (const std::string& key : known) {
+    const bool named = page.find("`" + key + "`") != std::string::npos || page.find(key + ":") != std::string::npos ||
+                       page.find(key + ",") != std::string::npos || page.find(key + "}") != std::string::npos;
+    EXPECT_TRUE(named) << key;
+  }
+}
+
+TEST(SceneFile, DefaultsAreThoseOfTheStructs) {
+  const Scene scene = scene_of(small());
+  const Scene defaults;
+  EXPECT_EQ(scene.gravity_W, defaults.gravity_W);
+  EXPECT_EQ(scene.duration, defaults.duration);
+  EXPECT_EQ(scene.stop_at_rest, defaults.stop_at_rest);
+  EXPECT_EQ(scene.models[0].contact, belief::ContactProperties{});
+  EXPECT_EQ(scene.models[0].mass, belief::ScalarDistribution(belief::FixedScalar{1.0}));
+  EXPECT_FALSE(scene.camera.has_value());
+  // Uniform density: (y^2 + z^2) / 12.
+  EXPECT_NEAR(scene.models[0].unit_inertia(0, 0), (0.04 + 0.09) / 12.0, 1e-12);
+}
+
+TEST(SceneFile, ReadsPosesInEveryForm) {
+  EXPECT_EQ(pose_of("{position: [1, 2, 3]}"),
+            belief::PoseDistribution(belief::FixedPose{Pose::from_translation({1, 2, 3})}));
+  const auto rotation = [&](const std::string& text) {
+    return std::get<belief::FixedPose>(pose_of("{position: [0, 0, 0], rotation: " + text + "}")).X_WO.rotation;
+  };
+  const Vector3d x = Vector3d::UnitX();
+  EXPECT_THAT(rotation("{euler_deg: [0, 0, 90]}") * x, tests::is_near(Vector3d(0, 1, 0), 1e-12));
+  EXPECT_THAT(rotation("{euler_deg: [90, 0, 90]}") * Vector3d(0, 1, 0), tests::is_near(Vector3d(0, 0, 1), 1e-12))
+      << "roll about the fixed x comes first";
+  EXPECT_THAT(rotation("{axis_angle_deg: [0, 2, 0, 90]}") * x, tests::is_near(Vector3d(0, 0, -1), 1e-12));
+  EXPECT_THAT(rotation("{quaternion: [0.7071, 0, 0, 0.7071]}") * x, tests::is_near(Vector3d(0, 1, 0), 1e-12));
+
+  const auto normal = std::get<belief::NormalPose>(
+      pose_of("{position: [1, 0, 0], normal: {position: [0.1, 0.2, 0], rotation_deg: 2}}"));
+  geometry::Vector6d expected;
+  expected << Vector3d::Constant(2 * kDegree).cwiseAbs2(), 0.01, 0.04, 0.0;
+  EXPECT_THAT(normal.covariance, tests::is_near(geometry::Matrix6d(expected.asDiagonal()), 1e-15));
+  const auto box =
+      std::get<belief::BoxPose>(pose_of("{position: [{uniform: [0, 1]}, 2, {normal: [0, 0.1]}], rotation: any}"));
+  EXPECT_TRUE(box.any_rotation);
+  EXPECT_EQ(box.position.x, belief::ScalarDistribution(belief::UniformScalar{0.0, 1.0}));
+  EXPECT_EQ(std::get<belief::SampledPose>(pose_of("{samples: [{position: [0, 0, 1]}, {position: [0, 0, 2]}]}"))
+                .samples.size(),
+            2U);
+}
+
+TEST(SceneFile, CutsNormalsWhereNatureDoes) {
+  const Scene scene = scene_of(small("",
+                                     "    mass: {normal: [1, 0.1]}\n    friction: {normal: [0.1, 0.1]}\n    "
+                                     "restitution: {normal: [0.1, 0.1], max: 0.5}\n"));
+  EXPECT_GT(belief::lowest(scene.models[0].mass), 0.0);
+  EXPECT_EQ(belief::lowest(scene.models[0].contact.friction), 0.0);
+  EXPECT_EQ(belief::lowest(scene.models[0].contact.restitution), 0.0);
+  EXPECT_EQ(belief::highest(scene.models[0].contact.restitution), 0.5);
+}
+
+TEST(SceneFile, AnOpenBinHasARealHollow) {
+  const Scene scene = scene_of(small("outcomes:\n  in: {inside: bin}\n"));
+  const belief::Support& bin = scene.supports[1];
+  EXPECT_EQ(bin.collision.size(), 5U);
+  EXPECT_EQ(bin.hollow->size, Vector3d(0.2, 0.3, 0.4));
+  EXPECT_THAT(bin.hollow->X_OV.translation, tests::is_near(Vector3d(0, 0, 0.21), 1e-12));
+  const auto& volume = std::get<belief::InsideVolume>(scene.outcomes[0].all_of[0].predicate);
+  EXPECT_EQ(volume.size, bin.hollow->size);
+  // The boxes fill just the walls of the mesh: same volume.
+  double boxes = 0.0;
+  for (const belief::CollisionShape& shape : bin.collision) boxes += belief::mass_properties(shape, 1.0)->mass;
+  EXPECT_NEAR(boxes, geometry::mass_properties(*bin.visual, 1.0)->mass, 1e-9);
+}
+
+TEST(SceneFile, ReadsOutcomesWithTheirTimesAndNegations) {
+  const Scene scene =
+      scene_of(small("outcomes:\n"
+                     "  a: {below: 0.1, when: ever, not: {touched: bin}}\n"
+                     "  b: {moving: false}\n"
+                     "  c: {not: {upright: {within_deg: 20, axis: -x}, when: always}}\n"
+                     "  d: {all_of: [{touched: table}, {touched: bin}]}\n"));
+  using belief::Condition;
+  const std::vector<Condition>& a = scene.outcomes[0].all_of;
+  EXPECT_EQ(a[0], (Condition{belief::BelowHeight{0.1}, belief::When::kEver, false}));
+  EXPECT_EQ(a[1], (Condition{belief::Touched{"bin"}, belief::When::kAtEnd, true}));
+  EXPECT_EQ(scene.outcomes[1].all_of[0], (Condition{belief::StillMoving{}, belief::When::kAtEnd, true}));
+  EXPECT_EQ(scene.outcomes[2].all_of[0],
+            (Condition{belief::UprightWithin{-Vector3d::UnitX(), 20 * kDegree}, belief::When::kAlways, true}));
+  EXPECT_EQ(scene.outcomes[3].all_of.size(), 2U);
+  EXPECT_EQ(scene.outcomes[3].object, "block") << "the only object need not be named";
+}
+
+TEST(SceneFile, ALookedAtPointIsInTheMiddleOfThePicture) {
+  const Scene scene =
+      scene_of(small("camera: {width: 320, height: 240, fov_deg: 90, look: {from: [1, 2, 3], at: [0, 0, 0.5]}}\n"));
+  const belief::SceneCamera& camera = *scene.camera;
+  const Vector3d p_C = camera.X_WC.inverse() * Vector3d(0, 0, 0.5);
+  EXPECT_NEAR(p_C.x(), 0.0, 1e-12);
+  EXPECT_NEAR(p_C.y(), 0.0, 1e-12);
+  EXPECT_GT(p_C.z(), 0.0);
+  const Vector3d above_C = camera.X_WC.inverse() * Vector3d(0, 0, 0.6);
+  EXPECT_LT(above_C.y(), 0.0) << "up in the world is up in the picture, where y points down";
+  EXPECT_NEAR(camera.intrinsics.fx, 160.0, 1e-9);
+  EXPECT_EQ(camera.intrinsics.cx, 159.5);
+}
+
+TEST(SceneFile, ListsAllMistakesAtOnce) {
+  FileReport report;
+  const std::string text = small("gravty: [0, 0, -9.81]\nduration: -1\n", "    fricton: 0.4\n", "    held_by: hand\n");
+  EXPECT_FALSE(parse_scene(text, "s.yaml", {}, &report).ok());
+  ASSERT_EQ(report.errors.size(), 4U);
+  EXPECT_THAT(error_of(text), HasSubstr("s.yaml:5: models.block.fricton: unknown key: did you mean 'friction'?"));
+  EXPECT_THAT(error_of(text), HasSubstr("gravty: unknown key: did you mean 'gravity'?"));
+  EXPECT_THAT(error_of(text), HasSubstr("duration: -1 is out of range: give seconds"));
+  EXPECT_THAT(error_of(text),
+              HasSubstr("objects.block.held_by: 'hand' is not a robot body of this file: define it first"));
+}
+
+TEST(SceneFile, GuessesWrongUnits) {
+  EXPECT_EQ(error_of(small("", "    mass: 100\n")), "") << "a box of lead is no mistake";
+  EXPECT_THAT(error_of("models:\n  m: {box: [0.105, 0.105, 0.105], mass: 370}\nobjects:\n  o: {model: m, pose: {}}\n"),
+              HasSubstr("denser than any metal: grams? then write 0.37"));
+  EXPECT_THAT(error_of("models:\n  m: {box: [105, 105, 105], mass: 0.37}\nobjects:\n  o: {model: m, pose: {}}\n"),
+              HasSubstr("105 is out of range: millimetres? then write 0.105"));
+  EXPECT_THAT(error_of("models:\n  m: {box: [10, 10, 10], mass: 0.37}\nobjects:\n  o: {model: m, pose: {}}\n"),
+              HasSubstr("lighter than air: check the sizes (metres"));
+  EXPECT_THAT(
+      error_of("models:\n  m: {mesh: {file: a.ply, scale: 1}, mass: 0.37}\nobjects:\n  o: {model: m, pose: {}}\n"),
+      HasSubstr("the mesh is 120 m large: millimetres? then give scale: 0.001"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {position: [0, 0, 5 cm]}\n")), HasSubstr("write 0.05 without a unit"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {rotation: {euler: [0, 0, 1]}}\n")),
+              HasSubstr("did you mean 'euler_deg'?"));
+}
+
+TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
+  EXPECT_THAT(error_of(small("", "    density: 5\n    mass: 1\n")),
+              HasSubstr("'density' and 'mass' exclude each other"));
+  EXPECT_THAT(error_of(small("", "    sphere: 1\n")), HasSubstr("exclude each other"));
+  EXPECT_THAT(error_of(small("actions:\n  - {time: 1, release: {object: block}}\n")),
+              HasSubstr("'block' is not held at that time"));
+  EXPECT_THAT(error_of(small("outcomes:\n  a: {inside: table}\n")),
+              HasSubstr("'table' has no hollow: make it an open_bin"));
+  EXPECT_THAT(error_of(small("outcomes:\n  a: {object: block}\n")), HasSubstr("the outcome has no condition"));
+  EXPECT_THAT(error_of(small("outcomes:\n  a: {not: {below: 1, moving: true}}\n")),
+              HasSubstr("'not' holds 2 conditions"));
+  EXPECT_THAT(error_of(small("exclusive_outcomes:\n  g: {outcomes: {other: {below: 1}}}\n")),
+              HasSubstr("'other' is made by itself"));
+  EXPECT_THAT(error_of(small("", "    inertia: [1, 1, 3]\n")), HasSubstr("no body has this inertia"));
+  EXPECT_THAT(error_of(small("", "    symmetry: {axis: z}\n")), HasSubstr("the turns about the axis are missing"));
+  EXPECT_THAT(error_of(small("", "    symmetry: {rotations: [[0.707, 0, 0, 0.707]]}\n")), HasSubstr("no group"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {rotation: {quaternion: [1, 1, 0, 0]}}\n")),
+              HasSubstr("has length 1.41"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {position: [{uniform: [0, 1]}, 0, 0], normal: {position: 1}}\n")),
+              HasSubstr("as its mean"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {position: [{uniform: [1, 0]}, 0, 0]}\n")),
+              HasSubstr("runs backwards"));
+  EXPECT_THAT(error_of("objects:\n  a b: {}\n"), HasSubstr("characters that names can't have"));
+  EXPECT_THAT(error_of(small("robot:\n  table: {sphere: 0.1, pose: {}}\n")), HasSubstr("the name is taken on line"));
+  EXPECT_THAT(error_of("models:\n  m: {mesh: {file: a.obj}, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n"),
+              HasSubstr("a.obj: no such file"));
+  EXPECT_THAT(error_of("name: x\n"), HasSubstr("the key 'objects' is missing"));
+  EXPECT_THAT(error_of("[1, 2]\n"), HasSubstr("this is a list of 2: give a map of keys"));
+}
+
+TEST(SceneFile, WithoutAMeshReaderMeshesAreErrors) {
+  const auto scene =
+      parse_scene("models:\n  m: {mesh: {file: a.ply}, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n", "s.yaml");
+  EXPECT_THAT(scene.status().message(), HasSubstr("models.m.mesh.file: meshes can't be read here"));
+}
+
+TEST(SceneFile, ModelsOfOneMeshFileShareIt) {
+  const Scene scene = scene_of(
+      "models:\n  a: {mesh: {file: a.ply, scale: 0.001}, mass: 0.5}\n  b: {mesh: {file: a.ply, scale: 0.001}, mass: "
+      "0.6}\n"
+      "objects:\n  o: {model: a, pose: {}}\n");
+  EXPECT_EQ(scene.models[0].visual, scene.models[1].visual);
+}
+
+TEST(SceneFile, WarnsOfOdditiesButReads) {
+  FileReport report;
+  const auto scene =
+      parse_scene("models:\n  m: {sphere: 0.1, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n", "s.yaml", {}, &report);
+  EXPECT_TRUE(scene.ok());
+  ASSERT_EQ(report.warnings.size(), 1U);
+  EXPECT_THAT(report.warnings[0].text(), HasSubstr("no support"));
+}
+
+TEST(ReadScene, SaysThatAFileIsMissing) {
+  FileReport report;
+  const auto scene = read_scene("/nowhere/scene.yaml", {}, &report);
+  EXPECT_EQ(scene.status().code(), core::StatusCode::kNotFound);
+  EXPECT_EQ(report.errors.size(), 1U);
+}
+
+}  // namespace
+}  // namespace prescene::interfaces
