@@ -20,6 +20,10 @@ namespace prescene::filter {
 struct AugmentOptions {
   int recover_after_frames = 4;  ///< An object not supported for so many frames is looked for ...
   int recover_every = 3;         ///< ... every so many frames.
+  /// An object that is tracked by less than this share of its pixels may be a wrong pose that the true one sticks out of:
+  /// it is looked for too, every so many frames.
+  double suspicious_share = 0.75;
+  int suspicious_every = 10;
   int recover_starts = 48;
   double near_share = 0.33;  ///< Of the starts are near the last pose; the others at unexplained pixels.
   double near_shift = 0.08;  ///< m, standard deviation
@@ -49,6 +53,9 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
              const rendering::PoseEvidence& current, const AugmentOptions& options, const WeightOptions& weighting,
              const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
              belief::ObjectBelief& object);
+
+/// Whether an object is to be looked for in the frame of this number.
+bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, std::uint64_t frame);
 
 /// Points in C of measured pixels that nothing known explains, row-major.
 std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const rendering::FrameTerms& terms,

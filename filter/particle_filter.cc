@@ -122,9 +122,7 @@ void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<Wei
   const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
-    if (object.frames_unseen < settings_.augment.recover_after_frames ||
-        (belief.step + i) % static_cast<std::uint64_t>(std::max(1, settings_.augment.recover_every)) != 0)
-      continue;
+    if (!wants_recovery(settings_.augment, object, belief.step + i)) continue;
     const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
     const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
     const WeightReport& report = reports[i];
@@ -134,7 +132,7 @@ void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<Wei
                  stream.at(belief.step, static_cast<std::uint32_t>(i)), object))
       continue;
     ++result.counters.recoveries;
-    object.state = TrackState::kDoubtful;  // the next frame decides
+    if (object.state != TrackState::kTracked) object.state = TrackState::kDoubtful;  // the next frame decides
     object.existence = std::max(object.existence, 0.5);
     object.frames_unseen = 0;
     depths[i] = depth_of(target, frame.X_CW * heaviest(object).X_WO, frame.terms.camera, *tools_.renderer);

@@ -14,6 +14,7 @@ namespace {
 using belief::Particle;
 using geometry::Matrix3d;
 
+constexpr double kMatch = 0.008;             // m: a measurement so near to the pose's surface is taken for it
 constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
 
 struct Gaussian {
@@ -213,24 +214,26 @@ double supported_evidence(const rendering::PoseEvidence& evidence, double outlin
 
 double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step) {
   const int width = terms.camera.width, height = terms.camera.height;
+  const auto matches = [&](int x, int y) {
+    const double z = terms.depth(x, y), d = object_depth(x, y);
+    return d > 0.0 && z > 0.0 && std::abs(z - d) < std::max(kMatch, 3.0 * terms.model.hit_sigma(d, 1.0));
+  };
   int ends = 0, goes_on = 0;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      if (object_depth(x, y) > 0.0f) continue;
-      // The object's surface nearest to this pixel, at most two pixels away: its depth at the outline.
-      float edge = 0.0f;
+      const double z = terms.depth(x, y);
+      if (z == 0.0 || matches(x, y)) continue;
+      // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side
+      // as often as not: judge by those two away.
+      double edge = 0.0;
       int nearest = 9;
       for (int dy = -2; dy <= 2; ++dy)
         for (int dx = -2; dx <= 2; ++dx) {
-          if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height) continue;
-          const float d = object_depth(x + dx, y + dy);
+          if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height || !matches(x + dx, y + dy)) continue;
           const int distance = dx * dx + dy * dy;
-          if (d > 0.0f && distance < nearest) nearest = distance, edge = d;
+          if (distance < nearest) nearest = distance, edge = terms.depth(x + dx, y + dy);
         }
-      // The pixels next to the object belong to it as often as not: judge by those two away.
-      if (edge == 0.0f || nearest < 4) continue;
-      const double z = terms.depth(x, y);
-      if (z == 0.0 || z < edge - step) continue;
+      if (edge == 0.0 || nearest < 4 || z < edge - step) continue;
       const double expected = terms.absent_peak(x, y);
       const bool known = expected > 0.0 && std::abs(z - expected) < 0.5 * step;
       (known || z > edge + step ? ends : goes_on)++;

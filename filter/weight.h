@@ -29,8 +29,8 @@ struct WeightOptions {
   double max_jump_speed = 2.0;  ///< m/s; a mode further from the prediction than this and its spread allow is refused.
   double outline_step =
       0.02;                   ///< m; where the measured surface goes on past the outline within this, there is no edge.
-  double min_outline = 0.35;  ///< Share of the outline with an edge below which a match is no evidence at all ...
-  double full_outline = 0.6;  ///< ... and from which it is full evidence.
+  double min_outline = 0.50;  ///< Share of the outline with an edge below which a match is no evidence at all ...
+  double full_outline = 0.80;  ///< ... and from which it is full evidence.
 };
 
 /// What became of one particle.
@@ -57,9 +57,10 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
                     std::vector<belief::Particle>& particles);
 
-/// Share of the outline of an object at `X_CO` (its rendered depth in terms.camera) at which the measured surface ends:
-/// just outside, it is further away, or known to be something else. What goes on past the outline is not the object, be
-/// the match inside ever so good. 1 when no outline pixel can tell (hidden by nearer things, or missing).
+/// Share of the edge of what matches an object (its rendered depth in terms.camera) at which the measured surface ends:
+/// just outside, it is further away, or known to be something else. A surface that goes on, past the outline or in front of
+/// the rest of the object, is not the object, be the match ever so good. 1 when no pixel can tell (hidden by nearer things,
+/// or missing).
 double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step);
 
 /// Evidence per visible pixel, scaled by what the outline is worth.
