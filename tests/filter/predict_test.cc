@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/predict.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "filter_fixture.h"
+#include "prescene/geometry/sampling.h"
+#include "prescene/tests/support/fake_simulator.h"
+#include "prescene/tests/support/matchers.h"
+
+namespace prescene::filter_tests {
+namespace {
+
+using belief::MotionMode;
+using belief::Particle;
+
+/// A scene of a hand and an object; all particles alike.
+belief::Belief hand_and_object(MotionMode mode, bool held) {
+  belief::Scene scene = *table_scene({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.1, 0.0, 0.3})},
+                                     0.001, 0.001);
+  belief::KinematicBody hand;
+  hand.name = "hand";
+  hand.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{Vector3d(0.1, 0.1, 0.02)}, Pose::identity()});
+  hand.timeline = {{0.0, Pose::from_translation({0.1, 0.0, 0.4})}};
+  scene.robot.push_back(hand);
+  if (held) scene.objects[0].held_by = "hand";
+  belief::Belief belief;
+  belief.scene = std::make_shared<const belief::Scene>(scene);
+  belief.robot = {hand.timeline[0].X_WG};
+  belief.seed = 3;
+  belief.step = 1;
+  belief::ObjectBelief object;
+  object.name = "box";
+  for (int i = 0; i < 16; ++i) {
+    Particle particle;
+    particle.log_weight = -std::log(16.0);
+    particle.X_WO = Pose::from_translation({0.1, 0.0, 0.3});
+    particle.covariance = 1e-6 * belief::Matrix12d::Identity();
+    particle.mode = mode;
+    object.particles.push_back(particle);
+  }
+  belief.objects.push_back(object);
+  return belief;
+}
+
+PredictOptions without_mode_changes() {
+  PredictOptions options;
+  options.wake_probability = 0.0;
+  options.settle_probability = 0.0;
+  return options;
+}
+
+class Predict : public ::testing::Test {
+ protected:
+  void run(belief::Belief& belief, const Pose& X_WG, double dt, const PredictOptions& options,
+           const belief::Control& control = {}, const SimulatorSource& simulators = {}) {
+    const Pose poses[] = {X_WG};
+    predict(belief, control, poses, dt, options, simulators, {3, core::Purpose::kProcessNoise}, threads_);
+  }
+  core::ThreadPool threads_{2};
+};
+
+TEST_F(Predict, RestingStaysWhereItIsAndGrowsALittleUnsure) {
+  belief::Belief belief = hand_and_object(MotionMode::kResting, false);
+  const belief::Belief before = belief;
+  run(belief, before.robot[0], 0.04, without_mode_changes());
+  for (std::size_t i = 0; i < 16; ++i) {
+    const Particle& particle = belief.objects[0].particles[i];
+    EXPECT_EQ(particle.X_WO, before.objects[0].particles[i].X_WO);
+    EXPECT_EQ(particle.log_weight, before.objects[0].particles[i].log_weight);
+    EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.003 * 0.003 * 0.04, 1e-15);
+    EXPECT_EQ(particle.covariance(9, 9), 1e-6);
+  }
+}
+
+TEST_F(Predict, HeldMovesRigidlyWithItsHand) {
+  belief::Belief belief = hand_and_object(MotionMode::kHeld, true);
+  const Pose X_GO = belief.robot[0].inverse() * belief.objects[0].particles[0].X_WO;
+  Pose X_WG = belief.robot[0];
+  X_WG.rotation = geometry::exp_rotation({0.2, 0.1, -0.3});
+  X_WG.translation += Vector3d(0.03, 0.02, -0.01);
+  run(belief, X_WG, 0.1, without_mode_changes());
+  for (const Particle& particle : belief.objects[0].particles) {
+    EXPECT_THAT(particle.X_WO, tests::is_near(X_WG * X_GO, 1e-9, 1e-9));
+    EXPECT_EQ(particle.mode, MotionMode::kHeld);
+    // The twist is that of the motion over the step.
+    EXPECT_THAT(Vector3d(0.1 * particle.V_WO.angular), tests::is_near(Vector3d(0.2, 0.1, -0.3), 1e-9));
+  }
+  EXPECT_EQ(belief.robot[0], X_WG);
+}
+
+TEST_F(Predict, ReleasedLeavesTheHandAtItsTimeWithTheHandsVelocity) {
+  belief::Belief belief = hand_and_object(MotionMode::kHeld, true);
+  const Pose X_WG = Pose::from_translation({0.2, 0.0, 0.4});  // 1 m/s along x
+  belief::Control control;
+  control.actions.push_back({0.04, belief::Release{"box"}});
+  PredictOptions options = without_mode_changes();
+  options.velocity_keep = options.unseen_velocity_keep = 1.0;
+  run(belief, X_WG, 0.1, options, control);
+  for (const Particle& particle : belief.objects[0].particles) {
+    EXPECT_EQ(particle.mode, MotionMode::kMoving);
+    EXPECT_NEAR(particle.V_WO.linear.x(), 1.0, 1e-9);
+    EXPECT_NEAR(particle.X_WO.translation.x(), 0.2, 1e-9);
+    EXPECT_GT(particle.covariance(9, 9), options.wake_speed * options.wake_speed);
+  }
+}
+
+TEST_F(Predict, GraspedFollowsTheHandAndTheOldSceneKeepsItsWord) {
+  belief::Belief belief = hand_and_object(MotionMode::kResting, false);
+  const auto scene_before = belief.scene;
+  belief::Control control;
+  control.actions.push_back({0.0, belief::Grasp{"box", "hand"}});
+  run(belief, Pose::from_translation({0.1, 0.0, 0.5}), 0.1, without_mode_changes(), control);
+  EXPECT_FALSE(scene_before->objects[0].held_by.has_value());
+  EXPECT_EQ(belief.scene->objects[0].held_by, "hand");
+  EXPECT_NEAR(belief.objects[0].particles[0].X_WO.translation.z(), 0.4, 1e-9);
+}
+
+TEST_F(Predict, FallsByTheSimulatorWhereThereIsOne) {
+  // Physics that moves everything down by a tenth of the duration and knows where the hand goes.
+  int scenes = 0;
+  const SimulatorSource source = [&](const belief::Scene& scene) {
+    ++scenes;
+    EXPECT_EQ(scene.robot[0].timeline.size(), 2u);
+    EXPECT_NEAR(scene.robot[0].timeline.back().X_WG.translation.z(), 0.45, 1e-12);
+    return std::make_unique<tests::FakeSimulator>(
+        [](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
+          belief::WorldState end = start;
+          end.objects[0].X_WO.translation.z() -= 0.1 * request.stop.duration;
+          end.objects[0].V_WO.linear.z() = -0.1;
+          return end;
+        });
+  };
+  belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
+  PredictOptions options = without_mode_changes();
+  options.physics_share = 0.5;
+  run(belief, Pose::from_translation({0.1, 0.0, 0.45}), 0.1, options, {}, source);
+  EXPECT_EQ(scenes, 1);
+  int fell = 0;
+  for (const Particle& particle : belief.objects[0].particles) {
+    const bool by_physics = particle.V_WO.linear.z() == -0.1;
+    fell += by_physics;
+    EXPECT_NEAR(particle.X_WO.translation.z(), by_physics ? 0.29 : 0.3, 1e-12);
+  }
+  EXPECT_GT(fell, 2);
+  EXPECT_LT(fell, 14);
+}
+
+TEST_F(Predict, SomeRestingParticlesWakeAndSlowOnesSettle) {
+  belief::Belief resting = hand_and_object(MotionMode::kResting, false);
+  belief::Belief moving = hand_and_object(MotionMode::kMoving, false);
+  resting.objects[0].state = moving.objects[0].state = belief::TrackState::kTracked;
+  int woken = 0, settled = 0;
+  for (int i = 0; i < 50; ++i) {
+    belief::Belief a = resting, b = moving;
+    a.step = b.step = static_cast<std::uint64_t>(i);
+    run(a, a.robot[0], 0.033, {});
+    run(b, b.robot[0], 0.033, {});
+    for (const Particle& particle : a.objects[0].particles) woken += particle.mode == MotionMode::kMoving;
+    for (const Particle& particle : b.objects[0].particles) settled += particle.mode == MotionMode::kResting;
+  }
+  // 800 Bernoulli draws each; five standard deviations are 0.057 and 0.063.
+  EXPECT_NEAR(woken / 800.0, PredictOptions().wake_probability, 0.058);
+  EXPECT_NEAR(settled / 800.0, PredictOptions().settle_probability, 0.064);
+}
+
+TEST(Drift, TurnsAboutTheGivenPoint) {
+  Particle particle;
+  particle.X_WO.rotation = geometry::exp_rotation({0.3, -0.2, 0.5});
+  const Vector3d p_OQ(0.0, 0.4, 0.1);
+  const Vector3d p_WQ = particle.X_WO * p_OQ;
+  // Q stands still while the body turns about it.
+  particle.V_WO.angular = Vector3d(0.5, 1.0, -2.0);
+  particle.V_WO = geometry::shifted(particle.V_WO, Vector3d::Zero());
+  particle.V_WO.linear = -particle.V_WO.angular.cross(particle.X_WO.rotation * p_OQ);
+  const geometry::Quaterniond before = particle.X_WO.rotation;
+  drift(particle, p_OQ, 0.1, 1.0, {0.0, 0.0, 0.0, 0.0});
+  EXPECT_THAT(Vector3d(particle.X_WO * p_OQ), tests::is_near(p_WQ, 1e-12));
+  EXPECT_NEAR(geometry::angle_between(before, particle.X_WO.rotation), 0.1 * Vector3d(0.5, 1.0, -2.0).norm(), 1e-9);
+  // And goes on standing still.
+  EXPECT_THAT(geometry::shifted(particle.V_WO, particle.X_WO.rotation * p_OQ).linear,
+              tests::is_near(Vector3d(0.0, 0.0, 0.0), 1e-12));
+}
+
+// The covariance of many drifted samples about the drifted mean, against the propagated one.
+TEST(DriftStatistics, CovarianceIsThatOfDriftedSamples) {
+  core::RandomStream stream(11, core::Purpose::kTest);
+  Particle mean;
+  mean.X_WO.rotation = geometry::exp_rotation({0.7, 0.1, -0.4});
+  mean.X_WO.translation = Vector3d(0.1, 0.2, 0.3);
+  mean.V_WO.linear = Vector3d(0.2, -0.1, 0.05);
+  mean.covariance.diagonal() << Eigen::Vector3d::Constant(1e-4), Eigen::Vector3d::Constant(4e-6),
+      Eigen::Vector3d::Constant(4e-2), Eigen::Vector3d::Constant(1e-2);
+  const MotionNoise none{0.0, 0.0, 0.0, 0.0};
+  Particle moved = mean;
+  drift(moved, Vector3d::Zero(), 0.1, 0.8, none);
+  using Vector12d = Eigen::Matrix<double, 12, 1>;
+  belief::Matrix12d sampled = belief::Matrix12d::Zero();
+  constexpr int kSamples = 4000;
+  for (int i = 0; i < kSamples; ++i) {
+    Particle sample = mean;
+    Vector12d d;
+    for (int k = 0; k < 12; ++k) d[k] = std::sqrt(mean.covariance(k, k)) * stream.normal();
+    sample.X_WO = geometry::box_plus(mean.X_WO, d.head<6>());
+    sample.V_WO.angular += d.segment<3>(6);
+    sample.V_WO.linear += d.tail<3>();
+    drift(sample, Vector3d::Zero(), 0.1, 0.8, none);
+    Vector12d e;
+    e.head<6>() = geometry::box_minus(sample.X_WO, moved.X_WO);
+    e.segment<3>(6) = sample.V_WO.angular - moved.V_WO.angular;
+    e.tail<3>() = sample.V_WO.linear - moved.V_WO.linear;
+    sampled += e * e.transpose() / kSamples;
+  }
+  // A sample covariance of n draws is off by sqrt(2 / n) = 2.2 %; five of those.
+  const Vector12d scale = moved.covariance.diagonal().cwiseSqrt();
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 12; ++j)
+      EXPECT_NEAR(sampled(i, j), moved.covariance(i, j), 0.12 * scale[i] * scale[j]) << i << ", " << j;
+}
+
+}  // namespace
+}  // namespace prescene::filter_tests

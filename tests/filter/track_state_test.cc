@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/track_state.h"
+
+#include <gtest/gtest.h>
+
+namespace prescene::filter_tests {
+namespace {
+
+using belief::TrackState;
+using filter::WeightReport;
+
+WeightReport seen(double nats) {
+  WeightReport report;
+  report.evidence_per_pixel = nats;
+  report.visible_share = 0.8;
+  return report;
+}
+
+constexpr core::TimeNs kFrame = 33'333'333;
+
+TEST(TrackState, FollowsTheEvidence) {
+  belief::ObjectBelief object;
+  const filter::TrackStateOptions options;
+  filter::update_track(seen(5.0), kFrame, options, object);
+  EXPECT_EQ(object.state, TrackState::kTracked);
+  EXPECT_EQ(object.last_seen_ns, kFrame);
+  filter::update_track(seen(2.0), 2 * kFrame, options, object);
+  EXPECT_EQ(object.state, TrackState::kDoubtful);
+  EXPECT_EQ(object.frames_unseen, 1);
+  EXPECT_EQ(object.last_seen_ns, kFrame);
+  filter::update_track(seen(5.0), 3 * kFrame, options, object);
+  EXPECT_EQ(object.frames_unseen, 0);
+}
+
+TEST(TrackState, IsLostOnlyAfterSomeFramesOfContradiction) {
+  belief::ObjectBelief object;
+  const filter::TrackStateOptions options;
+  for (int i = 1; i < options.lost_after_frames; ++i) {
+    filter::update_track(seen(-1.0), i * kFrame, options, object);
+    EXPECT_EQ(object.state, TrackState::kDoubtful) << i;
+  }
+  filter::update_track(seen(-1.0), options.lost_after_frames * kFrame, options, object);
+  EXPECT_EQ(object.state, TrackState::kLost);
+}
+
+TEST(TrackState, HiddenIsUnseenUntilItIsTooLong) {
+  belief::ObjectBelief object;
+  const filter::TrackStateOptions options;
+  filter::update_track(seen(5.0), 0, options, object);
+  const double existence = object.existence;
+  WeightReport hidden;
+  hidden.hidden_weight = 0.9;
+  filter::update_track(hidden, static_cast<core::TimeNs>(9e9), options, object);
+  EXPECT_EQ(object.state, TrackState::kUnseen);
+  EXPECT_EQ(object.existence, existence);  // hidden says nothing
+  filter::update_track(hidden, static_cast<core::TimeNs>(11e9), options, object);
+  EXPECT_EQ(object.state, TrackState::kLost);
+  filter::update_track(hidden, static_cast<core::TimeNs>(11.1e9), options, object);
+  EXPECT_EQ(object.state, TrackState::kLost);
+}
+
+TEST(TrackState, ExistenceFallsWithContradictionAndRecovers) {
+  belief::ObjectBelief object;
+  object.existence = 0.9;
+  const filter::TrackStateOptions options;
+  for (int i = 1; i < 40; ++i) filter::update_track(seen(-3.0), i * kFrame, options, object);
+  EXPECT_LT(object.existence, 0.01);
+  EXPECT_GT(object.existence, 0.0);
+  for (int i = 40; i < 80; ++i) filter::update_track(seen(5.0), i * kFrame, options, object);
+  EXPECT_GT(object.existence, 0.99);
+  EXPECT_LT(object.existence, 1.0);
+}
+
+}  // namespace
+}  // namespace prescene::filter_tests
