@@ -22,14 +22,17 @@ namespace {
 
 core::Status dds_status(dds_return_t code, const std::string& doing) {
   if (code >= 0) return core::ok_status();
-  return core::unavailable(doing + ": " + dds_strretcode(-code) + "; Cyclone DDS prints the cause above, CYCLONEDDS_URI sets it up");
+  return core::unavailable(doing + ": " + dds_strretcode(-code) +
+                           "; Cyclone DDS prints the cause above, CYCLONEDDS_URI sets it up");
 }
 
 // Ours first, so that the user's CYCLONEDDS_URI has the last word.
 std::string configuration(const DdsOptions& options) {
-  std::string xml = "<General><MaxMessageSize>65500B</MaxMessageSize></General>"
-                    "<Internal><SocketReceiveBufferSize max=\"" + std::to_string(options.receive_buffer_bytes) +
-                    "B\"/><MaxSampleSize>" + std::to_string(options.max_message_bytes) + "B</MaxSampleSize></Internal>";
+  std::string xml =
+      "<General><MaxMessageSize>65500B</MaxMessageSize></General>"
+      "<Internal><SocketReceiveBufferSize max=\"" +
+      std::to_string(options.receive_buffer_bytes) + "B\"/><MaxSampleSize>" +
+      std::to_string(options.max_message_bytes) + "B</MaxSampleSize></Internal>";
   if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
   return xml;
 }
@@ -55,22 +58,24 @@ struct DdsNode::Impl {
   dds_entity_t waitset = 0;
   dds_entity_t stop = 0;
   std::unique_ptr<GraphAnnouncement> graph;
-  mutable std::mutex mutex;                 // guards the two lists; their entries stay where they are
+  mutable std::mutex mutex;  // guards the two lists; their entries stay where they are
   std::deque<Subscription> subscriptions;
   std::deque<Publication> publications;
   std::atomic<std::uint64_t> dropped{0};
   std::thread thread;
 
   ~Impl() {
-    if (thread.joinable()) {
-      dds_set_guardcondition(stop, true);
-      thread.join();
-    }
+    stop_receiving();
     graph.reset();
     if (participant > 0) dds_delete(participant);
   }
 
   void run();
+  void stop_receiving() {
+    if (!thread.joinable()) return;
+    dds_set_guardcondition(stop, true);
+    thread.join();
+  }
   void take(Subscription& subscription);
   core::Result<dds_entity_t> make_topic(const std::string& topic, const std::string& type) const;
   template <class CType, class Message>
@@ -107,8 +112,8 @@ void DdsNode::Impl::take(Subscription& subscription) {
       if (infos[i].valid_data) {
         const std::size_t size = ddsi_serdata_size(samples[i]);
         if (size <= options.max_message_bytes) {
-          ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size), infos[i].source_timestamp,
-                                  core::wall_now_ns()};
+          ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size),
+                                  infos[i].source_timestamp, core::wall_now_ns()};
           ddsi_serdata_to_ser(samples[i], 0, size, message.cdr.data());
           subscription.on_message(std::move(message));
         } else {
@@ -128,7 +133,8 @@ void DdsNode::Impl::take(Subscription& subscription) {
 core::Result<dds_entity_t> DdsNode::Impl::make_topic(const std::string& topic, const std::string& type) const {
   PRESCENE_TRY(const std::string name, dds_topic_name(topic));
   const dds_topic_descriptor_t* descriptor = descriptor_of(type);
-  if (!descriptor) return core::unsupported("topic " + topic + ": the type '" + type + "' is not one that this program speaks");
+  if (!descriptor)
+    return core::unsupported("topic " + topic + ": the type '" + type + "' is not one that this program speaks");
   const dds_entity_t entity = dds_create_topic(participant, descriptor, name.c_str(), nullptr, nullptr);
   PRESCENE_RETURN_IF_ERROR(dds_status(entity, "topic " + topic + " of " + type));
   return entity;
@@ -149,7 +155,8 @@ DdsNode::~DdsNode() = default;
 core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options, const core::LogSink& log) {
   // 0.10's port mapping overflows 65535 beyond domain 232; ROS allows up to 230 with the default port range.
   if (options.domain < 0 || options.domain > 230) {
-    return core::invalid_input("DDS domain " + std::to_string(options.domain) + ": ROS_DOMAIN_ID is a number from 0 to 230");
+    return core::invalid_input("DDS domain " + std::to_string(options.domain) +
+                               ": ROS_DOMAIN_ID is a number from 0 to 230");
   }
   auto impl = std::make_unique<Impl>();
   impl->options = options;
@@ -165,7 +172,8 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
   dds_qset_entity_name(qos.get(), options.node_name.c_str());
   impl->participant = dds_create_participant(domain_id, qos.get(), nullptr);
-  PRESCENE_RETURN_IF_ERROR(dds_status(impl->participant, "DDS participant in domain " + std::to_string(options.domain)));
+  PRESCENE_RETURN_IF_ERROR(
+      dds_status(impl->participant, "DDS participant in domain " + std::to_string(options.domain)));
   impl->waitset = dds_create_waitset(impl->participant);
   PRESCENE_RETURN_IF_ERROR(dds_status(impl->waitset, "DDS waitset"));
   impl->stop = dds_create_guardcondition(impl->participant);
@@ -235,17 +243,19 @@ core::Status DdsNode::publish(DdsPublisher publisher, const RosClock& message) {
   return impl_->write<rosgraph_msgs_msg_dds__Clock_>(publisher, "rosgraph_msgs/msg/Clock", message);
 }
 core::Status DdsNode::publish(DdsPublisher publisher, const RosPoseWithCovarianceStamped& message) {
-  return impl_->write<geometry_msgs_msg_dds__PoseWithCovarianceStamped_>(publisher, "geometry_msgs/msg/PoseWithCovarianceStamped",
-                                                                         message);
+  return impl_->write<geometry_msgs_msg_dds__PoseWithCovarianceStamped_>(
+      publisher, "geometry_msgs/msg/PoseWithCovarianceStamped", message);
 }
 core::Status DdsNode::publish(DdsPublisher publisher, const RosDetection3dArray& message) {
   return impl_->write<vision_msgs_msg_dds__Detection3DArray_>(publisher, "vision_msgs/msg/Detection3DArray", message);
 }
 core::Status DdsNode::publish(DdsPublisher publisher, const RosMarkerArray& message) {
-  return impl_->write<visualization_msgs_msg_dds__MarkerArray_>(publisher, "visualization_msgs/msg/MarkerArray", message);
+  return impl_->write<visualization_msgs_msg_dds__MarkerArray_>(publisher, "visualization_msgs/msg/MarkerArray",
+                                                                message);
 }
 core::Status DdsNode::publish(DdsPublisher publisher, const RosDiagnosticArray& message) {
-  return impl_->write<diagnostic_msgs_msg_dds__DiagnosticArray_>(publisher, "diagnostic_msgs/msg/DiagnosticArray", message);
+  return impl_->write<diagnostic_msgs_msg_dds__DiagnosticArray_>(publisher, "diagnostic_msgs/msg/DiagnosticArray",
+                                                                 message);
 }
 
 core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr) {
@@ -270,18 +280,22 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
   return core::unsupported("messages of type '" + type + "' can't be published from recordings");
 }
 
+void DdsNode::stop_receiving() { impl_->stop_receiving(); }
+
 int DdsNode::matched_readers(DdsPublisher publisher) const {
   const std::lock_guard lock(impl_->mutex);
   dds_publication_matched_status_t status;
   const dds_entity_t writer = impl_->publications[static_cast<std::size_t>(publisher.index)].writer;
-  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK ? static_cast<int>(status.current_count) : 0;
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK ? static_cast<int>(status.current_count)
+                                                                               : 0;
 }
 
 int DdsNode::matched_writers(const std::string& topic) const {
   const std::lock_guard lock(impl_->mutex);
   for (const Impl::Subscription& subscription : impl_->subscriptions) {
     dds_subscription_matched_status_t status;
-    if (subscription.topic == topic && dds_get_subscription_matched_status(subscription.reader, &status) == DDS_RETCODE_OK) {
+    if (subscription.topic == topic &&
+        dds_get_subscription_matched_status(subscription.reader, &status) == DDS_RETCODE_OK) {
       return static_cast<int>(status.current_count);
     }
   }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// One participant on a DDS bus that ROS 2 users share: topics, types, qualities of service and type hashes are those that
-// ROS 2 Humble and Jazzy use, so that `ros2 topic list`, `echo` and `pub` work without glue.
+// One participant on a DDS bus that ROS 2 users share: topics, types, qualities of service and type hashes are those
+// that ROS 2 Humble and Jazzy use, so that `ros2 topic list`, `echo` and `pub` work without glue.
 //
 //   PRESCENE_TRY(auto node, DdsNode::create(options, log));
 //   PRESCENE_RETURN_IF_ERROR(node->subscribe("/camera/depth", "sensor_msgs/msg/Image", TopicQos::kSensor, on_image));
-//   PRESCENE_TRY(auto poses, node->advertise("/prescene/markers", "visualization_msgs/msg/MarkerArray", TopicQos::kReliable));
-//   node->publish(poses, markers);
+//   PRESCENE_TRY(auto poses, node->advertise("/poses", "geometry_msgs/msg/PoseArray", TopicQos::kReliable));
+//   node->publish(poses, message);
 #pragma once
 
 #include <cstdint>
@@ -26,30 +26,30 @@ namespace prescene::interfaces {
 enum class RosDistro { kHumble, kJazzy };
 
 struct DdsOptions {
-  int domain = 0;                        ///< 0 to 230; ROS_DOMAIN_ID.
-  std::string node_name = "prescene";    ///< As `ros2 node list` shows it.
-  /// Publish which nodes there are (for `ros2 node list`); topics work without it. Set it to the release that all others on
-  /// the bus have: the wrong form confuses their nodes.
+  int domain = 0;                      ///< 0 to 230; ROS_DOMAIN_ID.
+  std::string node_name = "prescene";  ///< As `ros2 node list` shows it.
+  /// Publish which nodes there are (for `ros2 node list`); topics work without it. Set it to the release that all
+  /// others on the bus have: the wrong form confuses their nodes.
   std::optional<RosDistro> ros_distro;
   /// Receive buffer asked of the system; RGB-D is lost below 4 MiB. A smaller one that the system grants is logged.
   int receive_buffer_bytes = 8 << 20;
-  std::size_t max_message_bytes = std::size_t{64} << 20;   ///< Larger samples are dropped unread.
+  std::size_t max_message_bytes = std::size_t{64} << 20;  ///< Larger samples are dropped unread.
 };
 
 /// How a topic is offered or asked for; names say who uses it.
 enum class TopicQos {
-  kSensor,      ///< Best effort, keep last 5: readers of cameras match every driver.
-  kImages,      ///< Reliable, keep last 2: writers of images serve best-effort and reliable readers.
-  kReliable,    ///< Reliable, keep last 10: poses, markers, diagnostics, queries and answers.
-  kTf,          ///< Reliable, keep last 100.
-  kLatched,     ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
-  kTfStatic,    ///< Reader of /tf_static: reliable, transient local, keep last 100.
+  kSensor,    ///< Best effort, keep last 5: readers of cameras match every driver.
+  kImages,    ///< Reliable, keep last 2: writers of images serve best-effort and reliable readers.
+  kReliable,  ///< Reliable, keep last 10: poses, markers, diagnostics, queries and answers.
+  kTf,        ///< Reliable, keep last 100.
+  kLatched,   ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
+  kTfStatic,  ///< Reader of /tf_static: reliable, transient local, keep last 100.
 };
 
 /// One sample as it came: CDR bytes with their header, for decode_cdr and recordings.
 struct ReceivedMessage {
-  std::string topic;             ///< "/camera/depth/image_raw"
-  std::string type;              ///< "sensor_msgs/msg/Image"
+  std::string topic;  ///< "/camera/depth/image_raw"
+  std::string type;   ///< "sensor_msgs/msg/Image"
   std::vector<std::uint8_t> cdr;
   core::TimeNs source_ns = 0;    ///< The writer's time.
   core::TimeNs received_ns = 0;  ///< Ours.
@@ -69,8 +69,8 @@ class DdsNode {
   DdsNode(const DdsNode&) = delete;
   DdsNode& operator=(const DdsNode&) = delete;
 
-  /// Calls `on_message` for each sample, from the node's one thread, until the node ends. Types: those of messages.h that
-  /// ros_messages.idl holds; another one is kUnsupported.
+  /// Calls `on_message` for each sample, from the node's one thread, until the node ends. Types: those of messages.h
+  /// that ros_messages.idl holds; another one is kUnsupported.
   core::Status subscribe(const std::string& topic, const std::string& type, TopicQos qos,
                          std::function<void(ReceivedMessage&&)> on_message);
 
@@ -88,6 +88,9 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
+
+  /// No callback runs once this has returned; publishing goes on. Not to be called from a callback.
+  void stop_receiving();
 
   /// How many readers on the bus match a publisher now.
   int matched_readers(DdsPublisher publisher) const;

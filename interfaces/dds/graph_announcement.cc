@@ -18,8 +18,8 @@ Gid gid_of(dds_entity_t entity) {
 
 // The two forms differ only in the size of an identity.
 template <class Info, class Node, class Gid>
-void write_info(dds_entity_t participant, dds_entity_t writer, const std::string& name, const std::vector<dds_entity_t>& readers,
-                const std::vector<dds_entity_t>& writers) {
+void write_info(dds_entity_t participant, dds_entity_t writer, const std::string& name,
+                const std::vector<dds_entity_t>& readers, const std::vector<dds_entity_t>& writers) {
   std::vector<Gid> reader_gids;
   std::vector<Gid> writer_gids;
   for (const dds_entity_t entity : readers) reader_gids.push_back(gid_of<Gid>(entity));
@@ -45,9 +45,9 @@ void write_info(dds_entity_t participant, dds_entity_t writer, const std::string
 }  // namespace
 
 core::Result<std::unique_ptr<GraphAnnouncement>> GraphAnnouncement::create(dds_entity_t participant, RosDistro distro) {
-  std::unique_ptr<GraphAnnouncement> graph(
-      new GraphAnnouncement(distro == RosDistro::kHumble ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
-                                                         : rmw_dds_common_jazzy_msg_dds__ParticipantEntitiesInfo__desc));
+  std::unique_ptr<GraphAnnouncement> graph(new GraphAnnouncement(
+      distro == RosDistro::kHumble ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
+                                   : rmw_dds_common_jazzy_msg_dds__ParticipantEntitiesInfo__desc));
   graph->distro_ = distro;
   graph->participant_ = participant;
   graph->descriptor_.m_typename = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
@@ -72,8 +72,9 @@ core::Result<std::unique_ptr<GraphAnnouncement>> GraphAnnouncement::create(dds_e
 void GraphAnnouncement::publish(const std::string& node_name, const std::vector<dds_entity_t>& readers,
                                 const std::vector<dds_entity_t>& writers) {
   if (distro_ == RosDistro::kHumble) {
-    write_info<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_, rmw_dds_common_humble_msg_dds__NodeEntitiesInfo_,
-               rmw_dds_common_humble_msg_dds__Gid_>(participant_, writer_, node_name, readers, writers);
+    write_info<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_,
+               rmw_dds_common_humble_msg_dds__NodeEntitiesInfo_, rmw_dds_common_humble_msg_dds__Gid_>(
+        participant_, writer_, node_name, readers, writers);
   } else {
     write_info<rmw_dds_common_jazzy_msg_dds__ParticipantEntitiesInfo_, rmw_dds_common_jazzy_msg_dds__NodeEntitiesInfo_,
                rmw_dds_common_jazzy_msg_dds__Gid_>(participant_, writer_, node_name, readers, writers);

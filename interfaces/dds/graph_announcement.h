@@ -16,7 +16,8 @@ class GraphAnnouncement {
  public:
   static core::Result<std::unique_ptr<GraphAnnouncement>> create(dds_entity_t participant, RosDistro distro);
   /// Publishes the whole list again: the participant's one node with its endpoints.
-  void publish(const std::string& node_name, const std::vector<dds_entity_t>& readers, const std::vector<dds_entity_t>& writers);
+  void publish(const std::string& node_name, const std::vector<dds_entity_t>& readers,
+               const std::vector<dds_entity_t>& writers);
 
  private:
   explicit GraphAnnouncement(const dds_topic_descriptor_t& descriptor) : descriptor_(descriptor) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the plain structs of messages.h to the C structs that idlc makes. Strings and sequences of numbers are borrowed, not
-// copied: a filled C struct lives no longer than its message and its arena.
+// From the plain structs of messages.h to the C structs that idlc makes. Strings and sequences of numbers are borrowed,
+// not copied: a filled C struct lives no longer than its message and its arena.
 #pragma once
 
 #include <cstddef>
@@ -31,10 +31,8 @@ class SampleArena {
 };
 
 template <class T>
-  requires std::is_arithmetic_v<T>
-void fill(T& to, const T& from, SampleArena&) {
-  to = from;
-}
+requires std::is_arithmetic_v<T>
+void fill(T& to, const T& from, SampleArena&) { to = from; }
 inline void fill(char*& to, const std::string& from, SampleArena&) { to = const_cast<char*>(from.c_str()); }
 template <class T, std::size_t N>
 void fill(T (&to)[N], const std::array<T, N>& from, SampleArena&) {
@@ -55,12 +53,11 @@ void fill(Sequence& to, const std::vector<T>& from, SampleArena& arena);
 #define PRESCENE_FILL_9(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_8(__VA_ARGS__)
 #define PRESCENE_FILL_10(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_9(__VA_ARGS__)
 #define PRESCENE_FILL_11(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_10(__VA_ARGS__)
-#define PRESCENE_FILL_19(a, b, c, d, e, f, g, h, ...) PRESCENE_FILL_8(a, b, c, d, e, f, g, h) PRESCENE_FILL_11(__VA_ARGS__)
+#define PRESCENE_FILL_19(a, b, c, d, e, f, g, h, ...) \
+  PRESCENE_FILL_8(a, b, c, d, e, f, g, h) PRESCENE_FILL_11(__VA_ARGS__)
 /// Fills every field of the C struct from the field of the same name.
-#define PRESCENE_FILL_STRUCT(c_type, message_type, count, ...)               \
-  inline void fill(c_type& to, const message_type& from, SampleArena& arena) { \
-    PRESCENE_FILL_##count(__VA_ARGS__)                                        \
-  }
+#define PRESCENE_FILL_STRUCT(c_type, message_type, count, ...) \
+  inline void fill(c_type& to, const message_type& from, SampleArena& arena) { PRESCENE_FILL_##count(__VA_ARGS__) }
 
 PRESCENE_FILL_STRUCT(builtin_interfaces_msg_dds__Time_, RosTime, 2, sec, nanosec)
 PRESCENE_FILL_STRUCT(builtin_interfaces_msg_dds__Duration_, RosDuration, 2, sec, nanosec)
@@ -75,14 +72,16 @@ PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Pose_, RosPose, 2, position, orienta
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__PoseWithCovariance_, RosPoseWithCovariance, 2, pose, covariance)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__PoseWithCovarianceStamped_, RosPoseWithCovarianceStamped, 2, header, pose)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Transform_, RosTransform, 2, translation, rotation)
-PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__TransformStamped_, RosTransformStamped, 3, header, child_frame_id, transform)
+PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__TransformStamped_, RosTransformStamped, 3, header, child_frame_id,
+                     transform)
 PRESCENE_FILL_STRUCT(tf2_msgs_msg_dds__TFMessage_, RosTfMessage, 1, transforms)
-PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__Image_, RosImage, 7, header, height, width, encoding, is_bigendian, step, data)
+PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__Image_, RosImage, 7, header, height, width, encoding, is_bigendian, step,
+                     data)
 PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__CompressedImage_, RosCompressedImage, 3, header, format, data)
 PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__RegionOfInterest_, RosRegionOfInterest, 5, x_offset, y_offset, height, width,
                      do_rectify)
-PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__CameraInfo_, RosCameraInfo, 11, header, height, width, distortion_model, d, k, r, p,
-                     binning_x, binning_y, roi)
+PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__CameraInfo_, RosCameraInfo, 11, header, height, width, distortion_model, d, k,
+                     r, p, binning_x, binning_y, roi)
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__ObjectHypothesis_, RosObjectHypothesis, 2, class_id, score)
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__ObjectHypothesisWithPose_, RosObjectHypothesisWithPose, 2, hypothesis, pose)
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__BoundingBox3D_, RosBoundingBox3d, 2, center, size)
@@ -90,12 +89,13 @@ PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__Detection3D_, RosDetection3d, 4, heade
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__Detection3DArray_, RosDetection3dArray, 2, header, detections)
 PRESCENE_FILL_STRUCT(visualization_msgs_msg_dds__UVCoordinate_, RosUvCoordinate, 2, u, v)
 PRESCENE_FILL_STRUCT(visualization_msgs_msg_dds__MeshFile_, RosMeshFile, 2, filename, data)
-PRESCENE_FILL_STRUCT(visualization_msgs_msg_dds__Marker_, RosMarker, 19, header, ns, id, type, action, pose, scale, color, lifetime,
-                     frame_locked, points, colors, texture_resource, texture, uv_coordinates, text, mesh_resource, mesh_file,
-                     mesh_use_embedded_materials)
+PRESCENE_FILL_STRUCT(visualization_msgs_msg_dds__Marker_, RosMarker, 19, header, ns, id, type, action, pose, scale,
+                     color, lifetime, frame_locked, points, colors, texture_resource, texture, uv_coordinates, text,
+                     mesh_resource, mesh_file, mesh_use_embedded_materials)
 PRESCENE_FILL_STRUCT(visualization_msgs_msg_dds__MarkerArray_, RosMarkerArray, 1, markers)
 PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__KeyValue_, RosKeyValue, 2, key, value)
-PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__DiagnosticStatus_, RosDiagnosticStatus, 5, level, name, message, hardware_id, values)
+PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__DiagnosticStatus_, RosDiagnosticStatus, 5, level, name, message,
+                     hardware_id, values)
 PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__DiagnosticArray_, RosDiagnosticArray, 2, header, status)
 
 #undef PRESCENE_FILL_STRUCT

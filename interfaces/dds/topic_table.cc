@@ -32,7 +32,8 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
 }
 
 core::Result<std::string> dds_topic_name(const std::string& ros_topic) {
-  const std::string remedy = ": ROS names are '/' and then letters, digits, '_' and '/', no token empty or begun by a digit";
+  const std::string remedy =
+      ": ROS names are '/' and then letters, digits, '_' and '/', no token empty or begun by a digit";
   if (ros_topic.size() < 2 || ros_topic.front() != '/' || ros_topic.back() == '/' || ros_topic.size() > 250) {
     return core::invalid_input("topic '" + ros_topic + "'" + remedy);
   }
@@ -52,12 +53,26 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
   bool reliable = true;
   bool latched = false;
   switch (kind) {
-    case TopicQos::kSensor: depth = 5; reliable = false; break;
-    case TopicQos::kImages: depth = 2; break;
-    case TopicQos::kReliable: break;
-    case TopicQos::kTf: depth = 100; break;
-    case TopicQos::kLatched: depth = 1; latched = true; break;
-    case TopicQos::kTfStatic: depth = 100; latched = true; break;
+    case TopicQos::kSensor:
+      depth = 5;
+      reliable = false;
+      break;
+    case TopicQos::kImages:
+      depth = 2;
+      break;
+    case TopicQos::kReliable:
+      break;
+    case TopicQos::kTf:
+      depth = 100;
+      break;
+    case TopicQos::kLatched:
+      depth = 1;
+      latched = true;
+      break;
+    case TopicQos::kTfStatic:
+      depth = 100;
+      latched = true;
+      break;
   }
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
   dds_qset_reliability(qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));

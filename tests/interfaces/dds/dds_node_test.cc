@@ -76,7 +76,8 @@ void expect_round_trip(const Message& message, const std::string& type) {
 const RosHeader kHeader{{12, 34}, "camera"};
 
 TEST(DdsNode, CarriesImages) {
-  expect_round_trip(RosImage{kHeader, 2, 3, "16UC1", 0, 6, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}}, "sensor_msgs/msg/Image");
+  expect_round_trip(RosImage{kHeader, 2, 3, "16UC1", 0, 6, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}},
+                    "sensor_msgs/msg/Image");
 }
 
 TEST(DdsNode, CarriesLargeImages) {
@@ -113,7 +114,8 @@ TEST(DdsNode, CarriesEveryFieldOfTheOtherTypes) {
   for (std::size_t i = 0; i < 36; ++i) pose.pose.covariance[i] = 0.25 * static_cast<double>(i);
   expect_round_trip(pose, "geometry_msgs/msg/PoseWithCovarianceStamped");
 
-  RosDetection3dArray detections{kHeader, {{kHeader, {{{"carton", 0.75}, pose.pose}}, {pose.pose.pose, {0.1, 0.2, 0.3}}, "7"}}};
+  RosDetection3dArray detections{kHeader,
+                                 {{kHeader, {{{"carton", 0.75}, pose.pose}}, {pose.pose.pose, {0.1, 0.2, 0.3}}, "7"}}};
   expect_round_trip(detections, "vision_msgs/msg/Detection3DArray");
 
   RosMarker marker;
@@ -136,8 +138,9 @@ TEST(DdsNode, CarriesEveryFieldOfTheOtherTypes) {
   marker.mesh_use_embedded_materials = true;
   expect_round_trip(RosMarkerArray{{marker, marker}}, "visualization_msgs/msg/MarkerArray");
 
-  expect_round_trip(RosDiagnosticArray{kHeader, {{1, "tracker", "late frames", "cpu", {{"skipped", "3"}, {"steps", "40"}}}}},
-                    "diagnostic_msgs/msg/DiagnosticArray");
+  expect_round_trip(
+      RosDiagnosticArray{kHeader, {{1, "tracker", "late frames", "cpu", {{"skipped", "3"}, {"steps", "40"}}}}},
+      "diagnostic_msgs/msg/DiagnosticArray");
 }
 
 TEST(DdsNode, BestEffortAndReliableReadersBothMatchAnImageWriter) {
@@ -147,9 +150,13 @@ TEST(DdsNode, BestEffortAndReliableReadersBothMatchAnImageWriter) {
   Inbox sensor;
   Inbox reliable;
   const std::string type = "sensor_msgs/msg/Image";
-  ASSERT_TRUE((*other)->subscribe("/image", type, TopicQos::kSensor, [&](ReceivedMessage&& m) { sensor.put(std::move(m)); }).ok());
+  ASSERT_TRUE((*other)
+                  ->subscribe("/image", type, TopicQos::kSensor, [&](ReceivedMessage&& m) { sensor.put(std::move(m)); })
+                  .ok());
   ASSERT_TRUE(
-      (*other)->subscribe("/image", type, TopicQos::kReliable, [&](ReceivedMessage&& m) { reliable.put(std::move(m)); }).ok());
+      (*other)
+          ->subscribe("/image", type, TopicQos::kReliable, [&](ReceivedMessage&& m) { reliable.put(std::move(m)); })
+          .ok());
   const auto publisher = (*node)->advertise("/image", type, TopicQos::kImages);
   ASSERT_TRUE(publisher.ok());
   // Volatile topics reach only who has been found: publish until both have heard one.
@@ -185,7 +192,8 @@ TEST(DdsNode, BadNamesTypesAndOptionsAreRefusedWithTheRemedy) {
               core::StatusCode::kInvalidInput)
         << topic;
   }
-  EXPECT_EQ((*node)->advertise("/a", "std_msgs/msg/Strin", TopicQos::kReliable).status().code(), core::StatusCode::kUnsupported);
+  EXPECT_EQ((*node)->advertise("/a", "std_msgs/msg/Strin", TopicQos::kReliable).status().code(),
+            core::StatusCode::kUnsupported);
   const auto publisher = (*node)->advertise("/a", "std_msgs/msg/String", TopicQos::kReliable);
   ASSERT_TRUE(publisher.ok());
   EXPECT_EQ((*node)->publish(*publisher, RosClock{}).code(), core::StatusCode::kInvalidInput);
