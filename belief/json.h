@@ -26,6 +26,8 @@ nlohmann::ordered_json to_json(const Answer& answer);
 
 /// {"id": "...", "where": {...}} or "predict", "stability", "view".
 core::Result<Query> query_from_json(std::string_view text);
+/// {"position": [x, y, z], "rotation": [w, x, y, z]}; the rotation is normalised, zero or not finite is an error.
+core::Result<Pose> pose_from_json(const nlohmann::ordered_json& value);
 core::Result<Action> action_from_json(const nlohmann::ordered_json& value);
 core::Result<Outcome> outcome_from_json(const nlohmann::ordered_json& value);
 /// A belief written by to_json, given its scene.

@@ -213,4 +213,11 @@ core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes) {
   }
 }
 
+core::Result<Pose> pose_from_json(const Json& value) {
+  JsonErrors errors;
+  const Pose pose = pose_from({value, "", errors});
+  if (!errors.ok()) return errors.status();
+  return pose;
+}
+
 }  // namespace prescene::belief

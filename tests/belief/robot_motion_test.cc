@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/belief/robot_motion.h"
+
+#include <gtest/gtest.h>
+
+namespace prescene::belief {
+namespace {
+
+Scene scene_with_hand() {
+  Scene scene;
+  KinematicBody hand;
+  hand.name = "hand";
+  hand.timeline = {{0.0, Pose::from_translation({0.0, 0.0, 1.0})}, {2.0, Pose::from_translation({2.0, 0.0, 1.0})}};
+  scene.robot = {hand};
+  SceneObject cup;
+  cup.name = "cup";
+  cup.pose = FixedPose{Pose::from_translation({0.0, 0.0, 0.9})};
+  cup.held_by = "hand";
+  scene.objects = {cup};
+  return scene;
+}
+
+TEST(RobotMotion, FollowsTheTimelineWithoutActions) {
+  const Scene scene = scene_with_hand();
+  EXPECT_NEAR(robot_pose_at(scene, {}, 0, 0.5).translation.x(), 0.5, 1e-12);
+  EXPECT_NEAR(robot_pose_at(scene, {}, 0, 9.0).translation.x(), 2.0, 1e-12);
+}
+
+TEST(RobotMotion, BacksOffAfterLettingGo) {
+  const Scene scene = scene_with_hand();
+  Release release;
+  release.object = "cup";
+  release.retreat = {0.0, 0.0, 0.4};
+  release.retreat_duration = 0.5;
+  const std::vector<Action> actions = {{1.0, release}};
+  EXPECT_NEAR(robot_pose_at(scene, actions, 0, 0.99).translation.z(), 1.0, 1e-12);
+  EXPECT_NEAR(robot_pose_at(scene, actions, 0, 1.25).translation.z(), 1.2, 1e-12);
+  EXPECT_NEAR(robot_pose_at(scene, actions, 0, 3.0).translation.z(), 1.4, 1e-12);
+}
+
+TEST(RobotMotion, CarriesWhatItPlacesToItsGoal) {
+  const Scene scene = scene_with_hand();
+  Place place;
+  place.object = "cup";
+  place.X_WO = FixedPose{Pose::from_translation({0.0, 1.0, 0.3})};
+  place.duration = 1.0;
+  const std::vector<Action> actions = {{1.0, place}};
+  // The hand stays 0.1 m above the cup.
+  const Pose half_way = robot_pose_at(scene, actions, 0, 1.5);
+  EXPECT_NEAR(half_way.translation.x(), 0.5, 1e-12);
+  EXPECT_NEAR(half_way.translation.y(), 0.5, 1e-12);
+  EXPECT_NEAR(half_way.translation.z(), 0.7, 1e-12);
+  EXPECT_NEAR(robot_pose_at(scene, actions, 0, 5.0).translation.z(), 0.4, 1e-12);
+}
+
+TEST(RobotMotion, ActionsOnWhatIsNotHeldDoNotMoveIt) {
+  Scene scene = scene_with_hand();
+  scene.objects[0].held_by.reset();
+  Release release;
+  release.object = "cup";
+  release.retreat = {0.0, 0.0, 0.4};
+  EXPECT_NEAR(robot_pose_at(scene, std::vector<Action>{{0.0, release}}, 0, 1.0).translation.z(), 1.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace prescene::belief
