@@ -21,10 +21,12 @@ core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llrou
 
 }  // namespace
 
-FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies, TfBufferSettings tf_settings)
+FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies,
+                               TfBufferSettings tf_settings)
     : settings_(std::move(settings)), robot_bodies_(std::move(robot_bodies)), tf_(tf_settings) {}
 
-core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns) {
+core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, MessageIndex index,
+                                       core::TimeNs received_ns) {
   PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
   std::string frame_id = settings_.camera_frame;
   if (frame_id.empty() && !image.header.frame_id.empty()) {
@@ -35,7 +37,8 @@ core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, Messag
   PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules));
 
   if (last_taken_ns_ && stamp_ns + kClockJumpNs < *last_taken_ns_) clock_jumped_back();
-  Waiting entry{index, stamp_ns, received_ns, std::move(frame_id), std::make_shared<geometry::DepthImage>(std::move(depth))};
+  Waiting entry{index, stamp_ns, received_ns, std::move(frame_id),
+                std::make_shared<geometry::DepthImage>(std::move(depth))};
   if (last_taken_ns_ && stamp_ns <= *last_taken_ns_) {
     skip(entry, "not newer than the frame before it");
     return core::ok_status();
@@ -79,17 +82,21 @@ core::Status FrameAssembler::add_tf(const interfaces::RosTfMessage& message, Mes
 const FrameAssembler::Color* FrameAssembler::color_of(const Waiting& waiting) const {
   const Color* best = nullptr;
   for (const Color& color : colors_) {
-    if (!best || std::abs(color.stamp_ns - waiting.stamp_ns) < std::abs(best->stamp_ns - waiting.stamp_ns)) best = &color;
+    if (!best || std::abs(color.stamp_ns - waiting.stamp_ns) < std::abs(best->stamp_ns - waiting.stamp_ns))
+      best = &color;
   }
-  return best && std::abs(best->stamp_ns - waiting.stamp_ns) <= ns_of(settings_.max_stamp_difference_s) ? best : nullptr;
+  return best && std::abs(best->stamp_ns - waiting.stamp_ns) <= ns_of(settings_.max_stamp_difference_s) ? best
+                                                                                                        : nullptr;
 }
 
 FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool out_of_time) const {
   if (!camera_) return {{}, "no usable camera info has come", false};
   if (camera_->width != waiting.depth->width() || camera_->height != waiting.depth->height()) {
-    return {{}, "the camera info is for " + std::to_string(camera_->width) + " x " + std::to_string(camera_->height) +
-                    " pixels, the depth image has " + std::to_string(waiting.depth->width()) + " x " +
-                    std::to_string(waiting.depth->height()), true};
+    return {{},
+            "the camera info is for " + std::to_string(camera_->width) + " x " + std::to_string(camera_->height) +
+                " pixels, the depth image has " + std::to_string(waiting.depth->width()) + " x " +
+                std::to_string(waiting.depth->height()),
+            true};
   }
   AssembledFrame frame;
   frame.depth = waiting.index;

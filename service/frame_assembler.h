@@ -25,10 +25,10 @@ struct AssemblerSettings {
   std::string camera_frame;
   /// The camera's pose when tf does not know it; empty = frames without tf are skipped.
   std::optional<geometry::Pose> X_WC;
-  double max_wait_s = 0.05;           ///< How long a depth image waits for its colour image, camera info and tf.
+  double max_wait_s = 0.05;               ///< How long a depth image waits for its colour image, camera info and tf.
   double max_stamp_difference_s = 0.017;  ///< Between a depth image and its colour image.
   bool use_color = true;
-  bool mono16_is_depth = false;       ///< Take `mono16` depth images as millimetres.
+  bool mono16_is_depth = false;  ///< Take `mono16` depth images as millimetres.
 };
 
 /// Running number of a message in a recording (or since the start), over all topics.

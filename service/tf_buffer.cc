@@ -7,7 +7,9 @@
 namespace prescene::service {
 namespace {
 
-std::string without_slash(const std::string& name) { return !name.empty() && name.front() == '/' ? name.substr(1) : name; }
+std::string without_slash(const std::string& name) {
+  return !name.empty() && name.front() == '/' ? name.substr(1) : name;
+}
 
 core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llround(seconds * 1e9)); }
 
@@ -22,22 +24,25 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
                            const geometry::Pose& X_PC, bool is_static) {
   const std::string parent = without_slash(raw_parent);
   const std::string child = without_slash(raw_child);
-  if (parent.empty() || child.empty()) return core::invalid_input("a transform with an empty frame name: name both frames");
+  if (parent.empty() || child.empty())
+    return core::invalid_input("a transform with an empty frame name: name both frames");
   if (parent == child) return core::invalid_input("frame '" + child + "' is its own parent: correct the publisher");
   if (!X_PC.is_finite()) {
     return core::invalid_input("transform " + parent + " -> " + child + " is not finite: correct the publisher");
   }
   for (std::string frame = parent; edges_.contains(frame); frame = edges_.at(frame).parent) {
     if (edges_.at(frame).parent == child) {
-      return core::invalid_input("transform " + parent + " -> " + child + " would close a cycle: a frame has one parent");
+      return core::invalid_input("transform " + parent + " -> " + child +
+                                 " would close a cycle: a frame has one parent");
     }
   }
   auto found = edges_.find(child);
   if (found != edges_.end() && found->second.parent != parent) {
-    const bool expired = !found->second.is_static && found->second.samples.back().first + ns_of(settings_.history_s) < stamp_ns;
+    const bool expired =
+        !found->second.is_static && found->second.samples.back().first + ns_of(settings_.history_s) < stamp_ns;
     if (!expired) {
-      return core::invalid_input("frame '" + child + "' has the parent '" + found->second.parent + "' and now also '" + parent +
-                                 "': stop one of the two publishers");
+      return core::invalid_input("frame '" + child + "' has the parent '" + found->second.parent + "' and now also '" +
+                                 parent + "': stop one of the two publishers");
     }
     if (--parents_[found->second.parent] == 0) parents_.erase(found->second.parent);
     edges_.erase(found);
@@ -79,12 +84,14 @@ void TfBuffer::forget_moving() {
   }
 }
 
-core::Result<geometry::Pose> TfBuffer::edge_pose(const std::string& child, const Edge& edge, core::TimeNs stamp_ns) const {
+core::Result<geometry::Pose> TfBuffer::edge_pose(const std::string& child, const Edge& edge,
+                                                 core::TimeNs stamp_ns) const {
   if (edge.is_static) return edge.samples.front().second;
   const auto& samples = edge.samples;
   if (stamp_ns < samples.front().first) {
     return core::unavailable("transform " + edge.parent + " -> " + child + " begins " +
-                             std::to_string(core::seconds_of(samples.front().first - stamp_ns)) + " s after the asked time");
+                             std::to_string(core::seconds_of(samples.front().first - stamp_ns)) +
+                             " s after the asked time");
   }
   if (stamp_ns > samples.back().first) {
     if (stamp_ns - samples.back().first > ns_of(settings_.max_extrapolation_s)) {
@@ -125,13 +132,15 @@ core::Result<geometry::Pose> TfBuffer::lookup(const std::string& raw_parent, con
   const std::string child = without_slash(raw_child);
   if (parent == child) return geometry::Pose::identity();
   for (const std::string& frame : {child, parent}) {
-    if (!knows(frame)) return core::not_found("no transform names the frame '" + frame + "': is its publisher running?");
+    if (!knows(frame))
+      return core::not_found("no transform names the frame '" + frame + "': is its publisher running?");
   }
   std::vector<std::string> from_parent = path_to_root(parent);
   std::vector<std::string> from_child = path_to_root(child);
   if (from_parent.back() != from_child.back()) {
-    return core::not_found("the frames '" + parent + "' and '" + child + "' are in two trees (roots '" + from_parent.back() +
-                           "' and '" + from_child.back() + "'): publish the transform between them");
+    return core::not_found("the frames '" + parent + "' and '" + child + "' are in two trees (roots '" +
+                           from_parent.back() + "' and '" + from_child.back() +
+                           "'): publish the transform between them");
   }
   // What is above the nearest common ancestor cancels out and need not be known at this time.
   while (!from_parent.empty() && !from_child.empty() && from_parent.back() == from_child.back()) {

@@ -16,8 +16,8 @@
 namespace prescene::service {
 
 struct TfBufferSettings {
-  double history_s = 10.0;        ///< Transforms older than the newest of their edge by more than this are dropped.
-  int max_frames = 2000;          ///< More frames are refused.
+  double history_s = 10.0;           ///< Transforms older than the newest of their edge by more than this are dropped.
+  int max_frames = 2000;             ///< More frames are refused.
   double max_extrapolation_s = 0.1;  ///< How far after its newest transform a moving edge may be asked.
 };
 
@@ -26,16 +26,16 @@ class TfBuffer {
  public:
   explicit TfBuffer(TfBufferSettings settings = {}) : settings_(settings) {}
 
-  /// Adds the pose of `child` in `parent` at a time; a static edge holds at all times. A leading '/' of a name is ignored.
-  /// Fails with kInvalidInput, changing nothing, on an empty name, child == parent, a cycle, another parent than before
-  /// (unless all its transforms are older than the history), or a pose that is not finite; with kResourceExhausted
-  /// beyond max_frames.
-  core::Status add(const std::string& parent, const std::string& child, core::TimeNs stamp_ns, const geometry::Pose& X_PC,
-                   bool is_static);
+  /// Adds the pose of `child` in `parent` at a time; a static edge holds at all times. A leading '/' of a name is
+  /// ignored. Fails with kInvalidInput, changing nothing, on an empty name, child == parent, a cycle, another parent
+  /// than before (unless all its transforms are older than the history), or a pose that is not finite; with
+  /// kResourceExhausted beyond max_frames.
+  core::Status add(const std::string& parent, const std::string& child, core::TimeNs stamp_ns,
+                   const geometry::Pose& X_PC, bool is_static);
 
   /// Pose of `child` in `parent` at a time, interpolated between the transforms around it. Fails with kNotFound when
-  /// a frame is unknown or the two are not connected, with kUnavailable when an edge on the way has no transform at that
-  /// time (yet, or any more): the text names the edge.
+  /// a frame is unknown or the two are not connected, with kUnavailable when an edge on the way has no transform at
+  /// that time (yet, or any more): the text names the edge.
   core::Result<geometry::Pose> lookup(const std::string& parent, const std::string& child, core::TimeNs stamp_ns) const;
 
   bool knows(const std::string& frame) const;
@@ -55,7 +55,7 @@ class TfBuffer {
   core::Result<geometry::Pose> pose_along(std::span<const std::string> path, core::TimeNs stamp_ns) const;
 
   TfBufferSettings settings_;
-  std::map<std::string, Edge> edges_;  // by child
+  std::map<std::string, Edge> edges_;   // by child
   std::map<std::string, int> parents_;  // number of edges that have this frame as their parent
 };
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Answers questions that come in as JSON, one after the other on a thread of its own, from snapshots of the belief.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "prescene/belief/belief.h"
+#include "prescene/core/progress.h"
+#include "prescene/queries/query_engine.h"
+#include "prescene/service/backends.h"
+
+namespace prescene::service {
+
+/// A question's text as JSON and its answer's. Called on the desk's thread.
+using AnswerSink = std::function<void(const std::string& question, const std::string& answer)>;
+
+class AnsweringDesk {
+ public:
+  /// `threads` of its own for simulating; `snapshot` gives the belief to ask. All must outlive the desk.
+  AnsweringDesk(Backends& backends, int threads, std::size_t max_waiting, double default_seconds,
+                std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer);
+  /// Cancels what is being answered and drops what waits.
+  ~AnsweringDesk();
+  AnsweringDesk(const AnsweringDesk&) = delete;
+  AnsweringDesk& operator=(const AnsweringDesk&) = delete;
+
+  /// Takes a question; one that is not understood or comes when too many wait gets an answer that says so.
+  void ask(std::string question_json);
+
+ private:
+  void work();
+  std::string answer(const std::string& question_json);
+
+  Backends& backends_;
+  core::ThreadPool pool_;
+  std::size_t max_waiting_;
+  double default_seconds_;
+  std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
+  AnswerSink on_answer_;
+  core::Cancellation stop_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::string> waiting_;
+  std::thread thread_;
+};
+
+/// {"id": the question's if it can be read, "error": text}.
+std::string error_answer(const std::string& question_json, const std::string& text);
+
+}  // namespace prescene::service

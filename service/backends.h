@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one place that chooses: Bullet simulates, the reference renderer draws what is recorded or answered, shapes and
+// meshes are made once and kept.
+//
+//   Backends backends(pool);
+//   auto simulator = backends.make_simulator(scene);
+//   belief::Answer answer = queries::answer(snapshot, query, backends.query_context());
+#pragma once
+
+#include <memory>
+
+#include "prescene/belief/scene.h"
+#include "prescene/core/parallel.h"
+#include "prescene/filter/render_scene.h"
+#include "prescene/queries/query_engine.h"
+#include "prescene/rendering/renderer.h"
+#include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/shape_store.h"
+#include "prescene/simulation/simulator.h"
+
+namespace prescene::service {
+
+struct BackendSettings {
+  simulation::BulletOptions bullet;
+};
+
+/// Safe to use from several threads.
+class Backends {
+ public:
+  /// `pool` must outlive the backends.
+  explicit Backends(core::ThreadPool& pool, const BackendSettings& settings = {});
+
+  core::ThreadPool& pool() { return pool_; }
+  filter::MeshCache& meshes() { return meshes_; }
+
+  core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene);
+  /// Deterministic bits: what is recorded, replayed or answered is drawn by it.
+  core::Result<std::unique_ptr<rendering::Renderer>> make_renderer();
+  /// For queries that run in `pool`.
+  queries::QueryContext query_context(core::ThreadPool& pool);
+
+ private:
+  core::ThreadPool& pool_;
+  BackendSettings settings_;
+  simulation::ShapeStore shapes_;
+  filter::MeshCache meshes_;
+};
+
+}  // namespace prescene::service

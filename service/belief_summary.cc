@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/belief_summary.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "prescene/belief/json.h"
+#include "prescene/geometry/triangle_mesh.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+
+// RViz draws each frame anew: enough triangles to know the object by.
+constexpr int kMarkerTriangles = 300;
+
+constexpr belief::TrackState kStates[] = {belief::TrackState::kTracked, belief::TrackState::kDoubtful,
+                                          belief::TrackState::kUnseen, belief::TrackState::kLost};
+
+const belief::ObjectModel* model_of(const belief::Scene& scene, const std::string& name) {
+  const auto found = std::find_if(scene.models.begin(), scene.models.end(),
+                                  [&](const belief::ObjectModel& model) { return model.name == name; });
+  return found == scene.models.end() ? nullptr : &*found;
+}
+
+geometry::TriangleMesh mesh_of(const belief::ObjectModel& model) {
+  return model.visual ? *model.visual : belief::collision_mesh(model);
+}
+
+interfaces::RosHeader header_of(core::TimeNs stamp_ns, const std::string& frame) {
+  return {interfaces::to_ros_time(stamp_ns), frame};
+}
+
+double number_or(const ordered_json& object, const char* key, double otherwise) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
+  const core::Status bad = core::invalid_input("belief: an object without name, state or pose");
+  if (!json.is_object()) return bad;
+  const auto name = json.find("name");
+  const auto state = json.find("state");
+  const auto pose = json.find("pose");
+  if (name == json.end() || !name->is_string() || state == json.end() || !state->is_string() || pose == json.end())
+    return bad;
+  ObjectSummary object;
+  object.name = name->get<std::string>();
+  if (const auto model = json.find("model"); model != json.end() && model->is_string())
+    object.model = model->get<std::string>();
+  const auto* known = std::find_if(std::begin(kStates), std::end(kStates), [&](belief::TrackState s) {
+    return belief::to_string(s) == state->get<std::string>();
+  });
+  if (known == std::end(kStates)) return bad;
+  object.state = *known;
+  PRESCENE_TRY(object.X_WO, belief::pose_from_json(*pose));
+  object.confidence = number_or(json, "confidence", 0.0);
+  object.existence = number_or(json, "existence", 0.0);
+  object.evidence_per_pixel = number_or(json, "evidence_per_pixel", 0.0);
+  object.visible_share = number_or(json, "visible_share", 0.0);
+  const auto covariance = json.find("covariance");
+  if (covariance != json.end() && covariance->is_array() && covariance->size() == 36) {
+    for (Eigen::Index i = 0; i < 36; ++i) {
+      const ordered_json& value = (*covariance)[static_cast<std::size_t>(i)];
+      if (value.is_number()) object.covariance(i / 6, i % 6) = value.get<double>();
+    }
+  }
+  return object;
+}
+
+}  // namespace
+
+BeliefSummary summary_of(const belief::Belief& belief) {
+  BeliefSummary summary{belief.step, belief.stamp_ns, {}};
+  for (const belief::ObjectBelief& object : belief.objects) {
+    const belief::ObjectEstimate estimate = belief::estimate(object);
+    summary.objects.push_back({object.name, belief.scene->models[static_cast<std::size_t>(object.model)].name,
+                               object.state, estimate.confidence, object.existence, estimate.mean, estimate.covariance,
+                               estimate.twist, object.evidence_per_pixel, object.visible_share});
+  }
+  return summary;
+}
+
+ordered_json to_json(const BeliefSummary& summary) {
+  ordered_json objects = ordered_json::array();
+  for (const ObjectSummary& object : summary.objects) {
+    std::vector<double> covariance;
+    for (Eigen::Index i = 0; i < 36; ++i) covariance.push_back(object.covariance(i / 6, i % 6));
+    objects.push_back({{"name", object.name},
+                       {"model", object.model},
+                       {"state", belief::to_string(object.state)},
+                       {"confidence", object.confidence},
+                       {"existence", object.existence},
+                       {"pose", belief::to_json(object.X_WO)},
+                       {"covariance", covariance},
+                       {"twist", belief::to_json(object.V_WO)},
+                       {"evidence_per_pixel", object.evidence_per_pixel},
+                       {"visible_share", object.visible_share}});
+  }
+  return {{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
+}
+
+core::Result<BeliefSummary> belief_summary_from_json(const std::string& text) {
+  const ordered_json json = ordered_json::parse(text, nullptr, false);
+  const auto is = [&json](const char* key, bool (ordered_json::*kind)() const noexcept) {
+    return json.is_object() && json.contains(key) && (json[key].*kind)();
+  };
+  if (!is("step", &ordered_json::is_number_integer) || !is("stamp_ns", &ordered_json::is_number_integer) ||
+      !is("objects", &ordered_json::is_array)) {
+    return core::invalid_input("belief: not {\"step\", \"stamp_ns\", \"objects\"}");
+  }
+  BeliefSummary summary{json["step"].get<std::uint64_t>(), json["stamp_ns"].get<core::TimeNs>(), {}};
+  for (const ordered_json& object : json["objects"]) {
+    PRESCENE_TRY(ObjectSummary read, object_from_json(object));
+    summary.objects.push_back(std::move(read));
+  }
+  return summary;
+}
+
+interfaces::RosPoseWithCovarianceStamped pose_of(const ObjectSummary& object, core::TimeNs stamp_ns,
+                                                 const std::string& world_frame) {
+  return {header_of(stamp_ns, world_frame), interfaces::to_ros_pose(object.X_WO, object.covariance)};
+}
+
+interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, const belief::Scene& scene,
+                                              const std::string& world_frame) {
+  interfaces::RosDetection3dArray array{header_of(summary.stamp_ns, world_frame), {}};
+  for (const ObjectSummary& object : summary.objects) {
+    if (object.state == belief::TrackState::kLost) continue;
+    interfaces::RosDetection3d detection;
+    detection.header = array.header;
+    detection.id = object.name;
+    detection.results.push_back(
+        {{object.model, object.confidence}, interfaces::to_ros_pose(object.X_WO, object.covariance)});
+    if (const belief::ObjectModel* model = model_of(scene, object.model)) {
+      const geometry::Box box = geometry::bounding_box(mesh_of(*model));
+      geometry::Pose X_WBox = object.X_WO;
+      X_WBox.translation = object.X_WO * geometry::Vector3d(box.center());
+      detection.bbox.center = interfaces::to_ros_pose(X_WBox);
+      detection.bbox.size = {box.sizes().x(), box.sizes().y(), box.sizes().z()};
+    }
+    array.detections.push_back(std::move(detection));
+  }
+  return array;
+}
+
+MarkerMeshes marker_meshes(const belief::Scene& scene) {
+  MarkerMeshes meshes;
+  for (const belief::ObjectModel& model : scene.models) {
+    meshes.emplace(model.name, geometry::simplified(mesh_of(model), kMarkerTriangles));
+  }
+  return meshes;
+}
+
+interfaces::RosMarkerArray markers_of(const BeliefSummary& summary, const belief::Scene& scene,
+                                      const MarkerMeshes& meshes, const std::string& world_frame) {
+  interfaces::RosMarkerArray array;
+  std::int32_t id = 0;
+  for (const ObjectSummary& object : summary.objects) {
+    const belief::ObjectModel* model = model_of(scene, object.model);
+    interfaces::RosMarker marker;
+    marker.header = header_of(summary.stamp_ns, world_frame);
+    marker.ns = "prescene";
+    marker.id = id++;
+    interfaces::RosMarker label = marker;
+    label.id = id++;
+    if (!model || object.state == belief::TrackState::kLost) {
+      marker.action = label.action = static_cast<std::int32_t>(interfaces::RosMarkerAction::kDelete);
+      array.markers.push_back(marker);
+      array.markers.push_back(label);
+      continue;
+    }
+    const geometry::TriangleMesh& mesh = meshes.at(model->name);
+    marker.type = static_cast<std::int32_t>(interfaces::RosMarkerType::kTriangleList);
+    marker.pose = interfaces::to_ros_pose(object.X_WO);
+    marker.scale = {1.0, 1.0, 1.0};
+    const float opacity = object.state == belief::TrackState::kTracked ? 1.0F : 0.4F;
+    marker.color = {static_cast<float>(model->color.r), static_cast<float>(model->color.g),
+                    static_cast<float>(model->color.b), opacity};
+    for (const auto& triangle : mesh.triangles) {
+      for (const std::uint32_t corner : triangle) {
+        const geometry::Vector3d& p = mesh.vertices[corner];
+        marker.points.push_back({p.x(), p.y(), p.z()});
+      }
+    }
+    label.type = static_cast<std::int32_t>(interfaces::RosMarkerType::kText);
+    label.pose = marker.pose;
+    label.pose.position.z += geometry::radius_about(mesh, geometry::Vector3d::Zero());
+    label.scale = {0.0, 0.0, 0.03};
+    label.color = {1.0F, 1.0F, 1.0F, 1.0F};
+    label.text = object.name + " (" + belief::to_string(object.state) + ")";
+    array.markers.push_back(std::move(marker));
+    array.markers.push_back(std::move(label));
+  }
+  return array;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The belief as it is published after each step: one estimate an object, without particles.
+#pragma once
+
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/interfaces/ros_messages/messages.h"
+
+namespace prescene::service {
+
+struct ObjectSummary {
+  std::string name;
+  std::string model;
+  belief::TrackState state = belief::TrackState::kTracked;
+  double confidence = 0.0;
+  double existence = 1.0;
+  geometry::Pose X_WO;                                         ///< The mean.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Zero();  ///< As geometry::box_plus.
+  geometry::Twist V_WO;
+  double evidence_per_pixel = 0.0;
+  double visible_share = 0.0;
+};
+
+struct BeliefSummary {
+  std::uint64_t step = 0;
+  core::TimeNs stamp_ns = 0;
+  std::vector<ObjectSummary> objects;
+};
+
+BeliefSummary summary_of(const belief::Belief& belief);
+/// {"step", "stamp_ns", "objects": [{"name", "model", "state", "confidence", "existence", "pose", "covariance" (36
+/// numbers, row-major), "twist", "evidence_per_pixel", "visible_share"}]}
+nlohmann::ordered_json to_json(const BeliefSummary& summary);
+core::Result<BeliefSummary> belief_summary_from_json(const std::string& text);
+
+/// Messages for ROS users. Lost objects are in none of them.
+interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, const belief::Scene& scene,
+                                              const std::string& world_frame);
+interfaces::RosPoseWithCovarianceStamped pose_of(const ObjectSummary& object, core::TimeNs stamp_ns,
+                                                 const std::string& world_frame);
+/// Coarse meshes of a scene's models by name, made once for markers.
+using MarkerMeshes = std::map<std::string, geometry::TriangleMesh>;
+MarkerMeshes marker_meshes(const belief::Scene& scene);
+/// Each object as a triangle list in its model's colour (paler when not tracked) with its name above.
+interfaces::RosMarkerArray markers_of(const BeliefSummary& summary, const belief::Scene& scene,
+                                      const MarkerMeshes& meshes, const std::string& world_frame);
+
+}  // namespace prescene::service

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/bus_recorder.h"
+
+#include <algorithm>
+
+#include "prescene/service/inbox.h"
+
+namespace prescene::service {
+namespace {
+
+constexpr std::chrono::milliseconds kPollInterval(100);
+// What may wait for the disk: two seconds of images at 30 Hz.
+constexpr std::size_t kWaitingImages = 60;
+constexpr std::size_t kWaitingTransforms = 10'000;
+
+}  // namespace
+
+core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const InputTopics& topics,
+                                          const core::Cancellation& cancellation, const core::LogSink& log,
+                                          RecordingWriter& recording) {
+  using interfaces::TopicQos;
+  Inbox inbox({{topics.depth, kWaitingImages}, {topics.color, kWaitingImages}, {topics.tf, kWaitingTransforms}});
+  PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
+  struct Row {
+    std::string topic;
+    const char* type;
+    TopicQos qos;
+  };
+  for (const Row& row : {Row{topics.depth, "sensor_msgs/msg/Image", TopicQos::kSensor},
+                         Row{topics.color, "sensor_msgs/msg/Image", TopicQos::kSensor},
+                         Row{topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor},
+                         Row{topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf},
+                         Row{topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic},
+                         Row{kControlTopic, "std_msgs/msg/String", TopicQos::kReliable},
+                         Row{kQueryTopic, "std_msgs/msg/String", TopicQos::kReliable},
+                         Row{kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable}}) {
+    if (row.topic.empty()) continue;
+    PRESCENE_RETURN_IF_ERROR(node->subscribe(
+        row.topic, row.type, row.qos, [&](interfaces::ReceivedMessage&& message) { inbox.put(std::move(message)); }));
+  }
+  std::uint64_t messages = 0;
+  core::TimeNs last_ns = 0;
+  while (!cancellation.requested()) {
+    for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kPollInterval)) {
+      // Never back, so that the order by time is the order of arrival.
+      message.received_ns = last_ns = std::max(last_ns, message.received_ns);
+      PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
+      ++messages;
+    }
+  }
+  node->stop_receiving();
+  if (inbox.dropped() + node->dropped_samples() > 0) {
+    core::log(log, core::LogLevel::kWarning,
+              std::to_string(inbox.dropped() + node->dropped_samples()) +
+                  " messages were lost: the disk or the network is too slow for these topics");
+  }
+  PRESCENE_RETURN_IF_ERROR(recording.close());
+  return messages;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// The live service: listens on the bus, steps the belief, publishes it, answers questions, and records what happened.
+//
+// One thread owns the belief and steps it; the bus has its own; questions are answered by a third from a snapshot, so
+// that a slow question never delays a frame. The newest frame wins, and skipped ones are counted.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "prescene/core/progress.h"
+#include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/service/tracker.h"
+
+namespace prescene::service {
+
+struct LiveSettings {
+  TrackerSettings tracker;
+  interfaces::DdsOptions dds;
+  int max_waiting_questions = 16;         ///< More are answered with an error at once.
+  double default_question_seconds = 0.8;  ///< Time that a question without limits of its own may take.
+  double marker_rate = 5.0;               ///< Markers a second, at most.
+  double diagnostics_rate = 1.0;
+};
+
+class LiveService {
+ public:
+  /// Joins the bus. `backends` must outlive the service; `recording` may be null.
+  static core::Result<std::unique_ptr<LiveService>> create(std::shared_ptr<const belief::Scene> scene,
+                                                           const LiveSettings& settings, std::uint64_t seed,
+                                                           Backends& backends,
+                                                           std::unique_ptr<RecordingWriter> recording,
+                                                           const core::LogSink& log);
+  ~LiveService();
+
+  /// Works until cancelled, then closes the recording.
+  core::Status run(const core::Cancellation& cancellation);
+
+ private:
+  struct Impl;
+  explicit LiveService(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace prescene::service

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/load_scene.h"
+
+#include "prescene/interfaces/mesh_files/mesh_file.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
+
+namespace prescene::service {
+namespace {
+
+interfaces::SceneFileOptions options(const core::LogSink& log) {
+  interfaces::SceneFileOptions options;
+  options.read_mesh = [log](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
+    interfaces::MeshReadOptions read;
+    read.metres_per_unit = request.scale;
+    read.up_axis = request.y_up ? interfaces::UpAxis::kY : interfaces::UpAxis::kDeclared;
+    PRESCENE_TRY(interfaces::LoadedMesh mesh, interfaces::read_mesh(request.path, read));
+    for (const std::string& warning : mesh.warnings) {
+      core::log(log, core::LogLevel::kWarning, request.path.string() + ": " + warning);
+    }
+    return std::move(mesh.mesh);
+  };
+  return options;
+}
+
+core::Result<std::shared_ptr<const belief::Scene>> shared(core::Result<belief::Scene> scene,
+                                                          const interfaces::FileReport& report,
+                                                          const core::LogSink& log) {
+  for (const interfaces::Problem& warning : report.warnings) core::log(log, core::LogLevel::kWarning, warning.text());
+  if (!scene) return scene.status();
+  return std::shared_ptr<const belief::Scene>(std::make_shared<belief::Scene>(*std::move(scene)));
+}
+
+}  // namespace
+
+core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
+                                                              const core::LogSink& log) {
+  interfaces::FileReport report;
+  return shared(interfaces::read_scene(path, options(log), &report), report, log);
+}
+
+core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
+                                                                   const std::filesystem::path& path,
+                                                                   const core::LogSink& log) {
+  interfaces::FileReport report;
+  return shared(interfaces::parse_scene(text, path.string(), options(log), &report), report, log);
+}
+
+}  // namespace prescene::service

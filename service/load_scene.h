@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes from files, with the meshes they name.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "prescene/belief/scene.h"
+#include "prescene/core/log.h"
+#include "prescene/core/status.h"
+
+namespace prescene::service {
+
+/// Reads a scene file and its meshes; warnings go to the log. The status of a failure lists every mistake on a line of
+/// its own: file:line: key: reason: remedy.
+core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
+                                                              const core::LogSink& log);
+
+/// The same from the text of a scene file that was recorded; files that it names are looked for relative to `path`.
+core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
+                                                                   const std::filesystem::path& path,
+                                                                   const core::LogSink& log);
+
+}  // namespace prescene::service

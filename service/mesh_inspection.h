@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a mesh file holds, and a model made of it.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/geometry/mass_properties.h"
+#include "prescene/geometry/resting_poses.h"
+#include "prescene/geometry/symmetry.h"
+#include "prescene/geometry/triangle_mesh.h"
+#include "prescene/interfaces/mesh_files/mesh_file.h"
+
+namespace prescene::service {
+
+struct MeshInspectionOptions {
+  interfaces::MeshReadOptions read;
+  double density = 500.0;            ///< kg/m^3: about that of filled household packages.
+  double symmetry_tolerance = 0.02;  ///< Of the surface, as a share of the mesh's radius.
+};
+
+struct MeshInspection {
+  std::filesystem::path path;
+  interfaces::LoadedMesh loaded;
+  geometry::MeshTopology topology;
+  geometry::Box box;
+  double surface_area = 0.0;                     ///< m^2
+  std::optional<geometry::MassProperties> mass;  ///< At the density; empty when the mesh is not closed.
+  /// Of the convex hull, when the mesh itself is not closed.
+  std::optional<geometry::MassProperties> hull_mass;
+  double density = 0.0;
+  geometry::SymmetryGroup symmetry;                  ///< A suggestion.
+  std::vector<geometry::RestingPose> resting_poses;  ///< Likeliest first; empty for a flat mesh.
+  std::vector<std::string> remarks;                  ///< Sentences for a person: doubtful scale, holes, repairs.
+};
+
+core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, const MeshInspectionOptions& options);
+
+nlohmann::ordered_json to_json(const MeshInspection& inspection);
+/// A model file that scene files can name (docs/scene_files.md): the mesh, mass, symmetry, with remarks as comments.
+/// `model_path` is where it will lie: the mesh is named relative to it.
+std::string model_file_text(const MeshInspection& inspection, const MeshInspectionOptions& options,
+                            const std::filesystem::path& model_path);
+/// "none", "continuous about z (both ways round)", "4 turns about z", ...
+std::string symmetry_text(const geometry::SymmetryGroup& symmetry);
+
+}  // namespace prescene::service

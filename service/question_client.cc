@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/question_client.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/topics.h"
+
+namespace prescene::service {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kPollInterval(20);
+// A service that was killed took the question with it: it is asked again after this time.
+constexpr std::chrono::seconds kAskAgain(2);
+
+std::string new_id() {
+  static std::atomic<unsigned> count{0};
+  return std::to_string(getpid()) + "-" + std::to_string(core::wall_now_ns()) + "-" + std::to_string(count++);
+}
+
+}  // namespace
+
+core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const interfaces::DdsOptions& dds,
+                                                                     const core::LogSink& log) {
+  std::unique_ptr<QuestionClient> client(new QuestionClient());
+  QuestionClient* raw = client.get();
+  interfaces::DdsOptions options = dds;
+  options.node_name = "prescene_client";
+  PRESCENE_TRY(client->node_, interfaces::DdsNode::create(options, log));
+  PRESCENE_RETURN_IF_ERROR(
+      client->node_->subscribe(kAnswerTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
+                               [raw](interfaces::ReceivedMessage&& message) {
+                                 const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+                                 if (!text) return;
+                                 const auto answer = nlohmann::ordered_json::parse(text->data, nullptr, false);
+                                 if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
+                                 const std::lock_guard lock(raw->mutex_);
+                                 if (answer["id"].get<std::string>() != raw->waiting_for_) return;  // somebody else's
+                                 raw->answers_[raw->waiting_for_] = text->data;
+                                 raw->changed_.notify_all();
+                               }));
+  PRESCENE_TRY(client->queries_,
+               client->node_->advertise(kQueryTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable));
+  return client;
+}
+
+QuestionClient::~QuestionClient() { node_.reset(); }
+
+core::Result<std::string> QuestionClient::ask(const std::string& question_json, double timeout,
+                                              const core::Cancellation& cancellation) {
+  auto question = nlohmann::ordered_json::parse(question_json, nullptr, false);
+  if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/queries.md)");
+  if (!question.contains("id") || !question["id"].is_string()) question["id"] = new_id();
+  const std::string id = question["id"].get<std::string>();
+  {
+    const std::lock_guard lock(mutex_);
+    waiting_for_ = id;
+    answers_.clear();
+  }
+  const auto deadline =
+      steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>(timeout));
+  auto ask_at = steady_clock::now();
+  bool found_service = false;
+  while (steady_clock::now() < deadline) {
+    if (cancellation.requested()) return core::cancelled("stopped on request");
+    // Both ways must be open, or the answer would be lost.
+    const bool there = node_->matched_readers(queries_) > 0 && node_->matched_writers(kAnswerTopic) > 0;
+    found_service = found_service || there;
+    if (there && steady_clock::now() >= ask_at) {
+      PRESCENE_RETURN_IF_ERROR(node_->publish(queries_, interfaces::RosString{question.dump()}));
+      ask_at = steady_clock::now() + kAskAgain;
+    }
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_for(lock, kPollInterval, [&] { return answers_.contains(id); })) return answers_[id];
+  }
+  const std::string waited = " within " + std::to_string(timeout) + " s";
+  return core::unavailable(found_service
+                               ? "no answer came" + waited + ": raise --timeout, or give the question less effort"
+                               : "no service was found" + waited +
+                                     ": start `prescene serve` in the same DDS domain (--domain, ROS_DOMAIN_ID)");
+}
+
+}  // namespace prescene::service

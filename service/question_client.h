@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Asks a running service over DDS. A client outlives restarts of the service.
+#pragma once
+
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "prescene/core/progress.h"
+#include "prescene/interfaces/dds/dds_node.h"
+
+namespace prescene::service {
+
+class QuestionClient {
+ public:
+  static core::Result<std::unique_ptr<QuestionClient>> create(const interfaces::DdsOptions& dds,
+                                                              const core::LogSink& log);
+  ~QuestionClient();
+
+  /// Sends a question (JSON; an id is added if it has none) as soon as a service is there, and waits for its answer. A
+  /// service that starts again meanwhile is asked again. Fails with kUnavailable after `timeout` s (no service, or no
+  /// answer), kInvalidInput when the question is not a JSON object, kCancelled.
+  core::Result<std::string> ask(const std::string& question_json, double timeout,
+                                const core::Cancellation& cancellation);
+
+ private:
+  QuestionClient() = default;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<std::string, std::string> answers_;  // by id, only those waited for
+  std::string waiting_for_;
+  interfaces::DdsPublisher queries_;
+  std::unique_ptr<interfaces::DdsNode> node_;  // last: its thread ends first
+};
+
+}  // namespace prescene::service

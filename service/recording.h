@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings: MCAP files with the robot's messages as they came, and what Prescene did with them, as JSON under
+// /prescene/.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/interfaces/mcap/mcap_reader.h"
+#include "prescene/interfaces/mcap/mcap_writer.h"
+#include "prescene/service/frame_assembler.h"
+
+namespace prescene::service {
+
+/// What a recording says about itself, in its metadata record "prescene".
+struct RecordingInfo {
+  std::string scene_file;  ///< Where the scene came from, as given; "" = not known.
+  std::string scene_text;  ///< Its YAML.
+  std::uint64_t seed = 0;
+  std::string settings;  ///< JSON of the settings that were used; "" = none.
+};
+
+/// What was done in one belief step: enough to repeat it. JSON form on kStepTopic.
+struct StepRecord {
+  std::uint64_t step = 0;
+  /// Messages with a number up to this one had been taken in; the frame was chosen as if at `now_ns`.
+  MessageIndex after = 0;
+  core::TimeNs now_ns = 0;
+  core::TimeNs stamp_ns = 0;  ///< Of the frame.
+  MessageIndex depth = 0;
+  std::optional<MessageIndex> color;
+  MessageIndex camera_info = 0;
+  MessageIndex tf_until = 0;
+  std::vector<SkippedFrame> skipped;  ///< Since the step before.
+  std::vector<std::string> degraded;  ///< What could not be done fully.
+  std::string belief_hash;            ///< Of all bits of the belief after the step.
+  double seconds = 0.0;               ///< Wall time it took; not replayed.
+};
+nlohmann::ordered_json to_json(const StepRecord& record);
+core::Result<StepRecord> step_record_from_json(const std::string& text);
+
+/// Writes one recording. Not thread-safe: owned by the thread that steps the belief.
+class RecordingWriter {
+ public:
+  static core::Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& path,
+                                                               const RecordingInfo& info);
+
+  /// Messages of the robot; numbered 0, 1, ... in the order of these calls.
+  core::Result<MessageIndex> write(const interfaces::ReceivedMessage& message);
+  /// One JSON document on a /prescene/ topic.
+  core::Status write_json(const std::string& topic, const std::string& json, core::TimeNs time_ns);
+  core::Status flush() { return writer_->flush(); }
+  core::Status close() { return writer_->close(); }
+
+ private:
+  explicit RecordingWriter(std::unique_ptr<interfaces::McapWriter> writer) : writer_(std::move(writer)) {}
+  core::Status write(const std::string& topic, const interfaces::McapChannel& channel, core::TimeNs log_ns,
+                     core::TimeNs publish_ns, std::vector<std::uint8_t> data);
+
+  std::unique_ptr<interfaces::McapWriter> writer_;
+  std::map<std::string, int> channels_;
+  std::map<std::string, std::uint32_t> sequences_;
+  MessageIndex next_index_ = 0;
+};
+
+/// One entry of a recording in its order.
+struct RecordedEntry {
+  interfaces::ReceivedMessage message;  ///< `cdr` holds the JSON text of entries that are JSON.
+  bool is_json = false;
+  MessageIndex index = 0;  ///< Of a robot message, as when it was written.
+};
+
+class RecordingReader {
+ public:
+  static core::Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path);
+
+  /// From the recording's metadata; defaults where it has none (a recording made by other tools).
+  const RecordingInfo& info() const { return info_; }
+  /// In the order of log times; empty at the end.
+  core::Result<std::optional<RecordedEntry>> next();
+  const interfaces::McapLoss& loss() const { return reader_->loss(); }
+  std::optional<std::uint64_t> message_count() const { return reader_->message_count(); }
+
+ private:
+  explicit RecordingReader(std::unique_ptr<interfaces::McapReader> reader) : reader_(std::move(reader)) {}
+
+  std::unique_ptr<interfaces::McapReader> reader_;
+  RecordingInfo info_;
+  MessageIndex next_index_ = 0;
+};
+
+}  // namespace prescene::service

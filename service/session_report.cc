@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/session_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "prescene/interfaces/reports/overlay.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMaxObservations = 48;  // in memory
+constexpr std::size_t kPictures = 6;          // on the page
+
+std::string digits(double value, int count) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.*f", count, value);
+  return buffer;
+}
+
+AssemblerSettings assembler_settings(const belief::Scene& scene) {
+  AssemblerSettings settings;
+  if (scene.camera) settings.X_WC = scene.camera->X_WC;
+  return settings;
+}
+
+std::vector<std::string> robot_names(const belief::Scene& scene) {
+  std::vector<std::string> names;
+  for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
+  return names;
+}
+
+/// The published objects that are not lost, with supports and the robot, as a scene to draw.
+rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary& summary,
+                                const belief::Observation& observation, filter::MeshCache& meshes,
+                                std::size_t* objects) {
+  rendering::RenderScene drawn;
+  for (const ObjectSummary& object : summary.objects) {
+    const auto model =
+        std::find_if(scene.models.begin(), scene.models.end(), [&](const auto& m) { return m.name == object.model; });
+    if (model == scene.models.end() || object.state == belief::TrackState::kLost) continue;
+    drawn.instances.push_back({meshes.get(model->visual, model->collision, filter::MeshDetail::kDisplay), object.X_WO,
+                               filter::material_of(model->surface, model->color), false});
+  }
+  *objects = drawn.instances.size();
+  std::vector<geometry::Pose> X_WG;
+  for (const belief::KinematicBody& body : scene.robot) {
+    const auto known = observation.robot.find(body.name);
+    X_WG.push_back(known == observation.robot.end() ? belief::pose_at(body, 0.0) : known->second);
+  }
+  const filter::BeliefView around = filter::known_surroundings(scene, X_WG, filter::MeshDetail::kDisplay, meshes);
+  drawn.instances.insert(drawn.instances.end(), around.scene.instances.begin(), around.scene.instances.end());
+  return drawn;
+}
+
+geometry::ColorImage picture_of(const belief::Observation& observation) {
+  if (observation.frame.color) return *observation.frame.color;
+  return interfaces::depth_picture(*observation.frame.depth, 0.2, 2.0);
+}
+
+belief::Timeline timeline_from(const ordered_json& json) {
+  belief::Timeline timeline;
+  constexpr belief::Relation kRelations[] = {
+      belief::Relation::kContact, belief::Relation::kSupports, belief::Relation::kInside, belief::Relation::kHolds,
+      belief::Relation::kMoving,  belief::Relation::kUpright,  belief::Relation::kFalling};
+  if (!json.is_array()) return timeline;
+  for (const ordered_json& interval : json) {
+    const std::string word = interval.value("relation", "");
+    for (const belief::Relation relation : kRelations) {
+      if (belief::to_string(relation) != word) continue;
+      timeline.push_back({relation, interval.value("subject", ""), interval.value("other", ""),
+                          interval.value("begin", 0.0), interval.value("end", 0.0)});
+    }
+  }
+  return timeline;
+}
+
+belief::OutcomeProbability outcome_from(const ordered_json& json) {
+  const auto limits = json.value("interval", std::vector<double>{0.0, 1.0});
+  return {json.value("name", ""), json.value("group", ""), json.value("probability", 0.0), limits.at(0), limits.at(1)};
+}
+
+void add_prediction(const ordered_json& predict, const belief::Scene& scene, interfaces::ReportSection& section) {
+  interfaces::OutcomeBlock outcomes;
+  outcomes.caption = std::to_string(predict.value("instances", 0)) + " simulated instances";
+  for (const ordered_json& outcome : predict.value("outcomes", ordered_json::array()))
+    outcomes.outcomes.push_back(outcome_from(outcome));
+  section.blocks.push_back(std::move(outcomes));
+  for (const ordered_json& poses : predict.value("final_poses", ordered_json::array())) {
+    const ordered_json& map = poses.at("heat_map");
+    interfaces::HeatMapBlock block;
+    block.caption = "Where " + poses.value("object", "") + " ends, from above";
+    block.map = {map.value("cell", 0.02), map.value("x0", 0.0), map.value("y0", 0.0),
+                 map.value("nx", 0),      map.value("ny", 0),   map.value("mass", std::vector<double>{})};
+    block.outlines = interfaces::support_outlines(scene);
+    section.blocks.push_back(std::move(block));
+  }
+  for (const ordered_json& run : predict.value("typical_runs", ordered_json::array())) {
+    interfaces::TimelineBlock block;
+    block.caption = "A typical run that ends " + run.value("outcome", "") + " (" +
+                    digits(100.0 * run.value("share", 0.0), 0) + " %)";
+    block.timeline = timeline_from(run.value("timeline", ordered_json::array()));
+    section.blocks.push_back(std::move(block));
+  }
+}
+
+}  // namespace
+
+SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const InputTopics& topics)
+    : scene_(std::move(scene)), topics_(topics), assembler_(assembler_settings(*scene_), robot_names(*scene_)) {}
+
+void SessionReport::add(const interfaces::ReceivedMessage& message) {
+  const MessageIndex index = next_index_++;
+  // What makes no sense is told by the tracker; here it is only left out.
+  core::Status taken;
+  if (message.topic == topics_.depth) {
+    if (const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr)) {
+      taken = assembler_.add_depth(*image, index, message.received_ns);
+    }
+  } else if (message.topic == topics_.color) {
+    if (const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr)) {
+      taken = assembler_.add_color(*image, index, message.received_ns);
+    }
+  } else if (message.topic == topics_.camera_info) {
+    if (const auto info = interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr))
+      taken = assembler_.add_camera_info(*info, index);
+  } else if (message.topic == topics_.tf || message.topic == topics_.tf_static) {
+    if (const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr)) {
+      taken = assembler_.add_tf(*tf, index, message.topic == topics_.tf_static);
+    }
+  }
+  static_cast<void>(taken);
+  while (const auto frame = assembler_.take(message.received_ns)) add(frame->observation);
+}
+
+void SessionReport::add(const belief::Observation& observation) {
+  if (seen_++ % every_ != 0) return;
+  observations_.push_back(observation);
+  if (observations_.size() <= kMaxObservations) return;
+  std::vector<belief::Observation> kept;
+  for (std::size_t i = 0; i < observations_.size(); i += 2) kept.push_back(std::move(observations_[i]));
+  observations_ = std::move(kept);
+  every_ *= 2;
+}
+
+void SessionReport::add(const BeliefSummary& summary) { summaries_[summary.stamp_ns] = summary; }
+
+interfaces::PictureBlock SessionReport::pictures(Backends& backends) const {
+  interfaces::PictureBlock block;
+  const auto renderer = backends.make_renderer();
+  std::vector<const belief::Observation*> usable;
+  for (const belief::Observation& observation : observations_) {
+    if (summaries_.contains(observation.stamp_ns)) usable.push_back(&observation);
+  }
+  if (!renderer || usable.empty()) return block;
+  const core::TimeNs first_ns = summaries_.begin()->first;
+  const std::size_t count = std::min(kPictures, usable.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const belief::Observation& observation = *usable[count > 1 ? i * (usable.size() - 1) / (count - 1) : 0];
+    std::size_t objects = 0;
+    const rendering::RenderScene drawn =
+        scene_at(*scene_, summaries_.at(observation.stamp_ns), observation, backends.meshes(), &objects);
+    rendering::RenderedView view;
+    if (!(*renderer)->render(drawn, observation.frame.camera, observation.X_WC, {}, &view).ok()) continue;
+    std::vector<std::optional<geometry::Rgb>> colors;
+    for (std::size_t object = 0; object < objects; ++object) colors.emplace_back(interfaces::series_color(object));
+    geometry::ColorImage picture = picture_of(observation);
+    interfaces::tint(view.labels, colors, 0.25, picture);
+    interfaces::draw_outlines(view.labels, colors, 2, picture);
+    block.pictures.push_back(
+        {digits(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", std::move(picture), false});
+  }
+  return block;
+}
+
+std::vector<interfaces::ReportBlock> SessionReport::curves() const {
+  interfaces::ChartBlock confidence{"Confidence", "time, s", "probability", {}, true};
+  interfaces::ChartBlock height{"Height of the object's origin", "time, s", "m", {}, true};
+  std::map<std::string, std::size_t> number;
+  for (const auto& [stamp_ns, summary] : summaries_) {
+    const double time = core::seconds_of(stamp_ns - summaries_.begin()->first);
+    for (const ObjectSummary& object : summary.objects) {
+      const auto [place, is_new] = number.emplace(object.name, number.size());
+      if (is_new) {
+        confidence.curves.push_back({object.name, {}});
+        height.curves.push_back({object.name, {}});
+      }
+      confidence.curves[place->second].points.emplace_back(time, object.confidence);
+      height.curves[place->second].points.emplace_back(time, object.X_WO.translation.z());
+    }
+  }
+  if (confidence.curves.empty()) return {};
+  return {std::move(confidence), std::move(height)};
+}
+
+void SessionReport::add_answers(interfaces::ReportContents& contents) const {
+  for (const auto& [at, text] : answers_) {
+    const ordered_json answer = ordered_json::parse(text, nullptr, false);
+    interfaces::ReportSection section;
+    section.title = "Asked at " + digits(at, 1) + " s";
+    if (!answer.is_object()) {
+      section.blocks.push_back(interfaces::TextBlock{"No answer came."});
+    } else if (const std::string error = answer.value("error", ""); !error.empty()) {
+      section.blocks.push_back(interfaces::TextBlock{error});
+    } else if (answer.contains("predict")) {
+      section.title += ": what happens?";
+      add_prediction(answer["predict"], *scene_, section);
+    } else if (answer.contains("stability")) {
+      const ordered_json& stability = answer["stability"];
+      section.title += ": does " + stability.value("object", "") + " stay?";
+      section.blocks.push_back(
+          interfaces::OutcomeBlock{stability.value("likely_event", ""), {outcome_from(stability["stable"])}});
+    } else {
+      continue;  // where things are is in the pictures
+    }
+    contents.sections.push_back(std::move(section));
+  }
+}
+
+core::Status SessionReport::write(const std::filesystem::path& path, const std::vector<ObjectTrackingScore>& rows,
+                                  Backends& backends) const {
+  interfaces::ReportContents contents;
+  contents.title = scene_->name.empty() ? "Prescene" : scene_->name;
+  contents.subtitle = "What was seen, believed and answered";
+  contents.facts = {{"steps", std::to_string(summaries_.size())},
+                    {"objects", std::to_string(scene_->objects.size())},
+                    {"supports", std::to_string(scene_->supports.size())}};
+  interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures(backends)}};
+  contents.sections.push_back(std::move(seen));
+  interfaces::ReportSection tracking{"Tracking", {}};
+  if (!rows.empty()) {
+    interfaces::TableBlock table{
+        "Against the simulated truth, over frames in which at least half of the object is visible",
+        {"object", "frames", "visible", "median error, mm", "90 %, mm", "median turn, deg", "tracked, %"},
+        {}};
+    for (const ObjectTrackingScore& row : rows) {
+      table.rows.push_back({row.object, std::to_string(row.frames), std::to_string(row.visible_frames),
+                            digits(1e3 * row.median_position_error, 1), digits(1e3 * row.p90_position_error, 1),
+                            digits(row.median_turn_error * 180.0 / std::numbers::pi, 1),
+                            digits(100.0 * row.share_tracked, 0)});
+    }
+    tracking.blocks.push_back(std::move(table));
+  }
+  for (interfaces::ReportBlock& block : curves()) tracking.blocks.push_back(std::move(block));
+  if (tracking.blocks.empty()) {
+    tracking.blocks.push_back(
+        interfaces::TextBlock{"The scene names no objects; its supports are drawn where they were found."});
+  }
+  contents.sections.push_back(std::move(tracking));
+  add_answers(contents);
+  return interfaces::write_report(path, contents);
+}
+
+}  // namespace prescene::service

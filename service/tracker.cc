@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "prescene/belief/json.h"
+#include "prescene/core/hash.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/rendering/reference/reference_likelihood.h"
+
+namespace prescene::service {
+namespace {
+
+// More than a robot does between two frames; a sender in a loop must not fill the memory.
+constexpr std::size_t kMaxControls = 1000;
+
+std::vector<std::string> robot_names(const belief::Scene& scene) {
+  std::vector<std::string> names;
+  for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
+  return names;
+}
+
+template <class Message>
+core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const char* type) {
+  if (message.type != type) {
+    return core::invalid_input("carries " + message.type + ", expected " + type +
+                               ": correct the topic's name in the settings");
+  }
+  return interfaces::decode_cdr<Message>(message.cdr);
+}
+
+std::vector<std::string> degraded_words(const filter::StepResult& result) {
+  std::vector<std::string> words;
+  if (result.degraded != 0) words.push_back(filter::degraded_text(result.degraded));
+  if (!result.frame_status.ok()) words.push_back(result.frame_status.message());
+  return words;
+}
+
+}  // namespace
+
+core::Result<std::unique_ptr<Tracker>> Tracker::create(std::shared_ptr<const belief::Scene> scene,
+                                                       const TrackerSettings& settings, std::uint64_t seed,
+                                                       Backends& backends) {
+  PRESCENE_RETURN_IF_ERROR(validate(*scene));
+  PRESCENE_TRY(auto renderer, backends.make_renderer());
+  return std::unique_ptr<Tracker>(new Tracker(std::move(scene), settings, seed, backends, std::move(renderer)));
+}
+
+Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
+                 Backends& backends, std::unique_ptr<rendering::Renderer> renderer)
+    : settings_(settings),
+      renderer_(std::move(renderer)),
+      likelihood_(rendering::make_reference_likelihood_batch()),
+      filter_(*likelihood_, *renderer_, backends.pool(), settings.filter,
+              [&backends](const belief::Scene& simulated) {
+                auto simulator = backends.make_simulator(simulated);
+                return simulator ? *std::move(simulator) : nullptr;
+              }),
+      assembler_(settings.assembler, robot_names(*scene), settings.tf),
+      belief_(std::make_shared<belief::Belief>(filter_.start(std::move(scene), seed))) {}
+
+std::shared_ptr<const belief::Belief> Tracker::belief() const {
+  const std::lock_guard lock(mutex_);
+  return belief_;
+}
+
+core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, MessageIndex index) {
+  last_index_ = index;
+  const InputTopics& topics = settings_.topics;
+  const auto take = [&]() -> core::Status {
+    if (message.topic == topics.depth) {
+      PRESCENE_TRY(const auto image, decoded<interfaces::RosImage>(message, "sensor_msgs/msg/Image"));
+      return assembler_.add_depth(image, index, message.received_ns);
+    }
+    if (message.topic == topics.color) {
+      PRESCENE_TRY(const auto image, decoded<interfaces::RosImage>(message, "sensor_msgs/msg/Image"));
+      return assembler_.add_color(image, index, message.received_ns);
+    }
+    if (message.topic == topics.camera_info) {
+      PRESCENE_TRY(const auto info, decoded<interfaces::RosCameraInfo>(message, "sensor_msgs/msg/CameraInfo"));
+      return assembler_.add_camera_info(info, index);
+    }
+    if (message.topic == topics.tf || message.topic == topics.tf_static) {
+      PRESCENE_TRY(const auto tf, decoded<interfaces::RosTfMessage>(message, "tf2_msgs/msg/TFMessage"));
+      return assembler_.add_tf(tf, index, message.topic == topics.tf_static);
+    }
+    if (message.topic == kControlTopic) return take_control(message);
+    return core::ok_status();
+  };
+  return take().at(message.topic);
+}
+
+core::Status Tracker::take_control(const interfaces::ReceivedMessage& message) {
+  PRESCENE_TRY(const auto text, decoded<interfaces::RosString>(message, "std_msgs/msg/String"));
+  PRESCENE_TRY(const auto actions, parse_control(text.data, message.received_ns));
+  if (controls_.size() + actions.size() > kMaxControls) {
+    return core::resource_exhausted("more than " + std::to_string(kMaxControls) +
+                                    " actions wait for a frame: send fewer");
+  }
+  controls_.insert(controls_.end(), actions.begin(), actions.end());
+  std::stable_sort(controls_.begin(), controls_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return core::ok_status();
+}
+
+belief::Control Tracker::control_until(core::TimeNs stamp_ns) {
+  belief::Control control;
+  control.begin_ns = belief_->stamp_ns;
+  control.end_ns = stamp_ns;
+  const auto due =
+      std::find_if(controls_.begin(), controls_.end(), [&](const auto& entry) { return entry.first > stamp_ns; });
+  for (auto entry = controls_.begin(); entry != due; ++entry) {
+    belief::Action action = entry->second;
+    action.time = std::max(0.0, core::seconds_of(entry->first - control.begin_ns));
+    control.actions.push_back(std::move(action));
+  }
+  controls_.erase(controls_.begin(), due);
+  return control;
+}
+
+std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
+  std::optional<AssembledFrame> frame = assembler_.take(now_ns);
+  if (!frame) return std::nullopt;
+  const core::Stopwatch watch;
+  const belief::Control control = control_until(frame->observation.stamp_ns);
+  filter::StepResult result = filter_.step(*belief_, frame->observation, control);
+
+  TrackerStep step;
+  step.record.after = last_index_;
+  step.record.now_ns = now_ns;
+  step.record.stamp_ns = frame->observation.stamp_ns;
+  step.record.depth = frame->depth;
+  step.record.color = frame->color;
+  step.record.camera_info = frame->camera_info;
+  step.record.tf_until = frame->tf_until;
+  step.record.skipped = assembler_.take_skipped();
+  step.record.degraded = degraded_words(result);
+  step.record.step = result.belief.step;
+  step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
+  step.counters = result.counters;
+  step.trace = std::move(result.trace);
+  step.observation = std::move(frame->observation);
+  {
+    auto next = std::make_shared<const belief::Belief>(std::move(result.belief));
+    const std::lock_guard lock(mutex_);
+    belief_ = std::move(next);
+  }
+  step.record.seconds = watch.seconds();
+  return step;
+}
+
+core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control(const std::string& text,
+                                                                                 core::TimeNs received_ns) {
+  const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("actions") || !json["actions"].is_array()) {
+    return core::invalid_input("a control is {\"stamp_ns\": n, \"actions\": [...]}, this one is not");
+  }
+  core::TimeNs begin_ns = received_ns;
+  if (json.contains("stamp_ns")) {
+    if (!json["stamp_ns"].is_number_integer())
+      return core::invalid_input("stamp_ns: not a whole number of nanoseconds");
+    begin_ns = json["stamp_ns"].get<core::TimeNs>();
+  }
+  std::vector<std::pair<core::TimeNs, belief::Action>> actions;
+  for (const auto& value : json["actions"]) {
+    PRESCENE_TRY(belief::Action action, belief::action_from_json(value));
+    // An hour bounds what is plausible, and keeps the sum in range.
+    if (!(std::abs(action.time) <= 3600.0))
+      return core::invalid_input("time: actions start within an hour of their control");
+    actions.emplace_back(begin_ns + static_cast<core::TimeNs>(std::llround(action.time * 1e9)), std::move(action));
+  }
+  return actions;
+}
+
+}  // namespace prescene::service

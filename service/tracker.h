@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// One scene, tracked: messages go in, beliefs come out. The live service and the replay of a recording both drive it;
+// it reads no clock and owns no thread, so that both come to the same bits.
+//
+//   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings, seed, backends, log));
+//   tracker->take_in(message, index);
+//   while (auto step = tracker->step(now_ns)) publish(*step, *tracker->belief());
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/filter/particle_filter.h"
+#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/service/backends.h"
+#include "prescene/service/recording.h"
+#include "prescene/service/topics.h"
+
+namespace prescene::service {
+
+struct TrackerSettings {
+  InputTopics topics;
+  AssemblerSettings assembler;
+  TfBufferSettings tf;
+  filter::FilterSettings filter;
+};
+
+/// One belief step as it happened.
+struct TrackerStep {
+  StepRecord record;
+  filter::StepCounters counters;
+  filter::HashTrace trace;
+  belief::Observation observation;
+};
+
+/// Not thread-safe but for belief().
+class Tracker {
+ public:
+  /// `backends` must outlive the tracker.
+  static core::Result<std::unique_ptr<Tracker>> create(std::shared_ptr<const belief::Scene> scene,
+                                                       const TrackerSettings& settings, std::uint64_t seed,
+                                                       Backends& backends);
+
+  /// Takes in one message of the robot; topics that nobody listens to are ignored. Numbers ascend. A message that says
+  /// something impossible is refused, and named with its topic; nothing else is lost by it.
+  core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
+  /// One belief step with the newest frame that is complete at `now_ns`; empty if there is none.
+  std::optional<TrackerStep> step(core::TimeNs now_ns);
+  /// When step() should be tried again although nothing came in.
+  std::optional<core::TimeNs> next_deadline() const { return assembler_.next_deadline(); }
+
+  /// The newest belief; a snapshot that never changes. Safe from any thread.
+  std::shared_ptr<const belief::Belief> belief() const;
+  const TrackerSettings& settings() const { return settings_; }
+
+ private:
+  Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
+          Backends& backends, std::unique_ptr<rendering::Renderer> renderer);
+  core::Status take_control(const interfaces::ReceivedMessage& message);
+  belief::Control control_until(core::TimeNs stamp_ns);
+
+  TrackerSettings settings_;
+  std::unique_ptr<rendering::Renderer> renderer_;
+  std::unique_ptr<rendering::LikelihoodBatch> likelihood_;
+  filter::ParticleFilter filter_;
+  FrameAssembler assembler_;
+  MessageIndex last_index_ = 0;
+  std::vector<std::pair<core::TimeNs, belief::Action>> controls_;  // not yet executed, ascending
+  mutable std::mutex mutex_;                                       // guards belief_
+  std::shared_ptr<const belief::Belief> belief_;
+};
+
+/// The actions of a control message: {"stamp_ns": n, "actions": [...]}; times of the actions count from the stamp (from
+/// `received_ns` if there is none).
+core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control(const std::string& json,
+                                                                                 core::TimeNs received_ns);
+
+}  // namespace prescene::service

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracking_score.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "prescene/geometry/symmetry.h"
+
+namespace prescene::service {
+namespace {
+
+constexpr double kVisibleShare = 0.5;
+constexpr double kWrong = 0.05;  // m
+
+/// The value below which the share lies; 0 for no values.
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+}  // namespace
+
+std::vector<ObjectTrackingScore> TrackingScore::rows() const {
+  std::vector<ObjectTrackingScore> rows;
+  if (truths_.empty()) return rows;
+  for (const TruthRecord::Object& named : truths_.begin()->second.objects) {
+    ObjectTrackingScore row;
+    row.object = named.name;
+    geometry::SymmetryGroup symmetry;
+    if (const auto index = belief::find_object(*scene_, named.name)) {
+      symmetry = scene_->model_of(scene_->objects[static_cast<std::size_t>(*index)]).symmetry;
+    }
+    std::vector<double> position_errors;
+    std::vector<double> turn_errors;
+    int tracked = 0;
+    int wrong = 0;
+    for (const auto& [stamp_ns, truth] : truths_) {
+      const auto summary = summaries_.find(stamp_ns);
+      if (summary == summaries_.end()) continue;
+      const auto same_name = [&](const auto& object) { return object.name == named.name; };
+      const auto true_object = std::find_if(truth.objects.begin(), truth.objects.end(), same_name);
+      const auto estimate = std::find_if(summary->second.objects.begin(), summary->second.objects.end(), same_name);
+      if (true_object == truth.objects.end() || estimate == summary->second.objects.end()) continue;
+      const geometry::Pose X_WO = geometry::closest_equivalent(estimate->X_WO, true_object->X_WO, symmetry);
+      const double error = (X_WO.translation - true_object->X_WO.translation).norm();
+      const bool is_tracked = estimate->state == belief::TrackState::kTracked;
+      ++row.frames;
+      wrong += is_tracked && error > kWrong ? 1 : 0;
+      if (true_object->visible_share < kVisibleShare) continue;
+      ++row.visible_frames;
+      tracked += is_tracked ? 1 : 0;
+      position_errors.push_back(error);
+      turn_errors.push_back(geometry::symmetric_angle(estimate->X_WO, true_object->X_WO, symmetry));
+    }
+    row.median_position_error = quantile(position_errors, 0.5);
+    row.p90_position_error = quantile(position_errors, 0.9);
+    row.median_turn_error = quantile(turn_errors, 0.5);
+    row.share_tracked = row.visible_frames > 0 ? static_cast<double>(tracked) / row.visible_frames : 0.0;
+    row.share_confidently_wrong = row.frames > 0 ? static_cast<double>(wrong) / row.frames : 0.0;
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+nlohmann::ordered_json to_json(const ObjectTrackingScore& score) {
+  return {{"object", score.object},
+          {"frames", score.frames},
+          {"visible_frames", score.visible_frames},
+          {"median_position_error_m", score.median_position_error},
+          {"p90_position_error_m", score.p90_position_error},
+          {"median_turn_error_rad", score.median_turn_error},
+          {"share_tracked", score.share_tracked},
+          {"share_confidently_wrong", score.share_confidently_wrong}};
+}
+
+}  // namespace prescene::service
