@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "prescene/service/question_client.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+struct Options {
+  std::string kind;
+  std::string object;
+  std::string json;
+  double timeout = 10.0;
+  interfaces::DdsOptions dds;
+};
+
+core::Result<nlohmann::ordered_json> question_of(const Options& options) {
+  if (!options.json.empty()) {
+    const auto question = nlohmann::ordered_json::parse(options.json, nullptr, false);
+    if (!question.is_object()) return core::invalid_input("--question: not a JSON object (docs/queries.md)");
+    return question;
+  }
+  const auto needs_object = [&]() -> core::Status {
+    return options.object.empty() ? core::invalid_input("ask " + options.kind + " OBJECT: name the object")
+                                  : core::ok_status();
+  };
+  if (options.kind == "where") {
+    return options.object.empty() ? nlohmann::ordered_json{{"where", nlohmann::ordered_json::object()}}
+                                  : nlohmann::ordered_json{{"where", {{"object", options.object}}}};
+  }
+  if (options.kind == "stability") {
+    PRESCENE_RETURN_IF_ERROR(needs_object());
+    return nlohmann::ordered_json{{"stability", {{"object", options.object}}}};
+  }
+  if (options.kind == "release") {
+    PRESCENE_RETURN_IF_ERROR(needs_object());
+    const nlohmann::ordered_json release = {{"time", 0.0}, {"release", {{"object", options.object}}}};
+    return nlohmann::ordered_json{{"predict", {{"actions", nlohmann::ordered_json::array({release})}}}};
+  }
+  return core::invalid_input("ask where | stability OBJECT | release OBJECT, or --question JSON");
+}
+
+core::Status run(const Options& options, VerbContext& context) {
+  PRESCENE_TRY(const auto question, question_of(options));
+  PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
+  PRESCENE_TRY(const std::string text, client->ask(question.dump(), options.timeout, context.cancellation()));
+  const auto answer = nlohmann::ordered_json::parse(text, nullptr, false);
+  if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
+  const std::string error = answer.value("error", "");
+  if (!error.empty()) return core::invalid_input(error);
+  context.print(answer, answer_text(answer));
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_ask_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand("ask", "Ask a running `serve`: where | stability OBJECT | release OBJECT");
+  auto options = std::make_shared<Options>();
+  verb->add_option("KIND", options->kind,
+                   "where: poses and confidence; stability: does it stay; release: what if it is let go");
+  verb->add_option("OBJECT", options->object, "The object's name in the scene");
+  verb->add_option("--question", options->json, "Any question as JSON (docs/queries.md) instead");
+  verb->add_option("--timeout", options->timeout, "How long to wait for an answer, s")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  add_domain_option(*verb, options->dds);
+  verb->footer("Example: prescene ask stability carton");
+  return {verb, [options](VerbContext& context) { return run(*options, context); }};
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "prescene/service/mesh_inspection.h"
+#include "prescene/service/prediction_report.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+struct Options {
+  std::string mesh;
+  std::string model;
+  std::string report;
+  bool y_up = false;
+  MeshInspectionOptions inspection;
+};
+
+std::string text_of(const MeshInspection& found) {
+  const auto size = found.box.sizes();
+  std::string text = found.path.string() + ": " + std::to_string(found.loaded.mesh.triangles.size()) + " triangles, " +
+                     fixed_digits(size.x(), 4) + " x " + fixed_digits(size.y(), 4) + " x " + fixed_digits(size.z(), 4) +
+                     " m, " + (found.topology.watertight() ? "closed" : "not closed") + "\n";
+  const auto& mass = found.mass ? found.mass : found.hull_mass;
+  if (mass) {
+    const geometry::Vector3d& com = mass->p_BoBcm;
+    text += std::string(found.mass ? "volume " : "volume of its convex hull ") +
+            fixed_digits(1e6 * mass->mass / found.density, 1) + " cm^3, mass " + fixed_digits(mass->mass, 4) +
+            " kg at " + fixed_digits(found.density, 0) + " kg/m^3, centre of mass (" + fixed_digits(com.x(), 4) + ", " +
+            fixed_digits(com.y(), 4) + ", " + fixed_digits(com.z(), 4) + ") m\n";
+  }
+  text += "symmetry: " + symmetry_text(found.symmetry) + "\n";
+  if (!found.resting_poses.empty()) {
+    std::vector<std::vector<std::string>> rows = {
+        {"lies with (body axis down)", "probability", "falls over at, deg", "height, mm"}};
+    for (std::size_t i = 0; i < std::min<std::size_t>(found.resting_poses.size(), 8); ++i) {
+      const geometry::RestingPose& pose = found.resting_poses[i];
+      const geometry::Vector3d down = pose.R_WB.inverse() * -geometry::Vector3d::UnitZ();
+      rows.push_back({fixed_digits(down.x(), 2) + " " + fixed_digits(down.y(), 2) + " " + fixed_digits(down.z(), 2),
+                      fixed_digits(pose.probability, 3), fixed_digits(pose.tip_angle * 180.0 / std::numbers::pi, 1),
+                      fixed_digits(1e3 * pose.height, 1)});
+    }
+    text += "\n" + table(rows);
+  }
+  for (const std::string& remark : found.remarks) text += "remark: " + remark + "\n";
+  return text;
+}
+
+core::Status write_text(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) return core::unavailable(path + ": can't be written: check the folder and the space on the disk");
+  return core::ok_status();
+}
+
+core::Status run(Options& options, VerbContext& context) {
+  if (options.y_up) options.inspection.read.up_axis = interfaces::UpAxis::kY;
+  PRESCENE_TRY(const MeshInspection found, inspect_mesh(options.mesh, options.inspection));
+  if (!options.model.empty()) {
+    PRESCENE_RETURN_IF_ERROR(write_text(options.model, model_file_text(found, options.inspection, options.model)));
+  }
+  if (!options.report.empty()) PRESCENE_RETURN_IF_ERROR(write_mesh_report(options.report, found));
+  context.print(to_json(found),
+                text_of(found) + (options.model.empty() ? "" : "model written to " + options.model + "\n"));
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_inspect_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand(
+      "inspect", "What a mesh holds (scale, closedness, mass, symmetry, how it can lie), and a model file of it");
+  auto options = std::make_shared<Options>();
+  verb->add_option("MESH", options->mesh, "PLY, OBJ, STL, glTF or COLLADA file")->required();
+  verb->add_option("-o,--output", options->model, "Write a model file that scene files can name");
+  verb->add_option("--density", options->inspection.density, "kg/m^3")
+      ->check(CLI::Range(0.1, 25000.0))
+      ->capture_default_str();
+  verb->add_option("--scale", options->inspection.read.metres_per_unit,
+                   "Metres per unit of the file: 0.001 for millimetres")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_flag("--y-up", options->y_up, "The file's y axis points up");
+  verb->add_option("--report", options->report, "Write an HTML page with pictures");
+  verb->footer("Example: prescene inspect cup.stl --scale 0.001 -o cup.yaml --report cup.html");
+  return {verb, [options](VerbContext& context) { return run(*options, context); }};
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "prescene/belief/json.h"
+#include "prescene/service/backends.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/service/prediction_report.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+struct Options {
+  std::string scene;
+  std::string report;
+  belief::Effort effort;
+  double max_seconds = 0.0;
+  double duration = 0.0;
+};
+
+nlohmann::ordered_json document_of(const belief::Scene& scene, std::uint64_t seed, const belief::Answer& answer) {
+  const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
+  nlohmann::ordered_json outcomes = nlohmann::ordered_json::array();
+  for (const belief::OutcomeProbability& outcome : predicted.outcomes) {
+    nlohmann::ordered_json row = {{"name", outcome.name}};
+    if (!outcome.group.empty()) row["group"] = outcome.group;
+    row["probability"] = outcome.probability;
+    row["interval"] = {outcome.low, outcome.high};
+    outcomes.push_back(row);
+  }
+  nlohmann::ordered_json document = {{"scene", scene.name},
+                                     {"seed", seed},
+                                     {"outcomes", outcomes},
+                                     {"converged", predicted.converged},
+                                     {"instances", predicted.instances},
+                                     {"simulated_seconds", predicted.simulated_seconds},
+                                     {"wall_seconds", predicted.wall_seconds}};
+  const nlohmann::ordered_json whole = belief::to_json(answer);
+  document["final_poses"] = whole.at("predict").at("final_poses");
+  document["typical_runs"] = whole.at("predict").at("typical_runs");
+  return document;
+}
+
+std::string text_of(const belief::PredictAnswer& predicted) {
+  std::vector<std::vector<std::string>> rows = {{"outcome", "probability", "95 % interval"}};
+  std::string group;
+  for (const belief::OutcomeProbability& outcome : predicted.outcomes) {
+    if (outcome.group != group && !outcome.group.empty()) rows.push_back({outcome.group + ":", "", ""});
+    group = outcome.group;
+    rows.push_back({(group.empty() ? "" : "  ") + outcome.name, fixed_digits(outcome.probability, 3),
+                    fixed_digits(outcome.low, 3) + " to " + fixed_digits(outcome.high, 3)});
+  }
+  return table(rows) + "\n" + std::to_string(predicted.instances) + " instances, " +
+         fixed_digits(predicted.simulated_seconds, 0) + " simulated seconds, " +
+         fixed_digits(predicted.wall_seconds, 1) + " s" +
+         (predicted.converged ? "" : "; not all intervals reached the tolerance") + "\n";
+}
+
+core::Status run(const Options& options, VerbContext& context) {
+  PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
+  Backends backends(context.pool());
+  belief::PredictQuery question;
+  question.effort = options.effort;
+  if (options.max_seconds > 0.0) question.effort.max_seconds = options.max_seconds;
+  if (options.duration > 0.0) question.duration = options.duration;
+  queries::QueryContext query_context = backends.query_context(context.pool());
+  query_context.cancellation = &context.cancellation();
+  query_context.progress = context.progress("predicting");
+  const belief::Answer answer = queries::answer(scene, context.options().seed, {"predict", question}, query_context);
+  context.end_progress();
+  if (!answer.error.empty()) return core::invalid_input(options.scene + ": " + answer.error);
+
+  if (!options.report.empty()) {
+    PRESCENE_RETURN_IF_ERROR(write_prediction_report(options.report, *scene, answer, backends));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
+  context.print(document_of(*scene, context.options().seed, answer),
+                text_of(std::get<belief::PredictAnswer>(answer.what)));
+  if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_predict_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand("predict", "What happens in a scene: probabilities of its outcomes, with intervals");
+  auto options = std::make_shared<Options>();
+  verb->add_option("SCENE", options->scene, "Scene file (docs/scene_files.md)")->required();
+  verb->add_option("--tolerance", options->effort.tolerance, "Half width of the intervals to reach")
+      ->check(CLI::Range(1e-4, 0.5))
+      ->capture_default_str();
+  verb->add_option("--confidence", options->effort.confidence, "Of the intervals")
+      ->check(CLI::Range(0.5, 0.9999))
+      ->capture_default_str();
+  verb->add_option("--max-instances", options->effort.max_instances, "Most simulated instances")
+      ->check(CLI::Range(1, 1 << 22))
+      ->capture_default_str();
+  verb->add_option("--max-seconds", options->max_seconds,
+                   "Most wall time, s; the answer then depends on the machine's speed")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
+  verb->footer("Example: prescene predict scenarios/milk_on_bin.yaml --json --seed 1");
+  return {verb, [options](VerbContext& context) { return run(*options, context); }};
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "prescene/service/bus_recorder.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/service/simulated_recording.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+struct Options {
+  std::string output;
+  std::string simulate;
+  SimulatedRecordingOptions simulation;
+  interfaces::DdsOptions dds;
+  InputTopics topics;
+};
+
+core::Status record_simulation(const Options& options, VerbContext& context) {
+  PRESCENE_TRY(const auto scene, load_scene(options.simulate, context.log()));
+  PRESCENE_TRY(const std::string text, read_text(options.simulate));
+  PRESCENE_TRY(const auto recording,
+               RecordingWriter::create(options.output, {options.simulate, text, context.options().seed, ""}));
+  Backends backends(context.pool());
+  const core::Status simulated = simulate_recording(*scene, options.simulation, context.options().seed, backends,
+                                                    context.cancellation(), context.progress("recording"), *recording);
+  PRESCENE_RETURN_IF_ERROR(recording->close());
+  PRESCENE_RETURN_IF_ERROR(simulated);
+  context.print({{"recording", options.output}, {"scene", scene->name}, {"simulated", true}},
+                "recorded " + options.output + "\n");
+  return core::ok_status();
+}
+
+core::Status record_bus(const Options& options, VerbContext& context) {
+  PRESCENE_TRY(const auto recording, RecordingWriter::create(options.output, {"", "", context.options().seed, ""}));
+  PRESCENE_TRY(const std::uint64_t messages,
+               record_topics(options.dds, options.topics, context.cancellation(), context.log(), *recording));
+  context.print({{"recording", options.output}, {"messages", messages}, {"simulated", false}},
+                "recorded " + std::to_string(messages) + " messages to " + options.output + "\n");
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_record_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand("record", "Record the robot's topics, or a scene as a simulated robot would see it");
+  auto options = std::make_shared<Options>();
+  verb->add_option("-o,--output", options->output, "Recording to write (MCAP)")->required();
+  verb->add_option("--simulate", options->simulate,
+                   "Scene file to play with a simulated RGB-D camera, instead of listening");
+  verb->add_option("--rate", options->simulation.rate, "Simulated frames a second")
+      ->check(CLI::Range(0.1, 240.0))
+      ->capture_default_str();
+  add_bus_options(*verb, options->dds, options->topics);
+  verb->footer(
+      "Examples: prescene record -o run.mcap                  (until Ctrl-C)\n"
+      "          prescene record --simulate scenarios/milk_on_bin.yaml -o milk.mcap --seed 1");
+  return {verb, [options](VerbContext& context) {
+            options->simulation.topics = options->topics;
+            return options->simulate.empty() ? record_bus(*options, context) : record_simulation(*options, context);
+          }};
+}
+
+}  // namespace prescene::service

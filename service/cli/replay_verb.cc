@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "prescene/service/bus_replay.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/service/replay.h"
+#include "prescene/service/session_report.h"
+#include "prescene/service/tracking_score.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct Options {
+  std::string input;
+  std::string scene;
+  std::string report;
+  bool over_dds = false;
+  BusReplayOptions bus;
+  std::vector<std::string> questions;
+  double depth_scale = 0.001;
+  double frame_rate = 30.0;
+  TrackerSettings tracker;
+};
+
+/// "SECONDS:JSON".
+core::Result<TimedQuestion> timed_question(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  char* end = nullptr;
+  const double at = std::strtod(text.c_str(), &end);
+  if (colon == std::string::npos || end != text.c_str() + colon || !(at >= 0.0)) {
+    return core::invalid_input("--ask SECONDS:JSON, as 2.5:'{\"where\": {}}'; this is not: " + text);
+  }
+  return TimedQuestion{at, text.substr(colon + 1)};
+}
+
+core::Result<std::shared_ptr<const belief::Scene>> scene_of(const Options& options, const RecordingInfo& info,
+                                                            VerbContext& context) {
+  if (!options.scene.empty()) return load_scene(options.scene, context.log());
+  if (!info.scene_text.empty()) return load_scene_text(info.scene_text, info.scene_file, context.log());
+  return core::invalid_input(options.input + " names no scene: give one with --scene FILE");
+}
+
+ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows) {
+  ordered_json json = ordered_json::array();
+  for (const ObjectTrackingScore& row : rows) json.push_back(to_json(row));
+  return json;
+}
+
+std::string tracking_text(const std::vector<ObjectTrackingScore>& rows) {
+  if (rows.empty()) return "";
+  std::vector<std::vector<std::string>> cells = {
+      {"object", "frames", "visible", "median error, mm", "90 %, mm", "median turn, deg", "tracked", "wrong"}};
+  for (const ObjectTrackingScore& row : rows) {
+    cells.push_back({row.object, std::to_string(row.frames), std::to_string(row.visible_frames),
+                     fixed_digits(1e3 * row.median_position_error, 1), fixed_digits(1e3 * row.p90_position_error, 1),
+                     fixed_digits(row.median_turn_error * 180.0 / 3.14159265358979, 1),
+                     fixed_digits(100.0 * row.share_tracked, 0) + " %",
+                     fixed_digits(100.0 * row.share_confidently_wrong, 0) + " %"});
+  }
+  return "\nTracking against the simulated truth\n" + table(cells);
+}
+
+std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) {
+  std::string text;
+  for (const BusReplayResult::Answered& answered : answers) {
+    text += "\nAsked at " + fixed_digits(answered.at, 1) + " s: " + answered.question + "\n";
+    if (answered.answer.empty()) {
+      text += "no answer came\n";
+      continue;
+    }
+    const ordered_json answer = ordered_json::parse(answered.answer, nullptr, false);
+    text += "answered after " + fixed_digits(answered.seconds, 2) + " s\n" + answer_text(answer);
+  }
+  return text;
+}
+
+core::Status run_over_dds(Options& options, VerbContext& context) {
+  PRESCENE_TRY(const auto info_reader, RecordingReader::open(options.input));
+  PRESCENE_TRY(const auto scene, scene_of(options, info_reader->info(), context));
+  for (const std::string& text : options.questions) {
+    PRESCENE_TRY(TimedQuestion question, timed_question(text));
+    options.bus.questions.push_back(std::move(question));
+  }
+  std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
+                   [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
+  TrackingScore score(scene);
+  SessionReport report(scene, options.tracker.topics);
+  PRESCENE_TRY(BusReplayResult result,
+               replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
+                               context.log(), [&](const RecordedEntry& entry) {
+                                 if (!options.report.empty()) report.add(entry.message);
+                                 if (!entry.is_json || entry.message.topic != kTruthTopic) return;
+                                 const std::string json(entry.message.cdr.begin(), entry.message.cdr.end());
+                                 if (const auto truth = truth_from_json(json)) score.add(*truth);
+                               }));
+  for (const BeliefSummary& summary : result.beliefs) {
+    score.add(summary);
+    report.add(summary);
+  }
+  ordered_json answers = ordered_json::array();
+  for (const BusReplayResult::Answered& answered : result.answers) {
+    const ordered_json answer = ordered_json::parse(answered.answer, nullptr, false);
+    answers.push_back({{"at", answered.at},
+                       {"seconds", answered.seconds},
+                       {"answer", answer.is_discarded() ? ordered_json() : answer}});
+    report.add_answer(answered.at, answered.answer);
+  }
+  const std::vector<ObjectTrackingScore> rows = score.rows();
+  if (!options.report.empty()) {
+    Backends backends(context.pool());
+    PRESCENE_RETURN_IF_ERROR(report.write(options.report, rows, backends));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
+  if (!result.loss.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + result.loss);
+  context.print({{"recording", options.input},
+                 {"messages", result.messages},
+                 {"beliefs", result.beliefs.size()},
+                 {"tracking", tracking_json(rows)},
+                 {"answers", answers},
+                 {"loss", result.loss}},
+                std::to_string(result.messages) + " messages played, " + std::to_string(result.beliefs.size()) +
+                    " beliefs came back\n" + answers_text(result.answers) + tracking_text(rows));
+  const bool unanswered =
+      std::any_of(result.answers.begin(), result.answers.end(), [](const auto& a) { return a.answer.empty(); });
+  if (unanswered) return core::unavailable("not every question was answered");
+  if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
+  return core::ok_status();
+}
+
+core::Status run_here(Options& options, VerbContext& context) {
+  const bool is_folder = std::filesystem::is_directory(options.input);
+  RecordingInfo info;
+  if (!is_folder) {
+    PRESCENE_TRY(const auto reader, RecordingReader::open(options.input));
+    info = reader->info();
+  }
+  PRESCENE_TRY(const auto scene, scene_of(options, info, context));
+  Backends backends(context.pool());
+  // A recording's own seed repeats its bits.
+  const std::uint64_t seed = context.options().seed_given || info.seed == 0 ? context.options().seed : info.seed;
+  PRESCENE_TRY(const auto tracker, Tracker::create(scene, options.tracker, seed, backends));
+  TrackingScore score(scene);
+  SessionReport report(scene, options.tracker.topics);
+  ordered_json steps = ordered_json::array();
+  const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
+    const BeliefSummary summary = summary_of(*at.belief());
+    score.add(summary);
+    if (!options.report.empty()) {
+      report.add(step.observation);
+      report.add(summary);
+      report.set_scene(at.belief()->scene);
+    }
+    ordered_json record = to_json(step.record);
+    record.erase("seconds");
+    ordered_json objects = to_json(summary)["objects"];
+    for (ordered_json& object : objects) object.erase("covariance");
+    record["objects"] = objects;
+    steps.push_back(std::move(record));
+    return core::ok_status();
+  };
+  const JsonSink on_json = [&](const std::string& topic, const std::string& json, core::TimeNs) -> core::Status {
+    if (topic != kTruthTopic) return core::ok_status();
+    if (const auto truth = truth_from_json(json)) score.add(*truth);
+    return core::ok_status();
+  };
+  core::Result<ReplaySummary> summary = ReplaySummary{};
+  if (is_folder) {
+    interfaces::FrameFolderOptions folder_options;
+    folder_options.metres_per_unit = options.depth_scale;
+    folder_options.frames_per_second = options.frame_rate;
+    folder_options.first_stamp_ns = 1'000'000'000;
+    PRESCENE_TRY(const auto folder, interfaces::FrameFolder::open(options.input, folder_options));
+    summary = replay_folder(folder, *tracker, context.cancellation(), context.progress("replaying"), on_step);
+  } else {
+    summary = replay_recording(options.input, *tracker, context.cancellation(), context.progress("replaying"), on_step,
+                               on_json);
+  }
+  context.end_progress();
+  if (!summary) return summary.status();
+  const std::vector<ObjectTrackingScore> rows = score.rows();
+  if (!options.report.empty()) {
+    PRESCENE_RETURN_IF_ERROR(report.write(options.report, rows, backends));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
+  for (const std::string& problem : {summary->loss, summary->first_refusal}) {
+    if (!problem.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + problem);
+  }
+  context.print(
+      {{"recording", options.input},
+       {"seed", seed},
+       {"messages", summary->messages},
+       {"refused", summary->refused},
+       {"skipped_frames", summary->skipped},
+       {"followed_step_records", summary->followed_step_records},
+       {"compared_steps", summary->compared},
+       {"different_steps", summary->different},
+       {"loss", summary->loss},
+       {"tracking", tracking_json(rows)},
+       {"steps", steps}},
+      std::to_string(summary->steps) + " steps from " + std::to_string(summary->messages) + " messages, " +
+          std::to_string(summary->skipped) + " frames skipped\n" +
+          (summary->followed_step_records ? std::to_string(summary->compared - summary->different) + " of " +
+                                                std::to_string(summary->compared) + " steps have the recorded bits\n"
+                                          : "") +
+          tracking_text(rows));
+  if (summary->different > 0) {
+    return core::unavailable("step " + std::to_string(*summary->first_different_step) +
+                             " is the first that differs from the recording: another version, machine or setting?");
+  }
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_replay_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand(
+      "replay", "Replay a recording or a folder of images: here, or onto the bus for a running `serve`");
+  auto options = std::make_shared<Options>();
+  verb->add_option("RECORDING", options->input,
+                   "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
+      ->required();
+  verb->add_option("--scene", options->scene, "Scene file; default: the one that the recording holds");
+  verb->add_flag("--over-dds", options->over_dds,
+                 "Publish the robot's messages as they were, and listen to a running `serve`");
+  verb->add_option("--speed", options->bus.speed, "Over DDS: times as fast as recorded")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable");
+  verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
+  add_bus_options(*verb, options->bus.dds, options->tracker.topics);
+  verb->footer(
+      "Examples: prescene replay milk.mcap --report milk.html\n"
+      "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");
+  return {verb, [options](VerbContext& context) {
+            return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);
+          }};
+}
+
+}  // namespace prescene::service

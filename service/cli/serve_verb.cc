@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "prescene/service/live_service.h"
+#include "prescene/service/load_scene.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+struct Options {
+  std::string scene;
+  std::string record;
+  LiveSettings settings;
+  std::vector<double> camera_pose;
+};
+
+core::Status run(Options& options, VerbContext& context) {
+  PRESCENE_TRY(options.settings.tracker.assembler.X_WC, camera_pose_of(options.camera_pose));
+  PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
+  std::unique_ptr<RecordingWriter> recording;
+  if (!options.record.empty()) {
+    PRESCENE_TRY(const std::string text, read_text(options.scene));
+    PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed, ""}));
+  }
+  Backends backends(context.pool());
+  PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,
+                                                       std::move(recording), context.log()));
+  return service->run(context.cancellation());
+}
+
+}  // namespace
+
+Verb add_serve_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand("serve", "Track a scene live: listen on DDS, publish the belief, answer questions");
+  auto options = std::make_shared<Options>();
+  verb->add_option("--scene", options->scene, "Scene file: models, supports, robot, objects (docs/scene_files.md)")
+      ->required();
+  verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)");
+  verb->add_option("--world-frame", options->settings.tracker.assembler.world_frame, "Frame of the scene in tf")
+      ->capture_default_str();
+  verb->add_option("--camera-pose", options->camera_pose, "Pose of the camera where tf has none: x y z qw qx qy qz (m)")
+      ->expected(7);
+  verb->add_option("--question-seconds", options->settings.default_question_seconds,
+                   "Time that a question without limits of its own may take")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
+  verb->footer(
+      "Runs until Ctrl-C. Topics: docs/ros2.md\n"
+      "Example: prescene serve --scene scenarios/milk_on_bin.yaml");
+  return {verb, [options](VerbContext& context) { return run(*options, context); }};
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "verb.h"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace prescene::service {
+namespace {
+
+core::LogSink stderr_log(bool quiet) {
+  auto logger = std::make_shared<spdlog::logger>("prescene", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+  logger->set_pattern("%^%l%$: %v");
+  logger->set_level(quiet ? spdlog::level::warn : spdlog::level::info);
+  return [logger](core::LogLevel level, const std::string& text) {
+    switch (level) {
+      case core::LogLevel::kDebug:
+        logger->debug("{}", text);
+        break;
+      case core::LogLevel::kInfo:
+        logger->info("{}", text);
+        break;
+      case core::LogLevel::kWarning:
+        logger->warn("{}", text);
+        break;
+      case core::LogLevel::kError:
+        logger->error("{}", text);
+        break;
+    }
+  };
+}
+
+std::string duration_text(double seconds) {
+  if (seconds < 90.0) return fixed_digits(seconds, 0) + " s";
+  return fixed_digits(seconds / 60.0, 1) + " min";
+}
+
+}  // namespace
+
+ExitCode exit_code_of(const core::Status& status) {
+  switch (status.code()) {
+    case core::StatusCode::kOk:
+      return ExitCode::kDone;
+    case core::StatusCode::kInvalidInput:
+    case core::StatusCode::kNotFound:
+    case core::StatusCode::kDataLoss:
+    case core::StatusCode::kUnsupported:
+      return ExitCode::kBadInput;
+    case core::StatusCode::kUnavailable:
+    case core::StatusCode::kResourceExhausted:
+    case core::StatusCode::kCancelled:
+      return ExitCode::kFailed;
+  }
+  return ExitCode::kFailed;
+}
+
+VerbContext::VerbContext(const CommonOptions& options, const core::Cancellation& cancellation)
+    : options_(options), cancellation_(cancellation), log_(stderr_log(options.quiet)) {}
+
+VerbContext::~VerbContext() { end_progress(); }
+
+core::ThreadPool& VerbContext::pool() {
+  if (!pool_) pool_ = std::make_unique<core::ThreadPool>(options_.threads);
+  return *pool_;
+}
+
+core::ProgressSink VerbContext::progress(const std::string& what) {
+  if (options_.quiet) return {};
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  return [this, what, terminal, last = -1](const core::Progress& progress) mutable {
+    const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
+    const int step = static_cast<int>(std::floor(fraction * (terminal ? 100.0 : 10.0)));
+    if (step == last) return;
+    last = step;
+    std::string left = progress.seconds_left ? ", about " + duration_text(*progress.seconds_left) + " left" : "";
+    if (!progress.text.empty()) left += ", " + progress.text;
+    const std::string percent = fixed_digits(100.0 * fraction, 0) + " %";
+    if (!terminal) {
+      std::fprintf(stderr, "%s: %s%s\n", what.c_str(), percent.c_str(), left.c_str());
+      return;
+    }
+    constexpr int kBarWidth = 30;
+    const auto filled = static_cast<std::size_t>(std::lround(fraction * kBarWidth));
+    const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
+    std::fprintf(stderr, "\r\033[K%s [%s] %s%s", what.c_str(), bar.c_str(), percent.c_str(), left.c_str());
+    std::fflush(stderr);
+    bar_open_ = true;
+  };
+}
+
+void VerbContext::end_progress() {
+  if (std::exchange(bar_open_, false)) std::fprintf(stderr, "\n");
+}
+
+void VerbContext::print(const nlohmann::ordered_json& document, const std::string& text) {
+  end_progress();
+  // Bytes that are not UTF-8 (a file name, say) are replaced, not thrown on.
+  const std::string out =
+      options_.json ? document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n" : text;
+  std::fwrite(out.data(), 1, out.size(), stdout);
+  std::fflush(stdout);
+}
+
+std::string table(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()), 0);
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string text;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    std::string line;
+    for (std::size_t i = 0; i < rows[r].size(); ++i) {
+      line += rows[r][i];
+      if (i + 1 < rows[r].size()) line += std::string(widths[i] - rows[r][i].size() + 2, ' ');
+    }
+    text += line + "\n";
+    if (r > 0) continue;
+    for (std::size_t i = 0; i < widths.size(); ++i) {
+      text += std::string(widths[i], '-') + (i + 1 < widths.size() ? "  " : "\n");
+    }
+  }
+  return text;
+}
+
+std::string fixed_digits(double value, int digits) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, "%.*f", digits, value);
+  return buffer;
+}
+
+}  // namespace prescene::service

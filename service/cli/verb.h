@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the verbs of the command line share: options that every verb has, output, progress, exit codes.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/core/log.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/progress.h"
+#include "prescene/core/status.h"
+#include "prescene/geometry/pose.h"
+#include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/service/topics.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
+
+namespace prescene::service {
+
+/// 0 = done, 1 = could not do it, 2 = bad arguments or bad input.
+enum class ExitCode { kDone = 0, kFailed = 1, kBadInput = 2 };
+ExitCode exit_code_of(const core::Status& status);
+
+/// Options that every verb takes.
+struct CommonOptions {
+  bool json = false;  ///< stdout is one JSON document; everything else goes to stderr.
+  std::uint64_t seed = 1;
+  bool seed_given = false;  ///< By the user, rather than the default.
+  int threads = 0;          ///< 0 = as many as the machine has.
+  bool quiet = false;       ///< No progress, warnings and errors only.
+};
+
+/// What a verb is given to run with.
+class VerbContext {
+ public:
+  VerbContext(const CommonOptions& options, const core::Cancellation& cancellation);
+  ~VerbContext();
+
+  const CommonOptions& options() const { return options_; }
+  /// To stderr.
+  const core::LogSink& log() const { return log_; }
+  core::ThreadPool& pool();
+  /// Set by Ctrl-C: long work stops cleanly and keeps what is done.
+  const core::Cancellation& cancellation() const { return cancellation_; }
+  /// A bar when stderr is a terminal, a plain line every ten per cent otherwise; `what` begins each line.
+  core::ProgressSink progress(const std::string& what);
+  /// Ends a progress bar's line.
+  void end_progress();
+
+  /// One JSON document to stdout with --json, the text otherwise.
+  void print(const nlohmann::ordered_json& document, const std::string& text);
+
+ private:
+  CommonOptions options_;
+  const core::Cancellation& cancellation_;
+  core::LogSink log_;
+  std::unique_ptr<core::ThreadPool> pool_;
+  bool bar_open_ = false;
+};
+
+/// One verb: adds its subcommand with its options to the app and returns what runs it. The options live in the returned
+/// function's captures.
+struct Verb {
+  CLI::App* app = nullptr;
+  std::function<core::Status(VerbContext&)> run;
+};
+
+Verb add_validate_verb(CLI::App& app);
+Verb add_predict_verb(CLI::App& app);
+Verb add_inspect_verb(CLI::App& app);
+Verb add_evaluate_verb(CLI::App& app);
+Verb add_record_verb(CLI::App& app);
+Verb add_replay_verb(CLI::App& app);
+Verb add_serve_verb(CLI::App& app);
+Verb add_ask_verb(CLI::App& app);
+
+/// --domain and --ros-distro; the domain is ROS_DOMAIN_ID's unless given.
+void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
+/// The same and the names of the robot's topics.
+void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
+/// Seven numbers x y z qw qx qy qz as a pose; nothing for none. kInvalidInput for a rotation that is not one.
+core::Result<std::optional<geometry::Pose>> camera_pose_of(const std::vector<double>& numbers);
+core::Result<std::string> read_text(const std::string& path);
+
+/// An answer as JSON, for a person; what has no short form stays JSON.
+std::string answer_text(const nlohmann::ordered_json& answer);
+
+/// Rows of text with columns padded to equal width; the first row is underlined.
+std::string table(const std::vector<std::vector<std::string>>& rows);
+/// "0.1235" with so many digits after the point.
+std::string fixed_digits(double value, int digits);
+
+}  // namespace prescene::service

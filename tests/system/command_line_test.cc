@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "prescene/tests/support/paths.h"
+#include "program.h"
+
+namespace prescene::tests {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string scenario(const std::string& name) { return (source_dir() / "scenarios" / (name + ".yaml")).string(); }
+
+ordered_json parsed(const Finished& finished) {
+  ordered_json json = ordered_json::parse(finished.out, nullptr, false);
+  EXPECT_FALSE(json.is_discarded()) << "stdout is not one JSON document:\n"
+                                    << finished.out << "\nstderr:\n"
+                                    << finished.err;
+  return json;
+}
+
+TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
+  EXPECT_EQ(run_program({"--help"}).exit_code, 0);
+  EXPECT_EQ(run_program({"--version"}).exit_code, 0);
+  for (const char* verb : {"validate", "predict", "inspect", "record", "replay", "serve", "ask", "evaluate"}) {
+    const Finished help = run_program({verb, "--help"});
+    EXPECT_EQ(help.exit_code, 0) << verb;
+    EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;
+    EXPECT_NE(help.out.find("--seed"), std::string::npos) << verb;
+  }
+}
+
+TEST(CommandLine, BadArgumentsEndWithTwo) {
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{},
+                                             {"nonsense"},
+                                             {"predict"},
+                                             {"predict", "a", "--tolerance", "2"},
+                                             {"predict", scenario("milk_on_bin"), "--threads", "-3"},
+                                             {"record"},
+                                             {"evaluate", "nothing", "--data", "."},
+                                             {"serve", "--scene", "x", "--domain", "999"}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_FALSE(finished.err.empty());
+    EXPECT_TRUE(finished.out.empty()) << finished.out;
+  }
+}
+
+TEST(CommandLine, MissingFilesAreNamed) {
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"predict", "no/such.yaml"},
+                                             {"inspect", "no/such.ply"},
+                                             {"replay", "no/such.mcap"},
+                                             {"evaluate", "ycb_video", "--data", "no/such"}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << args[0];
+    EXPECT_NE(finished.err.find("no/such"), std::string::npos) << finished.err;
+  }
+}
+
+TEST(CommandLine, EveryScenarioIsValid) {
+  for (const auto& entry : std::filesystem::directory_iterator(source_dir() / "scenarios")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Finished finished = run_program({"validate", entry.path().string(), "--json"});
+    EXPECT_EQ(finished.exit_code, 0) << finished.out << finished.err;
+    EXPECT_TRUE(parsed(finished)["files"][0]["valid"].get<bool>());
+  }
+}
+
+TEST(CommandLine, AMistypedKeyIsNamedWithItsLineAndTheRightOne) {
+  const ScratchDir folder;
+  std::string text = read_file(scenario("milk_on_bin"));
+  const std::size_t at = text.find("friction:");
+  text.replace(at, 9, "fricton:");
+  const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+  write_file(folder.path() / "bad.yaml", text);
+  const Finished finished = run_program({"validate", (folder.path() / "bad.yaml").string()});
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_NE(finished.out.find("bad.yaml:" + std::to_string(line)), std::string::npos) << finished.out;
+  EXPECT_NE(finished.out.find("'friction'"), std::string::npos) << finished.out;
+}
+
+TEST(CommandLine, PredictionsAreTheSameBytesForTheSameSeedAndAnyThreads) {
+  std::vector<std::string> documents;
+  for (const char* threads : {"1", "2", "2"}) {
+    const Finished finished = run_program({"predict", scenario("milk_on_bin"), "--json", "--seed", "1", "--threads",
+                                           threads, "--max-instances", "64", "--tolerance", "0.001"});
+    ASSERT_EQ(finished.exit_code, 0) << finished.err;
+    ordered_json json = parsed(finished);
+    EXPECT_EQ(json["instances"], 64);
+    EXPECT_GT(json["simulated_seconds"].get<double>(), 1.0);
+    json.erase("wall_seconds");
+    documents.push_back(json.dump());
+    double sum = 0.0;
+    for (const ordered_json& outcome : json["outcomes"]) {
+      const double p = outcome["probability"].get<double>();
+      EXPECT_LE(outcome["interval"][0].get<double>(), p);
+      EXPECT_GE(outcome["interval"][1].get<double>(), p);
+      if (outcome.value("group", "") == "where") sum += p;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-9);
+  }
+  EXPECT_EQ(documents[0], documents[1]);
+  EXPECT_EQ(documents[1], documents[2]);
+}
+
+TEST(CommandLine, InspectMakesAModelThatASceneCanUse) {
+  const ScratchDir folder;
+  // A cube of 100 in a file without a unit.
+  write_file(folder.path() / "cube.obj",
+             "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nv 0 0 100\nv 100 0 100\nv 100 100 100\nv 0 100 100\n"
+             "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  const Finished metres = run_program({"inspect", (folder.path() / "cube.obj").string(), "--json"});
+  EXPECT_EQ(metres.exit_code, 0) << metres.err;
+  EXPECT_NE(parsed(metres)["remarks"].dump().find("millimetres"), std::string::npos) << metres.out;
+
+  const Finished made = run_program({"inspect", (folder.path() / "cube.obj").string(), "--scale", "0.001", "--density",
+                                     "1000", "-o", (folder.path() / "cube.yaml").string(), "--report",
+                                     (folder.path() / "cube.html").string(), "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const ordered_json found = parsed(made);
+  EXPECT_NEAR(found["volume"].get<double>(), 1e-3, 1e-12);
+  EXPECT_NEAR(found["solid"]["mass"].get<double>(), 1.0, 1e-9);
+  EXPECT_EQ(found["resting_poses"].size(), 6u);
+  EXPECT_NE(read_file(folder.path() / "cube.html").find("<html"), std::string::npos);
+
+  write_file(folder.path() / "scene.yaml",
+             "name: cube\nmodels:\n  cube: {file: cube.yaml}\nsupports:\n  floor: {ground: {size: 2}}\n"
+             "objects:\n  cube: {model: cube, pose: {position: [0, 0, 0.3]}}\n"
+             "outcomes:\n  lies: {object: cube, resting_on: floor}\n");
+  const Finished predicted =
+      run_program({"predict", (folder.path() / "scene.yaml").string(), "--json", "--max-instances", "8"});
+  ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+  EXPECT_EQ(parsed(predicted)["outcomes"][0]["probability"], 1.0);
+}
+
+}  // namespace
+}  // namespace prescene::tests

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "program.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <sstream>
+
+#include "prescene/tests/support/paths.h"
+
+extern char** environ;
+
+namespace prescene::tests {
+namespace {
+
+pid_t start(const std::vector<std::string>& args, const std::vector<std::string>& environment, const std::string& out,
+            const std::string& err) {
+  const std::string program = (build_dir() / "prescene").string();
+  std::vector<char*> argv{const_cast<char*>(program.c_str())};
+  for (const std::string& arg : args) argv.push_back(const_cast<char*>(arg.c_str()));
+  argv.push_back(nullptr);
+  std::vector<char*> envp;
+  for (const std::string& entry : environment) envp.push_back(const_cast<char*>(entry.c_str()));
+  for (char** entry = environ; *entry != nullptr; ++entry) envp.push_back(*entry);
+  envp.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  pid_t pid = -1;
+  const int failed = posix_spawn(&pid, program.c_str(), &actions, nullptr, argv.data(), envp.data());
+  posix_spawn_file_actions_destroy(&actions);
+  EXPECT_EQ(failed, 0) << "can't start " << program;
+  return failed == 0 ? pid : -1;
+}
+
+int wait_for_end(pid_t pid) {
+  int status = 0;
+  if (pid <= 0 || waitpid(pid, &status, 0) != pid) return -1;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+}  // namespace
+
+Finished run_program(const std::vector<std::string>& args, const std::vector<std::string>& environment) {
+  const ScratchDir folder;
+  Finished finished;
+  finished.exit_code =
+      wait_for_end(start(args, environment, (folder.path() / "out").string(), (folder.path() / "err").string()));
+  finished.out = read_file(folder.path() / "out");
+  finished.err = read_file(folder.path() / "err");
+  return finished;
+}
+
+BackgroundProgram::BackgroundProgram(const std::vector<std::string>& args, const std::vector<std::string>& environment)
+    : pid_(start(args, environment, "/dev/null", "/dev/null")) {}
+
+BackgroundProgram::~BackgroundProgram() { stop(SIGKILL); }
+
+int BackgroundProgram::stop(int signal_number) {
+  if (pid_ <= 0) return -1;
+  kill(pid_, signal_number);
+  const int code = wait_for_end(pid_);
+  pid_ = -1;
+  return code;
+}
+
+void write_file(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  ASSERT_TRUE(file.good()) << path;
+}
+
+std::string read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string own_domain() { return "ROS_DOMAIN_ID=" + std::to_string(10 + getpid() % 200); }
+
+}  // namespace prescene::tests

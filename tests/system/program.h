@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs the built program as a user does.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace prescene::tests {
+
+struct Finished {
+  int exit_code = -1;  ///< 128 + signal when it was killed by one.
+  std::string out;
+  std::string err;
+};
+
+/// Runs `prescene args...` to its end. `environment` is added to ours ("NAME=value").
+Finished run_program(const std::vector<std::string>& args, const std::vector<std::string>& environment = {});
+
+/// A program that runs beside the test; killed with the object if it still runs.
+class BackgroundProgram {
+ public:
+  explicit BackgroundProgram(const std::vector<std::string>& args, const std::vector<std::string>& environment = {});
+  ~BackgroundProgram();
+  BackgroundProgram(const BackgroundProgram&) = delete;
+  BackgroundProgram& operator=(const BackgroundProgram&) = delete;
+
+  /// Sends a signal and waits for the end; the exit code as above.
+  int stop(int signal_number);
+
+ private:
+  pid_t pid_ = -1;
+};
+
+void write_file(const std::filesystem::path& path, const std::string& text);
+std::string read_file(const std::filesystem::path& path);
+
+/// A domain that other runs on this machine hardly use: "ROS_DOMAIN_ID=n".
+std::string own_domain();
+
+}  // namespace prescene::tests

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole session with processes of its own: record, serve, replay over DDS, ask, kill and start again.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "prescene/tests/support/paths.h"
+#include "program.h"
+
+namespace prescene::tests {
+namespace {
+
+using nlohmann::ordered_json;
+
+// Small, so that the processes keep up on any machine.
+constexpr const char* kScene = R"(name: box_on_table
+duration: 2.5
+models:
+  box:
+    box: [0.12, 0.08, 0.1]
+    mass: 0.4
+    color: [0.8, 0.3, 0.2]
+supports:
+  table:
+    box: [0.8, 0.8, 0.04]
+    pose: {position: [0, 0, -0.02]}
+objects:
+  box:
+    model: box
+    pose:
+      position: [0.02, 0.03, 0.05]
+      normal: {position: [0.01, 0.01, 0], rotation_deg: [0, 0, 10]}
+camera:
+  width: 160
+  height: 120
+  fov_deg: 55
+  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
+outcomes:
+  stays: {object: box, resting_on: table}
+)";
+
+ordered_json parsed(const Finished& finished) {
+  ordered_json json = ordered_json::parse(finished.out, nullptr, false);
+  EXPECT_FALSE(json.is_discarded()) << finished.out << finished.err;
+  return json;
+}
+
+class Session : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    write_file(path("scene.yaml"), kScene);
+    const Finished recorded =
+        run_program({"record", "--simulate", path("scene.yaml"), "-o", path("run.mcap"), "--rate", "8", "--seed", "4"});
+    ASSERT_EQ(recorded.exit_code, 0) << recorded.err;
+  }
+  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+
+  ScratchDir folder_;
+  std::vector<std::string> bus_ = {own_domain()};
+};
+
+TEST_F(Session, ARecordingTracksToTheSameBytesOnAnyThreads) {
+  const Finished one =
+      run_program({"replay", path("run.mcap"), "--json", "--threads", "1", "--report", path("run.html")});
+  ASSERT_EQ(one.exit_code, 0) << one.err;
+  const Finished two = run_program({"replay", path("run.mcap"), "--json", "--threads", "2"});
+  EXPECT_EQ(one.out, two.out);
+  const ordered_json json = parsed(one);
+  EXPECT_GE(json["steps"].size(), 19u);
+  EXPECT_LT(json["tracking"][0]["median_position_error_m"].get<double>(), 0.01) << json["tracking"].dump();
+  EXPECT_NE(read_file(path("run.html")).find("<img"), std::string::npos);
+}
+
+TEST_F(Session, ACutRecordingIsReadToItsLastWholeMessage) {
+  const std::string whole = read_file(path("run.mcap"));
+  write_file(path("cut.mcap"), whole.substr(0, whole.size() * 6 / 10));
+  const Finished finished = run_program({"replay", path("cut.mcap"), "--json"});
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const ordered_json json = parsed(finished);
+  EXPECT_GT(json["steps"].size(), 3u);
+  EXPECT_FALSE(json["loss"].get<std::string>().empty());
+  write_file(path("noise.mcap"), "this is no recording");
+  EXPECT_EQ(run_program({"replay", path("noise.mcap")}).exit_code, 2);
+}
+
+TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
+  const std::vector<std::string> serve = {"serve", "--scene", path("scene.yaml")};
+  const std::vector<std::string> replay = {"replay", path("run.mcap"), "--over-dds",
+                                           "--json", "--ask",          R"(1.0:{"where": {}})"};
+  {
+    BackgroundProgram service(serve, bus_);
+    const Finished played = run_program(replay, bus_);
+    EXPECT_EQ(played.exit_code, 0) << played.err;
+    EXPECT_GT(parsed(played)["beliefs"].get<int>(), 0);
+    const Finished asked = run_program({"ask", "stability", "box", "--json"}, bus_);
+    ASSERT_EQ(asked.exit_code, 0) << asked.err;
+    EXPECT_GT(parsed(asked)["stability"]["stable"]["probability"].get<double>(), 0.8) << asked.out;
+    EXPECT_EQ(run_program({"ask", "stability", "nobody"}, bus_).exit_code, 2);
+    EXPECT_EQ(service.stop(SIGKILL), 128 + SIGKILL);
+  }
+  {
+    std::vector<std::string> recording_serve = serve;
+    recording_serve.insert(recording_serve.end(), {"--record", path("session.mcap")});
+    BackgroundProgram service(recording_serve, bus_);
+    const Finished played = run_program(replay, bus_);
+    EXPECT_EQ(played.exit_code, 0) << played.err;
+    const ordered_json json = parsed(played);
+    EXPECT_LT(json["tracking"][0]["median_position_error_m"].get<double>(), 0.01) << json["tracking"].dump();
+    ASSERT_EQ(json["answers"].size(), 1u);
+    EXPECT_EQ(json["answers"][0]["answer"]["where"]["items"][0]["object"], "box");
+    EXPECT_EQ(service.stop(SIGINT), 0);
+  }
+  const Finished again = run_program({"replay", path("session.mcap"), "--json"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  const ordered_json json = parsed(again);
+  EXPECT_TRUE(json["followed_step_records"].get<bool>());
+  EXPECT_GT(json["compared_steps"].get<int>(), 0);
+  EXPECT_EQ(json["different_steps"], 0);
+}
+
+TEST_F(Session, AskingNobodySaysSo) {
+  const Finished asked = run_program({"ask", "where", "--timeout", "0.3"}, bus_);
+  EXPECT_EQ(asked.exit_code, 1);
+  EXPECT_NE(asked.err.find("prescene serve"), std::string::npos) << asked.err;
+}
+
+}  // namespace
+}  // namespace prescene::tests
