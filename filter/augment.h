@@ -20,8 +20,8 @@ namespace prescene::filter {
 struct AugmentOptions {
   int recover_after_frames = 4;  ///< An object not supported for so many frames is looked for ...
   int recover_every = 3;         ///< ... every so many frames.
-  /// An object that is tracked by less than this share of its pixels may be a wrong pose that the true one sticks out of:
-  /// it is looked for too, every so many frames.
+  /// An object that is tracked by less than this share of its pixels may be a wrong pose that the true one sticks out
+  /// of: it is looked for too, every so many frames.
   double suspicious_share = 0.75;
   int suspicious_every = 10;
   int recover_starts = 48;

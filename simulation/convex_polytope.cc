@@ -10,8 +10,8 @@
 namespace prescene::simulation {
 namespace {
 
-// Faces within this angle (rad) are one; 1e-4 is far below any angle that matters for a contact normal and far above the
-// rounding of a mesh file with six digits.
+// Faces within this angle (rad) are one; 1e-4 is far below any angle that matters for a contact normal and far above
+// the rounding of a mesh file with six digits.
 constexpr double kCoplanarAngle = 1e-4;
 // Relative to the size of the shape.
 constexpr double kCoplanarDistance = 1e-6;
@@ -76,8 +76,7 @@ core::Result<ConvexPolytope> make_polytope(const std::vector<Vector3d>& points) 
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < hull.triangles.size(); ++i) {
     const auto& t = hull.triangles[i];
-    const Vector3d n =
-        (hull.vertices[t[1]] - hull.vertices[t[0]]).cross(hull.vertices[t[2]] - hull.vertices[t[0]]);
+    const Vector3d n = (hull.vertices[t[1]] - hull.vertices[t[0]]).cross(hull.vertices[t[2]] - hull.vertices[t[0]]);
     const double area = n.norm();
     if (area > 0.0) candidates.push_back({area, i, n / area});
   }
@@ -127,8 +126,8 @@ std::optional<ConvexPolytope> inset(const ConvexPolytope& polytope, double dista
     const Eigen::FullPivLU<geometry::Matrix3d> lu(planes);
     if (!lu.isInvertible()) continue;
     const Vector3d vertex = center + lu.solve(offsets);
-    const bool known = std::any_of(vertices.begin(), vertices.end(),
-                                   [&](const Vector3d& v) { return (v - vertex).norm() < merge; });
+    const bool known =
+        std::any_of(vertices.begin(), vertices.end(), [&](const Vector3d& v) { return (v - vertex).norm() < merge; });
     if (!known) vertices.push_back(vertex);
   }
   core::Result<ConvexPolytope> result = make_polytope(vertices);

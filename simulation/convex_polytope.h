@@ -24,15 +24,16 @@ struct ConvexPolytope {
   std::vector<Face> faces;
 
   Vector3d vertex_mean() const;
-  /// Distance from the mean of the vertices to the nearest face plane, m: a lower bound of the inscribed sphere's radius.
+  /// Distance from the mean of the vertices to the nearest face plane, m: a lower bound of the inscribed sphere's
+  /// radius.
   double inner_radius() const;
 };
 
 /// The convex hull of points. Fails with kInvalidInput when they (almost) lie in a plane.
 core::Result<ConvexPolytope> make_polytope(const std::vector<Vector3d>& points);
 
-/// All face planes moved inwards by `distance` (m): the points whose ball of that radius fits inside. Faces that vanish are
-/// dropped. Empty when distance is not below inner_radius().
+/// All face planes moved inwards by `distance` (m): the points whose ball of that radius fits inside. Faces that vanish
+/// are dropped. Empty when distance is not below inner_radius().
 std::optional<ConvexPolytope> inset(const ConvexPolytope& polytope, double distance);
 
 }  // namespace prescene::simulation

@@ -58,9 +58,7 @@ core::Result<ConvexParts> build_parts(const TriangleMesh& mesh, belief::MeshUse 
 using EdgeKey = std::pair<std::array<double, 3>, std::array<double, 3>>;
 
 // Corners by position, so that meshes with split vertices (one per face) still know their neighbours.
-EdgeKey edge_key(const Vector3d& a, const Vector3d& b) {
-  return {{a.x(), a.y(), a.z()}, {b.x(), b.y(), b.z()}};
-}
+EdgeKey edge_key(const Vector3d& a, const Vector3d& b) { return {{a.x(), a.y(), a.z()}, {b.x(), b.y(), b.z()}}; }
 
 StaticMesh build_static(const TriangleMesh& mesh) {
   StaticMesh result{mesh, std::vector<std::uint8_t>(mesh.triangles.size(), 0)};

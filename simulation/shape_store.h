@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes that are expensive to make, made once: convex parts of meshes and prepared static triangle meshes, keyed by the
-// mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
+// Shapes that are expensive to make, made once: convex parts of meshes and prepared static triangle meshes, keyed by
+// the mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
 // threads may hold it.
 //
-//   ShapeStore shapes(decomposer);                       // decomposer: prescene/simulation/bullet/convex_decomposition.h
-//   auto parts = shapes.convex_parts(mesh, belief::MeshUse::kConvexHull, {});
+//   ShapeStore shapes(decomposer);                       // decomposer:
+//   prescene/simulation/bullet/convex_decomposition.h auto parts = shapes.convex_parts(mesh,
+//   belief::MeshUse::kConvexHull, {});
 #pragma once
 
 #include <cstdint>
@@ -30,8 +31,8 @@ struct DecompositionSettings {
 };
 
 /// Cuts a mesh into parts that are each nearly convex; the caller takes their hulls.
-using Decomposer = std::function<core::Result<std::vector<geometry::TriangleMesh>>(const geometry::TriangleMesh& mesh,
-                                                                                  const DecompositionSettings& settings)>;
+using Decomposer = std::function<core::Result<std::vector<geometry::TriangleMesh>>(
+    const geometry::TriangleMesh& mesh, const DecompositionSettings& settings)>;
 
 /// The convex parts that stand for a mesh in contacts, in the mesh's frame.
 using ConvexParts = std::vector<ConvexPolytope>;
@@ -39,8 +40,9 @@ using ConvexParts = std::vector<ConvexPolytope>;
 /// A static triangle mesh with what contact finding has to know of its edges.
 struct StaticMesh {
   geometry::TriangleMesh mesh;
-  /// Per triangle a bit k for the edge from corner k to corner k + 1: set when the edge is a ridge (convex) or a border.
-  /// Contacts at other edges (flat seams, valleys) must take the triangle's own normal, or bodies trip over seams.
+  /// Per triangle a bit k for the edge from corner k to corner k + 1: set when the edge is a ridge (convex) or a
+  /// border. Contacts at other edges (flat seams, valleys) must take the triangle's own normal, or bodies trip over
+  /// seams.
   std::vector<std::uint8_t> ridges;
 };
 

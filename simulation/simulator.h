@@ -24,20 +24,20 @@ namespace prescene::simulation {
 
 /// When an instance stops.
 struct StopRule {
-  double duration = 5.0;          ///< s, at most
-  bool stop_at_rest = true;       ///< Stop when everything is at rest: see RestRule.
-  double world_radius = 20.0;     ///< m from the origin: beyond it an object has left the world and is frozen.
+  double duration = 5.0;       ///< s, at most
+  bool stop_at_rest = true;    ///< Stop when everything is at rest: see RestRule.
+  double world_radius = 20.0;  ///< m from the origin: beyond it an object has left the world and is frozen.
 };
 
-/// At rest = kinetic energy per mass below `energy` for `time`, and no object in an unstable equilibrium (a nudge of its
-/// pose that lowers its centre of mass against its contacts is looked for).
+/// At rest = kinetic energy per mass below `energy` for `time`, and no object in an unstable equilibrium (a nudge of
+/// its pose that lowers its centre of mass against its contacts is looked for).
 struct RestRule {
-  double energy = 2e-4;           ///< J/kg
-  double time = 0.2;              ///< s
+  double energy = 2e-4;  ///< J/kg
+  double time = 0.2;     ///< s
 };
 
 struct RunRequest {
-  std::vector<belief::Action> actions;   ///< Instead of the scene's; times from the start of the run.
+  std::vector<belief::Action> actions;  ///< Instead of the scene's; times from the start of the run.
   StopRule stop;
   /// States are kept every so many seconds (first and last always); 0 = first and last only.
   double sample_interval = 0.0;
@@ -67,10 +67,11 @@ class Simulator {
  public:
   virtual ~Simulator() = default;
 
-  /// Runs starts.size() instances; trajectories.size() == starts.size(). Instance i uses stream.at(step, first_instance + i)
-  /// for what is random in its actions. A cancelled run ends its instances with TrajectoryEnd::kCancelled.
-  virtual void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
-                   std::uint32_t first_instance, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+  /// Runs starts.size() instances; trajectories.size() == starts.size(). Instance i uses stream.at(step, first_instance
+  /// + i) for what is random in its actions. A cancelled run ends its instances with TrajectoryEnd::kCancelled.
+  virtual void run(std::span<const belief::WorldState> starts, const RunRequest& request,
+                   const core::RandomStream& stream, std::uint32_t first_instance, core::ThreadPool& pool,
+                   std::span<belief::Trajectory> trajectories,
                    const core::Cancellation* cancellation = nullptr) const = 0;
 
   virtual std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,

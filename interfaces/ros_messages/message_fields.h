@@ -124,7 +124,8 @@ struct MinWireSize<std::array<T, n>> {
   DO(RosHeader)                                                                                                       \
   DO(RosString)                                                                                                       \
   DO(RosColorRgba)                                                                                                    \
-  DO(RosVector3) DO(RosPoint) DO(RosQuaternion) DO(RosPose) DO(RosPoseStamped) DO(RosPoseWithCovariance)              \
+  DO(RosVector3)                                                                                                      \
+  DO(RosPoint) DO(RosQuaternion) DO(RosPose) DO(RosPoseStamped) DO(RosPoseWithCovariance)                             \
       DO(RosPoseWithCovarianceStamped) DO(RosPoseArray) DO(RosTransform) DO(RosTransformStamped) DO(RosTfMessage)     \
           DO(RosTwist) DO(RosTwistStamped) DO(RosImage) DO(RosCompressedImage) DO(RosRegionOfInterest)                \
               DO(RosCameraInfo) DO(RosJointState) DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose)             \

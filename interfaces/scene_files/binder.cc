@@ -273,10 +273,10 @@ void Binder::finish() {
       return std::find(explained.begin(), explained.end(), key) != explained.end();
     });
     if (is_explained) continue;
-    problems_.add(value_.place, value_.path,
-                  missing.keys.size() == 1 ? "the key " + interfaces::quote(missing.keys[0]) + " is missing"
-                                           : "a key is missing",
-                  missing.remedy);
+    problems_.add(
+        value_.place, value_.path,
+        missing.keys.size() == 1 ? "the key " + interfaces::quote(missing.keys[0]) + " is missing" : "a key is missing",
+        missing.remedy);
   }
 }
 

@@ -126,8 +126,7 @@ core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses
     for (std::size_t i = 0; i < parameters.size(); ++i) line << ' ' << parameters[i].name << ' ' << best.values[i];
     return !progress || progress(line.str());
   };
-  const simulation::SearchResult found =
-      simulation::coordinate_search(parameters, cost, 3, max_evaluations, report);
+  const simulation::SearchResult found = simulation::coordinate_search(parameters, cost, 3, max_evaluations, report);
   PRESCENE_RETURN_IF_ERROR(failure);
   return CubeCalibration{model_from(start, found.values), found.cost, found.evaluations};
 }

@@ -32,8 +32,8 @@ struct CubeCalibration {
 /// Called after each round of the search with a line about the best so far; false stops it.
 using CalibrationProgress = std::function<bool(const std::string& line)>;
 
-/// Measures lengths, then searches frictions, restitution, inertia, rounding, centre of mass and the size of the start's
-/// noise (its four parts keep their ratios) with `samples` starts a toss, the same ones in each evaluation.
+/// Measures lengths, then searches frictions, restitution, inertia, rounding, centre of mass and the size of the
+/// start's noise (its four parts keep their ratios) with `samples` starts a toss, the same ones in each evaluation.
 core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses, CubeModel start, std::uint64_t seed,
                                              int samples, int max_evaluations, core::ThreadPool& threads,
                                              const CalibrationProgress& progress = {});

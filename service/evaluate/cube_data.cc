@@ -60,7 +60,8 @@ core::Result<std::vector<CubeToss>> read_cube_tosses(const std::filesystem::path
     const int number = static_cast<int>(c[0]);
     if (tosses.empty() || tosses.back().number != number) tosses.push_back({number, {}});
     std::vector<simulation::TimedPose>& frames = tosses.back().frames;
-    if (!frames.empty() && !(pose.time > frames.back().time)) return wrong(line, "its time is not after the row before");
+    if (!frames.empty() && !(pose.time > frames.back().time))
+      return wrong(line, "its time is not after the row before");
     frames.push_back(pose);
   }
   if (tosses.empty()) return wrong(2, "there is no toss in it");

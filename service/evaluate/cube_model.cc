@@ -40,9 +40,9 @@ belief::Scene make_cube_scene(const CubeModel& model) {
   cube.collision = {belief::PrimitiveShape{geometry::BoxShape{{edge, edge, edge}}, geometry::Pose{}}};
   cube.mass = belief::FixedScalar{model.mass};
   cube.center_of_mass = belief::Vector3Distribution::fixed({0.0, 0.0, model.center_of_mass_z});
-  cube.unit_inertia = geometry::Vector3d(model.unit_inertia, model.unit_inertia,
-                                         model.unit_inertia * model.unit_inertia_z_ratio)
-                          .asDiagonal();
+  cube.unit_inertia =
+      geometry::Vector3d(model.unit_inertia, model.unit_inertia, model.unit_inertia * model.unit_inertia_z_ratio)
+          .asDiagonal();
   cube.contact.friction = belief::FixedScalar{model.sliding_friction};
   cube.contact.impact_friction = belief::FixedScalar{model.impact_friction};
   cube.contact.restitution = belief::FixedScalar{model.restitution};

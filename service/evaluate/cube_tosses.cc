@@ -32,8 +32,7 @@ belief::WorldState perturbed_start(const belief::WorldState& mean, const CubeMod
   belief::WorldState start = mean;
   belief::ObjectState& cube = start.objects[0];
   cube.X_WO.translation += model.position_noise * Vector3d(z[0], z[1], z[2]);
-  cube.X_WO.rotation =
-      cube.X_WO.rotation * geometry::exp_rotation(model.rotation_noise * Vector3d(z[3], z[4], z[5]));
+  cube.X_WO.rotation = cube.X_WO.rotation * geometry::exp_rotation(model.rotation_noise * Vector3d(z[3], z[4], z[5]));
   cube.V_WO.linear += model.velocity_noise * Vector3d(z[6], z[7], z[8]);
   cube.V_WO.angular += model.spin_noise * Vector3d(z[9], z[10], z[11]);
   const double friction = std::exp(model.friction_noise * z[12]);
@@ -96,12 +95,9 @@ core::Result<simulation::BallisticState> start_of_toss(const CubeToss& toss, con
   return fit;
 }
 
-core::Result<std::vector<CubeForecast>> forecast_cube_tosses(const std::vector<CubeToss>& tosses,
-                                                             const CubeModel& model, std::uint64_t seed,
-                                                             core::ThreadPool& threads,
-                                                             const core::ProgressSink& progress,
-                                                             const core::Cancellation* cancellation,
-                                                             const CubeOptions& options) {
+core::Result<std::vector<CubeForecast>> forecast_cube_tosses(
+    const std::vector<CubeToss>& tosses, const CubeModel& model, std::uint64_t seed, core::ThreadPool& threads,
+    const core::ProgressSink& progress, const core::Cancellation* cancellation, const CubeOptions& options) {
   const belief::Scene scene = make_cube_scene(model);
   simulation::ShapeStore shapes;
   PRESCENE_TRY(const auto simulator, simulation::make_bullet_simulator(scene, shapes, make_cube_options(model)));
@@ -125,7 +121,8 @@ core::Result<std::vector<CubeForecast>> forecast_cube_tosses(const std::vector<C
     }
     std::vector<belief::Trajectory> runs(starts.size());
     simulator->run(starts, request, toss_stream, 0, threads, runs, cancellation);
-    if (cancellation && cancellation->requested()) return core::cancelled("stopped after " + std::to_string(i) + " tosses");
+    if (cancellation && cancellation->requested())
+      return core::cancelled("stopped after " + std::to_string(i) + " tosses");
     forecasts.push_back(make_forecast(tosses[i], runs, model));
     if (progress) {
       const double fraction = static_cast<double>(i + 1) / static_cast<double>(tosses.size());

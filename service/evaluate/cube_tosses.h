@@ -44,7 +44,7 @@ struct CubeReport {
   double log_score = 0.0;         ///< Mean natural logarithm, of at least 1e-3.
   double median_xy_error_m = 0.0;
   double p90_xy_error_m = 0.0;
-  double coverage_50 = 0.0;       ///< Share of tosses that ended inside their region of mass 0.5.
+  double coverage_50 = 0.0;  ///< Share of tosses that ended inside their region of mass 0.5.
   double coverage_90 = 0.0;
   std::vector<CubeForecast> forecasts;
 };

@@ -27,12 +27,12 @@ struct PlaneDensity {
 /// Kernel covariance (scale^2 n^(-1/3) times the mean covariance within the groups) + floor^2 identity. `groups[i]` is
 /// the class of sample i: what lies between two classes is not smoothed over. samples.size() == groups.size() > 0.
 PlaneDensity density_of(std::vector<Eigen::Vector2d> samples, std::span<const int> groups, double scale, double floor);
-/// Mass of the highest-density region on whose border `place` lies: below c iff the place is inside the region of mass c.
-/// By quadrature over points spread through each kernel, deterministic.
+/// Mass of the highest-density region on whose border `place` lies: below c iff the place is inside the region of mass
+/// c. By quadrature over points spread through each kernel, deterministic.
 double region_mass(const PlaneDensity& density, const Eigen::Vector2d& place);
 
-/// Mean distance of the samples to the place less half their mean distance to each other, m: proper, so that it is least
-/// in expectation for the true distribution [Gneiting & Raftery 2007]. Not empty.
+/// Mean distance of the samples to the place less half their mean distance to each other, m: proper, so that it is
+/// least in expectation for the true distribution [Gneiting & Raftery 2007]. Not empty.
 double energy_score(std::span<const Eigen::Vector2d> samples, const Eigen::Vector2d& place);
 
 /// Value below which the share `q` of the values lies, by linear interpolation between the sorted ones. Not empty.

@@ -48,22 +48,22 @@ class ActionPlayer {
   /// Of one object.
   struct Hold {
     Control control = Control::kFree;
-    int hand = -1;      // robot body that goes along, or -1
-    Pose X_GO;          // in the hand, while there is one; else in W
-    int action = -1;    // the carry or pour under way
+    int hand = -1;    // robot body that goes along, or -1
+    Pose X_GO;        // in the hand, while there is one; else in W
+    int action = -1;  // the carry or pour under way
     double begin = 0.0;
-    Pose X_from;        // X_WO at its begin
+    Pose X_from;  // X_WO at its begin
   };
   /// Of one robot body.
   struct Hand {
-    int carries = -1;     // object whose carry moves this hand
-    bool stays = false;   // where the last carry ended, no longer on its timeline
+    int carries = -1;    // object whose carry moves this hand
+    bool stays = false;  // where the last carry ended, no longer on its timeline
     Pose X_WG_stay;
   };
   /// Of one action.
   struct Step {
     bool done = false;
-    int hand = -1;        // that a release lets back off
+    int hand = -1;  // that a release lets back off
   };
   struct Pusher {
     Vector3d from, to;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulator on Bullet 3.24 in double precision: its rigid bodies and sequential impulse solver, with contact finding
-// and contact rows that keep true sizes, lose no restitution and rub in the direction of the slip. docs/simulation.md
-// says what differs from plain Bullet and what was measured.
+// The simulator on Bullet 3.24 in double precision: its rigid bodies and sequential impulse solver, with contact
+// finding and contact rows that keep true sizes, lose no restitution and rub in the direction of the slip.
+// docs/simulation.md says what differs from plain Bullet and what was measured.
 //
 //   ShapeStore shapes(hacd_decomposer());
 //   PRESCENE_TRY(auto simulator, make_bullet_simulator(scene, shapes, BulletOptions{}));
@@ -29,8 +29,8 @@ struct BulletOptions {
   double restitution_speed = 0.02;
   /// m/s: contacts that close faster rub with impact_friction, slower ones with friction; >= 0.
   double impact_speed = 0.2;
-  /// Smallest radius of edges and corners, m, in [1e-5, 0.01]; models may ask for more (ContactProperties::edge_radius).
-  /// Faces keep their true place.
+  /// Smallest radius of edges and corners, m, in [1e-5, 0.01]; models may ask for more
+  /// (ContactProperties::edge_radius). Faces keep their true place.
   double edge_rounding = 2e-4;
   /// Two shapes nearer than this touch, for contact intervals and final contacts, m; >= 0.
   double touching_distance = 2e-4;

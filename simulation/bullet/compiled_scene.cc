@@ -35,7 +35,8 @@ core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double r
   if (mesh.use == belief::MeshUse::kSurface) {
     if (!fixed) {
       return core::unsupported(
-          "a triangle surface can only be fixed or a robot body; use convex_hull, convex_parts or decompose for objects");
+          "a triangle surface can only be fixed or a robot body; use convex_hull, convex_parts or decompose for "
+          "objects");
     }
     PRESCENE_TRY(const auto prepared, shapes.static_mesh(*mesh.mesh));
     Part part;
@@ -83,7 +84,8 @@ core::Status validate(const BulletOptions& options) {
   }
   if (!in(options.solver_accuracy, 1e-15, 1.0)) return core::invalid_input("solver_accuracy must be in [1e-15, 1] m/s");
   if (!in(options.overlap_recovery, 1e-6, 1.0)) return core::invalid_input("overlap_recovery must be in [1e-6, 1]");
-  if (!in(options.restitution_speed, 0.0, 100.0)) return core::invalid_input("restitution_speed must be in [0, 100] m/s");
+  if (!in(options.restitution_speed, 0.0, 100.0))
+    return core::invalid_input("restitution_speed must be in [0, 100] m/s");
   if (!in(options.impact_speed, 0.0, 100.0)) return core::invalid_input("impact_speed must be in [0, 100] m/s");
   if (!in(options.edge_rounding, 1e-5, 0.01)) return core::invalid_input("edge_rounding must be in [1e-5, 0.01] m");
   if (!in(options.touching_distance, 0.0, 0.1)) return core::invalid_input("touching_distance must be in [0, 0.1] m");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene made ready for simulation: shapes, contact properties and principal axes of each body. Built once, shared const
-// by all instances.
+// A scene made ready for simulation: shapes, contact properties and principal axes of each body. Built once, shared
+// const by all instances.
 #pragma once
 
 #include <memory>
@@ -27,12 +27,12 @@ struct Part {
 struct CompiledBody {
   std::string name;
   std::vector<Part> parts;
-  double radius = 0.0;          ///< Farthest point of a part from O, m.
-  double friction = 0.0;        ///< Of supports and robot bodies; objects bring theirs.
+  double radius = 0.0;    ///< Farthest point of a part from O, m.
+  double friction = 0.0;  ///< Of supports and robot bodies; objects bring theirs.
   double impact_friction = 0.0;
   double restitution = 0.0;
   double rolling_arm = 0.0;
-  Pose X_WO;                    ///< Of supports.
+  Pose X_WO;                                 ///< Of supports.
   Vector3d unit_moments = Vector3d::Ones();  ///< Of objects: principal moments for 1 kg, m^2.
   Matrix3d R_OP = Matrix3d::Identity();      ///< Of objects: principal axes.
 };

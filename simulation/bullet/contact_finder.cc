@@ -210,8 +210,8 @@ void ContactFinder::convex_convex(const ConvexCore& a, const Frame& X_WA, const 
   if (!nearest(a, X_WA, b, X_WB, range, closest)) return;
   found_.clear();
   clip_features(a, X_WA, b, X_WB, closest.normal, range, found_);
-  const bool covered = std::any_of(found_.begin(), found_.end(),
-                                   [&](const ContactPoint& p) { return p.gap <= closest.gap + kSameGap; });
+  const bool covered =
+      std::any_of(found_.begin(), found_.end(), [&](const ContactPoint& p) { return p.gap <= closest.gap + kSameGap; });
   if (!covered) {
     const Vector3d on_a = closest.on_a - closest.normal * a.radius();
     const Vector3d on_b = closest.on_b + closest.normal * b.radius();

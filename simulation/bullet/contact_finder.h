@@ -62,7 +62,7 @@ class ContactFinder {
   void convex_surface(const ConvexCore& a, const Frame& X_WA, const SurfaceShape& b, const Frame& X_WB, double range,
                       std::vector<ContactPoint>& contacts);
 
-  static constexpr int kMaxPoints = 8;         ///< Of a pair of convex shapes.
+  static constexpr int kMaxPoints = 8;          ///< Of a pair of convex shapes.
   static constexpr int kMaxSurfacePoints = 16;  ///< Of a convex shape on a surface.
 
  private:

@@ -124,7 +124,8 @@ ContactSolver::Contact ContactSolver::make_contact(const SolverContact& given, b
 
 void ContactSolver::convertContacts(btPersistentManifold**, int, const btContactSolverInfo& info) {
   body_ids_.clear();
-  for (std::size_t i = 0; i < bodies_.size(); ++i) body_ids_.push_back(getOrInitSolverBody(*bodies_[i], info.m_timeStep));
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    body_ids_.push_back(getOrInitSolverBody(*bodies_[i], info.m_timeStep));
   rows_.clear();
   for (const SolverContact& given : given_) {
     Contact c = make_contact(given, info.m_timeStep);
@@ -190,7 +191,8 @@ btScalar ContactSolver::solve_rolling(Contact& c) {
   if (c.rolling_arm <= 0.0) return 0.0;
   btSolverBody& a = m_tmpSolverBodyPool[c.a];
   btSolverBody& b = m_tmpSolverBodyPool[c.b];
-  const btVector3 spin = a.m_angularVelocity + a.m_deltaAngularVelocity - b.m_angularVelocity - b.m_deltaAngularVelocity;
+  const btVector3 spin =
+      a.m_angularVelocity + a.m_deltaAngularVelocity - b.m_angularVelocity - b.m_deltaAngularVelocity;
   btVector3 impulse = c.rolling_impulse - spin * c.rolling_step;
   const btScalar limit = c.rolling_arm * c.normal.impulse;
   const btScalar size = impulse.length();
@@ -252,8 +254,8 @@ btScalar ContactSolver::solveGroupCacheFriendlyFinish(btCollisionObject** bodies
     const Contact& c = rows_[i];
     SolverContact& given = given_[i];
     given.impulse = c.normal.impulse;
-    given.friction_impulse = from_bullet(c.tangent_1.direction * c.tangent_1.impulse +
-                                         c.tangent_2.direction * c.tangent_2.impulse);
+    given.friction_impulse =
+        from_bullet(c.tangent_1.direction * c.tangent_1.impulse + c.tangent_2.direction * c.tangent_2.impulse);
     given.hit = c.hit && c.normal.impulse > 0.0;
     given.bounced = c.bounced && given.hit;
     given.hit_time = c.hit_time;

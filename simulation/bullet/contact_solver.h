@@ -2,7 +2,8 @@
 // Bullet's sequential impulse solver with contact rows of our own. Joints stay Bullet's; for contacts it differs in:
 //   - a round friction cone solved as one two-dimensional block, so that friction opposes the slip however it turns
 //     during the impact (Bullet fixes the directions beforehand);
-//   - Newton's restitution measured on the velocity before the step's gravity, so a gap that closes within the step loses
+//   - Newton's restitution measured on the velocity before the step's gravity, so a gap that closes within the step
+//   loses
 //     nothing and a body at rest does not bounce;
 //   - a gap that stays open only limits the approach to what closes it (no impulse at a distance);
 //   - overlap is pushed out by pseudo velocities that add no energy;
@@ -30,7 +31,7 @@ struct SolverContact {
   double friction = 0.0;                ///< While the contact slides or sticks.
   double impact_friction = 0.0;         ///< While it closes faster than SolverSettings::impact_speed.
   double restitution = 0.0;
-  double rolling_arm = 0.0;             ///< m
+  double rolling_arm = 0.0;  ///< m
   /// Normal velocity (A minus B) before this step's gravity, m/s; negative while closing.
   double speed_before = 0.0;
   /// In: the impulses of the step before (N s). Out: this step's.
@@ -55,7 +56,7 @@ struct SolverSettings {
 struct BodyResult {
   Vector3d push = Vector3d::Zero();  ///< Pseudo velocity that takes overlap away, m/s and rad/s.
   Vector3d turn = Vector3d::Zero();
-  bool touched = false;              ///< Some contact pressed on it.
+  bool touched = false;  ///< Some contact pressed on it.
 };
 
 class ContactSolver : public btSequentialImpulseConstraintSolver {
@@ -71,8 +72,7 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
   void convertContacts(btPersistentManifold** manifolds, int count, const btContactSolverInfo& info) override;
   btScalar solveSingleIteration(int iteration, btCollisionObject** bodies, int body_count,
                                 btPersistentManifold** manifolds, int manifold_count, btTypedConstraint** constraints,
-                                int constraint_count, const btContactSolverInfo& info,
-                                btIDebugDraw* drawer) override;
+                                int constraint_count, const btContactSolverInfo& info, btIDebugDraw* drawer) override;
   void solveGroupCacheFriendlySplitImpulseIterations(btCollisionObject** bodies, int body_count,
                                                      btPersistentManifold** manifolds, int manifold_count,
                                                      btTypedConstraint** constraints, int constraint_count,
@@ -92,14 +92,14 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
   struct Contact {
     int a = 0, b = 0;  // solver bodies
     Row normal, tangent_1, tangent_2;
-    btScalar target = 0.0;         // lower bound of the normal velocity
-    btScalar push_target = 0.0;    // lower bound of the normal pseudo velocity
+    btScalar target = 0.0;       // lower bound of the normal velocity
+    btScalar push_target = 0.0;  // lower bound of the normal pseudo velocity
     btScalar push_impulse = 0.0;
     btScalar mu = 0.0;
-    btScalar slip_step = 0.0;      // 1 / largest eigenvalue of the tangential response
-    btScalar rolling_arm = 0.0;    // m
+    btScalar slip_step = 0.0;    // 1 / largest eigenvalue of the tangential response
+    btScalar rolling_arm = 0.0;  // m
     btScalar rolling_step = 0.0;
-    btVector3 rolling_impulse;     // N m s
+    btVector3 rolling_impulse;  // N m s
     bool hit = false;
     bool bounced = false;
     btScalar hit_time = 0.0;

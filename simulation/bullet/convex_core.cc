@@ -157,8 +157,8 @@ Vector3d ConvexCore::support(const Vector3d& d) const {
 }
 
 void ConvexCore::cap(double z, const Vector3d& direction, Feature& feature) const {
-  // One point lies where the rim is lowest in `direction`, so that a tilted rim touches where it should. A flat cap keeps
-  // its points: where it is lowest would be noise, and contacts that jump about never come to rest.
+  // One point lies where the rim is lowest in `direction`, so that a tilted rim touches where it should. A flat cap
+  // keeps its points: where it is lowest would be noise, and contacts that jump about never come to rest.
   const bool tilted = length_of(direction.x(), direction.y()) > kFlatCap;
   const double start = tilted ? std::atan2(direction.y(), direction.x()) : 0.0;
   const double turn = (z > 0.0 ? 2.0 : -2.0) * std::numbers::pi / kCapPoints;

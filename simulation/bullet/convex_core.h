@@ -16,8 +16,8 @@
 
 namespace prescene::simulation {
 
-/// A face, edge or corner of a core, in the frame that the function says: one point, a segment, or a planar convex polygon
-/// counter-clockwise seen from outside with its outward normal.
+/// A face, edge or corner of a core, in the frame that the function says: one point, a segment, or a planar convex
+/// polygon counter-clockwise seen from outside with its outward normal.
 struct Feature {
   static constexpr int kMaxPoints = 32;
   int count = 0;

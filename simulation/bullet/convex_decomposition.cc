@@ -51,8 +51,8 @@ core::Result<std::vector<geometry::TriangleMesh>> decompose(const geometry::Tria
     geometry::TriangleMesh part;
     for (const auto& c : corners) part.vertices.emplace_back(c.X(), c.Y(), c.Z());
     for (const auto& f : faces) {
-      part.triangles.push_back({static_cast<std::uint32_t>(f.X()), static_cast<std::uint32_t>(f.Y()),
-                                static_cast<std::uint32_t>(f.Z())});
+      part.triangles.push_back(
+          {static_cast<std::uint32_t>(f.X()), static_cast<std::uint32_t>(f.Y()), static_cast<std::uint32_t>(f.Z())});
     }
     if (make_polytope(part.vertices)) parts.push_back(std::move(part));  // flat slivers carry nothing
   }

@@ -390,8 +390,8 @@ void InstanceWorld::integrate() {
     const BodyResult& result = results_[i];
     const Flight& flight = flights_[i];
     if (result.touched) {
-      // Up to the first hit within the step (its start if there is none) with the velocity of before, then with what came
-      // out. Gravity counts within the step only while nothing holds the body up.
+      // Up to the first hit within the step (its start if there is none) with the velocity of before, then with what
+      // came out. Gravity counts within the step only while nothing holds the body up.
       const Impact& impact = impacts_[i];
       const double before = impact.time.value_or(0.0);
       const double after = dt() - before;
@@ -477,8 +477,7 @@ bool InstanceWorld::freeze_beyond(double radius) {
 }
 
 bool InstanceWorld::all_frozen() const {
-  return !objects_.empty() &&
-         std::all_of(objects_.begin(), objects_.end(), [](const Object& o) { return o.frozen; });
+  return !objects_.empty() && std::all_of(objects_.begin(), objects_.end(), [](const Object& o) { return o.frozen; });
 }
 
 void InstanceWorld::read(belief::WorldState& state) const {
@@ -491,9 +490,9 @@ void InstanceWorld::read(belief::WorldState& state) const {
     out.X_WO = object_pose(object);
     out.V_WO.angular = object.w_WO;
     out.V_WO.linear = object.v_WCm - object.w_WO.cross(object.R_WO * object.physical.center_of_mass);
-    out.mode = object.held                            ? belief::MotionMode::kHeld
-               : object.calm_steps >= rest_steps      ? belief::MotionMode::kResting
-                                                      : belief::MotionMode::kMoving;
+    out.mode = object.held                       ? belief::MotionMode::kHeld
+               : object.calm_steps >= rest_steps ? belief::MotionMode::kResting
+                                                 : belief::MotionMode::kMoving;
     out.physical = object.physical;
   }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One simulated instance: the state of all bodies and one step of it. Everything that the next step depends on is here as
-// plain numbers; Bullet's bodies are filled from them before each solve and read after it, so that saving, restoring and
-// starting over leave nothing behind.
+// One simulated instance: the state of all bodies and one step of it. Everything that the next step depends on is here
+// as plain numbers; Bullet's bodies are filled from them before each solve and read after it, so that saving, restoring
+// and starting over leave nothing behind.
 #pragma once
 
 #include <memory>
@@ -57,8 +57,8 @@ class InstanceWorld {
   /// Position of the centre of mass, W.
   Vector3d center_of_mass(int object) const { return objects_[static_cast<std::size_t>(object)].p_WCm; }
   Quaterniond rotation(int object) const { return objects_[static_cast<std::size_t>(object)].R_WO; }
-  /// Turns an object about an axis through its centre of mass and stops it. Overlap that comes of it is pushed out by the
-  /// steps that follow, without energy.
+  /// Turns an object about an axis through its centre of mass and stops it. Overlap that comes of it is pushed out by
+  /// the steps that follow, without energy.
   void nudge(int object, const Vector3d& axis_W, double angle);
   /// What an object stands on as it is now; a function of the state alone.
   struct Footing {
@@ -73,7 +73,7 @@ class InstanceWorld {
 
  private:
   struct Object {
-    Vector3d p_WCm = Vector3d::Zero();          // centre of mass
+    Vector3d p_WCm = Vector3d::Zero();  // centre of mass
     Quaterniond R_WO = Quaterniond::Identity();
     Vector3d v_WCm = Vector3d::Zero();
     Vector3d w_WO = Vector3d::Zero();
@@ -85,19 +85,19 @@ class InstanceWorld {
   /// Geometry and motion of any body during a step.
   struct Moving {
     Frame X_WO;
-    Vector3d p_WCm = Vector3d::Zero();   // what velocities refer to
+    Vector3d p_WCm = Vector3d::Zero();  // what velocities refer to
     Vector3d velocity = Vector3d::Zero();
     Vector3d spin = Vector3d::Zero();
     Vector3d velocity_before = Vector3d::Zero();  // without this step's gravity
     Vector3d spin_before = Vector3d::Zero();
-    Vector3d low, high;                  // bounding box swept over the step
-    double travel = 0.0;                 // bound of any point's way in the step, m
+    Vector3d low, high;   // bounding box swept over the step
+    double travel = 0.0;  // bound of any point's way in the step, m
     bool present = true;
     bool dynamic = false;
   };
   struct Warm {
-    std::uint64_t key = 0;               // bodies and parts
-    Vector3d position;                   // in B's frame
+    std::uint64_t key = 0;  // bodies and parts
+    Vector3d position;      // in B's frame
     double impulse = 0.0;
     Vector3d friction_impulse;
   };

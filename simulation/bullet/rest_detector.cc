@@ -10,8 +10,8 @@ namespace {
 
 // rad. A body that half a degree topples is not at rest: tables shake more.
 constexpr double kNudge = 0.0087;
-// A toppling body has turned this many nudges when the test ends, and its centre of mass is lower by at least this share
-// of what turning about a tip below it takes away. A body that rolls or rocks back is not lower.
+// A toppling body has turned this many nudges when the test ends, and its centre of mass is lower by at least this
+// share of what turning about a tip below it takes away. A body that rolls or rocks back is not lower.
 constexpr double kRunAway = 3.0;
 constexpr double kLeastDrop = 0.25;
 // Time constants of an upright rod on its tip: it turns 6 times as far, a fat body still more than kRunAway times.

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether an instance is at rest: everything has been calm for the rest rule's time, and nothing merely balances.
 //
-// Balance is tested twice. An object that only fixed bodies touch is stable when the vertical through its centre of mass
-// passes inside the polygon of its contacts, a nudge's reach or more from every side. All others (balanced on an edge or
-// tip, round, leaning, stacked) are nudged: in a copy of the instance each is turned by a small angle about horizontal axes
-// in turn, and a short simulation shows whether it comes back (or merely rolls), or turns away and sinks.
+// Balance is tested twice. An object that only fixed bodies touch is stable when the vertical through its centre of
+// mass passes inside the polygon of its contacts, a nudge's reach or more from every side. All others (balanced on an
+// edge or tip, round, leaning, stacked) are nudged: in a copy of the instance each is turned by a small angle about
+// horizontal axes in turn, and a short simulation shows whether it comes back (or merely rolls), or turns away and
+// sinks.
 #pragma once
 
 #include <vector>

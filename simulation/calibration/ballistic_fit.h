@@ -24,8 +24,8 @@ struct BallisticState {
 };
 
 /// Least squares: the centre of mass (p_OoOcm, m) on a parabola under `gravity_W`, turning with a constant spin in W
-/// (exact for equal moments of inertia; over a tenth of a second nearly so for others). Fails with kInvalidInput for fewer
-/// than three poses, times that do not ascend, or more than a quarter turn from the middle pose.
+/// (exact for equal moments of inertia; over a tenth of a second nearly so for others). Fails with kInvalidInput for
+/// fewer than three poses, times that do not ascend, or more than a quarter turn from the middle pose.
 core::Result<BallisticState> fit_ballistic(std::span<const TimedPose> poses, const geometry::Vector3d& center_of_mass,
                                            const geometry::Vector3d& gravity_W);
 

@@ -11,8 +11,8 @@ namespace prescene::filter_tests {
 namespace {
 
 TEST(BeliefFromPriors, DrawsTheScenesDistributions) {
-  const auto scene = table_scene({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.1, 0.2, 0.09})},
-                                 0.02, 0.1);
+  const auto scene =
+      table_scene({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.1, 0.2, 0.09})}, 0.02, 0.1);
   InitialiseOptions options;
   options.particles = 400;
   const belief::Belief belief = belief_from_priors(scene, 5, 17, options);

@@ -144,7 +144,9 @@ TEST(ParticleFilter, FindsAllObjectsOfAnOpenSceneAndAddsOneThatComesLater) {
                      {Pose::from_translation({0.0, -0.15, 0.09}), Pose::from_translation({0.02, 0.05, 0.055}),
                       Pose::from_translation({-0.05, 0.20, 0.055})});
   const Motion second_can = sequence.objects[2];
-  sequence.objects[2] = [=](double time) { return time < 0.1 ? Pose::from_translation({0.0, 0.0, -5.0}) : second_can(time); };
+  sequence.objects[2] = [=](double time) {
+    return time < 0.1 ? Pose::from_translation({0.0, 0.0, -5.0}) : second_can(time);
+  };
   FilterSettings settings;
   settings.augment.new_objects = true;
   settings.augment.new_every = 4;
@@ -193,7 +195,8 @@ class BadFrames : public ::testing::Test {
   BadFrames()
       : sequence_(still_sequence({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.0, 0.0, 0.09})})),
         filter_(backends_.make_filter()),
-        belief_(filter_.step(filter_.start(sequence_.scene, 7), sequence_.observe(0, *backends_.renderer), {}).belief) {}
+        belief_(filter_.step(filter_.start(sequence_.scene, 7), sequence_.observe(0, *backends_.renderer), {}).belief) {
+  }
 
   void expect_rejected(belief::Observation observation, const std::string& word) {
     const StepResult result = filter_.step(belief_, observation, {});
@@ -251,11 +254,11 @@ TEST(DegradedText, NamesEveryBit) {
 
 TEST(NumberIslands, JoinsWhatTouches) {
   Backends backends;
-  const auto scene = table_scene({box_model("a", {0.1, 0.1, 0.1}), box_model("b", {0.1, 0.1, 0.1}),
-                                  box_model("c", {0.1, 0.1, 0.1})},
-                                 {Pose::from_translation({0.3, 0.0, 0.05}), Pose::from_translation({0.0, 0.0, 0.05}),
-                                  Pose::from_translation({0.0, 0.0, 0.152})},
-                                 0.0001, 0.0001);
+  const auto scene =
+      table_scene({box_model("a", {0.1, 0.1, 0.1}), box_model("b", {0.1, 0.1, 0.1}), box_model("c", {0.1, 0.1, 0.1})},
+                  {Pose::from_translation({0.3, 0.0, 0.05}), Pose::from_translation({0.0, 0.0, 0.05}),
+                   Pose::from_translation({0.0, 0.0, 0.152})},
+                  0.0001, 0.0001);
   Belief belief = backends.make_filter().start(scene, 1);
   number_islands(0.005, backends.meshes, belief);
   EXPECT_EQ(belief.objects[0].island, 0);

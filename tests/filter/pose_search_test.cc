@@ -45,7 +45,8 @@ TEST(DisturbedStarts, BeginWithThePoseItself) {
   ASSERT_EQ(starts.size(), 200u);
   EXPECT_LT(geometry::box_minus(starts[0], X).norm(), 1e-12);
   double squares = 0.0;
-  for (const Pose& start : starts) squares += (start * Vector3d(0.1, 0.0, 0.0) - X * Vector3d(0.1, 0.0, 0.0)).squaredNorm();
+  for (const Pose& start : starts)
+    squares += (start * Vector3d(0.1, 0.0, 0.0) - X * Vector3d(0.1, 0.0, 0.0)).squaredNorm();
   // Three axes of variance 0.03^2; 199 draws: 5 standard deviations of the sum are 20 %.
   EXPECT_NEAR(squares / 199 / 3 / (0.03 * 0.03), 1.0, 0.2);
 }
@@ -73,8 +74,7 @@ class Search : public ::testing::Test {
 };
 
 TEST_F(Search, FindsTheBoxFromFiveCentimetresAndHalfARadianOff) {
-  const auto found =
-      backends_.search.run(frame_.terms, target_, starts(32), {}, {2, core::Purpose::kProposal});
+  const auto found = backends_.search.run(frame_.terms, target_, starts(32), {}, {2, core::Purpose::kProposal});
   const Pose X_WO = frame_.X_WC * found.front().X_CO;
   EXPECT_LT((X_WO.translation - X_WO_.translation).norm(), 0.004);
   const geometry::SymmetryGroup symmetry = geometry::SymmetryGroup::cuboid();

@@ -18,8 +18,8 @@ using belief::Particle;
 
 /// A scene of a hand and an object; all particles alike.
 belief::Belief hand_and_object(MotionMode mode, bool held) {
-  belief::Scene scene = *table_scene({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.1, 0.0, 0.3})},
-                                     0.001, 0.001);
+  belief::Scene scene =
+      *table_scene({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.1, 0.0, 0.3})}, 0.001, 0.001);
   belief::KinematicBody hand;
   hand.name = "hand";
   hand.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{Vector3d(0.1, 0.1, 0.02)}, Pose::identity()});

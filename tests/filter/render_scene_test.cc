@@ -55,9 +55,9 @@ TEST(RenderScene, ListsObjectsThenSupportsThenRobot) {
 
 TEST(RenderScene, OfABeliefLeavesOutWhatIsNotBelievedToBeThere) {
   Backends backends;
-  const auto scene = table_scene({box_model("a", {0.1, 0.1, 0.1}), box_model("b", {0.1, 0.1, 0.1}),
-                                  box_model("c", {0.1, 0.1, 0.1})},
-                                 {Pose::identity(), Pose::identity(), Pose::identity()}, 0.01, 0.01);
+  const auto scene =
+      table_scene({box_model("a", {0.1, 0.1, 0.1}), box_model("b", {0.1, 0.1, 0.1}), box_model("c", {0.1, 0.1, 0.1})},
+                  {Pose::identity(), Pose::identity(), Pose::identity()}, 0.01, 0.01);
   belief::Belief belief = backends.make_filter().start(scene, 1);
   belief.objects[0].existence = 0.3;
   belief.objects[2].state = belief::TrackState::kLost;

@@ -15,8 +15,9 @@ namespace {
 class OnTheTable : public ::testing::Test {
  protected:
   OnTheTable()
-      : sequence_(still_sequence({box_model("box", {0.06, 0.10, 0.18}), can_model("can", 0.035, 0.11)},
-                                 {Pose::from_translation({0.0, -0.12, 0.09}), Pose::from_translation({0.05, 0.12, 0.055})})),
+      : sequence_(
+            still_sequence({box_model("box", {0.06, 0.10, 0.18}), can_model("can", 0.035, 0.11)},
+                           {Pose::from_translation({0.0, -0.12, 0.09}), Pose::from_translation({0.05, 0.12, 0.055})})),
         observation_(sequence_.observe(0, *backends_.renderer)),
         sampled_(sample_depth(*observation_.frame.depth, observation_.frame.camera, options_)) {}
 
@@ -54,7 +55,8 @@ TEST_F(OnTheTable, FindsTheTableAndWhatStandsOnIt) {
   EXPECT_GE(clusters[0].pixels.size(), clusters[1].pixels.size());
   for (const Cluster& cluster : clusters) {
     Vector3d mean = Vector3d::Zero();
-    for (const Vector3d& p : cluster.points_C) mean += sequence_.X_WC * p / static_cast<double>(cluster.points_C.size());
+    for (const Vector3d& p : cluster.points_C)
+      mean += sequence_.X_WC * p / static_cast<double>(cluster.points_C.size());
     EXPECT_LT(std::min((mean - Vector3d(0.0, -0.12, 0.09)).norm(), (mean - Vector3d(0.05, 0.12, 0.055)).norm()), 0.06);
   }
   geometry::Image<std::uint8_t> explained(sampled_.camera.width, sampled_.camera.height);
@@ -73,8 +75,7 @@ TEST_F(OnTheTable, UpIsObeyed) {
 }
 
 TEST_F(OnTheTable, BecomesASupportOfTheScene) {
-  const auto support =
-      support_from_frame(observation_, {0.0, 0.0, -9.81}, {}, {1, core::Purpose::kDetection});
+  const auto support = support_from_frame(observation_, {0.0, 0.0, -9.81}, {}, {1, core::Purpose::kDetection});
   ASSERT_TRUE(support.has_value());
   const auto& shape = std::get<belief::PrimitiveShape>(support->collision.front());
   const auto& box = std::get<geometry::BoxShape>(shape.primitive);

@@ -178,15 +178,15 @@ Motion wandering(const Pose& X_W, double speed, double rate, std::uint64_t seed)
   };
   std::array<std::array<Wave, 3>, 6> waves;
   for (auto& axis : waves)
-    for (Wave& wave : axis)
-      wave = {stream.uniform(1.0, 4.0), stream.uniform(0.0, 2.0 * std::numbers::pi)};
+    for (Wave& wave : axis) wave = {stream.uniform(1.0, 4.0), stream.uniform(0.0, 2.0 * std::numbers::pi)};
   return [=](double time) {
     geometry::Vector6d d;
     for (std::size_t axis = 0; axis < 6; ++axis) {
       const double total = axis < 3 ? rate : speed;
       double sum = 0.0;
       for (const Wave& wave : waves[axis])
-        sum += total * std::sqrt(2.0 / 9.0) / wave.omega * (std::sin(wave.omega * time + wave.phase) - std::sin(wave.phase));
+        sum += total * std::sqrt(2.0 / 9.0) / wave.omega *
+               (std::sin(wave.omega * time + wave.phase) - std::sin(wave.phase));
       d[static_cast<Eigen::Index>(axis)] = sum;
     }
     Pose moved = X_W;
@@ -202,7 +202,8 @@ Occluder plate(const Pose& X_WC, const Motion& target, double clearance, double 
           in_between(X_WC, target, clearance, begin, end)};
 }
 
-Occluder blob(const Pose& X_WC, const Motion& target, double clearance, const Vector3d& radii, double begin, double end) {
+Occluder blob(const Pose& X_WC, const Motion& target, double clearance, const Vector3d& radii, double begin,
+              double end) {
   geometry::TriangleMesh mesh = geometry::make_mesh(geometry::Sphere{1.0});
   for (Vector3d& vertex : mesh.vertices) vertex = vertex.cwiseProduct(radii);
   return {std::move(mesh), in_between(X_WC, target, clearance, begin, end)};

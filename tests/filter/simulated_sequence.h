@@ -35,7 +35,7 @@ struct SimulatedSequence {
   std::shared_ptr<const belief::Scene> scene;
   geometry::PinholeCamera camera;
   Pose X_WC;
-  std::vector<Motion> objects;        ///< In the scene's order.
+  std::vector<Motion> objects;  ///< In the scene's order.
   std::vector<Occluder> occluders;
   std::uint64_t seed = 1;
   double frame_rate = 30.0;
@@ -72,6 +72,7 @@ Motion wandering(const Pose& X_W, double speed, double rate, std::uint64_t seed)
 Occluder plate(const Pose& X_WC, const Motion& target, double clearance, double width, double height, double begin,
                double end);
 /// An ellipsoid that comes in the same way.
-Occluder blob(const Pose& X_WC, const Motion& target, double clearance, const Vector3d& radii, double begin, double end);
+Occluder blob(const Pose& X_WC, const Motion& target, double clearance, const Vector3d& radii, double begin,
+              double end);
 
 }  // namespace prescene::filter_tests

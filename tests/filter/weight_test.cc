@@ -48,9 +48,7 @@ class WeightOfABox : public ::testing::Test {
     return weight(frame_.terms, target_, frame_.X_WC, 1.0 / 30.0, {}, backends_.tools, {5, core::Purpose::kProposal},
                   particles);
   }
-  Occluder plate_in_front() const {
-    return plate(test_camera_pose(), fixed(X_WO_), 0.12, 0.34, 0.34, 0.0, 10.0);
-  }
+  Occluder plate_in_front() const { return plate(test_camera_pose(), fixed(X_WO_), 0.12, 0.34, 0.34, 0.0, 10.0); }
 
   Backends backends_;
   Pose X_WO_;

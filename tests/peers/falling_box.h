@@ -9,11 +9,11 @@ namespace prescene::tests {
 struct FallingBox {
   geometry::Vector3d size;  ///< Full edges, m; uniform density.
   double mass = 1.0;
-  double friction = 0.5;    ///< Of the pair; contacts do not bounce.
+  double friction = 0.5;  ///< Of the pair; contacts do not bounce.
   geometry::Pose X_WB;
-  geometry::Twist V_WB;     ///< Of the centre, in W.
-  double duration = 2.0;    ///< s
-  double step = 1e-3;       ///< s
+  geometry::Twist V_WB;   ///< Of the centre, in W.
+  double duration = 2.0;  ///< s
+  double step = 1e-3;     ///< s
 };
 
 /// X_WB after `duration`.

@@ -19,7 +19,8 @@ std::string scene_of(const FallingBox& box) {
       text.data(), text.size(),
       "<mujoco><option timestep='%.9g' gravity='0 0 -9.81' cone='elliptic' impratio='10'/><worldbody>"
       "<geom type='plane' size='10 10 1' friction='%.9g 0 0' condim='3' solref='.004 1'/>"
-      "<body><freejoint/><geom type='box' size='%.9g %.9g %.9g' mass='%.9g' friction='%.9g 0 0' condim='3' solref='.004 1'/>"
+      "<body><freejoint/><geom type='box' size='%.9g %.9g %.9g' mass='%.9g' friction='%.9g 0 0' condim='3' "
+      "solref='.004 1'/>"
       "</body></worldbody></mujoco>",
       box.step, box.friction, 0.5 * box.size.x(), 0.5 * box.size.y(), 0.5 * box.size.z(), box.mass, box.friction);
   PRESCENE_CHECK(size > 0 && static_cast<std::size_t>(size) < text.size());

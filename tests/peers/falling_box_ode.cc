@@ -24,8 +24,7 @@ void on_near(void* data, dGeomID a, dGeomID b) {
     surface = dSurfaceParameters{};
     surface.mode = dContactApprox1;  // a friction pyramid that follows the normal force
     surface.mu = contacts->friction;
-    const dJointID joint =
-        dJointCreateContact(contacts->world, contacts->joints, &found[static_cast<std::size_t>(i)]);
+    const dJointID joint = dJointCreateContact(contacts->world, contacts->joints, &found[static_cast<std::size_t>(i)]);
     dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
   }
 }

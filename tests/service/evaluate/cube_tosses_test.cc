@@ -88,12 +88,12 @@ TEST(CubeModel, NamesTheFaceThatIsUp) {
   const auto turned = [](const Vector3d& axis, double angle) {
     return geometry::Quaterniond(Eigen::AngleAxisd(angle, axis));
   };
-  EXPECT_EQ(face_up(geometry::Quaterniond::Identity()), 4);                      // +z
-  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), 3.1)), 5);                         // -z
-  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), 1.5)), 2);                         // +y
-  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), -1.5)), 3);                        // -y
-  EXPECT_EQ(face_up(turned(Vector3d::UnitY(), -1.5)), 0);                        // +x
-  EXPECT_EQ(face_up(turned(Vector3d::UnitY(), 1.5)), 1);                         // -x
+  EXPECT_EQ(face_up(geometry::Quaterniond::Identity()), 4);  // +z
+  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), 3.1)), 5);     // -z
+  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), 1.5)), 2);     // +y
+  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), -1.5)), 3);    // -y
+  EXPECT_EQ(face_up(turned(Vector3d::UnitY(), -1.5)), 0);    // +x
+  EXPECT_EQ(face_up(turned(Vector3d::UnitY(), 1.5)), 1);     // -x
 }
 
 /// Tosses simulated with `model` and seen without noise, as the tracker would.
@@ -188,10 +188,10 @@ TEST(CubeTosses, ReportHasTheKeysOfTheEvaluator) {
   forecast.place = {0.03, 0.04};
   forecast.region_mass = 0.6;
   const nlohmann::ordered_json json = to_json(report_of({forecast}));
-  EXPECT_EQ(json.dump(),
-            R"({"n":1,"right_face_share":1.0,"brier":)" + nlohmann::json(brier_score(forecast.face_probabilities, 0)).dump() +
-                R"(,"log_score":)" + nlohmann::json(std::log(0.9)).dump() +
-                R"(,"median_xy_error_m":0.05,"p90_xy_error_m":0.05,"coverage_50":0.0,"coverage_90":1.0})");
+  EXPECT_EQ(json.dump(), R"({"n":1,"right_face_share":1.0,"brier":)" +
+                             nlohmann::json(brier_score(forecast.face_probabilities, 0)).dump() + R"(,"log_score":)" +
+                             nlohmann::json(std::log(0.9)).dump() +
+                             R"(,"median_xy_error_m":0.05,"p90_xy_error_m":0.05,"coverage_50":0.0,"coverage_90":1.0})");
 }
 
 TEST(CubeTosses, BrokenFilesAreNamedWithTheirLine) {
@@ -201,7 +201,8 @@ TEST(CubeTosses, BrokenFilesAreNamedWithTheirLine) {
     std::ofstream(scratch.path() / "tosses_even.csv") << text;
     return evaluate_cube_tosses(scratch.path(), CubeSplit::kAll, 1, threads).status();
   };
-  EXPECT_EQ(evaluate_cube_tosses(scratch.path(), CubeSplit::kAll, 1, threads).status().code(), core::StatusCode::kNotFound);
+  EXPECT_EQ(evaluate_cube_tosses(scratch.path(), CubeSplit::kAll, 1, threads).status().code(),
+            core::StatusCode::kNotFound);
   const std::string header = "toss,row,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx_mps\n";
   EXPECT_THAT(status_of("a,b\n").message(), testing::HasSubstr("line 1"));
   EXPECT_THAT(status_of(header).message(), testing::HasSubstr("no toss"));

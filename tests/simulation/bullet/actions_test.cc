@@ -134,7 +134,7 @@ TEST(Actions, PusherPushesAndIsNumberedAfterAllOthers) {
     }
     return false;
   };
-  EXPECT_TRUE(touched(3));   // object 0, floor 1, hand 2, pusher 3
+  EXPECT_TRUE(touched(3));  // object 0, floor 1, hand 2, pusher 3
   EXPECT_FALSE(touched(2));
 }
 

@@ -48,7 +48,8 @@ inline ObjectModel primitive_model(const std::string& name, const geometry::Prim
 }
 
 /// A support that brings friction 1 and restitution 1, so that the objects' own values are the pair's.
-inline belief::Support support_of(const std::string& name, std::vector<belief::CollisionShape> shapes, const Pose& X_WS) {
+inline belief::Support support_of(const std::string& name, std::vector<belief::CollisionShape> shapes,
+                                  const Pose& X_WS) {
   belief::Support support;
   support.name = name;
   support.collision = std::move(shapes);

@@ -12,7 +12,8 @@ namespace {
 
 using geometry::BoxShape;
 
-/// A bin of triangles, a plate of five convex walls, a hull, a compound of two boxes, and a pusher: every kind of contact.
+/// A bin of triangles, a plate of five convex walls, a hull, a compound of two boxes, and a pusher: every kind of
+/// contact.
 Scene busy_scene() {
   Scene scene;
   scene.name = "busy";

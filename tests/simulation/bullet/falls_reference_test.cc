@@ -61,7 +61,7 @@ Peers fall_by_all() {
 
 struct Agreement {
   double same_face = 0.0;
-  double median_distance = 0.0;  // of stopping places where the face is the same, m
+  double median_distance = 0.0;   // of stopping places where the face is the same, m
   double share_difference = 0.0;  // largest, of an axis being up
 };
 

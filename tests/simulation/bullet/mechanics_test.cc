@@ -28,7 +28,8 @@ TEST(Mechanics, FreeFallIsAnExactParabolaAtAnyStep) {
       instance->step();
       const double t = n * step;
       const auto object = instance->state().objects[0];
-      const Vector3d expected = Vector3d(0.1, -0.2, 5.0) + t * Vector3d(0.7, -0.3, 1.1) - 0.5 * kG * t * t * Vector3d::UnitZ();
+      const Vector3d expected =
+          Vector3d(0.1, -0.2, 5.0) + t * Vector3d(0.7, -0.3, 1.1) - 0.5 * kG * t * t * Vector3d::UnitZ();
       EXPECT_LT((object.X_WO.translation - expected).norm(), 1e-12);
       EXPECT_LT((object.V_WO.linear - Vector3d(0.7, -0.3, 1.1 - kG * t)).norm(), 1e-12);
     }
@@ -220,8 +221,8 @@ TEST(Mechanics, TiltedBoxTipsAtTheAngleOfItsDiagonal) {
 }
 
 TEST(Mechanics, WeightedBallRocksAsAPendulumAndKeepsItsEnergy) {
-  // A ball of radius R with its centre of mass d below its middle, rolling without slip: small rocking has the frequency
-  // sqrt(m g d / (I + m (R - d)^2)), and nothing takes energy away.
+  // A ball of radius R with its centre of mass d below its middle, rolling without slip: small rocking has the
+  // frequency sqrt(m g d / (I + m (R - d)^2)), and nothing takes energy away.
   const double R = 0.1;
   const double d = 0.03;
   ObjectModel ball = primitive_model("ball", Sphere{R});
@@ -261,7 +262,8 @@ TEST(Mechanics, WeightedBallRocksAsAPendulumAndKeepsItsEnergy) {
     ASSERT_NEAR(energy(o), e0, 0.05 * e0) << "at " << n * options.step << " s";
   }
   const double period = (last_crossing - 0.25 * 2.0 * kPi / omega) / (crossings - 1);
-  // A pendulum of this amplitude is slower than a small one by 1 + a^2 / 16, here the ball's own rolling adds its share.
+  // A pendulum of this amplitude is slower than a small one by 1 + a^2 / 16, here the ball's own rolling adds its
+  // share.
   EXPECT_NEAR(period, 2.0 * kPi / omega, 0.01 * 2.0 * kPi / omega);
   EXPECT_NEAR(largest_late, amplitude, 0.03 * amplitude);
 }
@@ -273,7 +275,8 @@ TEST(Mechanics, ShapesRestAtTheirTrueHeight) {
     double height;
   };
   auto hull = [](const geometry::TriangleMesh& mesh) {
-    return belief::MeshShape{std::make_shared<const geometry::TriangleMesh>(mesh), Pose{}, belief::MeshUse::kConvexHull};
+    return belief::MeshShape{std::make_shared<const geometry::TriangleMesh>(mesh), Pose{},
+                             belief::MeshUse::kConvexHull};
   };
   const std::vector<Case> cases = {
       {"sphere", belief::PrimitiveShape{Sphere{0.05}, Pose{}}, 0.05},

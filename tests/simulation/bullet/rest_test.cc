@@ -51,8 +51,8 @@ TEST(Rest, ConeOnItsTipIsNot) {
 
 TEST(Rest, UprightCoinAndPencilAreNot) {
   const Quaterniond on_rim = about(Vector3d::UnitX(), 0.5 * kPi);
-  // A disc of foil balances on its rim and a pencil on its point; a pencil on its flat end stands (it takes 2 degrees to
-  // topple it).
+  // A disc of foil balances on its rim and a pencil on its point; a pencil on its flat end stands (it takes 2 degrees
+  // to topple it).
   const belief::Trajectory coin =
       run_from(floor_scene(primitive_model("coin", Cylinder{0.012, 0.00015})), {Pose{on_rim, {0, 0, 0.012}}}, 0.5);
   EXPECT_NE(coin.end, TrajectoryEnd::kAtRest);

@@ -20,7 +20,8 @@ const Vector3d kCenter(0.01, -0.02, 0.005);
 const Vector3d kGravity(0.0, 0.0, -9.81);
 
 /// Poses of a body whose centre of mass flies from p with v, turning with w, seen with noise.
-std::vector<TimedPose> flight(const Vector3d& p, const Vector3d& v, const Vector3d& w, double noise, double turn_noise) {
+std::vector<TimedPose> flight(const Vector3d& p, const Vector3d& v, const Vector3d& w, double noise,
+                              double turn_noise) {
   core::RandomStream stream(4, core::Purpose::kTest);
   std::vector<TimedPose> poses;
   for (int i = 0; i < 10; ++i) {
@@ -29,8 +30,8 @@ std::vector<TimedPose> flight(const Vector3d& p, const Vector3d& v, const Vector
     pose.time = 3.0 + t;
     pose.X_WO.rotation = geometry::exp_rotation(turn_noise * geometry::normal_vector(stream)) *
                          geometry::exp_rotation(w * t) * geometry::exp_rotation({0.3, 0.1, -0.7});
-    pose.X_WO.translation = p + v * t + 0.5 * t * t * kGravity - pose.X_WO.rotation * kCenter +
-                            noise * geometry::normal_vector(stream);
+    pose.X_WO.translation =
+        p + v * t + 0.5 * t * t * kGravity - pose.X_WO.rotation * kCenter + noise * geometry::normal_vector(stream);
     poses.push_back(pose);
   }
   return poses;
