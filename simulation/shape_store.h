@@ -3,9 +3,8 @@
 // the mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
 // threads may hold it.
 //
-//   ShapeStore shapes(decomposer);                       // decomposer:
-//   prescene/simulation/bullet/convex_decomposition.h auto parts = shapes.convex_parts(mesh,
-//   belief::MeshUse::kConvexHull, {});
+//   ShapeStore shapes(decomposer);  // one is in prescene/simulation/bullet/convex_decomposition.h
+//   auto parts = shapes.convex_parts(mesh, belief::MeshUse::kConvexHull, {});
 #pragma once
 
 #include <cstdint>

@@ -117,17 +117,13 @@ struct MinWireSize<std::array<T, n>> {
 }  // namespace prescene::interfaces::message_fields
 
 /// Every message of messages.h, for explicit instantiation.
-#define PRESCENE_FOR_EACH_MESSAGE(DO)                                                                                 \
-  DO(RosTime)                                                                                                         \
-  DO(RosDuration)                                                                                                     \
-  DO(RosClock)                                                                                                        \
-  DO(RosHeader)                                                                                                       \
-  DO(RosString)                                                                                                       \
-  DO(RosColorRgba)                                                                                                    \
-  DO(RosVector3)                                                                                                      \
-  DO(RosPoint) DO(RosQuaternion) DO(RosPose) DO(RosPoseStamped) DO(RosPoseWithCovariance)                             \
-      DO(RosPoseWithCovarianceStamped) DO(RosPoseArray) DO(RosTransform) DO(RosTransformStamped) DO(RosTfMessage)     \
-          DO(RosTwist) DO(RosTwistStamped) DO(RosImage) DO(RosCompressedImage) DO(RosRegionOfInterest)                \
-              DO(RosCameraInfo) DO(RosJointState) DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose)             \
-                  DO(RosBoundingBox3d) DO(RosDetection3d) DO(RosDetection3dArray) DO(RosUvCoordinate) DO(RosMeshFile) \
-                      DO(RosMarker) DO(RosMarkerArray) DO(RosKeyValue) DO(RosDiagnosticStatus) DO(RosDiagnosticArray)
+// clang-format off
+#define PRESCENE_FOR_EACH_MESSAGE(DO) \
+  DO(RosTime) DO(RosDuration) DO(RosClock) DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) \
+  DO(RosPoint) DO(RosQuaternion) DO(RosPose) DO(RosPoseStamped) DO(RosPoseWithCovariance) \
+  DO(RosPoseWithCovarianceStamped) DO(RosPoseArray) DO(RosTransform) DO(RosTransformStamped) DO(RosTfMessage) \
+  DO(RosTwist) DO(RosTwistStamped) DO(RosImage) DO(RosCompressedImage) DO(RosRegionOfInterest) \
+  DO(RosCameraInfo) DO(RosJointState) DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose) \
+  DO(RosBoundingBox3d) DO(RosDetection3d) DO(RosDetection3dArray) DO(RosUvCoordinate) DO(RosMeshFile) \
+  DO(RosMarker) DO(RosMarkerArray) DO(RosKeyValue) DO(RosDiagnosticStatus) DO(RosDiagnosticArray)
+// clang-format on
