@@ -42,8 +42,12 @@ core::Result<std::vector<interfaces::PictureBlock::Picture>> scene_pictures(cons
                                                                        filter::MeshDetail::kDisplay, backends.meshes()),
                                                   &images));
   pictures.push_back({"The start, at the means of what is uncertain", std::move(start), false});
-  PRESCENE_TRY(const geometry::ColorImage supports,
-               shaded(filter::known_surroundings(scene, {}, filter::MeshDetail::kDisplay, backends.meshes()), &images));
+  // Without the robot: it would hide what it stands above, and it moves on.
+  belief::Scene unmanned = scene;
+  unmanned.robot.clear();
+  PRESCENE_TRY(
+      const geometry::ColorImage supports,
+      shaded(filter::known_surroundings(unmanned, {}, filter::MeshDetail::kDisplay, backends.meshes()), &images));
   for (const belief::FinalPoses& poses : predicted.final_poses) {
     geometry::ColorImage picture = supports;
     interfaces::HeatMapProjection projection;

@@ -138,5 +138,20 @@ TEST(CommandLine, InspectMakesAModelThatASceneCanUse) {
   EXPECT_EQ(parsed(predicted)["outcomes"][0]["probability"], 1.0);
 }
 
+TEST(CommandLine, PredictWritesAReportWithTheStartAndAHeatMapOfEachObject) {
+  const ScratchDir folder;
+  for (const auto& [name, pictures] : {std::pair{"milk_on_bin", 2}, std::pair{"five_objects_pushed", 6}}) {
+    const std::string report = (folder.path() / "report.html").string();
+    const Finished finished = run_program({"predict", scenario(name), "--max-instances", "16", "--report", report});
+    ASSERT_EQ(finished.exit_code, 0) << finished.err;
+    const std::string page = read_file(report);
+    std::size_t images = 0;
+    for (std::size_t at = 0; (at = page.find("data:image/png", at)) != std::string::npos; ++at) ++images;
+    EXPECT_GE(images, static_cast<std::size_t>(pictures)) << name;
+    for (const char* outside : {"src=\"http", "href=\"http", "url(http"})
+      EXPECT_EQ(page.find(outside), std::string::npos) << "the page needs nothing from elsewhere";
+  }
+}
+
 }  // namespace
 }  // namespace prescene::tests
