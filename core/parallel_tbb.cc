@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <optional>
 #include <thread>
 
 #include "prescene/core/check.h"
@@ -12,15 +14,27 @@
 
 namespace prescene::core {
 
+namespace {
+
+int hardware_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
+
+}  // namespace
+
 struct ThreadPool::Impl {
-  explicit Impl(int count) : threads(count), arena(count) {}
+  explicit Impl(int count) : threads(count), arena(count) {
+    if (count > hardware_threads()) {
+      more_than_hardware.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count));
+    }
+  }
   int threads;
+  // TBB has one worker a hardware thread, and warns when an arena asks for more, unless it is told otherwise.
+  std::optional<tbb::global_control> more_than_hardware;
   tbb::task_arena arena;
 };
 
 ThreadPool::ThreadPool(int threads) {
   PRESCENE_CHECK(threads >= 0);
-  if (threads == 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  if (threads == 0) threads = hardware_threads();
   impl_ = std::make_unique<Impl>(threads);
 }
 
