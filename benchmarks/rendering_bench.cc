@@ -68,8 +68,8 @@ struct Scene {
 };
 
 const Scene& scene() {
-  static const Scene made;
-  return made;
+  static const Scene kScene;
+  return kScene;
 }
 
 void set_counters(benchmark::State& state) {
