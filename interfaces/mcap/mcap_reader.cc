@@ -46,7 +46,7 @@ struct Unpacked {
 }  // namespace
 
 struct McapReader::Impl {
-  Impl(McapSource source_, McapReaderOptions options_) : source(std::move(source_)), options(std::move(options_)) {}
+  Impl(McapSource from, McapReaderOptions with) : source(std::move(from)), options(std::move(with)) {}
 
   McapSource source;
   McapReaderOptions options;
