@@ -52,18 +52,39 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, s
 }
 
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-  std::filesystem::path partial = path;
+  std::error_code ignored;
+  const std::filesystem::file_status there = std::filesystem::status(path, ignored);
+  if (std::filesystem::is_directory(there)) return write_error(path, EISDIR);
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) {
+    // A device or a pipe is written to; a new file in its place would take it away from everybody.
+    PRESCENE_TRY(OutputFile file, OutputFile::create(path));
+    const Status written = file.write(bytes);
+    const Status closed = file.close();
+    return written.ok() ? closed : written;
+  }
+  // What a link names is replaced, not the link.
+  std::filesystem::path target = path;
+  if (std::filesystem::is_regular_file(there)) {
+    std::error_code error;
+    const std::filesystem::path resolved = std::filesystem::canonical(path, error);
+    if (!error) target = resolved;
+  }
+  std::filesystem::path partial = target;
   partial += ".partial";
   Status status;
   {
     Result<OutputFile> file = OutputFile::create(partial);
-    if (!file) return file.status();
+    if (!file) {
+      // Named as it was asked for.
+      const bool has_folder = target.parent_path().empty() || std::filesystem::is_directory(target.parent_path());
+      return has_folder ? file.status() : core::not_found(path.string() + ": its folder does not exist; make it first");
+    }
     status = file->write(bytes);
     if (const Status closed = file->close(); status.ok()) status = closed;
   }
   std::error_code error;
   if (status.ok()) {
-    std::filesystem::rename(partial, path, error);
+    std::filesystem::rename(partial, target, error);
     if (!error) return status;
     status = core::unavailable(path.string() + ": cannot be replaced: " + error.message());
   }

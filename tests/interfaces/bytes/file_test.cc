@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/interfaces/bytes/file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <utility>
 
@@ -48,6 +51,33 @@ TEST(WriteFile, SaysThatTheFolderIsMissing) {
   const auto status = write_file(dir.path() / "no" / "a", "x");
   EXPECT_EQ(status.code(), StatusCode::kNotFound);
   EXPECT_NE(status.message().find("folder does not exist"), std::string::npos) << status.message();
+}
+
+TEST(WriteFile, WritesToAPipeAndLeavesItThere) {
+  const tests::ScratchDir dir;
+  const std::filesystem::path pipe = dir.path() / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = open(pipe.c_str(), O_RDWR | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  EXPECT_TRUE(write_file(pipe, "text").ok());
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe)) << "replaced by a file";
+  std::array<char, 8> read_back{};
+  EXPECT_EQ(read(reader, read_back.data(), read_back.size()), 4);
+  close(reader);
+}
+
+TEST(WriteFile, KeepsALinkAndReplacesWhatItNames) {
+  const tests::ScratchDir dir;
+  ASSERT_TRUE(write_file(dir.path() / "a", "old").ok());
+  std::filesystem::create_symlink("a", dir.path() / "link");
+  ASSERT_TRUE(write_file(dir.path() / "link", "newer").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(dir.path() / "link"));
+  EXPECT_EQ(std::filesystem::file_size(dir.path() / "a"), 5U);
+}
+
+TEST(WriteFile, RefusesAFolder) {
+  const tests::ScratchDir dir;
+  EXPECT_EQ(write_file(dir.path(), "x").code(), StatusCode::kUnavailable);
 }
 
 TEST(OutputFile, ReportsAFullDisk) {
