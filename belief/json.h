@@ -24,6 +24,9 @@ nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);
 nlohmann::ordered_json to_json(const Answer& answer);
 
+/// The document, or where it stops being JSON. What is nested deeper than 64 lists and objects is refused too: such a
+/// value could be neither copied nor printed without running out of stack. For texts from outside.
+core::Result<nlohmann::ordered_json> parse_json(std::string_view text, std::size_t max_bytes = 16u << 20);
 /// {"id": "...", "where": {...}} or "predict", "stability", "view".
 core::Result<Query> query_from_json(std::string_view text);
 /// {"position": [x, y, z], "rotation": [w, x, y, z]}; the rotation is normalised, zero or not finite is an error.

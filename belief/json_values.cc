@@ -6,6 +6,27 @@
 namespace prescene::belief {
 namespace {
 
+constexpr int kDeepest = 64;
+
+/// Where brackets outside of texts are open deeper than kDeepest.
+std::optional<std::size_t> too_deep_at(std::string_view text) {
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted) {
+      if (c == '\\') ++i;
+      if (c == '"') quoted = false;
+      continue;
+    }
+    if (c == '"') quoted = true;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > kDeepest) return i;
+  }
+  return std::nullopt;
+}
+
 Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 }  // namespace
@@ -203,6 +224,9 @@ core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes) {
   if (text.size() > max_bytes)
     return core::resource_exhausted("the text has " + std::to_string(text.size()) + " bytes, at most " +
                                     std::to_string(max_bytes) + " are read: make it smaller");
+  if (const std::optional<std::size_t> byte = too_deep_at(text))
+    return core::invalid_input("byte " + std::to_string(*byte) + ": nested deeper than " + std::to_string(kDeepest) +
+                               " lists and objects: this is not meant for Prescene");
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {

@@ -39,7 +39,4 @@ Outcome outcome_from(const JsonAt& at);
 ExclusiveOutcomes exclusive_from(const JsonAt& at);
 Json exclusive_json(const ExclusiveOutcomes& group);
 
-/// The document, or where it stops being JSON.
-core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes);
-
 }  // namespace prescene::belief

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -23,11 +24,22 @@ using ProgressSink = std::function<void(const Progress&)>;
 /// what is done so far, or Status kCancelled.
 class Cancellation {
  public:
+  using Clock = std::chrono::steady_clock;
+
+  Cancellation() = default;
+  /// Requested too when `outer` is, which must outlive this one, and from `deadline` on.
+  Cancellation(const Cancellation& outer, Clock::time_point deadline) : outer_(&outer), deadline_(deadline) {}
+
   void request() { requested_.store(true, std::memory_order_relaxed); }
-  bool requested() const { return requested_.load(std::memory_order_relaxed); }
+  bool requested() const {
+    return requested_.load(std::memory_order_relaxed) || (outer_ && outer_->requested()) ||
+           (deadline_ && Clock::now() >= *deadline_);
+  }
 
  private:
   std::atomic<bool> requested_{false};
+  const Cancellation* outer_ = nullptr;
+  std::optional<Clock::time_point> deadline_;
 };
 
 }  // namespace prescene::core

@@ -93,12 +93,14 @@ std::optional<std::size_t> typical_instance(const Foresight& foresight, std::siz
   return members[*middle];
 }
 
-belief::Trajectory run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
-                             const QueryContext& context) {
+std::optional<belief::Trajectory> run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
+                                            const QueryContext& context) {
   simulation::RunRequest request = foresight.request;
   request.sample_interval = kTimelineInterval;
-  return simulation::run_instance(*foresight.simulator, prior.starts, foresight.estimate, instance, request,
-                                  prior.stream, *context.pool);
+  belief::Trajectory run = simulation::run_instance(*foresight.simulator, prior.starts, foresight.estimate, instance,
+                                                    request, prior.stream, *context.pool, context.cancellation);
+  if (run.end == belief::TrajectoryEnd::kCancelled) return std::nullopt;
+  return run;
 }
 
 }  // namespace prescene::queries

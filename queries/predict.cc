@@ -107,10 +107,12 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
     const std::optional<std::size_t> instance =
         typical_instance(foresight, candidate.variable, {candidate.which}, static_cast<std::size_t>(*object));
     if (!instance) continue;
+    std::optional<belief::Trajectory> trajectory = run_again(foresight, prior, *instance, context);
+    if (!trajectory) break;  // stopped: the probabilities are there, which matter most
     belief::TypicalRun& run = runs.emplace_back();
     run.outcome = foresight.variables[candidate.variable].classes[static_cast<std::size_t>(candidate.which)];
     run.share = candidate.share;
-    run.trajectory = run_again(foresight, prior, *instance, context);
+    run.trajectory = *std::move(trajectory);
     run.timeline = belief::timeline_of(scene, run.trajectory);
   }
   return runs;

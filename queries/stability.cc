@@ -60,8 +60,8 @@ core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief
   answer.object = query.object;
   answer.stable = {"stable", "", stays.probability, stays.low, stays.high};
   if (const std::optional<std::size_t> unstable = typical_instance(foresight, 0, {0, 1}, index)) {
-    answer.likely_event = event_text(*foresight.scene, run_again(foresight, prior, *unstable, context), *object,
-                                     query.max_move, query.max_turn);
+    if (const auto run = run_again(foresight, prior, *unstable, context))
+      answer.likely_event = event_text(*foresight.scene, *run, *object, query.max_move, query.max_turn);
   }
   answer.instances = static_cast<int>(foresight.estimate.instances.size());
   answer.simulated_seconds = foresight.estimate.simulated_seconds;

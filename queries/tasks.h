@@ -41,7 +41,7 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
 std::optional<std::size_t> typical_instance(const Foresight& foresight, std::size_t variable,
                                             const std::set<int>& class_indices, std::size_t object);
 /// That instance again, with states every 1/30 s.
-belief::Trajectory run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
-                             const QueryContext& context);
+std::optional<belief::Trajectory> run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
+                                            const QueryContext& context);
 
 }  // namespace prescene::queries

@@ -65,7 +65,9 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
 
   belief::Trajectory likeliest;
   foresight.simulator->run(std::span(&prior.likeliest, 1), foresight.request, prior.stream, 0, *context.pool,
-                           std::span(&likeliest, 1));
+                           std::span(&likeliest, 1), context.cancellation);
+  if (likeliest.end == belief::TrajectoryEnd::kCancelled)
+    return core::cancelled("stopped before the view was foreseen");
 
   PRESCENE_TRY(const std::unique_ptr<rendering::Renderer> renderer, context.make_renderer());
   filter::MeshCache own_meshes;

@@ -217,14 +217,15 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
 
 belief::Trajectory run_instance(const Simulator& simulator, const StartDistribution& starts,
                                 const OutcomeEstimate& estimate, std::size_t index, const RunRequest& request,
-                                const core::RandomStream& stream, core::ThreadPool& pool) {
+                                const core::RandomStream& stream, core::ThreadPool& pool,
+                                const core::Cancellation* cancellation) {
   PRESCENE_CHECK(index < estimate.instances.size());
   const InstanceRecord& record = estimate.instances[index];
   const std::vector<StartSampler> samplers = samplers_of(starts, stream);
   const belief::WorldState start = samplers[static_cast<std::size_t>(record.component)].draw(record.point);
   belief::Trajectory trajectory;
   simulator.run(std::span(&start, 1), request, stream, static_cast<std::uint32_t>(index), pool,
-                std::span(&trajectory, 1));
+                std::span(&trajectory, 1), cancellation);
   return trajectory;
 }
 

@@ -99,10 +99,11 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
                                   const core::ProgressSink& progress = {});
 
 /// The full trajectory of instance `index` of an estimate made with the same arguments; `request` may ask for more
-/// samples.
+/// samples. Ends as kCancelled if it is cancelled first.
 belief::Trajectory run_instance(const Simulator& simulator, const StartDistribution& starts,
                                 const OutcomeEstimate& estimate, std::size_t index, const RunRequest& request,
-                                const core::RandomStream& stream, core::ThreadPool& pool);
+                                const core::RandomStream& stream, core::ThreadPool& pool,
+                                const core::Cancellation* cancellation = nullptr);
 
 /// Number of instances after `count` in the growth of the net: 64, 96, 128, 192, 256, ...
 int next_net_size(int count);

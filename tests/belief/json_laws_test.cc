@@ -115,6 +115,12 @@ TEST(QueryFromJson, NamesThePathOfWhatIsWrong) {
   EXPECT_THAT(message(R"({"stability": {"object": "cup", "max_move": -1}})"), HasSubstr("stability.max_move"));
   EXPECT_EQ(query_from_json(std::string(2 << 20, ' ')).status().code(), core::StatusCode::kResourceExhausted);
   EXPECT_EQ(query_from_json(std::string(100000, '[')).status().code(), core::StatusCode::kInvalidInput);
+  const std::string deep = R"({"where": )" + std::string(100000, '[') + std::string(100000, ']') + "}";
+  EXPECT_THAT(message(deep.c_str()), HasSubstr("nested deeper than 64"));
+  EXPECT_THAT(
+      message(
+          R"({"where": {"object": "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["}, "a": 1})"),
+      HasSubstr("unknown key"));
 }
 
 TEST(QueryFromJson, FillsInWhatIsNotSaid) {
