@@ -1,13 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/answering_desk.h"
 
+#include <algorithm>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "prescene/belief/json.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
+
+// Longer ones are refused by the reader of questions in any case.
+constexpr std::size_t kLongestWithId = 1u << 20;
+
+core::Cancellation::Clock::time_point deadline_after(double seconds) {
+  return core::Cancellation::Clock::now() +
+         std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
+}
 
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
 void bound_effort(belief::Query& query, double seconds) {
@@ -22,18 +33,16 @@ void bound_effort(belief::Query& query, double seconds) {
 
 std::string error_answer(const std::string& question_json, const std::string& text) {
   nlohmann::ordered_json answer = nlohmann::ordered_json::object();
-  const auto question = nlohmann::ordered_json::parse(question_json, nullptr, false);
-  if (question.is_object() && question.contains("id") && question["id"].is_string()) answer["id"] = question["id"];
+  if (const std::string id = id_of(question_json); !id.empty()) answer["id"] = id;
   answer["error"] = text;
   return answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-AnsweringDesk::AnsweringDesk(Backends& backends, int threads, std::size_t max_waiting, double default_seconds,
+AnsweringDesk::AnsweringDesk(Backends& backends, int threads, const DeskSettings& settings,
                              std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
     : backends_(backends),
       pool_(threads),
-      max_waiting_(max_waiting),
-      default_seconds_(default_seconds),
+      settings_(settings),
       snapshot_(std::move(snapshot)),
       on_answer_(std::move(on_answer)),
       thread_([this] { work(); }) {}
@@ -48,16 +57,19 @@ AnsweringDesk::~AnsweringDesk() {
 }
 
 void AnsweringDesk::ask(std::string question_json) {
+  std::string id = question_json.size() <= kLongestWithId ? id_of(question_json) : "";
   {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() < max_waiting_) {
-      waiting_.push_back(std::move(question_json));
+    const auto is_same = [&id](const Waiting& other) { return other.id == id; };
+    if (!id.empty() && (id == id_in_work_ || std::any_of(waiting_.begin(), waiting_.end(), is_same))) return;
+    if (waiting_.size() < settings_.max_waiting) {
+      waiting_.push_back({std::move(id), std::move(question_json)});
       changed_.notify_all();
       return;
     }
   }
-  on_answer_(question_json,
-             error_answer(question_json, std::to_string(max_waiting_) + " questions wait already: ask again later"));
+  on_answer_(question_json, error_answer(question_json, std::to_string(settings_.max_waiting) +
+                                                            " questions wait already: ask again later"));
 }
 
 void AnsweringDesk::work() {
@@ -67,21 +79,32 @@ void AnsweringDesk::work() {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
       if (stop_.requested()) return;
-      question = std::move(waiting_.front());
+      question = std::move(waiting_.front().question);
+      id_in_work_ = std::move(waiting_.front().id);
       waiting_.pop_front();
     }
-    on_answer_(question, answer(question));
+    const std::string answered = answer(question);
+    {
+      const std::lock_guard lock(mutex_);
+      id_in_work_.clear();
+    }
+    on_answer_(question, answered);
   }
 }
 
 std::string AnsweringDesk::answer(const std::string& question_json) {
   auto query = belief::query_from_json(question_json);
   if (!query) return error_answer(question_json, query.status().message());
-  bound_effort(*query, default_seconds_);
+  bound_effort(*query, settings_.default_seconds);
   queries::QueryContext context = backends_.query_context(pool_);
-  context.cancellation = &stop_;
-  return belief::to_json(queries::answer(*snapshot_(), *query, context))
-      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  const core::Cancellation limit(stop_, deadline_after(settings_.most_seconds));
+  context.cancellation = &limit;
+  try {
+    return belief::to_json(queries::answer(*snapshot_(), *query, context))
+        .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  } catch (const std::bad_alloc&) {
+    return error_answer(question_json, "the answer does not fit into the memory: ask for less");
+  }
 }
 
 }  // namespace prescene::service

@@ -17,20 +17,27 @@
 
 namespace prescene::service {
 
+struct DeskSettings {
+  std::size_t max_waiting = 16;  ///< More questions are answered with an error at once.
+  double default_seconds = 0.8;  ///< Time that a question without limits of its own may take.
+  double most_seconds = 10.0;    ///< Time that any question may take: questions are answered one after the other.
+};
+
 /// A question's text as JSON and its answer's. Called on the desk's thread.
 using AnswerSink = std::function<void(const std::string& question, const std::string& answer)>;
 
 class AnsweringDesk {
  public:
   /// `threads` of its own for simulating; `snapshot` gives the belief to ask. All must outlive the desk.
-  AnsweringDesk(Backends& backends, int threads, std::size_t max_waiting, double default_seconds,
+  AnsweringDesk(Backends& backends, int threads, const DeskSettings& settings,
                 std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer);
   /// Cancels what is being answered and drops what waits.
   ~AnsweringDesk();
   AnsweringDesk(const AnsweringDesk&) = delete;
   AnsweringDesk& operator=(const AnsweringDesk&) = delete;
 
-  /// Takes a question; one that is not understood or comes when too many wait gets an answer that says so.
+  /// Takes a question; one that is not understood or comes when too many wait gets an answer that says so. A question
+  /// that waits or is being answered is not taken again under the same id: clients ask again when an answer is late.
   void ask(std::string question_json);
 
  private:
@@ -39,14 +46,18 @@ class AnsweringDesk {
 
   Backends& backends_;
   core::ThreadPool pool_;
-  std::size_t max_waiting_;
-  double default_seconds_;
+  DeskSettings settings_;
   std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
   AnswerSink on_answer_;
   core::Cancellation stop_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<std::string> waiting_;
+  struct Waiting {
+    std::string id;
+    std::string question;
+  };
+  std::deque<Waiting> waiting_;
+  std::string id_in_work_;
   std::thread thread_;
 };
 

@@ -7,6 +7,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
@@ -103,7 +104,7 @@ ordered_json to_json(const BeliefSummary& summary) {
 }
 
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text) {
-  const ordered_json json = ordered_json::parse(text, nullptr, false);
+  const ordered_json json = parse_or_discard(text);
   const auto is = [&json](const char* key, bool (ordered_json::*kind)() const noexcept) {
     return json.is_object() && json.contains(key) && (json[key].*kind)();
   };

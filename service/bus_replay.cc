@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
 #include "prescene/service/topics.h"
 
 namespace prescene::service {
@@ -42,7 +43,7 @@ class Listener {
     }
   }
   void add_answer(const std::string& text) {
-    const auto answer = nlohmann::ordered_json::parse(text, nullptr, false);
+    const auto answer = parse_or_discard(text);
     if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
     const std::lock_guard lock(mutex_);
     const auto asked = asked_.find(answer["id"].get<std::string>());
@@ -112,7 +113,7 @@ class BusPlayer {
   }
 
   core::Status ask(std::size_t number, const TimedQuestion& question) {
-    auto json = nlohmann::ordered_json::parse(question.json, nullptr, false);
+    auto json = parse_or_discard(question.json);
     if (!json.is_object())
       return core::invalid_input("question " + std::to_string(number) + " is not a JSON object: " + question.json);
     const std::string id = "replay-" + std::to_string(core::wall_now_ns()) + "-" + std::to_string(number);

@@ -119,8 +119,8 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
   impl->desk = std::make_unique<AnsweringDesk>(
-      backends, std::max(1, backends.pool().threads() - 1), static_cast<std::size_t>(settings.max_waiting_questions),
-      settings.default_question_seconds, [raw] { return raw->tracker->belief(); }, on_answer);
+      backends, std::max(1, backends.pool().threads() - 1), settings.desk, [raw] { return raw->tracker->belief(); },
+      on_answer);
   PRESCENE_RETURN_IF_ERROR(impl->join_bus());
   return std::unique_ptr<LiveService>(new LiveService(std::move(impl)));
 }

@@ -10,6 +10,7 @@
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/service/answering_desk.h"
 #include "prescene/service/tracker.h"
 
 namespace prescene::service {
@@ -17,9 +18,8 @@ namespace prescene::service {
 struct LiveSettings {
   TrackerSettings tracker;
   interfaces::DdsOptions dds;
-  int max_waiting_questions = 16;         ///< More are answered with an error at once.
-  double default_question_seconds = 0.8;  ///< Time that a question without limits of its own may take.
-  double marker_rate = 5.0;               ///< Markers a second, at most.
+  DeskSettings desk;
+  double marker_rate = 5.0;  ///< Markers a second, at most.
   double diagnostics_rate = 1.0;
 };
 

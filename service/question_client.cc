@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
 #include "prescene/service/topics.h"
 
 namespace prescene::service {
@@ -38,7 +39,7 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
                                [raw](interfaces::ReceivedMessage&& message) {
                                  const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
                                  if (!text) return;
-                                 const auto answer = nlohmann::ordered_json::parse(text->data, nullptr, false);
+                                 const auto answer = parse_or_discard(text->data);
                                  if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
                                  const std::lock_guard lock(raw->mutex_);
                                  if (answer["id"].get<std::string>() != raw->waiting_for_) return;  // somebody else's
@@ -54,7 +55,7 @@ QuestionClient::~QuestionClient() { node_.reset(); }
 
 core::Result<std::string> QuestionClient::ask(const std::string& question_json, double timeout,
                                               const core::Cancellation& cancellation) {
-  auto question = nlohmann::ordered_json::parse(question_json, nullptr, false);
+  auto question = parse_or_discard(question_json);
   if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/queries.md)");
   if (!question.contains("id") || !question["id"].is_string()) question["id"] = new_id();
   const std::string id = question["id"].get<std::string>();

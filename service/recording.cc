@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/service/outside_json.h"
+
 namespace prescene::service {
 namespace {
 
@@ -39,7 +41,7 @@ ordered_json to_json(const StepRecord& record) {
 }
 
 core::Result<StepRecord> step_record_from_json(const std::string& text) {
-  const ordered_json json = ordered_json::parse(text, nullptr, false);
+  const ordered_json json = parse_or_discard(text);
   const auto bad = [](const std::string& what) {
     return core::invalid_input("step record: " + what + ": the recording was made by another version or is damaged");
   };

@@ -77,8 +77,6 @@ class Replay {
   ReplaySummary summary_;
 };
 
-const core::Status kStopped = core::cancelled("stopped on request; the steps made so far are kept");
-
 }  // namespace
 
 core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, Tracker& tracker,
@@ -90,7 +88,10 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
   Replay replay(tracker, on_step, follow);
   std::uint64_t entries = 0;
   for (;;) {
-    if (cancellation.requested()) return kStopped;
+    if (cancellation.requested()) {
+      replay.summary().cancelled = true;
+      break;
+    }
     PRESCENE_TRY(const auto entry, reader->next());
     if (!entry) break;
     if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
@@ -106,7 +107,7 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
       PRESCENE_RETURN_IF_ERROR(on_json(entry->message.topic, json, entry->message.received_ns));
     }
   }
-  PRESCENE_RETURN_IF_ERROR(replay.finish());
+  if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
   replay.summary().loss = reader->loss().text();
   return replay.summary();
 }
@@ -118,7 +119,10 @@ core::Result<ReplaySummary> replay_folder(const interfaces::FrameFolder& folder,
   const InputTopics& topics = tracker.settings().topics;
   MessageIndex index = 0;
   for (std::size_t i = 0; i < folder.frames().size(); ++i) {
-    if (cancellation.requested()) return kStopped;
+    if (cancellation.requested()) {
+      replay.summary().cancelled = true;
+      break;
+    }
     const interfaces::FolderFrame& frame = folder.frames()[i];
     const core::Result<interfaces::RgbdImages> images = folder.load(i);
     if (!images) {  // one bad picture does not end the sequence
@@ -140,7 +144,7 @@ core::Result<ReplaySummary> replay_folder(const interfaces::FrameFolder& folder,
                                   interfaces::encode_cdr(interfaces::to_ros_image_32fc1(images->depth, header))));
     if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(folder.frames().size()), {}, frame.name});
   }
-  PRESCENE_RETURN_IF_ERROR(replay.finish());
+  if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
   return replay.summary();
 }
 

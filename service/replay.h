@@ -30,10 +30,11 @@ struct ReplaySummary {
   std::uint64_t compared = 0;  ///< Steps whose belief was compared with the recorded one.
   std::uint64_t different = 0;
   std::optional<std::uint64_t> first_different_step;
-  std::string loss;  ///< What of the file could not be read; empty = all was read.
+  bool cancelled = false;  ///< Stopped on request before the end.
+  std::string loss;        ///< What of the file could not be read; empty = all was read.
 };
 
-/// Stops early with kCancelled, everything up to then done. Status of the sinks end the replay.
+/// A stop on request ends it early, with what was done until then. Status of the sinks end the replay.
 core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, Tracker& tracker,
                                              const core::Cancellation& cancellation, const core::ProgressSink& progress,
                                              const StepSink& on_step, const JsonSink& on_json);

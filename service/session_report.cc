@@ -9,6 +9,7 @@
 
 #include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
@@ -201,7 +202,18 @@ std::vector<interfaces::ReportBlock> SessionReport::curves() const {
 
 void SessionReport::add_answers(interfaces::ReportContents& contents) const {
   for (const auto& [at, text] : answers_) {
-    const ordered_json answer = ordered_json::parse(text, nullptr, false);
+    try {
+      add_answer_section(at, parse_or_discard(text), contents);
+    } catch (const ordered_json::exception&) {
+      contents.sections.push_back({"Asked at " + digits(at, 1) + " s",
+                                   {interfaces::TextBlock{"The answer has not the form of docs/queries.md."}}});
+    }
+  }
+}
+
+void SessionReport::add_answer_section(double at, const ordered_json& answer,
+                                       interfaces::ReportContents& contents) const {
+  {
     interfaces::ReportSection section;
     section.title = "Asked at " + digits(at, 1) + " s";
     if (!answer.is_object()) {
@@ -215,9 +227,9 @@ void SessionReport::add_answers(interfaces::ReportContents& contents) const {
       const ordered_json& stability = answer["stability"];
       section.title += ": does " + stability.value("object", "") + " stay?";
       section.blocks.push_back(
-          interfaces::OutcomeBlock{stability.value("likely_event", ""), {outcome_from(stability["stable"])}});
+          interfaces::OutcomeBlock{stability.value("likely_event", ""), {outcome_from(stability.at("stable"))}});
     } else {
-      continue;  // where things are is in the pictures
+      return;  // where things are is in the pictures
     }
     contents.sections.push_back(std::move(section));
   }

@@ -38,6 +38,7 @@ class SessionReport {
   interfaces::PictureBlock pictures(Backends& backends) const;
   std::vector<interfaces::ReportBlock> curves() const;
   void add_answers(interfaces::ReportContents& contents) const;
+  void add_answer_section(double at, const nlohmann::ordered_json& answer, interfaces::ReportContents& contents) const;
 
   std::shared_ptr<const belief::Scene> scene_;
   InputTopics topics_;

@@ -10,6 +10,7 @@
 #include "prescene/belief/robot_motion.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
@@ -201,9 +202,9 @@ ordered_json to_json(const TruthRecord& record) {
 
 core::Result<TruthRecord> truth_from_json(const std::string& text) {
   const core::Status bad = core::data_loss("a truth record of the recording is damaged");
-  const ordered_json json = ordered_json::parse(text, nullptr, false);
+  const ordered_json json = parse_or_discard(text);
   if (!json.is_object() || !json.contains("stamp_ns") || !json["stamp_ns"].is_number_integer() ||
-      !json.contains("objects"))
+      !json.contains("objects") || !json["objects"].is_array())
     return bad;
   TruthRecord record;
   record.stamp_ns = json["stamp_ns"].get<core::TimeNs>();
@@ -211,7 +212,9 @@ core::Result<TruthRecord> truth_from_json(const std::string& text) {
     if (!object.is_object() || !object.contains("name") || !object["name"].is_string() || !object.contains("pose"))
       return bad;
     PRESCENE_TRY(const geometry::Pose X_WO, belief::pose_from_json(object["pose"]));
-    record.objects.push_back({object["name"].get<std::string>(), X_WO, object.value("visible_share", 0.0)});
+    const auto share = object.find("visible_share");
+    const double visible_share = share != object.end() && share->is_number() ? share->get<double>() : 0.0;
+    record.objects.push_back({object["name"].get<std::string>(), X_WO, visible_share});
   }
   return record;
 }

@@ -10,12 +10,16 @@
 #include "prescene/core/hash.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
 
 // More than a robot does between two frames; a sender in a loop must not fill the memory.
 constexpr std::size_t kMaxControls = 1000;
+
+// The end of ROS's 32 bit seconds.
+constexpr core::TimeNs kLatestNs = (core::TimeNs{1} << 31) * 1'000'000'000;
 
 std::vector<std::string> robot_names(const belief::Scene& scene) {
   std::vector<std::string> names;
@@ -60,7 +64,8 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
                 return simulator ? *std::move(simulator) : nullptr;
               }),
       assembler_(settings.assembler, robot_names(*scene), settings.tf),
-      belief_(std::make_shared<belief::Belief>(filter_.start(std::move(scene), seed))) {}
+      scene_(std::move(scene)),
+      belief_(std::make_shared<belief::Belief>(filter_.start(scene_, seed))) {}
 
 std::shared_ptr<const belief::Belief> Tracker::belief() const {
   const std::lock_guard lock(mutex_);
@@ -105,6 +110,14 @@ core::Status Tracker::take_control(const interfaces::ReceivedMessage& message) {
   return core::ok_status();
 }
 
+void Tracker::start_again() {
+  // What waits was meant for a time that the old clock did not reach.
+  std::erase_if(controls_, [&](const auto& entry) { return entry.first > belief_->stamp_ns; });
+  auto fresh = std::make_shared<const belief::Belief>(filter_.start(scene_, belief_->seed));
+  const std::lock_guard lock(mutex_);
+  belief_ = std::move(fresh);
+}
+
 belief::Control Tracker::control_until(core::TimeNs stamp_ns) {
   belief::Control control;
   control.begin_ns = belief_->stamp_ns;
@@ -124,6 +137,8 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   std::optional<AssembledFrame> frame = assembler_.take(now_ns);
   if (!frame) return std::nullopt;
   const core::Stopwatch watch;
+  const bool clock_went_back = belief_->step > 0 && frame->observation.stamp_ns <= belief_->stamp_ns;
+  if (clock_went_back) start_again();
   const belief::Control control = control_until(frame->observation.stamp_ns);
   filter::StepResult result = filter_.step(*belief_, frame->observation, control);
 
@@ -137,6 +152,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.record.tf_until = frame->tf_until;
   step.record.skipped = assembler_.take_skipped();
   step.record.degraded = degraded_words(result);
+  if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
   step.record.step = result.belief.step;
   step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
   step.counters = result.counters;
@@ -153,7 +169,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
 
 core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control(const std::string& text,
                                                                                  core::TimeNs received_ns) {
-  const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  const auto json = parse_or_discard(text);
   if (!json.is_object() || !json.contains("actions") || !json["actions"].is_array()) {
     return core::invalid_input("a control is {\"stamp_ns\": n, \"actions\": [...]}, this one is not");
   }
@@ -162,6 +178,8 @@ core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control
     if (!json["stamp_ns"].is_number_integer())
       return core::invalid_input("stamp_ns: not a whole number of nanoseconds");
     begin_ns = json["stamp_ns"].get<core::TimeNs>();
+    if (begin_ns < 0 || begin_ns > kLatestNs)
+      return core::invalid_input("stamp_ns: a time from 1970 to 2038 is needed, as in ROS headers");
   }
   std::vector<std::pair<core::TimeNs, belief::Action>> actions;
   for (const auto& value : json["actions"]) {

@@ -46,7 +46,8 @@ class Tracker {
   /// Takes in one message of the robot; topics that nobody listens to are ignored. Numbers ascend. A message that says
   /// something impossible is refused, and named with its topic; nothing else is lost by it.
   core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
-  /// One belief step with the newest frame that is complete at `now_ns`; empty if there is none.
+  /// One belief step with the newest frame that is complete at `now_ns`; empty if there is none. Where the sender's
+  /// clock went back (a recording is played again) the belief starts anew.
   std::optional<TrackerStep> step(core::TimeNs now_ns);
   /// When step() should be tried again although nothing came in.
   std::optional<core::TimeNs> next_deadline() const { return assembler_.next_deadline(); }
@@ -58,6 +59,8 @@ class Tracker {
  private:
   Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
           Backends& backends, std::unique_ptr<rendering::Renderer> renderer);
+  /// Forgets the belief: after a jump of the sender's clock nothing is known of the time between.
+  void start_again();
   core::Status take_control(const interfaces::ReceivedMessage& message);
   belief::Control control_until(core::TimeNs stamp_ns);
 
@@ -68,6 +71,7 @@ class Tracker {
   FrameAssembler assembler_;
   MessageIndex last_index_ = 0;
   std::vector<std::pair<core::TimeNs, belief::Action>> controls_;  // not yet executed, ascending
+  std::shared_ptr<const belief::Scene> scene_;                     // as given
   mutable std::mutex mutex_;                                       // guards belief_
   std::shared_ptr<const belief::Belief> belief_;
 };

@@ -12,31 +12,41 @@ std::string interval(const nlohmann::ordered_json& p) {
          fixed_digits(limits.at(1), 3) + ")";
 }
 
-}  // namespace
-
-std::string answer_text(const nlohmann::ordered_json& answer) {
+std::string short_form(const nlohmann::ordered_json& answer) {
   if (const auto stability = answer.find("stability"); stability != answer.end()) {
-    return stability->value("object", "") + " stays as it is: " + interval((*stability)["stable"]) + "\n";
+    return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n";
   }
   if (const auto predict = answer.find("predict"); predict != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"outcome", "group", "probability"}};
-    for (const auto& outcome : (*predict)["outcomes"]) {
+    for (const auto& outcome : predict->at("outcomes")) {
       rows.push_back({outcome.value("name", ""), outcome.value("group", ""), interval(outcome)});
     }
     return table(rows);
   }
   if (const auto where = answer.find("where"); where != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"object", "state", "confidence", "position, m"}};
-    for (const auto& item : (*where)["items"]) {
-      const auto& p = item["estimate"]["mean"]["position"];
+    for (const auto& item : where->at("items")) {
+      const auto& p = item.at("estimate").at("mean").at("position");
       rows.push_back({item.value("object", ""), item.value("state", ""),
-                      fixed_digits(item["estimate"].value("confidence", 0.0), 2),
-                      fixed_digits(p[0].get<double>(), 3) + " " + fixed_digits(p[1].get<double>(), 3) + " " +
-                          fixed_digits(p[2].get<double>(), 3)});
+                      fixed_digits(item.at("estimate").value("confidence", 0.0), 2),
+                      fixed_digits(p.at(0).get<double>(), 3) + " " + fixed_digits(p.at(1).get<double>(), 3) + " " +
+                          fixed_digits(p.at(2).get<double>(), 3)});
     }
     return table(rows);
   }
   return answer.dump(2) + "\n";
+}
+
+}  // namespace
+
+std::string answer_text(const nlohmann::ordered_json& answer) {
+  try {
+    return short_form(answer);
+  } catch (const nlohmann::ordered_json::exception&) {  // somebody else's answer, of another form
+    return answer.dump(2) + "\n";
+  } catch (const std::out_of_range&) {
+    return answer.dump(2) + "\n";
+  }
 }
 
 }  // namespace prescene::service

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "prescene/service/outside_json.h"
 #include "prescene/service/question_client.h"
 #include "verb.h"
 
@@ -18,7 +19,7 @@ struct Options {
 
 core::Result<nlohmann::ordered_json> question_of(const Options& options) {
   if (!options.json.empty()) {
-    const auto question = nlohmann::ordered_json::parse(options.json, nullptr, false);
+    const auto question = parse_or_discard(options.json);
     if (!question.is_object()) return core::invalid_input("--question: not a JSON object (docs/queries.md)");
     return question;
   }
@@ -46,10 +47,11 @@ core::Status run(const Options& options, VerbContext& context) {
   PRESCENE_TRY(const auto question, question_of(options));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
   PRESCENE_TRY(const std::string text, client->ask(question.dump(), options.timeout, context.cancellation()));
-  const auto answer = nlohmann::ordered_json::parse(text, nullptr, false);
+  const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
-  const std::string error = answer.value("error", "");
-  if (!error.empty()) return core::invalid_input(error);
+  if (const auto error = answer.find("error"); error != answer.end()) {
+    return core::invalid_input(error->is_string() ? error->get<std::string>() : error->dump());
+  }
   context.print(answer, answer_text(answer));
   return core::ok_status();
 }
@@ -64,7 +66,7 @@ Verb add_ask_verb(CLI::App& app) {
   verb->add_option("OBJECT", options->object, "The object's name in the scene");
   verb->add_option("--question", options->json, "Any question as JSON (docs/queries.md) instead");
   verb->add_option("--timeout", options->timeout, "How long to wait for an answer, s")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   add_domain_option(*verb, options->dds);
   verb->footer("Example: prescene ask stability carton");

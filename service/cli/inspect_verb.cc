@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/mesh_inspection.h"
 #include "prescene/service/prediction_report.h"
 #include "verb.h"
@@ -49,19 +49,14 @@ std::string text_of(const MeshInspection& found) {
   return text;
 }
 
-core::Status write_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) return core::unavailable(path + ": can't be written: check the folder and the space on the disk");
-  return core::ok_status();
-}
-
 core::Status run(Options& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.mesh, options.report}));
+  PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.mesh}));
   if (options.y_up) options.inspection.read.up_axis = interfaces::UpAxis::kY;
   PRESCENE_TRY(const MeshInspection found, inspect_mesh(options.mesh, options.inspection));
   if (!options.model.empty()) {
-    PRESCENE_RETURN_IF_ERROR(write_text(options.model, model_file_text(found, options.inspection, options.model)));
+    PRESCENE_RETURN_IF_ERROR(
+        interfaces::write_file(options.model, model_file_text(found, options.inspection, options.model)));
   }
   if (!options.report.empty()) PRESCENE_RETURN_IF_ERROR(write_mesh_report(options.report, found));
   context.print(to_json(found),
@@ -78,11 +73,11 @@ Verb add_inspect_verb(CLI::App& app) {
   verb->add_option("MESH", options->mesh, "PLY, OBJ, STL, glTF or COLLADA file")->required();
   verb->add_option("-o,--output", options->model, "Write a model file that scene files can name");
   verb->add_option("--density", options->inspection.density, "kg/m^3")
-      ->check(CLI::Range(0.1, 25000.0))
+      ->check(number_between(0.1, 25000.0))
       ->capture_default_str();
   verb->add_option("--scale", options->inspection.read.metres_per_unit,
                    "Metres per unit of the file: 0.001 for millimetres")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_flag("--y-up", options->y_up, "The file's y axis points up");
   verb->add_option("--report", options->report, "Write an HTML page with pictures");

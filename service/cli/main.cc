@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program: reads the arguments, runs one verb, says how it went.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <iostream>
+#include <new>
+#include <string>
 #include <vector>
 
 #include "verb.h"
@@ -17,10 +23,30 @@ extern "C" void on_interrupt(int signal_number) {
   std::signal(signal_number, SIG_DFL);
 }
 
+/// The libraries below throw where memory ends; everything else is a Status.
+prescene::core::Status run(const prescene::service::Verb& verb, prescene::service::VerbContext& context) {
+  try {
+    return verb.run(context);
+  } catch (const std::bad_alloc&) {
+    return prescene::core::resource_exhausted("the memory is used up: give smaller images, meshes or limits");
+  }
+}
+
 void add_common_options(CLI::App& verb, prescene::service::CommonOptions& options) {
   auto* group = verb.add_option_group("Common", "Options of every verb");
   group->add_flag("--json", options.json, "Print one JSON document on stdout; everything else goes to stderr");
+  // CLI11 wraps negative numbers around.
+  const CLI::Validator whole_number(
+      [](std::string& text) -> std::string {
+        const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+        errno = 0;
+        std::strtoull(text.c_str(), nullptr, 10);
+        return digits && errno == 0 ? ""
+                                    : "a whole number from 0 to 18446744073709551615 is needed, not '" + text + "'";
+      },
+      "");
   group->add_option("--seed", options.seed, "Seed of all random numbers; the same seed and input give the same answer")
+      ->check(whole_number)
       ->each([&options](const std::string&) { options.seed_given = true; })
       ->capture_default_str();
   group->add_option("--threads", options.threads, "Threads to use, 0 = all of the machine; does not change any answer")
@@ -51,9 +77,12 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
-    return app.exit(success);
+    const int code = app.exit(success);
+    return std::cout.flush() ? code : static_cast<int>(service::ExitCode::kFailed);
   } catch (const CLI::ParseError& error) {
     app.exit(error);
+    const bool json = std::any_of(argv + 1, argv + argc, [](const char* arg) { return std::string(arg) == "--json"; });
+    if (json) std::fputs(service::error_document(error.what()).c_str(), stdout);
     return static_cast<int>(service::ExitCode::kBadInput);
   }
 
@@ -63,11 +92,7 @@ int main(int argc, char** argv) {
   for (const service::Verb& verb : verbs) {
     if (!verb.app->parsed()) continue;
     service::VerbContext context(options, cancellation);
-    const core::Status status = verb.run(context);
-    context.end_progress();
-    if (!status.ok())
-      std::fprintf(stderr, "prescene %s: %s\n", verb.app->get_name().c_str(), to_string(status).c_str());
-    return static_cast<int>(service::exit_code_of(status));
+    return static_cast<int>(context.finish(verb.app->get_name(), run(verb, context)));
   }
   return static_cast<int>(service::ExitCode::kBadInput);
 }

@@ -58,6 +58,7 @@ std::string text_of(const belief::PredictAnswer& predicted) {
 }
 
 core::Status run(const Options& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
   Backends backends(context.pool());
   belief::PredictQuery question;
@@ -88,19 +89,19 @@ Verb add_predict_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "Scene file (docs/scene_files.md)")->required();
   verb->add_option("--tolerance", options->effort.tolerance, "Half width of the intervals to reach")
-      ->check(CLI::Range(1e-4, 0.5))
+      ->check(number_between(1e-4, 0.5))
       ->capture_default_str();
   verb->add_option("--confidence", options->effort.confidence, "Of the intervals")
-      ->check(CLI::Range(0.5, 0.9999))
+      ->check(number_between(0.5, 0.9999))
       ->capture_default_str();
   verb->add_option("--max-instances", options->effort.max_instances, "Most simulated instances")
       ->check(CLI::Range(1, 1 << 22))
       ->capture_default_str();
   verb->add_option("--max-seconds", options->max_seconds,
                    "Most wall time, s; the answer then depends on the machine's speed")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
   verb->footer("Example: prescene predict scenarios/milk_on_bin.yaml --json --seed 1");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};

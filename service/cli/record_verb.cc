@@ -19,6 +19,7 @@ struct Options {
 };
 
 core::Status record_simulation(const Options& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, {options.simulate}));
   PRESCENE_TRY(const auto scene, load_scene(options.simulate, context.log()));
   PRESCENE_TRY(const std::string text, read_text(options.simulate));
   PRESCENE_TRY(const auto recording,
@@ -51,7 +52,7 @@ Verb add_record_verb(CLI::App& app) {
   verb->add_option("--simulate", options->simulate,
                    "Scene file to play with a simulated RGB-D camera, instead of listening");
   verb->add_option("--rate", options->simulation.rate, "Simulated frames a second")
-      ->check(CLI::Range(0.1, 240.0))
+      ->check(number_between(0.1, 240.0))
       ->capture_default_str();
   add_bus_options(*verb, options->dds, options->topics);
   verb->footer(

@@ -6,6 +6,7 @@
 
 #include "prescene/service/bus_replay.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/outside_json.h"
 #include "prescene/service/replay.h"
 #include "prescene/service/session_report.h"
 #include "prescene/service/tracking_score.h"
@@ -74,7 +75,7 @@ std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) 
       text += "no answer came\n";
       continue;
     }
-    const ordered_json answer = ordered_json::parse(answered.answer, nullptr, false);
+    const ordered_json answer = parse_or_discard(answered.answer);
     text += "answered after " + fixed_digits(answered.seconds, 2) + " s\n" + answer_text(answer);
   }
   return text;
@@ -105,7 +106,7 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   }
   ordered_json answers = ordered_json::array();
   for (const BusReplayResult::Answered& answered : result.answers) {
-    const ordered_json answer = ordered_json::parse(answered.answer, nullptr, false);
+    const ordered_json answer = parse_or_discard(answered.answer);
     answers.push_back({{"at", answered.at},
                        {"seconds", answered.seconds},
                        {"answer", answer.is_discarded() ? ordered_json() : answer}});
@@ -209,6 +210,7 @@ core::Status run_here(Options& options, VerbContext& context) {
                                                 std::to_string(summary->compared) + " steps have the recorded bits\n"
                                           : "") +
           tracking_text(rows));
+  if (summary->cancelled) return core::cancelled("stopped on request; what was done is printed");
   if (summary->different > 0) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
                              " is the first that differs from the recording: another version, machine or setting?");
@@ -229,21 +231,22 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_flag("--over-dds", options->over_dds,
                  "Publish the robot's messages as they were, and listen to a running `serve`");
   verb->add_option("--speed", options->bus.speed, "Over DDS: times as fast as recorded")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable");
   verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
   add_bus_options(*verb, options->bus.dds, options->tracker.topics);
   verb->footer(
       "Examples: prescene replay milk.mcap --report milk.html\n"
       "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");
-  return {verb, [options](VerbContext& context) {
+  return {verb, [options](VerbContext& context) -> core::Status {
+            PRESCENE_RETURN_IF_ERROR(check_output("--report", options->report, {options->input, options->scene}));
             return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);
           }};
 }

@@ -19,6 +19,7 @@ struct Options {
 core::Status run(Options& options, VerbContext& context) {
   PRESCENE_TRY(options.settings.tracker.assembler.X_WC, camera_pose_of(options.camera_pose));
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
+  PRESCENE_RETURN_IF_ERROR(check_output("--record", options.record, {options.scene}));
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
     PRESCENE_TRY(const std::string text, read_text(options.scene));
@@ -27,7 +28,9 @@ core::Status run(Options& options, VerbContext& context) {
   Backends backends(context.pool());
   PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,
                                                        std::move(recording), context.log()));
-  return service->run(context.cancellation());
+  PRESCENE_RETURN_IF_ERROR(service->run(context.cancellation()));
+  context.print({{"scene", scene->name}, {"recording", options.record}}, "");
+  return core::ok_status();
 }
 
 }  // namespace
@@ -42,9 +45,13 @@ Verb add_serve_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--camera-pose", options->camera_pose, "Pose of the camera where tf has none: x y z qw qx qy qz (m)")
       ->expected(7);
-  verb->add_option("--question-seconds", options->settings.default_question_seconds,
-                   "Time that a question without limits of its own may take")
-      ->check(CLI::PositiveNumber)
+  verb->add_option("--question-seconds", options->settings.desk.default_seconds,
+                   "Time that a question without limits of its own may take, s")
+      ->check(number_between(1e-3, 3600.0))
+      ->capture_default_str();
+  verb->add_option("--most-question-seconds", options->settings.desk.most_seconds,
+                   "Time that any question may take, s; they are answered one after the other")
+      ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();
   add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
   verb->footer(

@@ -4,10 +4,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -34,6 +37,19 @@ core::LogSink stderr_log(bool quiet) {
         break;
     }
   };
+}
+
+std::optional<double> finite_number(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || end != text.c_str() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::string short_number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%g", value);
+  return buffer;
 }
 
 std::string duration_text(double seconds) {
@@ -103,8 +119,61 @@ void VerbContext::print(const nlohmann::ordered_json& document, const std::strin
   // Bytes that are not UTF-8 (a file name, say) are replaced, not thrown on.
   const std::string out =
       options_.json ? document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n" : text;
-  std::fwrite(out.data(), 1, out.size(), stdout);
-  std::fflush(stdout);
+  write_out(out);
+  printed_ = true;
+}
+
+void VerbContext::write_out(const std::string& out) {
+  const bool written = std::fwrite(out.data(), 1, out.size(), stdout) == out.size();
+  if (!written || std::fflush(stdout) != 0) print_failed_ = true;
+}
+
+ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
+  end_progress();
+  if (!status.ok() && options_.json && !printed_) write_out(error_document(to_string(status)));
+  if (print_failed_) {
+    const std::string text = "standard output can't be written: is the disk full, or was the pipe closed?";
+    if (status.ok())
+      status = core::unavailable(text);
+    else
+      std::fprintf(stderr, "prescene %s: %s\n", verb.c_str(), text.c_str());
+  }
+  if (!status.ok()) std::fprintf(stderr, "prescene %s: %s\n", verb.c_str(), to_string(status).c_str());
+  return exit_code_of(status);
+}
+
+std::string error_document(const std::string& text) {
+  return nlohmann::ordered_json{{"error", text}}.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+         "\n";
+}
+
+CLI::Validator positive_number() {
+  return {[](std::string& text) -> std::string {
+            const std::optional<double> value = finite_number(text);
+            return value && *value > 0.0 ? "" : "a number above 0 is needed, not '" + text + "'";
+          },
+          "POSITIVE"};
+}
+
+CLI::Validator number_between(double low, double high) {
+  const std::string range = short_number(low) + " to " + short_number(high);
+  return {[low, high, range](std::string& text) -> std::string {
+            const std::optional<double> value = finite_number(text);
+            return value && *value >= low && *value <= high
+                       ? ""
+                       : "a number from " + range + " is needed, not '" + text + "'";
+          },
+          range};
+}
+
+core::Status check_output(const std::string& option, const std::string& output,
+                          const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code none;
+    if (output.empty() || input.empty() || !std::filesystem::equivalent(output, input, none)) continue;
+    return core::invalid_input(option + " " + output + " is the input too and would be overwritten: name another file");
+  }
+  return core::ok_status();
 }
 
 std::string table(const std::vector<std::vector<std::string>>& rows) {

@@ -20,6 +20,7 @@
 
 namespace CLI {
 class App;
+class Validator;
 }  // namespace CLI
 
 namespace prescene::service {
@@ -27,6 +28,8 @@ namespace prescene::service {
 /// 0 = done, 1 = could not do it, 2 = bad arguments or bad input.
 enum class ExitCode { kDone = 0, kFailed = 1, kBadInput = 2 };
 ExitCode exit_code_of(const core::Status& status);
+/// {"error": text} and a line's end.
+std::string error_document(const std::string& text);
 
 /// Options that every verb takes.
 struct CommonOptions {
@@ -56,13 +59,20 @@ class VerbContext {
 
   /// One JSON document to stdout with --json, the text otherwise.
   void print(const nlohmann::ordered_json& document, const std::string& text);
+  /// The verb's end: what went wrong to stderr, and with --json as {"error": text} to stdout where nothing was printed.
+  /// Output that could not be written (a full disk, a closed pipe) is a failure too.
+  ExitCode finish(const std::string& verb, core::Status status);
 
  private:
+  void write_out(const std::string& out);
+
   CommonOptions options_;
   const core::Cancellation& cancellation_;
   core::LogSink log_;
   std::unique_ptr<core::ThreadPool> pool_;
   bool bar_open_ = false;
+  bool printed_ = false;
+  bool print_failed_ = false;
 };
 
 /// One verb: adds its subcommand with its options to the app and returns what runs it. The options live in the returned
@@ -91,6 +101,12 @@ core::Result<std::string> read_text(const std::string& path);
 
 /// An answer as JSON, for a person; what has no short form stays JSON.
 std::string answer_text(const nlohmann::ordered_json& answer);
+
+/// Checks of options: finite numbers only (CLI11's own let NaN pass).
+CLI::Validator positive_number();
+CLI::Validator number_between(double low, double high);
+/// kInvalidInput if `output`, named by `option`, would overwrite one of the inputs. Empty names are no files.
+core::Status check_output(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
 /// Rows of text with columns padded to equal width; the first row is underlined.
 std::string table(const std::vector<std::vector<std::string>>& rows);

@@ -40,6 +40,11 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
                                              {"predict"},
                                              {"predict", "a", "--tolerance", "2"},
                                              {"predict", scenario("milk_on_bin"), "--threads", "-3"},
+                                             {"predict", scenario("milk_on_bin"), "--seed", "-1"},
+                                             {"predict", scenario("milk_on_bin"), "--seed", "18446744073709551616"},
+                                             {"predict", scenario("milk_on_bin"), "--duration", "nan"},
+                                             {"predict", scenario("milk_on_bin"), "--duration", "inf"},
+                                             {"predict", scenario("milk_on_bin"), "--tolerance", "nan"},
                                              {"record"},
                                              {"evaluate", "nothing", "--data", "."},
                                              {"serve", "--scene", "x", "--domain", "999"}}) {
@@ -59,6 +64,45 @@ TEST(CommandLine, MissingFilesAreNamed) {
     const Finished finished = run_program(args);
     EXPECT_EQ(finished.exit_code, 2) << args[0];
     EXPECT_NE(finished.err.find("no/such"), std::string::npos) << finished.err;
+  }
+}
+
+TEST(CommandLine, WithJsonAFailureIsOneDocumentToo) {
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"predict", "no/such.yaml", "--json"},
+                                             {"predict", "--json"},
+                                             {"inspect", "no/such.ply", "--json"},
+                                             {"replay", "no/such.mcap", "--json"},
+                                             {"ask", "--json", "--question", "{"},
+                                             {"validate", "no/such.yaml", "--json"}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << args[0];
+    const ordered_json json = parsed(finished);
+    EXPECT_TRUE(json.contains("error") || json.contains("files")) << finished.out;
+    EXPECT_FALSE(finished.err.empty());
+  }
+}
+
+TEST(CommandLine, OutputThatCannotBeWrittenIsAFailure) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  EXPECT_EQ(run_program_writing_to("/dev/full", {"validate", scenario("milk_on_bin")}), 1);
+  EXPECT_EQ(run_program_writing_to("/dev/full", {"validate", scenario("milk_on_bin"), "--json"}), 1);
+  EXPECT_EQ(run_program_writing_to("/dev/full", {"--help"}), 1);
+}
+
+TEST(CommandLine, AnInputIsNeverOverwritten) {
+  const ScratchDir folder;
+  const std::string scene = (folder.path() / "scene.yaml").string();
+  std::filesystem::copy_file(scenario("milk_on_bin"), scene);
+  const std::string before = read_file(scene);
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"record", "--simulate", scene, "-o", scene},
+                                             {"predict", scene, "--max-instances", "4", "--report", scene},
+                                             {"serve", "--scene", scene, "--record", scene}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_NE(finished.err.find("overwritten"), std::string::npos) << finished.err;
+    EXPECT_EQ(read_file(scene), before);
   }
 }
 

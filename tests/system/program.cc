@@ -58,6 +58,10 @@ Finished run_program(const std::vector<std::string>& args, const std::vector<std
   return finished;
 }
 
+int run_program_writing_to(const std::string& out, const std::vector<std::string>& args) {
+  return wait_for_end(start(args, {}, out, "/dev/null"));
+}
+
 BackgroundProgram::BackgroundProgram(const std::vector<std::string>& args, const std::vector<std::string>& environment)
     : pid_(start(args, environment, "/dev/null", "/dev/null")) {}
 

@@ -19,6 +19,9 @@ struct Finished {
 /// Runs `prescene args...` to its end. `environment` is added to ours ("NAME=value").
 Finished run_program(const std::vector<std::string>& args, const std::vector<std::string>& environment = {});
 
+/// The exit code of a run whose standard output goes to that file.
+int run_program_writing_to(const std::string& out, const std::vector<std::string>& args);
+
 /// A program that runs beside the test; killed with the object if it still runs.
 class BackgroundProgram {
  public:

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/outside_json.h"
+
+#include <nlohmann/json.hpp>
+
+#include "prescene/belief/json.h"
+
+namespace prescene::service {
+namespace {
+
+// Above all that is sent: the images of a view of 4 million pixels are 54 MB.
+constexpr std::size_t kMostBytes = 256u << 20;
+
+}  // namespace
+
+nlohmann::ordered_json parse_or_discard(std::string_view text) {
+  auto document = belief::parse_json(text, kMostBytes);
+  return document ? *std::move(document) : nlohmann::ordered_json(nlohmann::ordered_json::value_t::discarded);
+}
+
+std::string id_of(std::string_view text) {
+  const nlohmann::ordered_json document = parse_or_discard(text);
+  if (!document.is_object()) return "";
+  const auto id = document.find("id");
+  return id != document.end() && id->is_string() ? id->get<std::string>() : "";
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON that others sent: over the bus, in a recording, on the command line.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+
+namespace prescene::service {
+
+/// The document; discarded (is_discarded()) where it is no JSON or nested too deep to be copied.
+nlohmann::ordered_json parse_or_discard(std::string_view text);
+/// The "id" of a question or an answer; empty where there is none.
+std::string id_of(std::string_view text);
+
+}  // namespace prescene::service
