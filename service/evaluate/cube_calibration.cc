@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kLeastFlight = 8;
 constexpr std::size_t kLastFrames = 5;
+// Of the search's steps, each after a round without gain.
+constexpr int kHalvings = 3;
 
 /// The coordinates of the search and their way into a model.
 struct Coordinate {
@@ -101,34 +103,45 @@ double calibration_cost(const std::vector<CubeForecast>& forecasts) {
 }
 
 core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses, CubeModel start, std::uint64_t seed,
-                                             int samples, int max_evaluations, core::ThreadPool& threads,
-                                             const CalibrationProgress& progress) {
+                                             core::ThreadPool& threads, const core::ProgressSink& progress,
+                                             const core::Cancellation* cancellation,
+                                             const CalibrationOptions& options) {
   PRESCENE_TRY(const CubeMeasurements measured, measure_cube(tosses, start));
   start.half_edge = measured.half_edge;
   start.gravity = measured.gravity;
-  CubeOptions options;
-  options.samples = samples;
+  CubeOptions forecast_options;
+  forecast_options.samples = options.samples;
   std::vector<simulation::SearchParameter> parameters;
   for (const Coordinate& c : kCoordinates) parameters.push_back({c.name, start.*c.field, c.step, c.low, c.high});
   parameters.push_back({"noise", 1.0, 0.2, 0.02, 5.0});
 
   core::Status failure;
+  CubeCalibration result;
   const auto cost = [&](std::span<const double> values) {
-    const auto forecasts = forecast_cube_tosses(tosses, model_from(start, values), seed, threads, {}, nullptr, options);
+    const auto forecasts =
+        forecast_cube_tosses(tosses, model_from(start, values), seed, threads, {}, cancellation, forecast_options);
     if (forecasts) return calibration_cost(*forecasts);
     failure = forecasts.status();
     return std::numeric_limits<double>::infinity();
   };
   const auto report = [&](const simulation::SearchResult& best) {
     if (!failure.ok()) return false;
-    std::ostringstream line;
-    line << best.evaluations << " evaluations, cost " << best.cost << ":";
-    for (std::size_t i = 0; i < parameters.size(); ++i) line << ' ' << parameters[i].name << ' ' << best.values[i];
-    return !progress || progress(line.str());
+    if (best.evaluations == 1) result.start_cost = best.cost;
+    if (progress) {
+      std::ostringstream text;
+      text << "cost " << best.cost << " after " << best.evaluations << " evaluations";
+      progress({static_cast<double>(best.evaluations) / options.max_evaluations, std::nullopt, text.str()});
+    }
+    return true;
   };
-  const simulation::SearchResult found = simulation::coordinate_search(parameters, cost, 3, max_evaluations, report);
-  PRESCENE_RETURN_IF_ERROR(failure);
-  return CubeCalibration{model_from(start, found.values), found.cost, found.evaluations};
+  const simulation::SearchResult found =
+      simulation::coordinate_search(parameters, cost, kHalvings, options.max_evaluations, report);
+  result.stopped = failure.code() == core::StatusCode::kCancelled;
+  if (!failure.ok() && !(result.stopped && found.evaluations > 1)) return failure;
+  result.model = model_from(start, found.values);
+  result.cost = found.cost;
+  result.evaluations = found.evaluations;
+  return result;
 }
 
 }  // namespace prescene::service

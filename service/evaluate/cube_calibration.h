@@ -2,8 +2,6 @@
 // Fits the cube's model to recorded tosses.
 #pragma once
 
-#include <functional>
-#include <string>
 #include <vector>
 
 #include "prescene/service/evaluate/cube_tosses.h"
@@ -24,18 +22,24 @@ core::Result<CubeMeasurements> measure_cube(const std::vector<CubeToss>& tosses,
 inline constexpr double kPlaceWeight = 5.0;  // per m
 double calibration_cost(const std::vector<CubeForecast>& forecasts);
 
+struct CalibrationOptions {
+  int samples = 24;           ///< Starts a toss, the same ones in each evaluation.
+  int max_evaluations = 150;  ///< Of the cost, > 0.
+};
 struct CubeCalibration {
   CubeModel model;
+  double start_cost = 0.0;  ///< With the lengths measured and all else as at the start.
   double cost = 0.0;
   int evaluations = 0;
+  bool stopped = false;  ///< By cancellation: `model` is the best so far.
 };
-/// Called after each round of the search with a line about the best so far; false stops it.
-using CalibrationProgress = std::function<bool(const std::string& line)>;
 
 /// Measures lengths, then searches frictions, restitution, inertia, rounding, centre of mass and the size of the
-/// start's noise (its four parts keep their ratios) with `samples` starts a toss, the same ones in each evaluation.
+/// start's noise (its four parts keep their ratios) from `start` for a minimum of the cost. Fails with kCancelled when
+/// stopped before the first evaluation was done.
 core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses, CubeModel start, std::uint64_t seed,
-                                             int samples, int max_evaluations, core::ThreadPool& threads,
-                                             const CalibrationProgress& progress = {});
+                                             core::ThreadPool& threads, const core::ProgressSink& progress = {},
+                                             const core::Cancellation* cancellation = nullptr,
+                                             const CalibrationOptions& options = {});
 
 }  // namespace prescene::service

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/cube_data.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -23,13 +24,16 @@ std::string_view next_part(std::string_view& rest, char separator) {
   return part;
 }
 
+constexpr double kLargestNumber = 1e9;  // of a toss
+
+/// The used cells of a row; false unless all are finite numbers and the toss has a number.
 bool parse_row(std::string_view line, std::array<double, kUsedColumns>& cells) {
   for (double& cell : cells) {
     const std::string_view text = next_part(line, ',');
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), cell);
     if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(cell)) return false;
   }
-  return true;
+  return cells[0] >= 0.0 && cells[0] <= kLargestNumber && cells[0] == std::floor(cells[0]);
 }
 
 }  // namespace
@@ -41,15 +45,22 @@ core::Result<std::vector<CubeToss>> read_cube_tosses(const std::filesystem::path
   const auto wrong = [&](std::size_t line, const std::string& what) {
     return core::invalid_input(file.string() + ", line " + std::to_string(line) + ": " + what);
   };
-  if (!next_part(rest, '\n').starts_with(kHeader)) {
+  const std::string_view header = next_part(rest, '\n');
+  if (!header.starts_with(kHeader)) {
     return wrong(1, "expected the columns " + std::string(kHeader) + "...: is this the tosses file?");
   }
+  const auto columns = std::count(header.begin(), header.end(), ',') + 1;
   std::vector<CubeToss> tosses;
   for (std::size_t line = 2; !rest.empty(); ++line) {
     const std::string_view text = next_part(rest, '\n');
     if (text.empty()) continue;
+    const auto cells = std::count(text.begin(), text.end(), ',') + 1;
+    if (cells != columns) {
+      return wrong(line,
+                   "has " + std::to_string(cells) + " of " + std::to_string(columns) + " columns: is the file cut?");
+    }
     std::array<double, kUsedColumns> c{};
-    if (!parse_row(text, c)) return wrong(line, "expected numbers toss,row,t,x,y,z,qw,qx,qy,qz");
+    if (!parse_row(text, c)) return wrong(line, "expected finite numbers toss,row,t,x,y,z,qw,qx,qy,qz");
     simulation::TimedPose pose;
     pose.time = c[2];
     pose.X_WO.translation = {c[3], c[4], c[5]};

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/cube_model.h"
 
+#include <nlohmann/json.hpp>
+
 namespace prescene::service {
 
-CubeModel shipped_cube_model() {
+CubeModel measured_cube_model() {
   CubeModel model;
-  model.provenance = "read off the recorded tosses by hand; the search has not been run yet";
+  model.provenance = "read off the recorded tosses by hand";
   return model;
 }
+
+CubeModel shipped_cube_model() { return measured_cube_model(); }
 
 CubeModel described_cube_model() {
   CubeModel model;
@@ -27,6 +31,30 @@ CubeModel described_cube_model() {
   model.spin_noise = 0.05;
   model.provenance = "README of the data set";
   return model;
+}
+
+nlohmann::ordered_json to_json(const CubeModel& model) {
+  return {{"half_edge", model.half_edge},
+          {"gravity", model.gravity},
+          {"edge_radius", model.edge_radius},
+          {"mass", model.mass},
+          {"center_of_mass_z", model.center_of_mass_z},
+          {"unit_inertia", model.unit_inertia},
+          {"unit_inertia_z_ratio", model.unit_inertia_z_ratio},
+          {"sliding_friction", model.sliding_friction},
+          {"impact_friction", model.impact_friction},
+          {"restitution", model.restitution},
+          {"impact_speed", model.impact_speed},
+          {"step", model.step},
+          {"position_noise", model.position_noise},
+          {"rotation_noise", model.rotation_noise},
+          {"velocity_noise", model.velocity_noise},
+          {"spin_noise", model.spin_noise},
+          {"friction_noise", model.friction_noise},
+          {"restitution_noise", model.restitution_noise},
+          {"kernel_scale", model.kernel_scale},
+          {"kernel_floor", model.kernel_floor},
+          {"provenance", model.provenance}};
 }
 
 belief::Scene make_cube_scene(const CubeModel& model) {

@@ -2,6 +2,7 @@
 // The model of the tossed cube and of what is uncertain about a toss.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "prescene/belief/scene.h"
@@ -40,10 +41,15 @@ struct CubeModel {
   std::string provenance;  ///< Where the numbers come from.
 };
 
-/// Calibrated on the even places of the list of even tosses; see docs/accuracy.md.
+/// Read off the recordings, most of it without simulating: where the calibration starts.
+CubeModel measured_cube_model();
+/// What the calibration found on the tosses at even places of the list; see docs/accuracy.md.
 CubeModel shipped_cube_model();
 /// The data set's own description and plain contact settings, for comparison.
 CubeModel described_cube_model();
+
+/// One key a field, in the order of the struct.
+nlohmann::ordered_json to_json(const CubeModel& model);
 
 /// The cube as object 0 above a board whose surface is z = 0.
 belief::Scene make_cube_scene(const CubeModel& model);

@@ -16,21 +16,25 @@ SearchResult coordinate_search(const std::vector<SearchParameter>& parameters,
   }
   best.cost = cost(best.values);
   best.evaluations = 1;
+  bool stopped = progress && !progress(best);
 
   const auto improves = [&](std::size_t i, double step) {
-    if (best.evaluations >= max_evaluations) return false;
+    if (stopped || best.evaluations >= max_evaluations) return false;
     std::vector<double> values = best.values;
     values[i] = std::clamp(values[i] + step, parameters[i].low, parameters[i].high);
     if (values[i] == best.values[i]) return false;
     const double c = cost(values);
     ++best.evaluations;
-    if (!(c < best.cost)) return false;
-    best.cost = c;
-    best.values = std::move(values);
-    return true;
+    const bool better = c < best.cost;
+    if (better) {
+      best.cost = c;
+      best.values = std::move(values);
+    }
+    stopped = progress && !progress(best);
+    return better;
   };
 
-  while (halvings > 0 && best.evaluations < max_evaluations) {
+  while (halvings > 0 && !stopped && best.evaluations < max_evaluations) {
     bool gained = false;
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       for (const double sign : {1.0, -1.0}) {
@@ -45,7 +49,6 @@ SearchResult coordinate_search(const std::vector<SearchParameter>& parameters,
       for (double& step : steps) step *= 0.5;
       --halvings;
     }
-    if (progress && !progress(best)) break;
   }
   return best;
 }

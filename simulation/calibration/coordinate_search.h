@@ -23,7 +23,7 @@ struct SearchResult {
   int evaluations = 0;
 };
 
-/// Called after each round with the best so far; false stops the search.
+/// Called after each evaluation with the best so far; false stops the search.
 using SearchProgress = std::function<bool(const SearchResult& best)>;
 
 /// Compass search [Kolda, Lewis & Torczon 2003]: each coordinate in turn one step up and down, keeping what is better,

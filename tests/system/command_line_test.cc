@@ -25,7 +25,8 @@ ordered_json parsed(const Finished& finished) {
 TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
   EXPECT_EQ(run_program({"--help"}).exit_code, 0);
   EXPECT_EQ(run_program({"--version"}).exit_code, 0);
-  for (const char* verb : {"validate", "predict", "inspect", "record", "replay", "serve", "ask", "evaluate"}) {
+  for (const char* verb :
+       {"validate", "predict", "inspect", "record", "replay", "serve", "ask", "evaluate", "calibrate"}) {
     const Finished help = run_program({verb, "--help"});
     EXPECT_EQ(help.exit_code, 0) << verb;
     EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;
@@ -47,6 +48,7 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
                                              {"predict", scenario("milk_on_bin"), "--tolerance", "nan"},
                                              {"record"},
                                              {"evaluate", "nothing", "--data", "."},
+                                             {"calibrate", "cube_tosses"},
                                              {"serve", "--scene", "x", "--domain", "999"}}) {
     const Finished finished = run_program(args);
     EXPECT_EQ(finished.exit_code, 2) << finished.err;
@@ -60,7 +62,8 @@ TEST(CommandLine, MissingFilesAreNamed) {
        std::vector<std::vector<std::string>>{{"predict", "no/such.yaml"},
                                              {"inspect", "no/such.ply"},
                                              {"replay", "no/such.mcap"},
-                                             {"evaluate", "ycb_video", "--data", "no/such"}}) {
+                                             {"evaluate", "ycb_video", "--data", "no/such"},
+                                             {"calibrate", "cube_tosses", "--data", "no/such"}}) {
     const Finished finished = run_program(args);
     EXPECT_EQ(finished.exit_code, 2) << args[0];
     EXPECT_NE(finished.err.find("no/such"), std::string::npos) << finished.err;
