@@ -11,7 +11,25 @@ CubeModel measured_cube_model() {
   return model;
 }
 
-CubeModel shipped_cube_model() { return measured_cube_model(); }
+CubeModel shipped_cube_model() {
+  CubeModel model = measured_cube_model();
+  model.half_edge = 0.051208;
+  model.gravity = 9.5963;
+  model.edge_radius = 0.0015;
+  model.unit_inertia = 3.19e-3;
+  model.sliding_friction = 0.221;
+  model.impact_friction = 0.164;
+  model.restitution = 0.27;
+  model.position_noise = 0.0012;
+  model.rotation_noise = 0.00628;
+  model.velocity_noise = 0.012;
+  model.spin_noise = 0.06;
+  model.friction_noise = 0.04;
+  model.provenance =
+      "prescene calibrate cube_tosses --seed 1: 150 evaluations of 24 samples on the 143 tosses at even places of the "
+      "list, from the values read off by hand";
+  return model;
+}
 
 CubeModel described_cube_model() {
   CubeModel model;
