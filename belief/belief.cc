@@ -266,6 +266,7 @@ std::uint64_t content_hash(const Belief& belief) {
   for (const ObjectBelief& object : belief.objects) {
     hasher.text(object.name).value(object.model).value(object.existence).value(object.state);
     hasher.value(object.evidence_per_pixel).value(object.visible_share).value(object.frames_unseen);
+    hasher.value(object.frames_refuted);
     hasher.value(object.last_seen_ns).value(object.island).value(object.particles.size());
     for (const Particle& particle : object.particles) hash_particle(hasher, particle);
   }

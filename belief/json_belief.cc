@@ -76,6 +76,8 @@ ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
   read("visible_share", object.visible_share);
   if (const auto frames = fields.require("frames_unseen"))
     object.frames_unseen = static_cast<int>(frames->integer(0, std::numeric_limits<int>::max()));
+  if (const auto frames = fields.require("frames_refuted"))
+    object.frames_refuted = static_cast<int>(frames->integer(0, std::numeric_limits<int>::max()));
   if (const auto seen = fields.require("last_seen_ns")) object.last_seen_ns = seen->integer(INT64_MIN, INT64_MAX);
   if (const auto island = fields.require("island"))
     object.island = static_cast<int>(island->integer(0, std::numeric_limits<int>::max()));
@@ -151,6 +153,7 @@ Json to_json(const ObjectBelief& object) {
           {"evidence_per_pixel", object.evidence_per_pixel},
           {"visible_share", object.visible_share},
           {"frames_unseen", object.frames_unseen},
+          {"frames_refuted", object.frames_refuted},
           {"last_seen_ns", object.last_seen_ns},
           {"island", object.island}};
 }

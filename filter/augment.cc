@@ -106,6 +106,48 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   return true;
 }
 
+int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
+                   const Vector3d& gravity_W, const AugmentOptions& options, const WeightOptions& weighting,
+                   const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
+                   ObjectBelief& object) {
+  std::stable_sort(object.particles.begin(), object.particles.end(), lighter);
+  const Particle last = object.particles.back();
+  if (last.mode == belief::MotionMode::kHeld) return 0;
+  const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
+  const double shift = std::min(options.hidden_furthest, options.hidden_shift + options.hidden_speed * unseen);
+  const double fall = std::min(options.hidden_furthest, 0.5 * gravity_W.norm() * unseen * unseen);
+  const Vector3d down = fall * gravity_W.normalized();
+  core::RandomStream draws = stream.for_purpose(core::Purpose::kProposal);
+  const Vector3d p_WQ = last.X_WO * target.centre();
+  std::vector<Pose> places_W;
+  std::vector<rendering::PoseHypothesis> hypotheses;
+  for (int i = 0; i < options.hidden_draws; ++i) {
+    Vector6d d;
+    for (int k = 0; k < 6; ++k) d[k] = draws.normal() * (k < 3 ? options.hidden_turn : shift);
+    if (fall > 0.0) d.tail<3>() += draws.uniform() * down;
+    const Pose X_WO = moved_about(last.X_WO, target.centre(), d);
+    if (frame.surfaces->crosses(p_WQ, X_WO * target.centre())) continue;
+    if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > 0.0) continue;
+    places_W.push_back(X_WO);
+    hypotheses.push_back(hypothesis(target, frame.X_CW * X_WO));
+  }
+  std::vector<rendering::PoseEvidence> evidence(hypotheses.size());
+  {
+    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+    tools.search->batch().evaluate(terms, hypotheses, *workspace, evidence);
+  }
+  const int wanted = static_cast<int>(std::lround(options.hidden_share * static_cast<double>(object.particles.size())));
+  int placed = 0;
+  for (std::size_t i = 0; i < places_W.size() && placed < wanted; ++i) {
+    if (evidence[i].measured == 0 || evidence[i].visible_share() >= weighting.hidden_share) continue;
+    Particle& particle = object.particles[static_cast<std::size_t>(placed++)];
+    particle = particles_about(places_W[i], last.physical, belief::MotionMode::kMoving, 1, spread, stream).front();
+    particle.log_weight = weighting.log_hidden - std::log(static_cast<double>(wanted));
+  }
+  if (placed > 0) belief::normalize(object.particles);
+  return placed;
+}
+
 int new_objects(const FilterFrame& frame, const belief::Observation& observation, const geometry::DepthImage& known,
                 const AugmentOptions& options, const InitialiseOptions& spread, const FilterTools& tools,
                 const core::RandomStream& stream, belief::Belief& belief) {

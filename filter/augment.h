@@ -41,6 +41,15 @@ struct AugmentOptions {
   double injected_share = 0.5;  ///< Of the particles are put at the find, the least probable ones.
   double explained = 0.015;     ///< m; measurements so near to a known surface are explained.
 
+  /// An object that the evidence speaks against may have gone where it cannot be seen: so many places about where it
+  /// was and below it are tried, those that are hidden and free get this share of the particles.
+  int hidden_draws = 160;
+  double hidden_share = 0.25;
+  double hidden_shift = 0.06;    ///< m, standard deviation of the places, ...
+  double hidden_speed = 0.3;     ///< m/s; ... growing so fast while it was not seen ...
+  double hidden_furthest = 0.3;  ///< m; ... to this.
+  double hidden_turn = 0.8;      ///< rad
+
   bool new_objects = false;      ///< Look for more objects of the scene's models than it names.
   int new_every = 15;            ///< frames
   double new_log_ratio = 250.0;  ///< nats; smaller finds are remnants more often than objects.
@@ -53,6 +62,14 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
              const rendering::PoseEvidence& current, const AugmentOptions& options, const WeightOptions& weighting,
              const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
              belief::ObjectBelief& object);
+
+/// Gives some particles of an object that is refuted where it was (`frames_refuted` > 0) to places near by that it can
+/// have reached unseen: hidden, outside of supports, not through them. They weigh what becoming hidden is worth; the
+/// next frame decides. Returns how many were put there. Held particles stay in the hand.
+int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
+                   const Vector3d& gravity_W, const AugmentOptions& options, const WeightOptions& weighting,
+                   const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
+                   belief::ObjectBelief& object);
 
 /// Whether an object is to be looked for in the frame of this number.
 bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, std::uint64_t frame);

@@ -51,6 +51,8 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   PRESCENE_RETURN_IF_ERROR(geometry::validate(rgbd.camera).at("the frame's camera"));
 
   const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kDisplay, *tools.meshes);
+  if (cache.scene != scene || !cache.surfaces)
+    cache.surfaces = std::make_shared<const SupportSurfaces>(*scene, *tools.meshes);
   if (cache.scene != scene || !(cache.camera == rgbd.camera) || !(cache.X_WC == observation.X_WC)) {
     PRESCENE_RETURN_IF_ERROR(render_depth(only(known, InstanceKind::kSupport), rgbd.camera, observation.X_WC,
                                           *tools.renderer, &cache.supports));
@@ -59,6 +61,7 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
     cache.X_WC = observation.X_WC;
   }
 
+  frame->surfaces = cache.surfaces;
   frame->stamp_ns = observation.stamp_ns;
   frame->X_WC = observation.X_WC;
   frame->X_CW = observation.X_WC.inverse();

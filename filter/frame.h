@@ -19,6 +19,7 @@
 #include "prescene/filter/pose_search.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/filter/segmentation.h"
+#include "prescene/filter/support_surfaces.h"
 #include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/renderer.h"
 
@@ -41,19 +42,21 @@ struct FilterFrame {
   core::TimeNs stamp_ns = 0;
   Pose X_WC;
   Pose X_CW;
-  std::vector<Pose> X_WG;                 ///< Of the robot's bodies, in the order of Scene::robot.
-  rendering::FrameTerms terms;            ///< With the supports as what is seen where no object is.
-  geometry::DepthImage supports;          ///< Their depth in terms.camera, 0 = none.
-  geometry::DepthImage robot;             ///< The same of the robot's bodies.
-  std::vector<std::string> color_models;  ///< Model names, in the order of terms.color_ratio.
+  std::vector<Pose> X_WG;                           ///< Of the robot's bodies, in the order of Scene::robot.
+  rendering::FrameTerms terms;                      ///< With the supports as what is seen where no object is.
+  geometry::DepthImage supports;                    ///< Their depth in terms.camera, 0 = none.
+  geometry::DepthImage robot;                       ///< The same of the robot's bodies.
+  std::shared_ptr<const SupportSurfaces> surfaces;  ///< Of the supports, where no object can be. Never null.
+  std::vector<std::string> color_models;            ///< Model names, in the order of terms.color_ratio.
 };
 
-/// The rendering of the supports alone, kept while camera and supports stay where they are.
+/// The supports alone, rendered and as surfaces, kept while camera and supports stay where they are.
 struct FrameCache {
   std::shared_ptr<const belief::Scene> scene;
   geometry::PinholeCamera camera;
   Pose X_WC;
   geometry::DepthImage supports;
+  std::shared_ptr<const SupportSurfaces> surfaces;
 };
 
 /// Colour models by the name of the object model; none for a model means depth only.

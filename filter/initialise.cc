@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "prescene/core/check.h"
+#include "prescene/filter/support_tracking.h"
 
 namespace prescene::filter {
 namespace {
@@ -167,7 +168,7 @@ std::optional<belief::Support> support_from_frame(const belief::Observation& obs
   for (const Vector3d& p : corners) extent.extend(Vector3d(R_WS.transpose() * p));
   const Vector3d size(extent.sizes().x(), extent.sizes().y(), options.support_thickness);
   belief::Support support;
-  support.name = "support_plane";
+  support.name = kFoundSupport;
   support.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{size}, Pose::identity()});
   support.X_WS.rotation = geometry::Quaterniond(R_WS).normalized();
   support.X_WS.translation = R_WS * extent.center() - 0.5 * options.support_thickness * z;

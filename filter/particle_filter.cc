@@ -80,6 +80,31 @@ std::vector<Pose> ParticleFilter::robot_poses(const belief::Scene& scene, const 
   return X_WG;
 }
 
+void ParticleFilter::follow_supports(const belief::Observation& observation, StepResult& result) const {
+  Belief& belief = result.belief;
+  if (belief.scene->supports.empty() && settings_.initialise.add_support) {
+    const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
+    if (auto support = support_from_frame(observation, belief.scene->gravity_W, settings_.initialise, stream)) {
+      auto scene = std::make_shared<belief::Scene>(*belief.scene);
+      scene->supports.push_back(*std::move(support));
+      belief.scene = std::move(scene);
+    }
+  }
+  const SampledDepth sampled =
+      sample_depth(*observation.frame.depth, observation.frame.camera, settings_.initialise.detection.segmentation);
+  for (std::size_t i = 0; i < belief.scene->supports.size(); ++i) {
+    auto measured = measure_support(sampled, observation.X_WC, belief.scene->supports[i], settings_.supports);
+    if (!measured) continue;
+    if (measured->support == kFoundSupport) {
+      const double gain = std::max(1.0 / static_cast<double>(belief.step), settings_.supports.least_gain);
+      auto scene = std::make_shared<belief::Scene>(*belief.scene);
+      correct_support(*measured, gain, scene->supports[i]);
+      belief.scene = std::move(scene);
+    }
+    result.supports.push_back(*std::move(measured));
+  }
+}
+
 void ParticleFilter::first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result) {
   const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0);
   const FindReport report = find_in_frame(frame, observation, settings_.initialise, tools_, stream, result.belief);
@@ -108,7 +133,8 @@ void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& 
     const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
     const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
     reports[i] = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
-                        stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles);
+                        stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
+                        {.supports = frame.surfaces.get(), .was_unseen = object.state == TrackState::kUnseen});
     if (reports[i].all_impossible) result.degraded |= kImpossibleWeights;
     for (const ParticleWeight& particle : reports[i].particles) result.counters.hidden_particles += particle.hidden;
     update_track(reports[i], frame.stamp_ns, settings_.track, object);
@@ -122,19 +148,28 @@ void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<Wei
   const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
-    if (!wants_recovery(settings_.augment, object, belief.step + i)) continue;
+    const bool look = wants_recovery(settings_.augment, object, belief.step + i);
+    if (!look && object.frames_refuted == 0) continue;
     const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
     const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
     const WeightReport& report = reports[i];
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
-    ++result.counters.recoveries_tried;
-    if (!recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise, tools_,
-                 stream.at(belief.step, static_cast<std::uint32_t>(i)), object))
+    const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
+    result.counters.recoveries_tried += look ? 1 : 0;
+    if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
+                          tools_, mine, object)) {
+      if (object.frames_refuted > 0) {
+        result.counters.hidden_proposed +=
+            propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment, settings_.weight,
+                           settings_.initialise, tools_, mine, object);
+      }
       continue;
+    }
     ++result.counters.recoveries;
     if (object.state != TrackState::kTracked) object.state = TrackState::kDoubtful;  // the next frame decides
     object.existence = std::max(object.existence, 0.5);
     object.frames_unseen = 0;
+    object.frames_refuted = 0;
     depths[i] = depth_of(target, frame.X_CW * heaviest(object).X_WO, frame.terms.camera, *tools_.renderer);
   }
 }
@@ -174,15 +209,9 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   const bool has_depth = observation.frame.depth && !observation.frame.depth->empty() &&
                          observation.frame.depth->width() == observation.frame.camera.width &&
-                         observation.frame.depth->height() == observation.frame.camera.height;
-  if (belief.scene->supports.empty() && settings_.initialise.add_support && has_depth && observation.X_WC.is_finite()) {
-    const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
-    if (auto support = support_from_frame(observation, belief.scene->gravity_W, settings_.initialise, stream)) {
-      auto scene = std::make_shared<belief::Scene>(*belief.scene);
-      scene->supports.push_back(*std::move(support));
-      belief.scene = std::move(scene);
-    }
-  }
+                         observation.frame.depth->height() == observation.frame.camera.height &&
+                         geometry::validate(observation.frame.camera).ok();
+  if (has_depth && observation.X_WC.is_finite()) follow_supports(observation, result);
 
   const std::vector<Pose> X_WG = robot_poses(*belief.scene, observation, &result.degraded);
   if (!first)

@@ -25,6 +25,7 @@
 #include "prescene/filter/initialise.h"
 #include "prescene/filter/predict.h"
 #include "prescene/filter/resample.h"
+#include "prescene/filter/support_tracking.h"
 #include "prescene/filter/track_state.h"
 #include "prescene/filter/weight.h"
 
@@ -38,6 +39,7 @@ struct FilterSettings {
   WeightOptions weight;
   ResampleOptions resample;
   TrackStateOptions track;
+  SupportTrackingOptions supports;
   ColorModels colors;         ///< By model name; a model without one is tracked by depth alone.
   bool recover = true;        ///< Look for objects that are not tracked.
   double max_gap = 1.0;       ///< s; a longer pause between frames is predicted as one of this length.
@@ -65,6 +67,7 @@ struct StepCounters {
   int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
   int hidden_particles = 0;  ///< That stayed hidden.
+  int hidden_proposed = 0;   ///< Put at places where a refuted object may hide.
   int looked_for = 0;        ///< At the start.
   int found = 0;
 };
@@ -78,6 +81,7 @@ struct StepResult {
   core::Status frame_status;  ///< Why the frame was rejected; ok otherwise.
   StepCounters counters;
   HashTrace trace;
+  std::vector<SupportMeasurement> supports;  ///< Those flat ones that the frame shows, against the belief before it.
 };
 
 class ParticleFilter {
@@ -99,6 +103,7 @@ class ParticleFilter {
   struct Work;
   std::vector<Pose> robot_poses(const belief::Scene& scene, const belief::Observation& observation,
                                 std::uint32_t* degraded) const;
+  void follow_supports(const belief::Observation& observation, StepResult& result) const;
   void first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result);
   void weigh_all(const FilterFrame& frame, double dt, StepResult& result, std::vector<geometry::DepthImage>& depths,
                  std::vector<WeightReport>& reports);

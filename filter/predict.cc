@@ -78,7 +78,15 @@ std::optional<double> release_time(const belief::Control& control, const std::st
   return std::nullopt;
 }
 
-/// Puts a grasp of the control into the scene (a copy: the context of earlier beliefs stays as it was).
+/// The scene with the object held by this hand, or by none (a copy: the context of earlier beliefs stays as it was).
+void set_holder(std::size_t object, const std::optional<std::string>& hand, belief::Belief& belief) {
+  if (belief.scene->objects[object].held_by == hand) return;
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  scene->objects[object].held_by = hand;
+  belief.scene = std::move(scene);
+}
+
+/// Puts the grasps of the control into the scene.
 void apply_grasps(const belief::Control& control, belief::Belief& belief) {
   for (const belief::Action& action : control.actions) {
     const auto* grasp = std::get_if<belief::Grasp>(&action.what);
@@ -86,11 +94,7 @@ void apply_grasps(const belief::Control& control, belief::Belief& belief) {
     const auto object = belief::find_object(*belief.scene, grasp->object);
     if (!object || !belief::find_robot_body(*belief.scene, grasp->hand)) continue;
     const auto index = static_cast<std::size_t>(*object);
-    if (belief.scene->objects[index].held_by != grasp->hand) {
-      auto scene = std::make_shared<belief::Scene>(*belief.scene);
-      scene->objects[index].held_by = grasp->hand;
-      belief.scene = std::move(scene);
-    }
+    set_holder(index, grasp->hand, belief);
     for (Particle& particle : belief.objects[index].particles) {
       particle.mode = MotionMode::kHeld;
       clear_twist(particle);
@@ -174,10 +178,17 @@ Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
 }
 
 /// The modes of one object's particles for this step.
-void change_modes(const PredictOptions& options, bool tracked, core::RandomStream& stream, ObjectBelief& object) {
+void change_modes(const PredictOptions& options, bool tracked, bool in_hand, core::RandomStream& stream,
+                  ObjectBelief& object) {
   for (Particle& particle : object.particles) {
     const double draw = stream.uniform();
-    if (particle.mode != MotionMode::kMoving) {
+    if (in_hand && particle.mode != MotionMode::kHeld) {
+      // It may have slipped, but a hand that has not let go carries it on.
+      if (draw < options.regrasp_probability) {
+        particle.mode = MotionMode::kHeld;
+        clear_twist(particle);
+      }
+    } else if (particle.mode != MotionMode::kMoving) {
       // What is hidden gives no reason to think that it moves.
       if (tracked && draw < options.wake_probability) wake(options, particle);
     } else if (draw < options.settle_probability && particle.V_WO.linear.norm() < options.settle_speed &&
@@ -235,13 +246,13 @@ void predict(belief::Belief& belief, const belief::Control& control, std::span<c
     const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
     const std::optional<double> released = release_time(control, object.name, dt);
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
-    change_modes(options, tracked, draws, object);
+    change_modes(options, tracked, hand.has_value(), draws, object);
     const Vector3d centre = centre_of(*belief.scene, object);
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
       double left = dt;
       const double physics_draw = draws.uniform();
-      double physics_share = options.physics_share;
+      double physics_share = tracked ? options.physics_share : options.unseen_physics_share;
       if (particle.mode == MotionMode::kHeld && hand) {
         const Pose& X_from = belief.robot[static_cast<std::size_t>(*hand)];
         const Pose& X_to = X_WG[static_cast<std::size_t>(*hand)];
@@ -268,6 +279,7 @@ void predict(belief::Belief& belief, const belief::Control& control, std::span<c
       }
       limit_spread(options, particle.covariance);
     }
+    if (released) set_holder(i, std::nullopt, belief);
   }
   // Runs of one call share a duration.
   std::stable_sort(falling.begin(), falling.end(),

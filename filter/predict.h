@@ -44,12 +44,14 @@ struct PredictOptions {
   double max_speed_deviation = 1.0;    ///< m/s
   double max_rate_deviation = 8.0;     ///< rad/s
   double wake_probability = 0.12;      ///< Per frame and particle: resting or held becomes moving.
-  double settle_probability = 0.15;    ///< Per frame and particle: moving slower than the next two becomes resting.
-  double settle_speed = 0.04;          ///< m/s
-  double settle_rate = 0.5;            ///< rad/s
-  double wake_speed = 0.15;            ///< m/s, standard deviation of the velocity of what starts to move.
-  double wake_rate = 1.0;              ///< rad/s
-  double physics_share = 0.5;          ///< Of the moving particles, simulated in place of constant velocity.
+  double regrasp_probability = 0.5;  ///< Per frame and particle: what the scene says is held moves with the hand again.
+  double settle_probability = 0.15;  ///< Per frame and particle: moving slower than the next two becomes resting.
+  double settle_speed = 0.04;        ///< m/s
+  double settle_rate = 0.5;          ///< rad/s
+  double wake_speed = 0.15;          ///< m/s, standard deviation of the velocity of what starts to move.
+  double wake_rate = 1.0;            ///< rad/s
+  double physics_share = 0.5;        ///< Of the moving particles, simulated in place of constant velocity.
+  double unseen_physics_share = 1.0;   ///< The same of an object that is not tracked: nothing else says where it goes.
   double physics_after_release = 1.0;  ///< The same in the step in which an object was released.
 };
 

@@ -36,23 +36,6 @@ std::optional<geometry::Plane> plane_through(const Vector3d& a, const Vector3d& 
   return plane;
 }
 
-geometry::Plane fitted(std::span<const Vector3d> points) {
-  Vector3d mean = Vector3d::Zero();
-  for (const Vector3d& p : points) mean += p;
-  mean /= static_cast<double>(points.size());
-  geometry::Matrix3d scatter = geometry::Matrix3d::Zero();
-  for (const Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<geometry::Matrix3d> solver(scatter);
-  geometry::Plane plane;
-  plane.normal = solver.eigenvectors().col(0);
-  plane.offset = -plane.normal.dot(mean);
-  if (plane.offset < 0.0) {
-    plane.normal = -plane.normal;
-    plane.offset = -plane.offset;
-  }
-  return plane;
-}
-
 /// Labels of 4-connected pixels for which `inside` holds and `joined` holds between neighbours; pixels of each
 /// component in ascending order, components in the order of their first pixel.
 template <class Inside, class Joined>
@@ -86,20 +69,22 @@ std::vector<std::vector<int>> components(int width, int height, const Inside& in
   return result;
 }
 
-/// Pixels of the plane whose 3 x 3 neighbourhood is on the plane too: thin bridges to other things are cut.
+/// Pixels of the plane of whose 3 x 3 neighbourhood two thirds are on the plane and nothing is off it: thin bridges to
+/// other things are cut, single holes are not.
 std::vector<std::uint8_t> eroded_inliers(const SampledDepth& sampled, const geometry::Plane& plane, double inlier) {
   const int width = sampled.camera.width, height = sampled.camera.height;
-  const auto on_plane = [&](int x, int y) {
-    const Vector3d& p = sampled.points_C[static_cast<std::size_t>(y * width + x)];
-    return measured(p) && std::abs(plane.signed_distance(p)) < inlier;
+  const auto point = [&](int x, int y) -> const Vector3d& {
+    return sampled.points_C[static_cast<std::size_t>(y * width + x)];
   };
+  const auto on_plane = [&](const Vector3d& p) { return std::abs(plane.signed_distance(p)) < inlier; };
   std::vector<std::uint8_t> eroded(static_cast<std::size_t>(width * height), 0);
   for (int y = 1; y + 1 < height; ++y)
     for (int x = 1; x + 1 < width; ++x) {
-      bool all = true;
-      for (int dy = -1; dy <= 1 && all; ++dy)
-        for (int dx = -1; dx <= 1 && all; ++dx) all = on_plane(x + dx, y + dy);
-      eroded[static_cast<std::size_t>(y * width + x)] = all;
+      int on = 0, off = 0;
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+          if (measured(point(x + dx, y + dy))) (on_plane(point(x + dx, y + dy)) ? on : off)++;
+      eroded[static_cast<std::size_t>(y * width + x)] = measured(point(x, y)) && on >= 6 && off == 0;
     }
   return eroded;
 }
@@ -127,6 +112,43 @@ std::vector<Vector2d> hull_of(std::vector<Vector2d> points) {
 
 }  // namespace
 
+geometry::Plane fit_plane(std::span<const Vector3d> points) {
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& p : points) mean += p;
+  mean /= static_cast<double>(points.size());
+  geometry::Matrix3d scatter = geometry::Matrix3d::Zero();
+  for (const Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<geometry::Matrix3d> solver(scatter);
+  geometry::Plane plane;
+  plane.normal = solver.eigenvectors().col(0);
+  plane.offset = -plane.normal.dot(mean);
+  if (plane.offset < 0.0) {
+    plane.normal = -plane.normal;
+    plane.offset = -plane.offset;
+  }
+  return plane;
+}
+
+namespace {
+
+/// The measured pixel nearest to (x, y), at most `reach` away in either direction; nearest first, ties by row.
+std::optional<std::array<int, 2>> measured_near(const geometry::DepthImage& depth, int x, int y, int reach,
+                                                const SegmentationOptions& options) {
+  std::optional<std::array<int, 2>> found;
+  int nearest = 2 * reach * reach + 1;
+  for (int v = std::max(0, y - reach); v <= std::min(depth.height() - 1, y + reach); ++v)
+    for (int u = std::max(0, x - reach); u <= std::min(depth.width() - 1, x + reach); ++u) {
+      const float z = depth(u, v);
+      const int distance = (u - x) * (u - x) + (v - y) * (v - y);
+      if (!(z >= options.min_depth && z <= options.max_depth) || distance >= nearest) continue;
+      nearest = distance;
+      found = {u, v};
+    }
+  return found;
+}
+
+}  // namespace
+
 SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                           const SegmentationOptions& options) {
   PRESCENE_CHECK(depth.width() == camera.width && depth.height() == camera.height);
@@ -138,10 +160,13 @@ SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::Pin
   sampled.points_C.assign(sampled.depth.size(), Vector3d::Zero());
   for (int y = 0; y < sampled.camera.height; ++y)
     for (int x = 0; x < sampled.camera.width; ++x) {
-      const float z = depth(offset + step * x, offset + step * y);
-      if (!(z >= options.min_depth && z <= options.max_depth)) continue;
+      // Depth that was registered to a colour camera is full of single holes: a neighbour stands in, at its own place.
+      const auto pixel = measured_near(depth, offset + step * x, offset + step * y, step / 2, options);
+      if (!pixel) continue;
+      const float z = depth((*pixel)[0], (*pixel)[1]);
       sampled.depth(x, y) = z;
-      sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)] = sampled.camera.unproject(x, y, z);
+      sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)] =
+          camera.unproject((*pixel)[0], (*pixel)[1], z);
     }
   return sampled;
 }
@@ -205,7 +230,7 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
     for (const Vector3d& p : points)
       if (std::abs(best.signed_distance(p)) < options.plane_inlier) inliers.push_back(p);
     if (inliers.size() < 30) return std::nullopt;
-    best = fitted(inliers);
+    best = fit_plane(inliers);
   }
   SupportPlane support;
   support.region.plane_C = best;

@@ -39,10 +39,13 @@ struct SegmentationOptions {
 struct SampledDepth {
   geometry::PinholeCamera camera;
   geometry::DepthImage depth;      ///< 0 = missing or out of range.
-  std::vector<Vector3d> points_C;  ///< One a pixel, row-major; zero where missing.
+  std::vector<Vector3d> points_C;  ///< One a pixel, row-major, of the measurement nearest to it; zero where missing.
 };
 SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                           const SegmentationOptions& options);
+
+/// The plane of least squares through points in C (at least three), its normal turned towards the camera.
+geometry::Plane fit_plane(std::span<const Vector3d> points_C);
 
 /// The plane that the most measured points lie on (RANSAC [Fischler & Bolles 1981], then least squares), its normal
 /// turned towards the camera, with the convex hull of the largest connected patch of its points. With `up_C` (unit),

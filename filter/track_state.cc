@@ -21,6 +21,7 @@ void change_existence(double nats, const TrackStateOptions& options, ObjectBelie
 
 void mark_unseen(core::TimeNs stamp_ns, const TrackStateOptions& options, ObjectBelief& object) {
   ++object.frames_unseen;
+  object.frames_refuted = 0;
   object.evidence_per_pixel = 0.0;
   object.visible_share = 0.0;
   const double unseen = 1e-9 * static_cast<double>(stamp_ns - object.last_seen_ns);
@@ -38,18 +39,17 @@ void update_track(const WeightReport& report, core::TimeNs stamp_ns, const Track
   object.evidence_per_pixel = report.evidence_per_pixel;
   object.visible_share = report.visible_share;
   change_existence(report.evidence_per_pixel - options.lost_evidence, options, object);
-  if (report.evidence_per_pixel >= options.tracked_evidence) {
+  object.frames_refuted = report.evidence_per_pixel >= options.lost_evidence ? 0 : object.frames_refuted + 1;
+  if (report.evidence_per_pixel >= options.tracked_evidence && report.visible_pixels >= options.tracked_pixels) {
     object.state = TrackState::kTracked;
     object.frames_unseen = 0;
     object.last_seen_ns = stamp_ns;
     return;
   }
   ++object.frames_unseen;
-  if (report.evidence_per_pixel >= options.lost_evidence) {
-    object.state = TrackState::kDoubtful;
-  } else if (object.frames_unseen >= options.lost_after_frames) {
+  if (object.frames_refuted >= options.lost_after_frames) {
     object.state = TrackState::kLost;
-  } else if (object.state != TrackState::kLost) {
+  } else if (object.frames_refuted == 0 || object.state != TrackState::kLost) {
     object.state = TrackState::kDoubtful;
   }
 }

@@ -9,11 +9,12 @@
 namespace prescene::filter {
 
 struct TrackStateOptions {
-  double tracked_evidence = 3.0;  ///< Nats per visible pixel from which a pose counts as tracked.
-  double lost_evidence = 1.0;     ///< Below this for `lost_after_frames` it is lost; between, it is doubtful.
-  int lost_after_frames = 4;
+  double tracked_evidence = 3.0;  ///< Nats per visible pixel from which a pose counts as tracked ...
+  int tracked_pixels = 5;      ///< ... if so many pixels show it, at the likelihood's resolution; else it is doubtful.
+  double lost_evidence = 1.0;  ///< Below this it is refuted; between, it is doubtful.
+  int lost_after_frames = 4;   ///< Refuted so often without a better frame or hiding in between, it is lost.
   double min_visible_share = 0.08;   ///< Of the covered pixels: with less, nothing can be said.
-  double unseen_lost_after = 10.0;   ///< s
+  double unseen_lost_after = 60.0;   ///< s
   double existence_rate = 0.5;       ///< Largest change of the log odds of existence by one frame.
   double min_existence_odds = -5.0;  ///< Log odds are kept between these.
   double max_existence_odds = 7.0;

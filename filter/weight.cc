@@ -58,13 +58,15 @@ Vector6d random_start(const Gaussian& predicted, const WeightOptions& options, c
 class ParticleUpdate {
  public:
   ParticleUpdate(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CW, double pixels,
-                 const WeightOptions& options, const FilterTools& tools, rendering::LikelihoodWorkspace& workspace)
+                 const WeightOptions& options, const FilterTools& tools, const WeightContext& context,
+                 rendering::LikelihoodWorkspace& workspace)
       : terms_(terms),
         target_(target),
         X_CW_(X_CW),
         pixels_(pixels),
         options_(options),
         tools_(tools),
+        context_(context),
         workspace_(workspace),
         information_share_(rendering::tempering(terms.tempering.hessian_pixels, pixels)),
         weight_share_(rendering::tempering(terms.tempering.weight_pixels, pixels)) {}
@@ -113,6 +115,14 @@ class ParticleUpdate {
                            options_.outline_step);
   }
 
+  /// What it costs to be where a support is.
+  double log_overlap(const Pose& X_WO) const {
+    if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
+    const double overlap = context_.supports->overlap(*target_.mesh, X_WO, options_.support_tolerance);
+    return options_.log_in_support * std::min(1.0, overlap / options_.support_overlap);
+  }
+
+  bool was_unseen() const { return context_.was_unseen; }
   double weight_share() const { return weight_share_; }
 
  private:
@@ -122,6 +132,7 @@ class ParticleUpdate {
   double pixels_;
   const WeightOptions& options_;
   const FilterTools& tools_;
+  const WeightContext& context_;
   rendering::LikelihoodWorkspace& workspace_;
   double information_share_;
   double weight_share_;
@@ -169,11 +180,16 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
   ParticleWeight stay;
   stay.evidence = frame.evidence(particle.X_WO);
   const bool hidden = shown_share(stay.evidence) < options.hidden_share;
+  // What was hidden stays so more often than not; without this a pose that explains nothing would beat one that nothing
+  // speaks against.
+  const double log_becomes_hidden = frame.was_unseen() ? 0.0 : options.log_hidden;
+  const double log_appears = frame.was_unseen() && hidden ? options.log_hidden : 0.0;
   // Pixels with something nearer are what a hidden pose predicts: they neither support nor refute it.
   double log_stay = -std::numeric_limits<double>::infinity();
   if (hidden) {
     stay.hidden = true;
-    log_stay = options.log_hidden + frame.weight_share() * std::min(0.0, stay.evidence.visible_log_ratio);
+    log_stay = log_becomes_hidden + frame.weight_share() * std::min(0.0, stay.evidence.visible_log_ratio) +
+               frame.log_overlap(particle.X_WO);
   }
 
   const Mode mode =
@@ -182,11 +198,14 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
   moved.evidence = frame.evidence(mode.X_WO);
   moved.outline = frame.outline(mode.X_WO);
   const double log_moved = within_reach(mode, predicted, dt, options)
-                               ? frame.weight_share() * worth(moved.evidence.log_ratio, moved.outline, options) -
+                               ? log_appears +
+                                     frame.weight_share() * worth(moved.evidence.log_ratio, moved.outline, options) -
                                      0.5 * mode.shift.dot(predicted.information * mode.shift) +
                                      0.5 * (mode.log_determinant - predicted.log_determinant)
                                : -std::numeric_limits<double>::infinity();
-  if (hidden && !(log_moved > log_stay)) {
+  // A mode that is hidden as well explains nothing by having moved.
+  const bool mode_hidden = shown_share(moved.evidence) < options.hidden_share;
+  if (hidden && (mode_hidden || !(log_moved > log_stay))) {
     particle.log_weight += log_stay;
     return stay;
   }
@@ -243,7 +262,7 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
 
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                    std::vector<Particle>& particles) {
+                    std::vector<Particle>& particles, const WeightContext& context) {
   WeightReport report;
   report.particles.resize(particles.size());
   const Pose X_CW = X_WC.inverse();
@@ -260,7 +279,7 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
   }
   tools.search->threads().for_each_index(particles.size(), [&](std::size_t i) {
     const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    const ParticleUpdate frame(terms, target, X_CW, pixels, options, tools, *workspace);
+    const ParticleUpdate frame(terms, target, X_CW, pixels, options, tools, context, *workspace);
     core::RandomStream draws = stream;
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kProposal, i);
     report.particles[i] = update(frame, dt, static_cast<std::ptrdiff_t>(i) == best, options, mine, particles[i]);
@@ -272,6 +291,7 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
     if (report.particles[i].hidden) report.hidden_weight += std::exp(particles[i].log_weight);
   const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
   report.evidence_per_pixel = supported_evidence(heaviest.evidence, heaviest.outline, options);
+  report.visible_pixels = heaviest.evidence.visible;
   report.visible_share =
       heaviest.evidence.in_view > 0 ? static_cast<double>(heaviest.evidence.visible) / heaviest.evidence.in_view : 0.0;
   return report;

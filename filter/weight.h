@@ -11,6 +11,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/filter/frame.h"
+#include "prescene/filter/support_surfaces.h"
 
 namespace prescene::filter {
 
@@ -25,7 +26,12 @@ struct WeightOptions {
   /// A pose is hidden when less than this share of the pixels that it should show is not behind something else; then
   /// staying hidden competes with moving to where something is seen.
   double hidden_share = 0.35;
-  double log_hidden = -4.0;     ///< log prior odds of staying hidden.
+  double log_hidden = -4.0;  ///< log prior odds of becoming hidden, and of coming into sight again.
+  /// Hidden poses that overlap a support by this share (beyond the tolerance, m: contacts are not known better) or more
+  /// cost so many nats, others in proportion.
+  double support_overlap = 0.25;
+  double support_tolerance = 0.015;
+  double log_in_support = -12.0;
   double max_jump_speed = 2.0;  ///< m/s; a mode further from the prediction than this and its spread allow is refused.
   double outline_step =
       0.02;                   ///< m; where the measured surface goes on past the outline within this, there is no edge.
@@ -40,6 +46,12 @@ struct ParticleWeight {
   bool hidden = false;
 };
 
+/// What is known of the object besides the frame.
+struct WeightContext {
+  const SupportSurfaces* supports = nullptr;  ///< Where hidden poses cannot be; null = anywhere.
+  bool was_unseen = false;                    ///< In the frame before.
+};
+
 struct WeightReport {
   std::vector<ParticleWeight> particles;
   int heaviest = 0;
@@ -48,6 +60,7 @@ struct WeightReport {
   /// Nats per visible pixel of the heaviest particle, worth less where the outline has no edge.
   double evidence_per_pixel = 0.0;
   double visible_share = 0.0;  ///< Of the pixels that it covers in view.
+  int visible_pixels = 0;
 };
 
 /// `terms`: the frame with what else is known put in (terms_for_object); `dt` since the last frame, s. Particles'
@@ -55,7 +68,7 @@ struct WeightReport {
 /// with Laplace's approximation about each particle's mode.
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                    std::vector<belief::Particle>& particles);
+                    std::vector<belief::Particle>& particles, const WeightContext& context = {});
 
 /// Share of the edge of what matches an object (its rendered depth in terms.camera) at which the measured surface ends:
 /// just outside, it is further away, or known to be something else. A surface that goes on, past the outline or in

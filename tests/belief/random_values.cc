@@ -193,6 +193,7 @@ ObjectBelief random_object_belief(RandomStream& stream, const std::string& name)
   object.evidence_per_pixel = stream.uniform(-1.0, 1.0);
   object.visible_share = stream.uniform();
   object.frames_unseen = random_below(stream, 100);
+  object.frames_refuted = random_below(stream, 100);
   object.last_seen_ns = static_cast<core::TimeNs>(stream.next_u64() >> 2);
   object.island = random_below(stream, 5);
   const Pose middle = random_pose(stream);

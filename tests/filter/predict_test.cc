@@ -118,6 +118,27 @@ TEST_F(Predict, GraspedFollowsTheHandAndTheOldSceneKeepsItsWord) {
   EXPECT_NEAR(belief.objects[0].particles[0].X_WO.translation.z(), 0.4, 1e-9);
 }
 
+TEST_F(Predict, ReleasedIsHeldByNobody) {
+  belief::Belief belief = hand_and_object(MotionMode::kHeld, true);
+  const auto scene_before = belief.scene;
+  belief::Control control;
+  control.actions.push_back({0.04, belief::Release{"box"}});
+  run(belief, Pose::from_translation({0.0, 0.0, 0.4}), 0.1, without_mode_changes(), control);
+  EXPECT_EQ(scene_before->objects[0].held_by, "hand");
+  EXPECT_FALSE(belief.scene->objects[0].held_by.has_value());
+}
+
+TEST_F(Predict, AHandThatHasNotLetGoCarriesOnWhatSeemedToSlip) {
+  PredictOptions options = without_mode_changes();
+  options.regrasp_probability = 1.0;
+  for (const bool held : {true, false}) {
+    belief::Belief belief = hand_and_object(MotionMode::kMoving, held);
+    run(belief, Pose::from_translation({0.0, 0.0, 0.4}), 0.1, options);
+    for (const Particle& particle : belief.objects[0].particles)
+      EXPECT_EQ(particle.mode, held ? MotionMode::kHeld : MotionMode::kMoving);
+  }
+}
+
 TEST_F(Predict, FallsByTheSimulatorWhereThereIsOne) {
   // Physics that moves everything down by a tenth of the duration and knows where the hand goes.
   int scenes = 0;

@@ -13,6 +13,7 @@ WeightReport seen(double nats) {
   WeightReport report;
   report.evidence_per_pixel = nats;
   report.visible_share = 0.8;
+  report.visible_pixels = 40;
   return report;
 }
 
@@ -43,6 +44,31 @@ TEST(TrackState, IsLostOnlyAfterSomeFramesOfContradiction) {
   EXPECT_EQ(object.state, TrackState::kLost);
 }
 
+TEST(TrackState, HidingEndsTheContradiction) {
+  belief::ObjectBelief object;
+  const filter::TrackStateOptions options;
+  WeightReport hidden;
+  hidden.hidden_weight = 0.9;
+  for (int i = 1; i < 40; ++i) {
+    filter::update_track(i % options.lost_after_frames == 0 ? hidden : seen(-1.0), i * kFrame, options, object);
+    EXPECT_NE(object.state, TrackState::kLost) << i;
+  }
+}
+
+TEST(TrackState, AFewPixelsAreNotEnoughToBeSure) {
+  belief::ObjectBelief object;
+  const filter::TrackStateOptions options;
+  WeightReport corner = seen(9.0);
+  corner.visible_pixels = options.tracked_pixels - 1;
+  filter::update_track(corner, kFrame, options, object);
+  EXPECT_EQ(object.state, TrackState::kDoubtful);
+  for (int i = 2; i < 20; ++i) filter::update_track(corner, i * kFrame, options, object);
+  EXPECT_EQ(object.state, TrackState::kDoubtful);
+  corner.visible_pixels = options.tracked_pixels;
+  filter::update_track(corner, 20 * kFrame, options, object);
+  EXPECT_EQ(object.state, TrackState::kTracked);
+}
+
 TEST(TrackState, HiddenIsUnseenUntilItIsTooLong) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
@@ -50,12 +76,12 @@ TEST(TrackState, HiddenIsUnseenUntilItIsTooLong) {
   const double existence = object.existence;
   WeightReport hidden;
   hidden.hidden_weight = 0.9;
-  filter::update_track(hidden, static_cast<core::TimeNs>(9e9), options, object);
+  filter::update_track(hidden, static_cast<core::TimeNs>(59e9), options, object);
   EXPECT_EQ(object.state, TrackState::kUnseen);
   EXPECT_EQ(object.existence, existence);  // hidden says nothing
-  filter::update_track(hidden, static_cast<core::TimeNs>(11e9), options, object);
+  filter::update_track(hidden, static_cast<core::TimeNs>(61e9), options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
-  filter::update_track(hidden, static_cast<core::TimeNs>(11.1e9), options, object);
+  filter::update_track(hidden, static_cast<core::TimeNs>(61.1e9), options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
 }
 

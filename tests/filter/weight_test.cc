@@ -103,6 +103,31 @@ TEST_F(WeightOfABox, StaysHiddenBehindAPlateInPlaceOfMovingOntoIt) {
   }
 }
 
+TEST_F(WeightOfABox, AHiddenPoseInsideASupportWeighsLessThanOneBesideIt) {
+  see({plate_in_front()});
+  Pose sunk = X_WO_;
+  sunk.translation.z() -= 0.08;  // in the table, and behind the plate as well
+  std::vector<Particle> particles = particles_at(X_WO_, 1);
+  particles.push_back(particles_at(sunk, 1).front());
+  belief::normalize(particles);
+  const WeightReport report =
+      weight(frame_.terms, target_, frame_.X_WC, 1.0 / 30.0, {}, backends_.tools, {5, core::Purpose::kProposal},
+             particles, {.supports = frame_.surfaces.get(), .was_unseen = true});
+  EXPECT_GT(report.hidden_weight, 0.99);
+  EXPECT_GT(std::exp(particles[0].log_weight), 0.99);
+}
+
+TEST_F(WeightOfABox, WhatWasHiddenStaysHiddenWhereNothingIsExplained) {
+  see({plate_in_front()});
+  std::vector<Particle> particles = particles_at(X_WO_);
+  // Knowing well where it is makes moving cheap.
+  for (Particle& particle : particles) particle.covariance.topLeftCorner<6, 6>() *= 1e-4;
+  const WeightReport report =
+      weight(frame_.terms, target_, frame_.X_WC, 1.0 / 30.0, {}, backends_.tools, {5, core::Purpose::kProposal},
+             particles, {.supports = nullptr, .was_unseen = true});
+  EXPECT_GT(report.hidden_weight, 0.99);
+}
+
 TEST_F(WeightOfABox, AMatchOnAPlateHasNoOutline) {
   see({plate_in_front()});
   // The box put with a face into the plate's surface, well inside the plate.

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/support_surfaces.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace prescene::filter {
+namespace {
+
+using geometry::Vector3d;
+
+constexpr std::size_t kMostSegments = 64;
+
+/// Where the segment p + t (q - p), t in [0, 1], meets the triangle [Moeller & Trumbore 1997].
+bool meets(const Vector3d& a, const Vector3d& ab, const Vector3d& ac, const Vector3d& p, const Vector3d& pq) {
+  const Vector3d h = pq.cross(ac);
+  const double determinant = ab.dot(h);
+  if (std::abs(determinant) < 1e-15) return false;
+  const Vector3d ap = p - a;
+  const double u = ap.dot(h) / determinant;
+  if (u < 0.0 || u > 1.0) return false;
+  const Vector3d k = ap.cross(ab);
+  const double v = pq.dot(k) / determinant;
+  if (v < 0.0 || u + v > 1.0) return false;
+  const double t = ac.dot(k) / determinant;
+  return t >= 0.0 && t <= 1.0;
+}
+
+bool boxes_meet(const geometry::Box& box, const Vector3d& p, const Vector3d& q) {
+  return (p.cwiseMin(q).array() <= box.max().array()).all() && (p.cwiseMax(q).array() >= box.min().array()).all();
+}
+
+}  // namespace
+
+SupportSurfaces::SupportSurfaces(const belief::Scene& scene, MeshCache& meshes) {
+  for (const belief::Support& support : scene.supports) {
+    const rendering::MeshHandle mesh = meshes.get(support.visual, support.collision, MeshDetail::kLikelihood);
+    Part part;
+    for (const auto& corners : mesh->triangles) {
+      Vector3d p[3];
+      for (int i = 0; i < 3; ++i) {
+        p[i] = support.X_WS * mesh->vertices[corners[static_cast<std::size_t>(i)]].cast<double>();
+        part.box.extend(p[i]);
+      }
+      part.triangles.push_back({p[0], p[1] - p[0], p[2] - p[0]});
+    }
+    if (!part.triangles.empty()) parts_.push_back(std::move(part));
+  }
+}
+
+int SupportSurfaces::crossings(const Part& part, const Vector3d& p, const Vector3d& q) const {
+  if (!boxes_meet(part.box, p, q)) return 0;
+  const Vector3d pq = q - p;
+  return static_cast<int>(std::count_if(part.triangles.begin(), part.triangles.end(),
+                                        [&](const Triangle& t) { return meets(t.a, t.ab, t.ac, p, pq); }));
+}
+
+bool SupportSurfaces::crosses(const Vector3d& p_W, const Vector3d& q_W) const {
+  return std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) { return crossings(part, p_W, q_W) > 0; });
+}
+
+bool SupportSurfaces::inside(const Vector3d& p_W) const {
+  return std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) {
+    if (!part.box.contains(p_W)) return false;
+    // A direction that runs along no edge of things built at right angles.
+    const Vector3d away = p_W + 2.0 * part.box.diagonal().norm() * Vector3d(0.2673, 0.5345, 0.8018);
+    return crossings(part, p_W, away) % 2 == 1;
+  });
+}
+
+double SupportSurfaces::overlap(const rendering::RenderMesh& mesh, const geometry::Pose& X_WO, double tolerance) const {
+  if (parts_.empty() || mesh.vertices.empty()) return 0.0;
+  geometry::Box box;
+  for (const auto& vertex : mesh.vertices) box.extend(vertex.cast<double>());
+  const Vector3d middle = box.center();
+  const Vector3d p_WQ = X_WO * middle;
+  if (inside(p_WQ)) return 1.0;
+  const Vector3d half = 0.5 * box.sizes();
+  const Vector3d shrink = (1.0 - tolerance / half.array().max(tolerance + 1e-9)).matrix();
+  const std::size_t stride = 1 + (mesh.vertices.size() - 1) / kMostSegments;
+  int cut = 0, all = 0;
+  for (std::size_t i = 0; i < mesh.vertices.size(); i += stride) {
+    const Vector3d arm = (mesh.vertices[i].cast<double>() - middle).cwiseProduct(shrink);
+    ++all;
+    cut += crosses(p_WQ, X_WO * (middle + arm)) ? 1 : 0;
+  }
+  return static_cast<double>(cut) / all;
+}
+
+}  // namespace prescene::filter

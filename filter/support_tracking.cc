@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/support_tracking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace prescene::filter {
+namespace {
+
+/// The upper face of a box that is a support: its middle, axes and half sizes.
+struct Face {
+  Pose X_WF;  ///< z along the normal, origin in the face's middle.
+  double half_x, half_y;
+};
+
+std::optional<Face> upper_face(const belief::Support& support) {
+  if (support.collision.size() != 1) return std::nullopt;
+  const auto* primitive = std::get_if<belief::PrimitiveShape>(&support.collision.front());
+  if (primitive == nullptr) return std::nullopt;
+  const auto* box = std::get_if<geometry::BoxShape>(&primitive->primitive);
+  if (box == nullptr) return std::nullopt;
+  return Face{support.X_WS * primitive->X_OS * Pose::from_translation({0.0, 0.0, 0.5 * box->size.z()}),
+              0.5 * box->size.x(), 0.5 * box->size.y()};
+}
+
+/// The sampled points (in C) that the face may have returned, and how many pixels should show it.
+struct Candidates {
+  std::vector<Vector3d> points_C;
+  int expected = 0;  ///< Pixels on the face with a measurement that is not of something nearer.
+};
+
+/// What a threshold for near points is at this depth.
+double at_depth(double threshold, double z, const SupportTrackingOptions& options) {
+  return threshold * std::max(1.0, options.growth * z * z);
+}
+
+Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Pose& X_CF,
+                         const SupportTrackingOptions& options) {
+  Candidates found;
+  const Pose X_FC = X_CF.inverse();
+  const Vector3d normal = X_CF.rotation * Vector3d::UnitZ();
+  const double offset = normal.dot(X_CF.translation);
+  for (int y = 0; y < sampled.camera.height; ++y)
+    for (int x = 0; x < sampled.camera.width; ++x) {
+      const double z = sampled.depth(x, y);
+      const Vector3d ray = sampled.camera.unproject(x, y, 1.0);
+      const double along = normal.dot(ray);
+      if (z <= 0.0 || std::abs(along) < 1e-9) continue;
+      const double expected = offset / along;
+      if (expected <= 0.0) continue;
+      const Vector3d foot = X_FC * (expected * ray);
+      if (std::abs(foot.x()) > face.half_x || std::abs(foot.y()) > face.half_y) continue;
+      const Vector3d p_C = sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)];
+      const double above = normal.dot(p_C) - offset;
+      const double gate = at_depth(options.gate, z, options);
+      if (above > gate) continue;  // something stands on it, or before it
+      ++found.expected;
+      if (above > -gate) found.points_C.push_back(p_C);
+    }
+  return found;
+}
+
+}  // namespace
+
+std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, const Pose& X_WC,
+                                                  const belief::Support& support,
+                                                  const SupportTrackingOptions& options) {
+  const std::optional<Face> face = upper_face(support);
+  if (!face) return std::nullopt;
+  const Pose X_CF = X_WC.inverse() * face->X_WF;
+  if ((X_CF.inverse().translation).z() <= 0.0) return std::nullopt;  // seen from below
+  const Candidates seen = candidates_of(sampled, *face, X_CF, options);
+  if (static_cast<int>(seen.points_C.size()) < options.min_pixels) return std::nullopt;
+
+  geometry::Plane plane_C = fit_plane(seen.points_C);
+  std::vector<Vector3d> inliers;
+  for (int round = 0; round < 3; ++round) {
+    inliers.clear();
+    for (const Vector3d& p : seen.points_C)
+      if (std::abs(plane_C.signed_distance(p)) < at_depth(options.inlier, p.z(), options)) inliers.push_back(p);
+    if (static_cast<int>(inliers.size()) < options.min_pixels) return std::nullopt;
+    plane_C = fit_plane(inliers);
+  }
+  SupportMeasurement measured;
+  measured.support = support.name;
+  measured.pixels = static_cast<int>(inliers.size());
+  measured.share = static_cast<double>(inliers.size()) / seen.expected;
+  if (measured.share < options.min_share) return std::nullopt;
+  double squares = 0.0;
+  for (const Vector3d& p : inliers) squares += std::pow(plane_C.signed_distance(p), 2);
+  measured.rms = std::sqrt(squares / static_cast<double>(inliers.size()));
+
+  const Vector3d believed = face->X_WF.rotation * Vector3d::UnitZ();
+  measured.plane_W.normal = X_WC.rotation * plane_C.normal;
+  measured.plane_W.offset = plane_C.offset - measured.plane_W.normal.dot(X_WC.translation);
+  const double cosine = measured.plane_W.normal.dot(believed);
+  if (cosine < 0.5) return std::nullopt;
+  measured.tilt = std::atan2(measured.plane_W.normal.cross(believed).norm(), cosine);
+  const Vector3d& middle = face->X_WF.translation;
+  measured.height = -measured.plane_W.signed_distance(middle) / cosine;
+  measured.p_WQ = middle + measured.height * believed;
+  return measured;
+}
+
+void correct_support(const SupportMeasurement& measured, double gain, belief::Support& support) {
+  const std::optional<Face> face = upper_face(support);
+  if (!face) return;
+  const Vector3d believed = face->X_WF.rotation * Vector3d::UnitZ();
+  const Vector3d axis = believed.cross(measured.plane_W.normal);
+  const double sine = axis.norm();
+  Vector3d turn = Vector3d::Zero();
+  if (sine > 1e-12) turn = gain * measured.tilt / sine * axis;
+  // About the face's middle, then up.
+  Pose motion;
+  motion.rotation = geometry::exp_rotation(turn);
+  const Vector3d& middle = face->X_WF.translation;
+  motion.translation = middle + gain * (measured.p_WQ - middle) - motion.rotation * middle;
+  support.X_WS = geometry::normalized(motion * support.X_WS);
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Follows a flat support from frame to frame: where the frame shows it, against where it is believed to be. A support
+// that was found in a frame, and not given by the scene, is corrected by what later frames show.
+//
+//   if (auto seen = measure_support(sampled, X_WC, support, options)) correct_support(*seen, gain, support);
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "prescene/belief/scene.h"
+#include "prescene/filter/segmentation.h"
+
+namespace prescene::filter {
+
+/// The name of a support that was found in a frame.
+inline constexpr const char* kFoundSupport = "support_plane";
+
+struct SupportTrackingOptions {
+  double gate = 0.02;     ///< m from the believed plane: measurements further off belong to something else.
+  double inlier = 0.008;  ///< m from the fitted plane
+  double growth =
+      1.2;  ///< 1/m^2: both grow by this factor times the squared depth where that is more than 1, as noise does.
+  int min_pixels = 60;      ///< At the sampled width; less is no measurement.
+  double min_share = 0.25;  ///< Of the pixels that should show it; less is something else.
+  /// A found support is averaged over the first frames and follows at this rate afterwards.
+  double least_gain = 0.1;
+};
+
+/// A support as one frame shows it.
+struct SupportMeasurement {
+  std::string support;
+  geometry::Plane plane_W;  ///< Its upper face, fitted to this frame alone; the normal points up from it.
+  Vector3d p_WQ;            ///< The point of that plane above the middle of the believed face.
+  double tilt = 0.0;        ///< rad between the measured normal and the believed one.
+  double height = 0.0;      ///< m, of the measured face above the believed one, at its middle.
+  int pixels = 0;           ///< That lie on it, of the sampled image.
+  double share = 0.0;       ///< Of the pixels that should show it and show nothing nearer.
+  double rms = 0.0;         ///< m, distance of these from the plane.
+};
+
+/// Empty for supports that are no single box, and where too little of the upper (+z) face is seen.
+std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, const Pose& X_WC,
+                                                  const belief::Support& support,
+                                                  const SupportTrackingOptions& options);
+
+/// Moves the support by `gain` (0 .. 1) of the way to where it was measured: tilted about the face's middle and lifted.
+void correct_support(const SupportMeasurement& measured, double gain, belief::Support& support);
+
+}  // namespace prescene::filter
