@@ -45,4 +45,11 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
   return shared(interfaces::parse_scene(text, path.string(), options(log), &report), report, log);
 }
 
+std::shared_ptr<const belief::Scene> unknown_scene(const std::filesystem::path& folder, const geometry::Pose& X_WC) {
+  auto scene = std::make_shared<belief::Scene>();
+  scene->name = (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
+  scene->gravity_W = 9.81 * (X_WC.rotation * geometry::Vector3d(0.0, 1.0, 1.0).normalized());
+  return scene;
+}
+
 }  // namespace prescene::service

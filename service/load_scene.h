@@ -22,4 +22,9 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
                                                                    const std::filesystem::path& path,
                                                                    const core::LogSink& log);
 
+/// A scene of which nothing is known, named after the folder that it was seen in: its support is found and followed. Up
+/// is taken to be where a camera at X_WC has it that is held upright and looks down at 45 degrees; the search for the
+/// support allows 34 degrees about that.
+std::shared_ptr<const belief::Scene> unknown_scene(const std::filesystem::path& folder, const geometry::Pose& X_WC);
+
 }  // namespace prescene::service

@@ -37,7 +37,8 @@ std::vector<std::string> robot_names(const belief::Scene& scene) {
   return names;
 }
 
-/// The published objects that are not lost, with supports and the robot, as a scene to draw.
+/// The published objects that are not lost, then supports and the robot, as a scene to draw; supports that were found
+/// in the sequence count among the objects that are outlined.
 rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary& summary,
                                 const belief::Observation& observation, filter::MeshCache& meshes,
                                 std::size_t* objects) {
@@ -54,6 +55,12 @@ rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary&
   for (const belief::KinematicBody& body : scene.robot) {
     const auto known = observation.robot.find(body.name);
     X_WG.push_back(known == observation.robot.end() ? belief::pose_at(body, 0.0) : known->second);
+  }
+  for (const belief::Support& support : scene.supports) {
+    if (support.name != filter::kFoundSupport) continue;
+    drawn.instances.push_back({meshes.get(support.visual, support.collision, filter::MeshDetail::kDisplay),
+                               support.X_WS, filter::material_of(belief::SurfaceKind::kOpaque, support.color), false});
+    ++*objects;
   }
   const filter::BeliefView around = filter::known_surroundings(scene, X_WG, filter::MeshDetail::kDisplay, meshes);
   drawn.instances.insert(drawn.instances.end(), around.scene.instances.begin(), around.scene.instances.end());
@@ -200,6 +207,36 @@ std::vector<interfaces::ReportBlock> SessionReport::curves() const {
   return {std::move(confidence), std::move(height)};
 }
 
+void SessionReport::add_supports(interfaces::ReportContents& contents) const {
+  if (supports_.frames().empty()) return;
+  interfaces::TableBlock table{
+      "Each frame's own plane against that of the first frame: where nothing moves, what is left is error",
+      {"support", "frames", "measured", "median tilt, deg", "largest tilt, deg", "median height, mm",
+       "largest height, mm", "points off the plane, mm", "of its pixels, %"},
+      {}};
+  for (const SupportRow& row : supports_.rows()) {
+    table.rows.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
+                          digits(row.median_tilt * 180.0 / std::numbers::pi, 2),
+                          digits(row.largest_tilt * 180.0 / std::numbers::pi, 2), digits(1e3 * row.median_height, 1),
+                          digits(1e3 * row.largest_height, 1), digits(1e3 * row.median_rms, 1),
+                          digits(100.0 * row.median_share, 0)});
+  }
+  interfaces::ChartBlock height{"Height over the first frame's plane", "time, s", "mm", {}, true};
+  interfaces::ChartBlock tilt{"Tilt against the first frame's plane", "time, s", "deg", {}, true};
+  const core::TimeNs first_ns = summaries_.empty() ? 0 : summaries_.begin()->first;
+  for (const std::vector<SupportFrame>& frames : supports_.frames()) {
+    const std::string& name = frames.front().measured.support;
+    height.curves.push_back({name, {}});
+    tilt.curves.push_back({name, {}});
+    for (const SupportFrame& frame : frames) {
+      const double time = core::seconds_of(frame.stamp_ns - first_ns);
+      height.curves.back().points.emplace_back(time, 1e3 * frame.height);
+      tilt.curves.back().points.emplace_back(time, frame.tilt * 180.0 / std::numbers::pi);
+    }
+  }
+  contents.sections.push_back({"Supports", {std::move(table), std::move(height), std::move(tilt)}});
+}
+
 void SessionReport::add_answers(interfaces::ReportContents& contents) const {
   for (const auto& [at, text] : answers_) {
     try {
@@ -265,6 +302,7 @@ core::Status SessionReport::write(const std::filesystem::path& path, const std::
         interfaces::TextBlock{"The scene names no objects; its supports are drawn where they were found."});
   }
   contents.sections.push_back(std::move(tracking));
+  add_supports(contents);
   add_answers(contents);
   return interfaces::write_report(path, contents);
 }

@@ -12,6 +12,7 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/frame_assembler.h"
+#include "prescene/service/support_score.h"
 #include "prescene/service/topics.h"
 #include "prescene/service/tracking_score.h"
 
@@ -28,6 +29,8 @@ class SessionReport {
   void add(const BeliefSummary& summary);
   /// The scene as the tracker sees it by now (supports that it found).
   void set_scene(std::shared_ptr<const belief::Scene> scene) { scene_ = std::move(scene); }
+  /// Supports as they were followed; the last call counts.
+  void set_supports(const SupportScore& supports) { supports_ = supports; }
   /// An answer as JSON, and when it was asked for (s into the session).
   void add_answer(double at, const std::string& json) { answers_.emplace_back(at, json); }
 
@@ -37,6 +40,7 @@ class SessionReport {
  private:
   interfaces::PictureBlock pictures(Backends& backends) const;
   std::vector<interfaces::ReportBlock> curves() const;
+  void add_supports(interfaces::ReportContents& contents) const;
   void add_answers(interfaces::ReportContents& contents) const;
   void add_answer_section(double at, const nlohmann::ordered_json& answer, interfaces::ReportContents& contents) const;
 
@@ -48,6 +52,7 @@ class SessionReport {
   std::size_t every_ = 1;  // observations between two that are kept
   std::size_t seen_ = 0;
   std::map<core::TimeNs, BeliefSummary> summaries_;
+  SupportScore supports_;
   std::vector<std::pair<double, std::string>> answers_;
 };
 

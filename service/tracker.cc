@@ -157,6 +157,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
   step.counters = result.counters;
   step.trace = std::move(result.trace);
+  step.supports = std::move(result.supports);
   step.observation = std::move(frame->observation);
   {
     auto next = std::make_shared<const belief::Belief>(std::move(result.belief));

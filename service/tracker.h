@@ -32,6 +32,7 @@ struct TrackerStep {
   StepRecord record;
   filter::StepCounters counters;
   filter::HashTrace trace;
+  std::vector<filter::SupportMeasurement> supports;
   belief::Observation observation;
 };
 

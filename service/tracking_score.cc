@@ -22,37 +22,49 @@ double quantile(std::vector<double> values, double share) {
 
 }  // namespace
 
+std::optional<FrameError> TrackingScore::error_at(core::TimeNs stamp_ns, const std::string& name) const {
+  const auto truth = truths_.find(stamp_ns);
+  const auto summary = summaries_.find(stamp_ns);
+  if (truth == truths_.end() || summary == summaries_.end()) return std::nullopt;
+  const auto same_name = [&](const auto& object) { return object.name == name; };
+  const auto& true_objects = truth->second.objects;
+  const auto& estimates = summary->second.objects;
+  const auto true_object = std::find_if(true_objects.begin(), true_objects.end(), same_name);
+  const auto estimate = std::find_if(estimates.begin(), estimates.end(), same_name);
+  if (true_object == true_objects.end() || estimate == estimates.end()) return std::nullopt;
+  geometry::SymmetryGroup symmetry;
+  if (const auto index = belief::find_object(*scene_, name)) {
+    symmetry = scene_->model_of(scene_->objects[static_cast<std::size_t>(*index)]).symmetry;
+  }
+  const geometry::Pose X_WO = geometry::closest_equivalent(estimate->X_WO, true_object->X_WO, symmetry);
+  return FrameError{(X_WO.translation - true_object->X_WO.translation).norm(),
+                    geometry::symmetric_angle(estimate->X_WO, true_object->X_WO, symmetry), true_object->visible_share};
+}
+
 std::vector<ObjectTrackingScore> TrackingScore::rows() const {
   std::vector<ObjectTrackingScore> rows;
   if (truths_.empty()) return rows;
   for (const TruthRecord::Object& named : truths_.begin()->second.objects) {
     ObjectTrackingScore row;
     row.object = named.name;
-    geometry::SymmetryGroup symmetry;
-    if (const auto index = belief::find_object(*scene_, named.name)) {
-      symmetry = scene_->model_of(scene_->objects[static_cast<std::size_t>(*index)]).symmetry;
-    }
     std::vector<double> position_errors;
     std::vector<double> turn_errors;
     int tracked = 0;
     int wrong = 0;
-    for (const auto& [stamp_ns, truth] : truths_) {
-      const auto summary = summaries_.find(stamp_ns);
-      if (summary == summaries_.end()) continue;
-      const auto same_name = [&](const auto& object) { return object.name == named.name; };
-      const auto true_object = std::find_if(truth.objects.begin(), truth.objects.end(), same_name);
-      const auto estimate = std::find_if(summary->second.objects.begin(), summary->second.objects.end(), same_name);
-      if (true_object == truth.objects.end() || estimate == summary->second.objects.end()) continue;
-      const geometry::Pose X_WO = geometry::closest_equivalent(estimate->X_WO, true_object->X_WO, symmetry);
-      const double error = (X_WO.translation - true_object->X_WO.translation).norm();
-      const bool is_tracked = estimate->state == belief::TrackState::kTracked;
+    for (const auto& [stamp_ns, summary] : summaries_) {
+      const std::optional<FrameError> error = error_at(stamp_ns, named.name);
+      if (!error) continue;
+      const bool is_tracked =
+          std::any_of(summary.objects.begin(), summary.objects.end(), [&](const ObjectSummary& object) {
+            return object.name == named.name && object.state == belief::TrackState::kTracked;
+          });
       ++row.frames;
-      wrong += is_tracked && error > kWrong ? 1 : 0;
-      if (true_object->visible_share < kVisibleShare) continue;
+      wrong += is_tracked && error->position_error > kWrong ? 1 : 0;
+      if (error->visible_share < kVisibleShare) continue;
       ++row.visible_frames;
       tracked += is_tracked ? 1 : 0;
-      position_errors.push_back(error);
-      turn_errors.push_back(geometry::symmetric_angle(estimate->X_WO, true_object->X_WO, symmetry));
+      position_errors.push_back(error->position_error);
+      turn_errors.push_back(error->turn_error);
     }
     row.median_position_error = quantile(position_errors, 0.5);
     row.p90_position_error = quantile(position_errors, 0.9);

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,13 @@ struct ObjectTrackingScore {
   double share_confidently_wrong = 0.0;  ///< Of all frames: tracked, yet more than 5 cm off.
 };
 
+/// One object in one frame, against the truth.
+struct FrameError {
+  double position_error = 0.0;  ///< m, as in ObjectTrackingScore.
+  double turn_error = 0.0;      ///< rad, modulo the model's symmetry.
+  double visible_share = 0.0;   ///< The true one.
+};
+
 /// Collects summaries and truths in any order and scores those with equal stamps.
 class TrackingScore {
  public:
@@ -33,6 +41,8 @@ class TrackingScore {
   void add(const TruthRecord& truth) { truths_[truth.stamp_ns] = truth; }
   /// One row an object of the truth, in its order; empty without truth.
   std::vector<ObjectTrackingScore> rows() const;
+  /// Empty where the frame has no truth, or no estimate, of this object.
+  std::optional<FrameError> error_at(core::TimeNs stamp_ns, const std::string& object) const;
 
  private:
   std::shared_ptr<const belief::Scene> scene_;

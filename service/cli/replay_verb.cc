@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "prescene/service/bus_replay.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/replay.h"
 #include "prescene/service/session_report.h"
+#include "prescene/service/support_score.h"
 #include "prescene/service/tracking_score.h"
 #include "verb.h"
 
@@ -40,6 +42,14 @@ core::Result<TimedQuestion> timed_question(const std::string& text) {
   return TimedQuestion{at, text.substr(colon + 1)};
 }
 
+core::Result<interfaces::FrameFolder> open_folder(const Options& options) {
+  interfaces::FrameFolderOptions folder_options;
+  folder_options.metres_per_unit = options.depth_scale;
+  folder_options.frames_per_second = options.frame_rate;
+  folder_options.first_stamp_ns = 1'000'000'000;
+  return interfaces::FrameFolder::open(options.input, folder_options);
+}
+
 core::Result<std::shared_ptr<const belief::Scene>> scene_of(const Options& options, const RecordingInfo& info,
                                                             VerbContext& context) {
   if (!options.scene.empty()) return load_scene(options.scene, context.log());
@@ -51,6 +61,19 @@ ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows) {
   ordered_json json = ordered_json::array();
   for (const ObjectTrackingScore& row : rows) json.push_back(to_json(row));
   return json;
+}
+
+/// Each object's error in each frame, where the recording holds the truth.
+void add_errors(const TrackingScore& score, ordered_json& steps) {
+  for (ordered_json& step : steps) {
+    for (ordered_json& object : step["objects"]) {
+      const auto error = score.error_at(step["stamp_ns"].get<core::TimeNs>(), object["name"].get<std::string>());
+      if (!error) continue;
+      object["truth"] = {{"position_error_m", error->position_error},
+                         {"turn_error_rad", error->turn_error},
+                         {"visible_share", error->visible_share}};
+    }
+  }
 }
 
 std::string tracking_text(const std::vector<ObjectTrackingScore>& rows) {
@@ -65,6 +88,20 @@ std::string tracking_text(const std::vector<ObjectTrackingScore>& rows) {
                      fixed_digits(100.0 * row.share_confidently_wrong, 0) + " %"});
   }
   return "\nTracking against the simulated truth\n" + table(cells);
+}
+
+std::string supports_text(const std::vector<SupportRow>& rows) {
+  if (rows.empty()) return "";
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  std::vector<std::vector<std::string>> cells = {{"support", "frames", "measured", "median tilt, deg", "largest",
+                                                  "median height, mm", "largest", "points off it, mm"}};
+  for (const SupportRow& row : rows) {
+    cells.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
+                     fixed_digits(row.median_tilt * kDegrees, 2), fixed_digits(row.largest_tilt * kDegrees, 2),
+                     fixed_digits(1e3 * row.median_height, 1), fixed_digits(1e3 * row.largest_height, 1),
+                     fixed_digits(1e3 * row.median_rms, 1)});
+  }
+  return "\nSupports, each frame's plane against the first one's\n" + table(cells);
 }
 
 std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) {
@@ -137,16 +174,24 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
 core::Status run_here(Options& options, VerbContext& context) {
   const bool is_folder = std::filesystem::is_directory(options.input);
   RecordingInfo info;
-  if (!is_folder) {
+  std::optional<interfaces::FrameFolder> folder;
+  std::shared_ptr<const belief::Scene> scene;
+  if (is_folder) {
+    PRESCENE_TRY(folder, open_folder(options));
+    if (options.scene.empty()) scene = unknown_scene(options.input, folder->frames().front().X_WC);
+  } else {
     PRESCENE_TRY(const auto reader, RecordingReader::open(options.input));
     info = reader->info();
   }
-  PRESCENE_TRY(const auto scene, scene_of(options, info, context));
+  if (!scene) {
+    PRESCENE_TRY(scene, scene_of(options, info, context));
+  }
   Backends backends(context.pool());
   // A recording's own seed repeats its bits.
   const std::uint64_t seed = context.options().seed_given || info.seed == 0 ? context.options().seed : info.seed;
   PRESCENE_TRY(const auto tracker, Tracker::create(scene, options.tracker, seed, backends));
   TrackingScore score(scene);
+  SupportScore supports;
   SessionReport report(scene, options.tracker.topics);
   ordered_json steps = ordered_json::array();
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
@@ -162,6 +207,9 @@ core::Status run_here(Options& options, VerbContext& context) {
     ordered_json objects = to_json(summary)["objects"];
     for (ordered_json& object : objects) object.erase("covariance");
     record["objects"] = objects;
+    record["supports"] = ordered_json::array();
+    for (const SupportFrame& frame : supports.add(summary.stamp_ns, step.supports))
+      record["supports"].push_back(to_json(frame));
     steps.push_back(std::move(record));
     return core::ok_status();
   };
@@ -172,19 +220,18 @@ core::Status run_here(Options& options, VerbContext& context) {
   };
   core::Result<ReplaySummary> summary = ReplaySummary{};
   if (is_folder) {
-    interfaces::FrameFolderOptions folder_options;
-    folder_options.metres_per_unit = options.depth_scale;
-    folder_options.frames_per_second = options.frame_rate;
-    folder_options.first_stamp_ns = 1'000'000'000;
-    PRESCENE_TRY(const auto folder, interfaces::FrameFolder::open(options.input, folder_options));
-    summary = replay_folder(folder, *tracker, context.cancellation(), context.progress("replaying"), on_step);
+    summary = replay_folder(*folder, *tracker, context.cancellation(), context.progress("replaying"), on_step);
   } else {
     summary = replay_recording(options.input, *tracker, context.cancellation(), context.progress("replaying"), on_step,
                                on_json);
   }
   context.end_progress();
   if (!summary) return summary.status();
+  add_errors(score, steps);
+  report.set_supports(supports);
   const std::vector<ObjectTrackingScore> rows = score.rows();
+  ordered_json support_rows = ordered_json::array();
+  for (const SupportRow& row : supports.rows()) support_rows.push_back(to_json(row));
   if (!options.report.empty()) {
     PRESCENE_RETURN_IF_ERROR(report.write(options.report, rows, backends));
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
@@ -203,13 +250,14 @@ core::Status run_here(Options& options, VerbContext& context) {
        {"different_steps", summary->different},
        {"loss", summary->loss},
        {"tracking", tracking_json(rows)},
+       {"supports", support_rows},
        {"steps", steps}},
       std::to_string(summary->steps) + " steps from " + std::to_string(summary->messages) + " messages, " +
           std::to_string(summary->skipped) + " frames skipped\n" +
           (summary->followed_step_records ? std::to_string(summary->compared - summary->different) + " of " +
                                                 std::to_string(summary->compared) + " steps have the recorded bits\n"
                                           : "") +
-          tracking_text(rows));
+          tracking_text(rows) + supports_text(supports.rows()));
   if (summary->cancelled) return core::cancelled("stopped on request; what was done is printed");
   if (summary->different > 0) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
@@ -227,7 +275,9 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("RECORDING", options->input,
                    "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
       ->required();
-  verb->add_option("--scene", options->scene, "Scene file; default: the one that the recording holds");
+  verb->add_option(
+      "--scene", options->scene,
+      "Scene file; default: the one that the recording holds; a folder without one is searched for its support");
   verb->add_flag("--over-dds", options->over_dds,
                  "Publish the robot's messages as they were, and listen to a running `serve`");
   verb->add_option("--speed", options->bus.speed, "Over DDS: times as fast as recorded")
