@@ -73,7 +73,8 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,
                                     prior.stream, options, *context.pool, context.cancellation, context.progress);
   if (foresight.estimate.instances.empty())
-    return core::cancelled("stopped before the first simulated instance was finished");
+    return core::cancelled(
+        "stopped before the first simulated instance was finished: give more time, or a shorter duration");
   return foresight;
 }
 

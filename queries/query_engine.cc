@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/queries/query_engine.h"
 
+#include <algorithm>
+#include <chrono>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -18,6 +21,27 @@ void put(core::Result<Value> result, belief::Answer& answer) {
     answer.error = core::to_string(result.status());
 }
 
+/// The estimator looks at its time limit between instances, which may be long ones; beyond this nothing goes on. What
+/// is finished by then is the answer.
+std::optional<core::Cancellation::Clock::time_point> last_moment(const belief::Effort& effort) {
+  if (!effort.max_seconds || effort.exact_instances) return std::nullopt;
+  constexpr double kMost = 1e6;  // s: far from the end of the clock
+  const std::chrono::duration<double> most(2.0 * std::min(*effort.max_seconds, kMost) + 2.0);
+  return core::Cancellation::Clock::now() + std::chrono::duration_cast<core::Cancellation::Clock::duration>(most);
+}
+
+/// Calls `task` with a context that ends at the last moment.
+template <class Task>
+auto within_time(const belief::Effort& effort, const QueryContext& context, const Task& task) {
+  const core::Cancellation never;
+  const auto end = last_moment(effort);
+  if (!end) return task(context);
+  const core::Cancellation limit(context.cancellation != nullptr ? *context.cancellation : never, *end);
+  QueryContext limited = context;
+  limited.cancellation = &limit;
+  return task(limited);
+}
+
 /// `make_prior` is called for what needs one; `known` is the belief or the scene.
 template <class Known, class MakePrior>
 void dispatch(const Known& known, const belief::Query& query, const QueryContext& context, const MakePrior& make_prior,
@@ -30,9 +54,13 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
         if constexpr (std::is_same_v<Asked, belief::WhereQuery>)
           put(where(known, what), answer);
         else if constexpr (std::is_same_v<Asked, belief::PredictQuery>)
-          put(predict(make_prior(), what, context), answer);
+          put(within_time(what.effort, context,
+                          [&](const QueryContext& limited) { return predict(make_prior(), what, limited); }),
+              answer);
         else if constexpr (std::is_same_v<Asked, belief::StabilityQuery>)
-          put(stability(make_prior(), what, context), answer);
+          put(within_time(what.effort, context,
+                          [&](const QueryContext& limited) { return stability(make_prior(), what, limited); }),
+              answer);
         else
           put(view(make_prior(), what, context), answer);
       },

@@ -68,7 +68,7 @@ void AnsweringDesk::ask(std::string question_json) {
       return;
     }
   }
-  on_answer_(question_json, error_answer(question_json, std::to_string(settings_.max_waiting) +
+  on_answer_(question_json, error_answer(question_json, "unavailable: " + std::to_string(settings_.max_waiting) +
                                                             " questions wait already: ask again later"));
 }
 
@@ -103,7 +103,7 @@ std::string AnsweringDesk::answer(const std::string& question_json) {
     return belief::to_json(queries::answer(*snapshot_(), *query, context))
         .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   } catch (const std::bad_alloc&) {
-    return error_answer(question_json, "the answer does not fit into the memory: ask for less");
+    return error_answer(question_json, "resource exhausted: the answer does not fit into the memory: ask for less");
   }
 }
 

@@ -7,6 +7,9 @@
 namespace prescene::service {
 namespace {
 
+// So many transforms from before the history can't all be late.
+constexpr int kTooOldToBeWrong = 3;
+
 std::string without_slash(const std::string& name) {
   return !name.empty() && name.front() == '/' ? name.substr(1) : name;
 }
@@ -62,6 +65,11 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
     edge.samples.assign(1, {stamp_ns, X_PC});
     return core::ok_status();
   }
+  if (!edge.samples.empty() && stamp_ns + ns_of(settings_.history_s) < edge.samples.back().first) {
+    if (++edge.too_old_in_a_row < kTooOldToBeWrong) return core::ok_status();
+    edge.samples.clear();
+  }
+  edge.too_old_in_a_row = 0;
   const auto place = std::lower_bound(edge.samples.begin(), edge.samples.end(), stamp_ns,
                                       [](const auto& sample, core::TimeNs t) { return sample.first < t; });
   if (place != edge.samples.end() && place->first == stamp_ns) {

@@ -26,10 +26,11 @@ class TfBuffer {
  public:
   explicit TfBuffer(TfBufferSettings settings = {}) : settings_(settings) {}
 
-  /// Adds the pose of `child` in `parent` at a time; a static edge holds at all times. A leading '/' of a name is
-  /// ignored. Fails with kInvalidInput, changing nothing, on an empty name, child == parent, a cycle, another parent
-  /// than before (unless all its transforms are older than the history), or a pose that is not finite; with
-  /// kResourceExhausted beyond max_frames.
+  /// Adds the pose of `child` in `parent` at a time; a static edge holds at all times. A transform older than the
+  /// history is left out; three in a row mean that the newest one's stamp was wrong, or that the clock went back, and
+  /// count. A leading '/' of a name is ignored. Fails with kInvalidInput, changing nothing, on an empty name, child ==
+  /// parent, a cycle, another parent than before (unless all its transforms are older than the history), or a pose that
+  /// is not finite; with kResourceExhausted beyond max_frames.
   core::Status add(const std::string& parent, const std::string& child, core::TimeNs stamp_ns,
                    const geometry::Pose& X_PC, bool is_static);
 
@@ -47,6 +48,7 @@ class TfBuffer {
     std::string parent;
     bool is_static = false;
     std::deque<std::pair<core::TimeNs, geometry::Pose>> samples;  // ascending stamps; one entry if static
+    int too_old_in_a_row = 0;
   };
   core::Result<geometry::Pose> edge_pose(const std::string& child, const Edge& edge, core::TimeNs stamp_ns) const;
   /// The frame, its parent, ... up to the root of its tree.

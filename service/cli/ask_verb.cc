@@ -50,7 +50,7 @@ core::Status run(const Options& options, VerbContext& context) {
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
   if (const auto error = answer.find("error"); error != answer.end()) {
-    return core::invalid_input(error->is_string() ? error->get<std::string>() : error->dump());
+    return status_of_error("", error->is_string() ? error->get<std::string>() : error->dump());
   }
   context.print(answer, answer_text(answer));
   return core::ok_status();

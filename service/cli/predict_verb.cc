@@ -70,7 +70,7 @@ core::Status run(const Options& options, VerbContext& context) {
   query_context.progress = context.progress("predicting");
   const belief::Answer answer = queries::answer(scene, context.options().seed, {"predict", question}, query_context);
   context.end_progress();
-  if (!answer.error.empty()) return core::invalid_input(options.scene + ": " + answer.error);
+  if (!answer.error.empty()) return status_of_error(options.scene + ": ", answer.error);
 
   if (!options.report.empty()) {
     PRESCENE_RETURN_IF_ERROR(write_prediction_report(options.report, *scene, answer, backends));

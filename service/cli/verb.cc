@@ -147,6 +147,16 @@ std::string error_document(const std::string& text) {
          "\n";
 }
 
+core::Status status_of_error(const std::string& place, const std::string& error) {
+  using core::StatusCode;
+  for (const StatusCode code : {StatusCode::kInvalidInput, StatusCode::kNotFound, StatusCode::kCancelled,
+                                StatusCode::kUnavailable, StatusCode::kResourceExhausted}) {
+    const std::string prefix = std::string(core::to_string(code)) + ": ";
+    if (error.starts_with(prefix)) return {code, place + error.substr(prefix.size())};
+  }
+  return core::invalid_input(place + error);
+}
+
 CLI::Validator positive_number() {
   return {[](std::string& text) -> std::string {
             const std::optional<double> value = finite_number(text);

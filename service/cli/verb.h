@@ -100,6 +100,10 @@ void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& t
 core::Result<std::optional<geometry::Pose>> camera_pose_of(const std::vector<double>& numbers);
 core::Result<std::string> read_text(const std::string& path);
 
+/// An answer's error as a status: what begins with "cancelled: ", "unavailable: " or "resource exhausted: " could not
+/// be done, everything else is a bad question. `place` goes in front of the text.
+core::Status status_of_error(const std::string& place, const std::string& error);
+
 /// An answer as JSON, for a person; what has no short form stays JSON.
 std::string answer_text(const nlohmann::ordered_json& answer);
 

@@ -101,6 +101,11 @@ void report_progress(const core::ProgressSink& sink, double fraction, const std:
   if (sink) sink({fraction, std::nullopt, text});
 }
 
+core::Status check_going_on(const core::Cancellation* cancellation) {
+  return cancellation != nullptr && cancellation->requested() ? core::cancelled("stopped on request")
+                                                              : core::ok_status();
+}
+
 /// Medians and shares over all runs and per object.
 void summarise(const std::vector<double>& adds, const std::vector<double>& add, YcbSection& section) {
   section.n = static_cast<int>(adds.size());
@@ -121,7 +126,8 @@ Pose disturbed(const Pose& X_CO, const geometry::Vector3d& p_OQ, const YcbOption
 }  // namespace
 
 core::Result<YcbSection> evaluate_disturbed(const fs::path& dir, std::uint64_t seed, core::ThreadPool& threads,
-                                            const YcbOptions& options, const core::ProgressSink& progress) {
+                                            const YcbOptions& options, const core::ProgressSink& progress,
+                                            const core::Cancellation* cancellation) {
   Bench bench(threads);
   PRESCENE_RETURN_IF_ERROR(bench.load(dir));
   const core::RandomStream stream(seed, core::Purpose::kEvaluation);
@@ -137,6 +143,7 @@ core::Result<YcbSection> evaluate_disturbed(const fs::path& dir, std::uint64_t s
       const Model& model = bench.model(object.name);
       std::vector<double> adds, add;
       for (int draw = 0; draw < options.draws; ++draw) {
+        PRESCENE_RETURN_IF_ERROR(check_going_on(cancellation));
         core::RandomStream mine = stream.at(instance, static_cast<std::uint32_t>(draw));
         const Pose start = disturbed(object.X_CO, model.target.centre(), options, mine);
         const core::Stopwatch watch;
@@ -162,7 +169,8 @@ core::Result<YcbSection> evaluate_disturbed(const fs::path& dir, std::uint64_t s
 }
 
 core::Result<YcbSection> evaluate_amortised(const fs::path& dir, std::uint64_t seed, core::ThreadPool& threads,
-                                            const YcbOptions&, const core::ProgressSink& progress) {
+                                            const YcbOptions&, const core::ProgressSink& progress,
+                                            const core::Cancellation* cancellation) {
   Bench bench(threads);
   PRESCENE_RETURN_IF_ERROR(bench.load(dir));
   const core::RandomStream stream(seed, core::Purpose::kEvaluation);
@@ -171,6 +179,7 @@ core::Result<YcbSection> evaluate_amortised(const fs::path& dir, std::uint64_t s
   double seconds = 0.0;
   for (std::size_t f = 0; f < bench.frames().size(); ++f) {
     const YcbFrame& frame = bench.frames()[f];
+    PRESCENE_RETURN_IF_ERROR(check_going_on(cancellation));
     report_progress(progress, static_cast<double>(f) / static_cast<double>(bench.frames().size()), frame.name);
     const core::Stopwatch watch;
     PreparedFrame prepared;
@@ -228,7 +237,7 @@ core::Result<std::vector<YcbAucRow>> evaluate_auc(const fs::path& dir, core::Thr
   double done = 0.0;
   for (const std::string& method : methods)
     for (const std::string& track : tracks) {
-      if (cancellation != nullptr && cancellation->requested()) return core::cancelled("stopped on request");
+      PRESCENE_RETURN_IF_ERROR(check_going_on(cancellation));
       report_progress(progress, done++ / static_cast<double>(methods.size() * tracks.size()), method + " " + track);
       const fs::path file = dir / "eval" / method / track;
       PRESCENE_TRY(const YcbTrack estimates, read_ycb_track(file));
@@ -272,9 +281,10 @@ core::Result<YcbReport> evaluate_ycb_video(const fs::path& dir, std::uint64_t se
       progress({begin + (end - begin) * p.fraction, std::nullopt, std::string(name) + ": " + p.text});
     };
   };
-  PRESCENE_TRY(report.disturbed, evaluate_disturbed(dir, seed, threads, options, part(0.0, 0.2, "disturbed")));
-  if (cancellation != nullptr && cancellation->requested()) return core::cancelled("stopped on request");
-  PRESCENE_TRY(report.amortised, evaluate_amortised(dir, seed, threads, options, part(0.2, 0.3, "amortised")));
+  PRESCENE_TRY(report.disturbed,
+               evaluate_disturbed(dir, seed, threads, options, part(0.0, 0.2, "disturbed"), cancellation));
+  PRESCENE_TRY(report.amortised,
+               evaluate_amortised(dir, seed, threads, options, part(0.2, 0.3, "amortised"), cancellation));
   if (options.auc) {
     PRESCENE_TRY(report.auc, evaluate_auc(dir, threads, part(0.3, 1.0, "evaluator"), cancellation));
   }

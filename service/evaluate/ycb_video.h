@@ -72,10 +72,12 @@ core::Result<YcbReport> evaluate_ycb_video(const std::filesystem::path& dir, std
 /// Its parts, for tests.
 core::Result<YcbSection> evaluate_disturbed(const std::filesystem::path& dir, std::uint64_t seed,
                                             core::ThreadPool& threads, const YcbOptions& options = {},
-                                            const core::ProgressSink& progress = {});
+                                            const core::ProgressSink& progress = {},
+                                            const core::Cancellation* cancellation = nullptr);
 core::Result<YcbSection> evaluate_amortised(const std::filesystem::path& dir, std::uint64_t seed,
                                             core::ThreadPool& threads, const YcbOptions& options = {},
-                                            const core::ProgressSink& progress = {});
+                                            const core::ProgressSink& progress = {},
+                                            const core::Cancellation* cancellation = nullptr);
 core::Result<std::vector<YcbAucRow>> evaluate_auc(const std::filesystem::path& dir, core::ThreadPool& threads,
                                                   const core::ProgressSink& progress = {},
                                                   const core::Cancellation* cancellation = nullptr);

@@ -141,7 +141,7 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
     const bool left = world.freeze_beyond(request.stop.world_radius);
     const double elapsed = static_cast<double>(done) * dt;
     const bool last = done == steps;
-    const bool ended = request.stop.stop_at_rest ? worker.rest.at_rest(world) : world.all_frozen();
+    const bool ended = request.stop.stop_at_rest ? worker.rest.at_rest(world, cancellation) : world.all_frozen();
     if (ended) trajectory.end = left ? belief::TrajectoryEnd::kLeftTheWorld : belief::TrajectoryEnd::kAtRest;
     if (ended || last) break;
     if (request.sample_interval > 0.0 && elapsed >= next_sample - 0.5 * dt) {

@@ -55,7 +55,7 @@ double margin_inside(std::vector<Eigen::Vector2d>& points) {
 
 }  // namespace
 
-bool RestDetector::at_rest(InstanceWorld& world) {
+bool RestDetector::at_rest(InstanceWorld& world, const core::Cancellation* cancellation) {
   const int needed = static_cast<int>(std::ceil(world.scene().options.rest.time / world.dt()));
   for (int i = 0; i < world.object_count(); ++i) {
     if (world.free(i) && world.calm_steps(i) < needed) {
@@ -68,7 +68,8 @@ bool RestDetector::at_rest(InstanceWorld& world) {
     tested_ = true;
     stable_ = true;
     for (int i = 0; i < world.object_count() && stable_; ++i) {
-      if (world.free(i)) stable_ = stands_firmly(world, i) || returns_after_nudges(world, i);
+      if (world.free(i)) stable_ = stands_firmly(world, i) || returns_after_nudges(world, i, cancellation);
+      if (cancellation && cancellation->requested()) tested_ = stable_ = false;
     }
   }
   return stable_;
@@ -89,7 +90,7 @@ bool RestDetector::stands_firmly(InstanceWorld& world, int object) {
   return margin_inside(points) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
 }
 
-bool RestDetector::returns_after_nudges(InstanceWorld& world, int object) {
+bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const core::Cancellation* cancellation) {
   const Vector3d& gravity = world.scene().scene.gravity_W;
   if (gravity.isZero(0.0)) return true;
   const Vector3d down = gravity.normalized();
@@ -98,6 +99,7 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object) {
   before_.clear();
   double tallest = 0.0;
   for (int i = 0; i < world.object_count(); ++i) {
+    if (cancellation && cancellation->requested()) return false;
     const Vector3d center = world.center_of_mass(i);
     before_.push_back({world.rotation(i), center, world.footing(i, down).height});
     if (i == object) tallest = before_.back().height;
@@ -122,6 +124,7 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object) {
     const double angle = (0.125 + 0.25 * k) * 2.0 * std::numbers::pi;
     world.nudge(object, std::cos(angle) * u + std::sin(angle) * v, kNudge);
     for (int s = 0; s < steps && returns; ++s) {
+      if (cancellation && cancellation->requested()) returns = false;
       world.step();
       ++nudge_steps_;
       for (int i = 0; i < world.object_count() && returns; ++i) returns = !world.free(i) || !runs_away(i);

@@ -11,14 +11,15 @@
 #include <vector>
 
 #include "instance_world.h"
+#include "prescene/core/progress.h"
 
 namespace prescene::simulation {
 
 class RestDetector {
  public:
   /// Calm, no action to come, and nothing balances. The costly test runs once for each calm: its answer holds until
-  /// something moves again.
-  bool at_rest(InstanceWorld& world);
+  /// something moves again. False, untested, once cancelled: the tests of many objects take longer than their fall.
+  bool at_rest(InstanceWorld& world, const core::Cancellation* cancellation = nullptr);
   void reset() { tested_ = false; }
 
   /// Steps simulated by nudge tests so far.
@@ -26,7 +27,7 @@ class RestDetector {
 
  private:
   bool stands_firmly(InstanceWorld& world, int object);
-  bool returns_after_nudges(InstanceWorld& world, int object);
+  bool returns_after_nudges(InstanceWorld& world, int object, const core::Cancellation* cancellation);
 
   struct Before {
     Quaterniond rotation;

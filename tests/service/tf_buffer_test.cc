@@ -87,6 +87,17 @@ TEST(TfBuffer, AFrameMayChangeItsParentOnceItsOldTransformsHaveExpired) {
   EXPECT_FALSE(tf.knows("table"));
 }
 
+TEST(TfBuffer, OneStampFromTheFutureDoesNotBlockAFrameForEver) {
+  TfBuffer tf;
+  ASSERT_TRUE(tf.add("world", "camera", 1 * kSecond, turned_z(0.1, {1.0, 0.0, 0.0}), false).ok());
+  ASSERT_TRUE(tf.add("world", "camera", 2'000'000'000 * kSecond, turned_z(0.1, {9.0, 0.0, 0.0}), false).ok());
+  for (core::TimeNs s = 2; s <= 5; ++s)
+    ASSERT_TRUE(tf.add("world", "camera", s * kSecond, turned_z(0.1, {2.0, 0.0, 0.0}), false).ok());
+  const auto X_WC = tf.lookup("world", "camera", 5 * kSecond);
+  ASSERT_TRUE(X_WC.ok()) << X_WC.status().message();
+  EXPECT_DOUBLE_EQ(X_WC->translation.x(), 2.0);
+}
+
 TEST(TfBuffer, KeepsBoundedHistoryAndFrames) {
   TfBuffer tf({.history_s = 1.0, .max_frames = 2});
   for (int i = 0; i < 100; ++i) {

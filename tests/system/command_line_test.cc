@@ -93,6 +93,23 @@ TEST(CommandLine, OutputThatCannotBeWrittenIsAFailure) {
   EXPECT_EQ(run_program_writing_to("/dev/full", {"--help"}), 1);
 }
 
+TEST(CommandLine, TooLittleTimeIsNoBadInput) {
+  const ScratchDir folder;
+  // 200 boxes in heaps: one instance takes minutes, most of it to see whether they rest.
+  std::string scene =
+      "name: heaps\nmodels:\n  box: {box: [0.12, 0.08, 0.1], mass: 0.4}\n"
+      "supports:\n  floor: {ground: {size: 4}}\nobjects:\n";
+  for (int i = 0; i < 200; ++i) {
+    scene += "  b" + std::to_string(i) + ": {model: box, pose: {position: [" + std::to_string(0.13 * (i % 6)) + ", " +
+             std::to_string(0.1 * (i / 6 % 6)) + ", " + std::to_string(0.06 + 0.11 * (i / 36)) + "]}}\n";
+  }
+  write_file(folder.path() / "heaps.yaml", scene);
+  const Finished finished =
+      run_program({"predict", (folder.path() / "heaps.yaml").string(), "--json", "--max-seconds", "0.001"});
+  EXPECT_EQ(finished.exit_code, 1) << finished.err;
+  EXPECT_NE(parsed(finished)["error"].get<std::string>().find("give more time"), std::string::npos) << finished.out;
+}
+
 TEST(CommandLine, AnInputIsNeverOverwritten) {
   const ScratchDir folder;
   const std::string scene = (folder.path() / "scene.yaml").string();
