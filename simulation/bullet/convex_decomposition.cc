@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <map>
-#include <optional>
+#include <numbers>
+
+#include "prescene/geometry/refine.h"
 
 namespace prescene::simulation {
 namespace {
@@ -21,73 +21,128 @@ constexpr std::size_t kMaxRefinedTriangles = 2000;
 // HACD measures concavity on data scaled to this size.
 constexpr double kScale = 1000.0;
 
-/// Halves all edges longer than `longest` (m), again and again; triangles that share an edge still do.
-geometry::TriangleMesh refined(geometry::TriangleMesh mesh, double longest) {
-  constexpr std::uint32_t kWhole = std::numeric_limits<std::uint32_t>::max();
-  using Edge = std::pair<std::uint32_t, std::uint32_t>;
-  const auto edge = [](std::uint32_t a, std::uint32_t b) -> Edge { return {std::min(a, b), std::max(a, b)}; };
-  while (true) {
-    std::map<Edge, std::uint32_t> middles;
-    for (const auto& t : mesh.triangles) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Edge e = edge(t[k], t[(k + 1) % 3]);
-        if ((mesh.vertices[e.first] - mesh.vertices[e.second]).norm() > longest) middles[e] = 0;
-      }
-    }
-    if (middles.empty() || mesh.triangles.size() + 2 * middles.size() > kMaxRefinedTriangles) return mesh;
-    for (auto& [e, middle] : middles) {
-      middle = static_cast<std::uint32_t>(mesh.vertices.size());
-      mesh.vertices.push_back(0.5 * (mesh.vertices[e.first] + mesh.vertices[e.second]));
-    }
-    std::vector<std::array<std::uint32_t, 3>> triangles;
-    for (const auto& t : mesh.triangles) {
-      // Cut off each corner between two halved edges; what remains has four corners, three or all of the triangle.
-      std::array<std::uint32_t, 3> m{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto found = middles.find(edge(t[k], t[(k + 1) % 3]));
-        m[k] = found == middles.end() ? kWhole : found->second;
-      }
-      std::vector<std::uint32_t> rest;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t before = m[(k + 2) % 3];
-        if (before != kWhole && m[k] != kWhole) {
-          triangles.push_back({before, t[k], m[k]});
-        } else {
-          rest.push_back(t[k]);
-        }
-        if (m[k] != kWhole) rest.push_back(m[k]);
-      }
-      for (std::size_t k = 2; k < rest.size(); ++k) triangles.push_back({rest[0], rest[k - 1], rest[k]});
-    }
-    mesh.triangles = std::move(triangles);
+/// Of a point to a triangle [Ericson 2005, section 5.1.5].
+double squared_distance(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const Vector3d normal = (b - a).cross(c - a);
+  const bool above = normal.dot((b - a).cross(p - a)) >= 0.0 && normal.dot((c - b).cross(p - b)) >= 0.0 &&
+                     normal.dot((a - c).cross(p - c)) >= 0.0;
+  if (above && normal.squaredNorm() > 0.0) {
+    const double height = normal.dot(p - a);
+    return height * height / normal.squaredNorm();
   }
+  const auto to_edge = [&](const Vector3d& from, const Vector3d& to) {
+    const Vector3d along = to - from;
+    const double length = along.squaredNorm();
+    const double t = length > 0.0 ? std::clamp(along.dot(p - from) / length, 0.0, 1.0) : 0.0;
+    return (p - from - t * along).squaredNorm();
+  };
+  return std::min({to_edge(a, b), to_edge(b, c), to_edge(c, a)});
 }
 
-/// The hull of triangles that lie in a plane, made `thickness` (m) thick inwards: one side of a wall is often a part of
-/// its own. Nothing for slivers that carry nothing.
-std::optional<geometry::TriangleMesh> plate(const geometry::TriangleMesh& mesh,
-                                            const std::vector<std::size_t>& triangles, double thickness) {
-  Vector3d area = Vector3d::Zero();
-  std::vector<Vector3d> points;
-  for (const std::size_t i : triangles) {
-    const auto& t = mesh.triangles[i];
-    const Vector3d& a = mesh.vertices[t[0]];
-    area += 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
-    for (const std::uint32_t corner : t) points.push_back(mesh.vertices[corner]);
+/// A mesh and its triangles' clusters, which become parts.
+class PartMaker {
+ public:
+  /// `dent` (m): what a part may fill of the space outside.
+  PartMaker(const geometry::TriangleMesh& mesh, double dent) : mesh_(mesh), dent_(dent) {}
+
+  /// Appends the hull of a cluster, `corners` if it is given. HACD looks for dents along the triangles' normals, so a
+  /// ring of triangles that face one way (the rim of a bin) seems convex to it: what fills space outside is halved.
+  void add(const std::vector<std::size_t>& triangles, std::vector<Vector3d> corners,
+           std::vector<geometry::TriangleMesh>& parts) const {
+    if (corners.empty()) {
+      for (const std::size_t i : triangles) {
+        for (const std::uint32_t corner : mesh_.triangles[i]) corners.push_back(mesh_.vertices[corner]);
+      }
+    }
+    if (!make_polytope(corners) && !thicken(triangles, corners)) return;  // slivers carry nothing
+    auto hull = geometry::convex_hull(corners);
+    if (!hull || !make_polytope(hull->vertices)) return;
+    if (triangles.size() < 2 || !fills_outside(*hull)) {
+      parts.push_back(*std::move(hull));
+      return;
+    }
+    std::vector<std::size_t> order = triangles;
+    const Vector3d size = geometry::bounding_box(*hull).sizes();
+    int axis = 0;
+    size.maxCoeff(&axis);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t i, std::size_t k) { return middle(i)[axis] < middle(k)[axis]; });
+    const auto half = order.begin() + static_cast<std::ptrdiff_t>(order.size() / 2);
+    add({order.begin(), half}, {}, parts);
+    add({half, order.end()}, {}, parts);
   }
-  if (area.norm() < thickness * thickness) return std::nullopt;
-  const std::size_t count = points.size();
-  for (std::size_t i = 0; i < count; ++i) points.push_back(points[i] - thickness * area.normalized());
-  auto hull = geometry::convex_hull(points);
-  if (!hull || !make_polytope(hull->vertices)) return std::nullopt;
-  return *std::move(hull);
-}
+
+ private:
+  const Vector3d& corner(std::size_t triangle, std::size_t k) const {
+    return mesh_.vertices[mesh_.triangles[triangle][k]];
+  }
+  Vector3d middle(std::size_t i) const { return (corner(i, 0) + corner(i, 1) + corner(i, 2)) / 3.0; }
+
+  /// Makes triangles that lie in a plane a plate, inwards: one side of a wall is often a part of its own.
+  bool thicken(const std::vector<std::size_t>& triangles, std::vector<Vector3d>& corners) const {
+    Vector3d area = Vector3d::Zero();
+    for (const std::size_t i : triangles) {
+      area += 0.5 * (corner(i, 1) - corner(i, 0)).cross(corner(i, 2) - corner(i, 0));
+    }
+    if (area.norm() < 0.1 * dent_ * dent_) return false;
+    const std::size_t count = corners.size();
+    for (std::size_t i = 0; i < count; ++i) corners.push_back(corners[i] - dent_ * area.normalized());
+    return true;
+  }
+
+  /// Whether a part holds a point that is outside of the mesh and deeper than kDeepDent dents from its surface. Looks
+  /// at the middles of pairs of corners.
+  bool fills_outside(const geometry::TriangleMesh& part) const {
+    const std::vector<Vector3d>& v = part.vertices;
+    const std::size_t pairs = v.size() * (v.size() - 1) / 2;
+    const std::size_t stride = std::max<std::size_t>(1, pairs / kProbes);
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      for (std::size_t k = 0; k < i; ++k) {
+        if (n++ % stride != 0) continue;
+        const Vector3d p = 0.5 * (v[i] + v[k]);
+        if (far_from_surface(p, kDeepDent * dent_) && !inside(p)) return true;
+      }
+    }
+    return false;
+  }
+
+  bool far_from_surface(const Vector3d& p, double distance) const {
+    for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
+      if (squared_distance(p, corner(i, 0), corner(i, 1), corner(i, 2)) < distance * distance) return false;
+    }
+    return true;
+  }
+
+  /// By the winding number, which copes with small holes.
+  bool inside(const Vector3d& p) const {
+    double angle = 0.0;
+    for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
+      const Vector3d a = corner(i, 0) - p;
+      const Vector3d b = corner(i, 1) - p;
+      const Vector3d c = corner(i, 2) - p;
+      const double na = a.norm();
+      const double nb = b.norm();
+      const double nc = c.norm();
+      // [Van Oosterom & Strackee 1983]
+      angle += 2.0 * std::atan2(a.dot(b.cross(c)), na * nb * nc + a.dot(b) * nc + b.dot(c) * na + c.dot(a) * nb);
+    }
+    return angle > 2.0 * std::numbers::pi;
+  }
+
+  static constexpr std::size_t kProbes = 60;
+  static constexpr double kDeepDent = 2.0;
+
+  const geometry::TriangleMesh& mesh_;
+  double dent_;
+};
 
 core::Result<std::vector<geometry::TriangleMesh>> decompose(const geometry::TriangleMesh& input,
                                                             const DecompositionSettings& settings) {
   if (const auto whole = make_polytope(input.vertices); !whole) return whole.status();
   const double diagonal = geometry::bounding_box(input).sizes().norm();
-  const geometry::TriangleMesh mesh = refined(geometry::simplified(input, kMaxTriangles), kLongestEdge * diagonal);
+  const geometry::TriangleMesh mesh =
+      geometry::refined(geometry::simplified(input, kMaxTriangles), kLongestEdge * diagonal, kMaxRefinedTriangles);
   std::vector<HACD::Vec3<HACD::Real>> points;
   points.reserve(mesh.vertices.size());
   for (const Vector3d& v : mesh.vertices) points.emplace_back(v.x(), v.y(), v.z());
@@ -120,21 +175,14 @@ core::Result<std::vector<geometry::TriangleMesh>> decompose(const geometry::Tria
     triangles_of[static_cast<std::size_t>(hacd.GetPartition()[i])].push_back(i);
   }
   std::vector<geometry::TriangleMesh> parts;
+  const PartMaker maker(mesh, settings.concavity * diagonal);
   for (std::size_t i = 0; i < hacd.GetNClusters(); ++i) {
-    std::vector<HACD::Vec3<HACD::Real>> corners(hacd.GetNPointsCH(i));
+    std::vector<HACD::Vec3<HACD::Real>> hull(hacd.GetNPointsCH(i));
     std::vector<HACD::Vec3<long>> faces(hacd.GetNTrianglesCH(i));
-    hacd.GetCH(i, corners.data(), faces.data());
-    geometry::TriangleMesh part;
-    for (const auto& c : corners) part.vertices.emplace_back(c.X(), c.Y(), c.Z());
-    for (const auto& f : faces) {
-      part.triangles.push_back(
-          {static_cast<std::uint32_t>(f.X()), static_cast<std::uint32_t>(f.Y()), static_cast<std::uint32_t>(f.Z())});
-    }
-    if (make_polytope(part.vertices)) {
-      parts.push_back(std::move(part));
-    } else if (auto sheet = plate(mesh, triangles_of[i], settings.concavity * diagonal)) {
-      parts.push_back(std::move(*sheet));
-    }
+    hacd.GetCH(i, hull.data(), faces.data());
+    std::vector<Vector3d> corners;
+    for (const auto& c : hull) corners.emplace_back(c.X(), c.Y(), c.Z());
+    maker.add(triangles_of[i], std::move(corners), parts);
   }
   if (parts.empty()) {
     return core::invalid_input("convex decomposition found no part with a volume; check the mesh's scale");

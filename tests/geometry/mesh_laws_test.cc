@@ -7,6 +7,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/geometry/refine.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/tests/support/generators.h"
@@ -248,6 +249,36 @@ TEST(SimplifiedLaws, KeepsClosedSurfacesClosed) {
     box.extend(Vector3d(box.min() - Vector3d::Constant(0.2 * size)));
     box.extend(Vector3d(box.max() + Vector3d::Constant(0.2 * size)));
     for (const Vector3d& p : coarse.vertices) RC_ASSERT(box.contains(p));
+  }));
+}
+
+TEST(MeshLaws, RefiningKeepsTheSurfaceAndItsSeamsAndMakesNoSlivers) {
+  EXPECT_TRUE(rc::check([] {
+    const TriangleMesh mesh = *closed_meshes();
+    const double size = size_of(mesh);
+    const double longest = 0.01 * *rc::gen::inRange(15, 120) * size;
+    const std::size_t most = 20000;
+    const TriangleMesh fine = refined(mesh, longest, most);
+    RC_ASSERT(fine.triangles.size() <= std::max(most, mesh.triangles.size()));
+    RC_ASSERT(mesh_topology(fine).watertight() && mesh_topology(fine).oriented());
+    RC_ASSERT(std::abs(surface_area(fine) - surface_area(mesh)) < 1e-12 * size * size);
+    RC_ASSERT(std::abs(signed_volume(fine) - signed_volume(mesh)) < 1e-12 * size * size * size);
+    // Halving edges makes angles smaller, but no triangle without area out of one that has some.
+    const auto least_area = [](const TriangleMesh& m) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const auto& t : m.triangles) {
+        const Vector3d& a = m.vertices[t[0]];
+        least = std::min(least, (m.vertices[t[1]] - a).cross(m.vertices[t[2]] - a).norm());
+      }
+      return least;
+    };
+    const double pieces = static_cast<double>(fine.triangles.size());
+    RC_ASSERT(least_area(fine) > 0.1 * least_area(mesh) / (pieces * pieces));
+    for (const auto& t : fine.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        RC_ASSERT((fine.vertices[t[k]] - fine.vertices[t[(k + 1) % 3]]).norm() <= longest);
+      }
+    }
   }));
 }
 

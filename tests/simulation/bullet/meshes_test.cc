@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "bullet_scenes.h"
+#include "prescene/geometry/triangle_mesh.h"
+#include "prescene/simulation/convex_polytope.h"
 
 namespace prescene::tests {
 namespace {
@@ -120,6 +124,43 @@ TEST(Meshes, AHullCoversItsHollowAndTheOtherUsesKeepIt) {
     const belief::ObjectState end = instance->state().objects[0];
     EXPECT_NEAR(end.X_WO.translation.z(), c.z, 2e-3) << c.name;
     EXPECT_LT(end.V_WO.linear.norm(), 1e-3) << c.name;
+  }
+}
+
+TEST(Meshes, DecompositionsCoverTheSurfaceAndFillNoHollow) {
+  struct Case {
+    const char* name;
+    TriangleMesh mesh;
+    std::vector<Vector3d> hollow;  // points of it
+  };
+  // A bin, a cup turned from a profile that goes up outside and down inside, and a clamp: two bars on a third.
+  const TriangleMesh clamp = geometry::joined(
+      box_at({0.1, 0.02, 0.02}, {0, 0, 0.01}),
+      geometry::joined(box_at({0.02, 0.02, 0.1}, {-0.04, 0, 0.0701}), box_at({0.02, 0.02, 0.1}, {0.04, 0, 0.0701})));
+  const TriangleMesh cup =
+      geometry::make_lathe({{0.0, 0.0}, {0.04, 0.0}, {0.04, 0.1}, {0.037, 0.1}, {0.037, 0.004}, {0.0, 0.004}});
+  for (const Case& c :
+       {Case{"bin", geometry::make_open_bin({0.2, 0.2, 0.08}, 0.01), {{0, 0, 0.03}, {0.08, -0.08, 0.08}}},
+        Case{"cup", cup, {{0, 0, 0.02}, {0.025, 0, 0.05}, {0, -0.02, 0.095}}},
+        Case{"clamp", clamp, {{0, 0, 0.05}, {0.02, 0, 0.1}}}}) {
+    const auto parts = simulation::hacd_decomposer()(c.mesh, {});
+    ASSERT_TRUE(parts.ok()) << c.name;
+    const double diagonal = geometry::bounding_box(c.mesh).sizes().norm();
+    // Signed distance to the nearest part's planes, negative inside.
+    const auto depth = [&](const Vector3d& p) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const TriangleMesh& part : *parts) {
+        const auto polytope = simulation::make_polytope(part.vertices);
+        double out = -std::numeric_limits<double>::infinity();
+        for (const auto& face : polytope->faces) out = std::max(out, face.normal.dot(p) - face.offset);
+        least = std::min(least, out);
+      }
+      return least;
+    };
+    for (const Vector3d& p : c.hollow) EXPECT_GT(depth(p), 0.0) << c.name << " at " << p.transpose();
+    for (const auto& point : geometry::sample_surface(c.mesh, 200, 1)) {
+      EXPECT_LT(depth(point.position), 0.02 * diagonal) << c.name << " at " << point.position.transpose();
+    }
   }
 }
 
