@@ -5,6 +5,7 @@
 #include "json_values.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/check.h"
+#include "prescene/core/text.h"
 
 namespace prescene::belief {
 namespace {
@@ -125,19 +126,6 @@ ViewQuery view_from(JsonObject& fields) {
   return view;
 }
 
-std::string base64(const std::uint8_t* bytes, std::size_t size) {
-  static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((size + 2) / 3 * 4);
-  for (std::size_t i = 0; i < size; i += 3) {
-    const std::size_t rest = std::min<std::size_t>(3, size - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < rest ? bytes[i + k] : 0u);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= rest ? kDigits[group >> (18 - 6 * k) & 63u] : '=';
-  }
-  return text;
-}
-
 // Rows from the top without padding, little-endian, in base64; `encoding` as in ROS.
 template <class Pixel>
 Json image_json(const geometry::Image<Pixel>& image, const char* encoding) {
@@ -145,7 +133,7 @@ Json image_json(const geometry::Image<Pixel>& image, const char* encoding) {
   return {{"width", image.width()},
           {"height", image.height()},
           {"encoding", encoding},
-          {"base64", base64(bytes, image.size() * sizeof(Pixel))}};
+          {"base64", core::base64({bytes, image.size() * sizeof(Pixel)})}};
 }
 
 Json outcome_probability_json(const OutcomeProbability& outcome) {
@@ -203,13 +191,10 @@ struct AnswerJson {
                       {"share", run.share},
                       {"timeline", to_json(run.timeline)},
                       {"trajectory", to_json(run.trajectory)}});
-    return {{"outcomes", std::move(outcomes)},
-            {"final_poses", std::move(poses)},
-            {"typical_runs", std::move(runs)},
-            {"instances", predict.instances},
-            {"simulated_seconds", predict.simulated_seconds},
-            {"wall_seconds", predict.wall_seconds},
-            {"converged", predict.converged}};
+    return {{"outcomes", std::move(outcomes)},      {"converged", predict.converged},
+            {"instances", predict.instances},       {"simulated_seconds", predict.simulated_seconds},
+            {"wall_seconds", predict.wall_seconds}, {"final_poses", std::move(poses)},
+            {"typical_runs", std::move(runs)}};
   }
   Json operator()(const StabilityAnswer& stability) const {
     return {{"object", stability.object},

@@ -4,29 +4,27 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "prescene/core/text.h"
 
 namespace prescene::belief {
 namespace {
 
 using core::invalid_input;
+using core::rounded_text;
 using core::Status;
 
-std::string text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", value);
-  return buffer;
-}
-
 Status check_value(double value, const ScalarRange& range) {
-  if (!std::isfinite(value)) return invalid_input(text(value) + " is not a number: " + range.remedy);
-  if (value < range.low || value > range.high) return invalid_input(text(value) + " is out of range: " + range.remedy);
+  if (!std::isfinite(value)) return invalid_input(rounded_text(value) + " is not a number: " + range.remedy);
+  if (value < range.low || value > range.high)
+    return invalid_input(rounded_text(value) + " is out of range: " + range.remedy);
   return {};
 }
 
 Status check_length(double value, const char* what) {
   if (!(value > 0.0) || !(value <= 1e4))
-    return invalid_input(std::string(what) + " of " + text(value) + ": give metres, more than 0 and at most 1e4");
+    return invalid_input(std::string(what) + " of " + rounded_text(value) +
+                         ": give metres, more than 0 and at most 1e4");
   return {};
 }
 
@@ -75,7 +73,7 @@ Status check_scalar(const ScalarDistribution& distribution, const ScalarRange& r
     PRESCENE_RETURN_IF_ERROR(check_value(uniform->low, range));
     PRESCENE_RETURN_IF_ERROR(check_value(uniform->high, range));
     if (uniform->low > uniform->high)
-      return invalid_input("the interval from " + text(uniform->low) + " to " + text(uniform->high) +
+      return invalid_input("the interval from " + rounded_text(uniform->low) + " to " + rounded_text(uniform->high) +
                            " runs backwards: give [lowest, highest]");
     return {};
   }
@@ -86,17 +84,18 @@ Status check_scalar(const ScalarDistribution& distribution, const ScalarRange& r
   }
   const auto& normal = std::get<NormalScalar>(distribution);
   if (!std::isfinite(normal.mean) || !std::isfinite(normal.standard_deviation) || normal.standard_deviation < 0.0)
-    return invalid_input("normal of mean " + text(normal.mean) + " and standard deviation " +
-                         text(normal.standard_deviation) + ": both have to be finite, the deviation at least 0");
+    return invalid_input("normal of mean " + rounded_text(normal.mean) + " and standard deviation " +
+                         rounded_text(normal.standard_deviation) +
+                         ": both have to be finite, the deviation at least 0");
   if (std::isnan(normal.low) || std::isnan(normal.high) || normal.low > normal.high)
-    return invalid_input("the cut from " + text(normal.low) + " to " + text(normal.high) +
+    return invalid_input("the cut from " + rounded_text(normal.low) + " to " + rounded_text(normal.high) +
                          " is empty: give a min below the max");
   PRESCENE_RETURN_IF_ERROR(check_value(std::clamp(normal.mean, normal.low, normal.high), range));
   if (normal.standard_deviation == 0.0) return {};
   if (range.hard_low && normal.low < range.low)
-    return invalid_input("the normal reaches below " + text(range.low) + ": cut it there with min");
+    return invalid_input("the normal reaches below " + rounded_text(range.low) + ": cut it there with min");
   if (range.hard_high && normal.high > range.high)
-    return invalid_input("the normal reaches above " + text(range.high) + ": cut it there with max");
+    return invalid_input("the normal reaches above " + rounded_text(range.high) + ": cut it there with max");
   return {};
 }
 
@@ -109,7 +108,7 @@ Status check_vector(const Vector3Distribution& distribution, const ScalarRange& 
 Status check_pose(const Pose& pose) {
   if (!pose.is_finite()) return invalid_input("the pose is not finite: give numbers");
   if (std::abs(pose.rotation.norm() - 1.0) > 1e-6)
-    return invalid_input("the quaternion has length " + text(pose.rotation.norm()) +
+    return invalid_input("the quaternion has length " + rounded_text(pose.rotation.norm()) +
                          ": give a unit quaternion w, x, y, z");
   for (int i = 0; i < 3; ++i) PRESCENE_RETURN_IF_ERROR(check_value(pose.translation[i], kLengthRange).at("position"));
   return {};

@@ -2,9 +2,9 @@
 #include "html_text.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"
 
 namespace prescene::interfaces {
@@ -65,31 +65,12 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-std::string base64(std::span<const std::uint8_t> bytes) {
-  static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k) word = word << 8 | (k < count ? bytes[i + k] : 0u);
-    for (std::size_t k = 0; k < 4; ++k) out += k <= count ? kDigits[word >> (18 - 6 * k) & 63u] : '=';
-  }
-  return out;
-}
-
 std::string png_data_uri(const geometry::ColorImage& picture) {
-  return "data:image/png;base64," + base64(encode_png(picture.view()));
+  return "data:image/png;base64," + core::base64(encode_png(picture.view()));
 }
 
 std::string decimal(double value, int decimals) {
-  if (!std::isfinite(value)) return "–";
-  char buffer[400];
-  const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, decimals);
-  std::string text(buffer, end);
-  // No negative zero.
-  if (text.starts_with('-') && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
-  return text;
+  return std::isfinite(value) ? core::fixed_text(value, decimals) : "–";
 }
 
 std::string significant(double value, int digits) {

@@ -2,8 +2,6 @@
 // Text and numbers as HTML and SVG want them.
 #pragma once
 
-#include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 
@@ -14,10 +12,9 @@ namespace prescene::interfaces {
 /// Fit for element content and quoted attributes: & < > " ' escaped, control bytes dropped (line ends and tabs stay),
 /// bytes that are not UTF-8 replaced by U+FFFD.
 std::string escaped(std::string_view text);
-std::string base64(std::span<const std::uint8_t> bytes);
 /// "data:image/png;base64,..." of the picture, which must not be empty.
 std::string png_data_uri(const geometry::ColorImage& picture);
-/// With so many decimals, independent of the locale; "–" for what is not finite.
+/// core::fixed_text, with "–" for what is not finite.
 std::string decimal(double value, int decimals);
 /// With about so many significant digits: 0.0123, 12.3, 4560.
 std::string significant(double value, int digits);

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -43,7 +43,7 @@ std::optional<std::string> converted(std::string_view text, std::string_view bas
   const std::string_view name = trimmed(text.substr(end));
   for (const Unit& unit : kUnits)
     if (unit.name == name && unit.base == base)
-      return "write " + rounded_text(number * unit.factor) + " without a unit";
+      return "write " + core::rounded_text(number * unit.factor) + " without a unit";
   return std::nullopt;
 }
 
@@ -59,7 +59,7 @@ std::string unit_guess(double number, const NumberRange& range) {
   for (const Guess& guess : kGuesses) {
     const double meant = number * guess.factor;
     if (guess.base == range.unit && std::abs(number) > std::abs(meant) && meant >= range.low && meant <= range.high)
-      return std::string(guess.name) + "? then write " + rounded_text(meant) + "; ";
+      return std::string(guess.name) + "? then write " + core::rounded_text(meant) + "; ";
   }
   return {};
 }
@@ -69,12 +69,6 @@ std::string_view without_plus(std::string_view text) {
 }
 
 }  // namespace
-
-std::string rounded_text(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", number);
-  return text;
-}
 
 std::string description(const LocatedValue& value) {
   switch (value.kind) {

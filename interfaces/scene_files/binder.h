@@ -49,8 +49,6 @@ std::optional<std::size_t> read_word(const LocatedValue& value, Problems& proble
 
 /// Reports that `value` is not what is needed: "is a list: give ...".
 void report_type(const LocatedValue& value, Problems& problems, std::string_view remedy);
-/// A number worked out from what was given, with 6 significant digits at most: "0.00115".
-std::string rounded_text(double number);
 /// "nothing", "a list", "a map", "the word 'abc'".
 std::string description(const LocatedValue& value);
 

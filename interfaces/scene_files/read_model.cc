@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "prescene/belief/validation.h"
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "read_scene_parts.h"
 
@@ -142,13 +143,14 @@ void check_density(const LocatedValue& at, double mass, double volume, Problems&
   const double density = mass / volume;
   if (density > kDensity.high) {
     const double grams = density * 1e-3;
-    problems.add(at.place, at.path,
-                 number_text(mass) + " kg in this volume of " + rounded_text(volume) + " m^3 is denser than any metal",
-                 grams > kDensity.low && grams < kDensity.high ? "grams? then write " + rounded_text(mass * 1e-3)
-                                                               : std::string("check the mass (kg) and the sizes (m)"));
+    problems.add(
+        at.place, at.path,
+        number_text(mass) + " kg in this volume of " + core::rounded_text(volume) + " m^3 is denser than any metal",
+        grams > kDensity.low && grams < kDensity.high ? "grams? then write " + core::rounded_text(mass * 1e-3)
+                                                      : std::string("check the mass (kg) and the sizes (m)"));
   } else if (density < kDensity.low) {
     problems.add(at.place, at.path,
-                 number_text(mass) + " kg in this volume of " + rounded_text(volume) + " m^3 is lighter than air",
+                 number_text(mass) + " kg in this volume of " + core::rounded_text(volume) + " m^3 is lighter than air",
                  "check the sizes (metres, not millimetres or centimetres) and the mass (kg)");
   }
 }

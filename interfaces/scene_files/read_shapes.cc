@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "read_scene_parts.h"
 
@@ -127,10 +128,10 @@ class ShapeReader {
   void check_extent(const LocatedValue& value, const geometry::TriangleMesh& mesh) {
     const double extent = geometry::bounding_box(mesh).sizes().maxCoeff();
     if (extent > size_.high)
-      problems_.add(value.place, value.path, "the mesh is " + rounded_text(extent) + " m large",
+      problems_.add(value.place, value.path, "the mesh is " + core::rounded_text(extent) + " m large",
                     "millimetres? then give scale: 0.001");
     else if (extent < 1e-4)
-      problems_.add(value.place, value.path, "the mesh is only " + rounded_text(extent) + " m large",
+      problems_.add(value.place, value.path, "the mesh is only " + core::rounded_text(extent) + " m large",
                     "give the scale in metres per unit of the file");
   }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -213,7 +214,7 @@ Quaterniond read_quaternion(const LocatedValue& value, Problems& problems) {
   // Hand-written digits are rounded to about three places; more is a mistake (order, sign, a missing number).
   const double error = std::abs(rotation.norm() - 1.0);
   if (error > 0.01) {
-    problems.add(value.place, value.path, "the quaternion has length " + rounded_text(rotation.norm()), kRemedy);
+    problems.add(value.place, value.path, "the quaternion has length " + core::rounded_text(rotation.norm()), kRemedy);
     return Quaterniond::Identity();
   }
   return error < 1e-9 ? rotation : rotation.normalized();  // what we wrote ourselves keeps its bits
