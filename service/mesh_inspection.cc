@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
+
+#include "prescene/core/text.h"
 
 namespace prescene::service {
 namespace {
@@ -13,12 +14,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-
-std::string number_text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", value);
-  return buffer;
-}
 
 ordered_json vector_json(const geometry::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -36,7 +31,8 @@ std::string axis_text(const geometry::Vector3d& axis) {
   for (Eigen::Index i = 0; i < 3; ++i) {
     if (std::abs(axis[i]) > 1.0 - 1e-9) return kLetters[i];
   }
-  return "[" + number_text(axis.x()) + ", " + number_text(axis.y()) + ", " + number_text(axis.z()) + "]";
+  return "[" + core::rounded_text(axis.x()) + ", " + core::rounded_text(axis.y()) + ", " +
+         core::rounded_text(axis.z()) + "]";
 }
 
 /// Whether half turns exchange the ends of the continuous axis.
@@ -56,31 +52,11 @@ int cyclic_order(const geometry::SymmetryGroup& symmetry, geometry::Vector3d* ax
   return static_cast<int>(symmetry.rotations.size()) + 1;
 }
 
-/// The rows of a model file that say the symmetry; a group that they can't say becomes its strongest part, with a
-/// comment.
-std::string symmetry_yaml(const geometry::SymmetryGroup& symmetry) {
-  const std::string center = symmetry.p_BoC.norm() > 1e-9
-                                 ? ", center: [" + number_text(symmetry.p_BoC.x()) + ", " +
-                                       number_text(symmetry.p_BoC.y()) + ", " + number_text(symmetry.p_BoC.z()) + "]"
-                                 : "";
-  if (symmetry.trivial()) return "  symmetry: none\n";
-  if (symmetry.axis) {
-    return "  symmetry: {axis: " + axis_text(*symmetry.axis) + ", continuous: true" +
-           (flips(symmetry) ? ", flip: true" : "") + center + "}\n";
-  }
-  geometry::Vector3d axis;
-  if (const int order = cyclic_order(symmetry, &axis); order > 1) {
-    return "  symmetry: {axis: " + axis_text(axis) + ", order: " + std::to_string(order) + center + "}\n";
-  }
-  if (symmetry.rotations.size() == 3 && center.empty()) return "  symmetry: cuboid\n";
-  return "  # The mesh has " + std::to_string(symmetry.rotations.size() + 1) +
-         " symmetric rotations about several axes, more than this file can say.\n  symmetry: none\n";
-}
-
 }  // namespace
 
 std::string symmetry_text(const geometry::SymmetryGroup& symmetry) {
   if (symmetry.trivial()) return "none";
+  if (symmetry.ball) return "every rotation";
   if (symmetry.axis)
     return "continuous about " + axis_text(*symmetry.axis) + (flips(symmetry) ? ", both ways round" : "");
   geometry::Vector3d axis;
@@ -157,27 +133,27 @@ ordered_json to_json(const MeshInspection& found) {
   return json;
 }
 
-std::string model_file_text(const MeshInspection& found, const MeshInspectionOptions& options,
-                            const std::filesystem::path& model_path) {
+core::Result<interfaces::ModelFile> model_file(const MeshInspection& found, const MeshInspectionOptions& options,
+                                               const std::filesystem::path& model_path) {
+  const auto& mass = found.mass ? found.mass : found.hull_mass;
+  if (!mass) return core::invalid_input(found.path.string() + ": flat: a model needs a volume");
   std::error_code ignored;
   const auto folder = std::filesystem::absolute(model_path, ignored).parent_path();
   const auto relative = std::filesystem::relative(std::filesystem::absolute(found.path, ignored), folder, ignored);
-  std::string text = "# Made from " + found.path.filename().string() +
-                     "; a scene names it as {file: " + model_path.filename().string() + "}.\n";
-  for (const std::string& remark : found.remarks) text += "# " + remark + "\n";
-  const std::string mesh_path = relative.empty() ? found.path.string() : relative.generic_string();
-  // Quoted, as a path may hold what YAML would read otherwise.
-  text += "model:\n  mesh:\n    file: " +
-          ordered_json(mesh_path).dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
-  if (options.read.metres_per_unit != 1.0) text += "    scale: " + number_text(options.read.metres_per_unit) + "\n";
-  if (options.read.up_axis == interfaces::UpAxis::kY) text += "    up: y\n";
-  text += "    use: convex_hull  # or convex_parts, decompose\n";
-  const auto& mass = found.mass ? found.mass : found.hull_mass;
-  if (mass) {
-    text += "  mass: " + number_text(mass->mass) + "  # " + number_text(found.density) + " kg/m^3" +
-            (found.mass ? "" : " of its convex hull: weigh it") + "\n";
-  }
-  return text + symmetry_yaml(found.symmetry);
+  interfaces::ModelFile file;
+  file.mesh_file = relative.empty() ? found.path.string() : relative.generic_string();
+  file.scale = options.read.metres_per_unit;
+  file.y_up = options.read.up_axis == interfaces::UpAxis::kY;
+  file.model.mass = belief::FixedScalar{mass->mass};
+  file.model.center_of_mass = belief::Vector3Distribution::fixed(mass->p_BoBcm);
+  file.model.unit_inertia = mass->I_BBcm_B / mass->mass;
+  file.model.symmetry = found.symmetry;
+  file.remarks = {"Made from " + found.path.filename().string() +
+                  "; a scene names it as {file: " + model_path.filename().string() + "}."};
+  file.remarks.insert(file.remarks.end(), found.remarks.begin(), found.remarks.end());
+  file.remarks.push_back("The mass is that of " + core::rounded_text(found.density) + " kg/m^3" +
+                         (found.mass ? "" : " in its convex hull") + ": weigh the object.");
+  return file;
 }
 
 }  // namespace prescene::service

@@ -13,6 +13,7 @@
 #include "prescene/geometry/symmetry.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
+#include "prescene/interfaces/scene_files/model_file.h"
 
 namespace prescene::service {
 
@@ -40,11 +41,12 @@ struct MeshInspection {
 core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, const MeshInspectionOptions& options);
 
 nlohmann::ordered_json to_json(const MeshInspection& inspection);
-/// A model file that scene files can name (docs/scene_files.md): the mesh, mass, symmetry, with remarks as comments.
-/// `model_path` is where it will lie: the mesh is named relative to it.
-std::string model_file_text(const MeshInspection& inspection, const MeshInspectionOptions& options,
-                            const std::filesystem::path& model_path);
-/// "none", "continuous about z (both ways round)", "4 turns about z", ...
+/// A model file that scene files can name (docs/scene_files.md): the mesh, mass properties and symmetry, with remarks
+/// as comments. `model_path` is where it will lie: the mesh is named relative to it. Fails with kInvalidInput for a
+/// flat mesh.
+core::Result<interfaces::ModelFile> model_file(const MeshInspection& inspection, const MeshInspectionOptions& options,
+                                               const std::filesystem::path& model_path);
+/// "none", "continuous about z, both ways round", "4 turns about z", ...
 std::string symmetry_text(const geometry::SymmetryGroup& symmetry);
 
 }  // namespace prescene::service

@@ -3,13 +3,15 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "prescene/interfaces/bytes/file.h"
+#include "prescene/core/text.h"
 #include "prescene/service/mesh_inspection.h"
 #include "prescene/service/prediction_report.h"
 #include "verb.h"
 
 namespace prescene::service {
 namespace {
+
+using core::fixed_text;
 
 struct Options {
   std::string mesh;
@@ -22,15 +24,15 @@ struct Options {
 std::string text_of(const MeshInspection& found) {
   const auto size = found.box.sizes();
   std::string text = found.path.string() + ": " + std::to_string(found.loaded.mesh.triangles.size()) + " triangles, " +
-                     fixed_digits(size.x(), 4) + " x " + fixed_digits(size.y(), 4) + " x " + fixed_digits(size.z(), 4) +
+                     fixed_text(size.x(), 4) + " x " + fixed_text(size.y(), 4) + " x " + fixed_text(size.z(), 4) +
                      " m, " + (found.topology.watertight() ? "closed" : "not closed") + "\n";
   const auto& mass = found.mass ? found.mass : found.hull_mass;
   if (mass) {
     const geometry::Vector3d& com = mass->p_BoBcm;
     text += std::string(found.mass ? "volume " : "volume of its convex hull ") +
-            fixed_digits(1e6 * mass->mass / found.density, 1) + " cm^3, mass " + fixed_digits(mass->mass, 4) +
-            " kg at " + fixed_digits(found.density, 0) + " kg/m^3, centre of mass (" + fixed_digits(com.x(), 4) + ", " +
-            fixed_digits(com.y(), 4) + ", " + fixed_digits(com.z(), 4) + ") m\n";
+            fixed_text(1e6 * mass->mass / found.density, 1) + " cm^3, mass " + fixed_text(mass->mass, 4) + " kg at " +
+            fixed_text(found.density, 0) + " kg/m^3, centre of mass (" + fixed_text(com.x(), 4) + ", " +
+            fixed_text(com.y(), 4) + ", " + fixed_text(com.z(), 4) + ") m\n";
   }
   text += "symmetry: " + symmetry_text(found.symmetry) + "\n";
   if (!found.resting_poses.empty()) {
@@ -39,9 +41,9 @@ std::string text_of(const MeshInspection& found) {
     for (std::size_t i = 0; i < std::min<std::size_t>(found.resting_poses.size(), 8); ++i) {
       const geometry::RestingPose& pose = found.resting_poses[i];
       const geometry::Vector3d down = pose.R_WB.inverse() * -geometry::Vector3d::UnitZ();
-      rows.push_back({fixed_digits(down.x(), 2) + " " + fixed_digits(down.y(), 2) + " " + fixed_digits(down.z(), 2),
-                      fixed_digits(pose.probability, 3), fixed_digits(pose.tip_angle * 180.0 / std::numbers::pi, 1),
-                      fixed_digits(1e3 * pose.height, 1)});
+      rows.push_back({fixed_text(down.x(), 2) + " " + fixed_text(down.y(), 2) + " " + fixed_text(down.z(), 2),
+                      fixed_text(pose.probability, 3), fixed_text(pose.tip_angle * 180.0 / std::numbers::pi, 1),
+                      fixed_text(1e3 * pose.height, 1)});
     }
     text += "\n" + table(rows);
   }
@@ -55,8 +57,8 @@ core::Status run(Options& options, VerbContext& context) {
   if (options.y_up) options.inspection.read.up_axis = interfaces::UpAxis::kY;
   PRESCENE_TRY(const MeshInspection found, inspect_mesh(options.mesh, options.inspection));
   if (!options.model.empty()) {
-    PRESCENE_RETURN_IF_ERROR(
-        interfaces::write_file(options.model, model_file_text(found, options.inspection, options.model)));
+    PRESCENE_TRY(const interfaces::ModelFile model, model_file(found, options.inspection, options.model));
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_model(options.model, model));
   }
   if (!options.report.empty()) PRESCENE_RETURN_IF_ERROR(write_mesh_report(options.report, found));
   context.print(to_json(found),

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/mesh_inspection.h"
+
+#include <gmock/gmock.h>
+
+#include "prescene/geometry/primitives.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/tests/support/paths.h"
+
+namespace prescene::service {
+namespace {
+
+using geometry::Vector3d;
+
+struct Case {
+  const char* name;
+  geometry::TriangleMesh mesh;
+  const char* symmetry;
+};
+
+std::vector<Case> cases() {
+  return {{"ball", geometry::make_mesh(geometry::Sphere{0.04}, 48), "every rotation"},
+          {"can", geometry::make_mesh(geometry::Cylinder{0.03, 0.1}, 48), "continuous about z, both ways round"},
+          {"cone", geometry::make_mesh(geometry::Cone{0.03, 0.1}, 48), "continuous about z"},
+          {"box", geometry::make_mesh(geometry::BoxShape{Vector3d(0.05, 0.1, 0.2)}), "4 rotations about several axes"},
+          {"carton", geometry::make_gable_carton(0.07, 0.09, 0.18, 0.22), "2 turns about z"}};
+}
+
+/// The model that a scene gets from the model file that was made of a mesh.
+core::Result<belief::ObjectModel> model_in_a_scene(const MeshInspection& inspection,
+                                                   const MeshInspectionOptions& options,
+                                                   const std::filesystem::path& folder) {
+  PRESCENE_TRY(const interfaces::ModelFile file, model_file(inspection, options, folder / "model.yaml"));
+  PRESCENE_RETURN_IF_ERROR(interfaces::write_model(folder / "model.yaml", file));
+  PRESCENE_TRY(const auto scene,
+               load_scene_text("models: {m: {file: model.yaml}}\nobjects: {m: {model: m, pose: {}}}\n",
+                               folder / "scene.yaml", {}));
+  return scene->models[0];
+}
+
+TEST(MeshInspection, ASceneGetsTheModelThatWasFound) {
+  const tests::ScratchDir folder;
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    const auto path = folder.path() / (std::string(c.name) + ".ply");
+    // Beside its own origin and in millimetres, so that place and unit matter.
+    const geometry::Pose X_MO = geometry::Pose::from_translation({0.01, -0.02, 0.03});
+    ASSERT_TRUE(interfaces::write_ply(path, geometry::scaled(geometry::transformed(c.mesh, X_MO), 1000.0)).ok());
+    MeshInspectionOptions options;
+    options.read.metres_per_unit = 0.001;
+    options.density = 700.0;
+    const auto found = inspect_mesh(path, options);
+    ASSERT_TRUE(found.ok()) << found.status().message();
+    EXPECT_EQ(symmetry_text(found->symmetry), c.symmetry);
+    const auto truth = geometry::mass_properties(geometry::transformed(c.mesh, X_MO), 700.0);
+    ASSERT_TRUE(truth.ok());
+
+    const auto model = model_in_a_scene(*found, options, folder.path());
+    ASSERT_TRUE(model.ok()) << model.status().message();
+    EXPECT_NEAR(belief::mean(model->mass), truth->mass, 1e-9 * truth->mass);
+    EXPECT_LT((belief::mean(model->center_of_mass) - truth->p_BoBcm).norm(), 1e-9);
+    EXPECT_LT((model->unit_inertia - truth->I_BBcm_B / truth->mass).norm(), 1e-9);
+    EXPECT_EQ(symmetry_text(model->symmetry), c.symmetry);
+    EXPECT_LT((model->symmetry.p_BoC - found->symmetry.p_BoC).norm(), 1e-9);
+    EXPECT_LT(geometry::radius_about(*model->visual, Vector3d::Zero()), 0.2) << "metres";
+  }
+}
+
+TEST(MeshInspection, AnOpenMeshGetsTheMassOfItsHullAndSaysSo) {
+  const tests::ScratchDir folder;
+  geometry::TriangleMesh open = geometry::make_mesh(geometry::BoxShape{Vector3d(0.1, 0.1, 0.1)});
+  open.triangles.pop_back();
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "open.ply", open).ok());
+  const auto found = inspect_mesh(folder.path() / "open.ply", {});
+  ASSERT_TRUE(found.ok());
+  EXPECT_FALSE(found->mass.has_value());
+  const auto file = model_file(*found, {}, folder.path() / "open.yaml");
+  ASSERT_TRUE(file.ok());
+  EXPECT_NEAR(belief::mean(file->model.mass), 0.5, 1e-9);
+  EXPECT_THAT(file->remarks.back(), testing::HasSubstr("convex hull"));
+}
+
+TEST(MeshInspection, AFlatMeshMakesNoModel) {
+  const tests::ScratchDir folder;
+  const geometry::TriangleMesh flat{{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}}, {{0, 1, 2}}};
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "flat.ply", flat).ok());
+  const auto found = inspect_mesh(folder.path() / "flat.ply", {});
+  ASSERT_TRUE(found.ok());
+  const auto file = model_file(*found, {}, folder.path() / "flat.yaml");
+  ASSERT_FALSE(file.ok());
+  EXPECT_THAT(file.status().message(), testing::HasSubstr("flat"));
+}
+
+}  // namespace
+}  // namespace prescene::service
