@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/load_scene.h"
 
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 
@@ -32,10 +33,15 @@ core::Result<std::shared_ptr<const belief::Scene>> shared(core::Result<belief::S
 
 }  // namespace
 
+core::Result<std::string> read_scene_text(const std::filesystem::path& path) {
+  PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(path, interfaces::YamlLimits{}.max_bytes));
+  return std::string(bytes.begin(), bytes.end());
+}
+
 core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
                                                               const core::LogSink& log) {
-  interfaces::FileReport report;
-  return shared(interfaces::read_scene(path, options(log), &report), report, log);
+  PRESCENE_TRY(const std::string text, read_scene_text(path));
+  return load_scene_text(text, path, log);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,

@@ -17,7 +17,10 @@ namespace prescene::service {
 core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
                                                               const core::LogSink& log);
 
-/// The same from the text of a scene file that was recorded; files that it names are looked for relative to `path`.
+/// The text of a scene file, to be recorded. Errors of interfaces::read_file.
+core::Result<std::string> read_scene_text(const std::filesystem::path& path);
+
+/// load_scene from such a text; files that it names are looked for relative to `path`.
 core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
                                                                    const std::filesystem::path& path,
                                                                    const core::LogSink& log);

@@ -2,9 +2,9 @@
 #include "prescene/service/prediction_report.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <numbers>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/reports/report.h"
 #include "prescene/rendering/reference/reference_renderer.h"
@@ -13,13 +13,9 @@
 namespace prescene::service {
 namespace {
 
-constexpr std::size_t kPosePictures = 6;
+using core::fixed_text;
 
-std::string digits(double value, int count) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.*f", count, value);
-  return buffer;
-}
+constexpr std::size_t kPosePictures = 6;
 
 /// The scene at its mean start, shaded; the same with each object's heat map painted onto the supports.
 core::Result<std::vector<interfaces::PictureBlock::Picture>> scene_pictures(const belief::Scene& scene,
@@ -94,8 +90,8 @@ core::Status write_prediction_report(const std::filesystem::path& path, const be
   contents.title = scene.name;
   contents.subtitle = "What may happen";
   contents.facts = {{"instances", std::to_string(predicted.instances)},
-                    {"simulated", digits(predicted.simulated_seconds, 0) + " s"},
-                    {"took", digits(predicted.wall_seconds, 1) + " s"}};
+                    {"simulated", fixed_text(predicted.simulated_seconds, 0) + " s"},
+                    {"took", fixed_text(predicted.wall_seconds, 1) + " s"}};
   if (scene.camera) {
     PRESCENE_TRY(auto pictures, scene_pictures(scene, predicted, backends));
     contents.sections.push_back({"The scene", {interfaces::PictureBlock{std::move(pictures)}}});
@@ -110,12 +106,14 @@ core::Status write_mesh_report(const std::filesystem::path& path, const MeshInsp
   contents.title = found.path.filename().string();
   contents.subtitle = "What the mesh holds";
   const geometry::Vector3d size = found.box.sizes();
-  contents.facts = {{"triangles", std::to_string(found.loaded.mesh.triangles.size())},
-                    {"size", digits(size.x(), 4) + " x " + digits(size.y(), 4) + " x " + digits(size.z(), 4) + " m"},
-                    {"closed", found.topology.watertight() ? "yes" : "no"},
-                    {"symmetry", symmetry_text(found.symmetry)}};
+  contents.facts = {
+      {"triangles", std::to_string(found.loaded.mesh.triangles.size())},
+      {"size", fixed_text(size.x(), 4) + " x " + fixed_text(size.y(), 4) + " x " + fixed_text(size.z(), 4) + " m"},
+      {"closed", found.topology.watertight() ? "yes" : "no"},
+      {"symmetry", symmetry_text(found.symmetry)}};
   if (found.mass)
-    contents.facts.emplace_back("mass", digits(found.mass->mass, 4) + " kg at " + digits(found.density, 0) + " kg/m^3");
+    contents.facts.emplace_back("mass",
+                                fixed_text(found.mass->mass, 4) + " kg at " + fixed_text(found.density, 0) + " kg/m^3");
 
   const rendering::MeshHandle mesh = rendering::make_render_mesh(found.loaded.mesh);
   const geometry::Vector3d center = found.box.center();
@@ -129,8 +127,8 @@ core::Status write_mesh_report(const std::filesystem::path& path, const MeshInsp
   for (std::size_t i = 0; i < std::min(kPosePictures, found.resting_poses.size()); ++i) {
     const geometry::RestingPose& pose = found.resting_poses[i];
     PRESCENE_TRY(geometry::ColorImage picture, mesh_picture(mesh, pose.R_WB, radius, center));
-    resting.pictures.push_back({digits(100.0 * pose.probability, 1) + " %, falls over at " +
-                                    digits(pose.tip_angle * 180.0 / std::numbers::pi, 1) + " deg",
+    resting.pictures.push_back({fixed_text(100.0 * pose.probability, 1) + " %, falls over at " +
+                                    fixed_text(pose.tip_angle * 180.0 / std::numbers::pi, 1) + " deg",
                                 std::move(picture), false});
   }
   if (!resting.pictures.empty()) contents.sections.push_back({"How it can lie", {std::move(resting)}});

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
@@ -14,16 +14,11 @@
 namespace prescene::service {
 namespace {
 
+using core::fixed_text;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kMaxObservations = 48;  // in memory
 constexpr std::size_t kPictures = 6;          // on the page
-
-std::string digits(double value, int count) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.*f", count, value);
-  return buffer;
-}
 
 AssemblerSettings assembler_settings(const belief::Scene& scene) {
   AssemblerSettings settings;
@@ -112,7 +107,7 @@ void add_prediction(const ordered_json& predict, const belief::Scene& scene, int
   for (const ordered_json& run : predict.value("typical_runs", ordered_json::array())) {
     interfaces::TimelineBlock block;
     block.caption = "A typical run that ends " + run.value("outcome", "") + " (" +
-                    digits(100.0 * run.value("share", 0.0), 0) + " %)";
+                    fixed_text(100.0 * run.value("share", 0.0), 0) + " %)";
     block.timeline = timeline_from(run.value("timeline", ordered_json::array()));
     section.blocks.push_back(std::move(block));
   }
@@ -182,7 +177,7 @@ interfaces::PictureBlock SessionReport::pictures(Backends& backends) const {
     interfaces::tint(view.labels, colors, 0.25, picture);
     interfaces::draw_outlines(view.labels, colors, 2, picture);
     block.pictures.push_back(
-        {digits(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", std::move(picture), false});
+        {fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", std::move(picture), false});
   }
   return block;
 }
@@ -216,10 +211,10 @@ void SessionReport::add_supports(interfaces::ReportContents& contents) const {
       {}};
   for (const SupportRow& row : supports_.rows()) {
     table.rows.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
-                          digits(row.median_tilt * 180.0 / std::numbers::pi, 2),
-                          digits(row.largest_tilt * 180.0 / std::numbers::pi, 2), digits(1e3 * row.median_height, 1),
-                          digits(1e3 * row.largest_height, 1), digits(1e3 * row.median_rms, 1),
-                          digits(100.0 * row.median_share, 0)});
+                          fixed_text(row.median_tilt * 180.0 / std::numbers::pi, 2),
+                          fixed_text(row.largest_tilt * 180.0 / std::numbers::pi, 2),
+                          fixed_text(1e3 * row.median_height, 1), fixed_text(1e3 * row.largest_height, 1),
+                          fixed_text(1e3 * row.median_rms, 1), fixed_text(100.0 * row.median_share, 0)});
   }
   interfaces::ChartBlock height{"Height over the first frame's plane", "time, s", "mm", {}, true};
   interfaces::ChartBlock tilt{"Tilt against the first frame's plane", "time, s", "deg", {}, true};
@@ -242,7 +237,7 @@ void SessionReport::add_answers(interfaces::ReportContents& contents) const {
     try {
       add_answer_section(at, parse_or_discard(text), contents);
     } catch (const ordered_json::exception&) {
-      contents.sections.push_back({"Asked at " + digits(at, 1) + " s",
+      contents.sections.push_back({"Asked at " + fixed_text(at, 1) + " s",
                                    {interfaces::TextBlock{"The answer has not the form of docs/queries.md."}}});
     }
   }
@@ -252,7 +247,7 @@ void SessionReport::add_answer_section(double at, const ordered_json& answer,
                                        interfaces::ReportContents& contents) const {
   {
     interfaces::ReportSection section;
-    section.title = "Asked at " + digits(at, 1) + " s";
+    section.title = "Asked at " + fixed_text(at, 1) + " s";
     if (!answer.is_object()) {
       section.blocks.push_back(interfaces::TextBlock{"No answer came."});
     } else if (const std::string error = answer.value("error", ""); !error.empty()) {
@@ -290,9 +285,9 @@ core::Status SessionReport::write(const std::filesystem::path& path, const std::
         {}};
     for (const ObjectTrackingScore& row : rows) {
       table.rows.push_back({row.object, std::to_string(row.frames), std::to_string(row.visible_frames),
-                            digits(1e3 * row.median_position_error, 1), digits(1e3 * row.p90_position_error, 1),
-                            digits(row.median_turn_error * 180.0 / std::numbers::pi, 1),
-                            digits(100.0 * row.share_tracked, 0)});
+                            fixed_text(1e3 * row.median_position_error, 1), fixed_text(1e3 * row.p90_position_error, 1),
+                            fixed_text(row.median_turn_error * 180.0 / std::numbers::pi, 1),
+                            fixed_text(100.0 * row.share_tracked, 0)});
     }
     tracking.blocks.push_back(std::move(table));
   }

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include "prescene/core/text.h"
+
 #include "verb.h"
 
 namespace prescene::service {
 namespace {
 
+using core::fixed_text;
+
 std::string interval(const nlohmann::ordered_json& p) {
   const auto limits = p.value("interval", std::vector<double>{0.0, 1.0});
-  return fixed_digits(p.value("probability", 0.0), 3) + " (" + fixed_digits(limits.at(0), 3) + " to " +
-         fixed_digits(limits.at(1), 3) + ")";
+  return fixed_text(p.value("probability", 0.0), 3) + " (" + fixed_text(limits.at(0), 3) + " to " +
+         fixed_text(limits.at(1), 3) + ")";
 }
 
 std::string short_form(const nlohmann::ordered_json& answer) {
@@ -28,9 +32,9 @@ std::string short_form(const nlohmann::ordered_json& answer) {
     for (const auto& item : where->at("items")) {
       const auto& p = item.at("estimate").at("mean").at("position");
       rows.push_back({item.value("object", ""), item.value("state", ""),
-                      fixed_digits(item.at("estimate").value("confidence", 0.0), 2),
-                      fixed_digits(p.at(0).get<double>(), 3) + " " + fixed_digits(p.at(1).get<double>(), 3) + " " +
-                          fixed_digits(p.at(2).get<double>(), 3)});
+                      fixed_text(item.at("estimate").value("confidence", 0.0), 2),
+                      fixed_text(p.at(0).get<double>(), 3) + " " + fixed_text(p.at(1).get<double>(), 3) + " " +
+                          fixed_text(p.at(2).get<double>(), 3)});
     }
     return table(rows);
   }

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <cstdlib>
-#include <fstream>
 #include <map>
-#include <sstream>
 
 #include "verb.h"
 
@@ -41,14 +39,6 @@ core::Result<std::optional<geometry::Pose>> camera_pose_of(const std::vector<dou
     return core::invalid_input("--camera-pose x y z qw qx qy qz: the last four are a unit quaternion, real part first");
   }
   return std::optional<geometry::Pose>(geometry::normalized(X_WC));
-}
-
-core::Result<std::string> read_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) return core::not_found(path + ": can't be read: check the name and its permissions");
-  return text.str();
 }
 
 }  // namespace prescene::service

@@ -4,11 +4,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "prescene/core/text.h"
 #include "prescene/service/evaluate/cube_calibration.h"
 #include "verb.h"
 
 namespace prescene::service {
 namespace {
+
+using core::fixed_text;
 
 struct Options {
   std::string name;
@@ -40,7 +43,7 @@ std::string text_of(const nlohmann::ordered_json& start, const nlohmann::ordered
   std::vector<std::vector<std::string>> rows = {{"", "start", "found"}};
   for (const auto& [key, value] : start.items()) {
     if (value.is_number()) {
-      rows.push_back({key, fixed_digits(value.get<double>(), 5), fixed_digits(found[key].get<double>(), 5)});
+      rows.push_back({key, fixed_text(value.get<double>(), 5), fixed_text(found[key].get<double>(), 5)});
     }
   }
   return table(rows);

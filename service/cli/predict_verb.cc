@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
+#include "prescene/core/text.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/prediction_report.h"
@@ -10,6 +11,8 @@
 
 namespace prescene::service {
 namespace {
+
+using core::fixed_text;
 
 struct Options {
   std::string scene;
@@ -20,41 +23,24 @@ struct Options {
 };
 
 nlohmann::ordered_json document_of(const belief::Scene& scene, std::uint64_t seed, const belief::Answer& answer) {
-  const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
-  nlohmann::ordered_json outcomes = nlohmann::ordered_json::array();
-  for (const belief::OutcomeProbability& outcome : predicted.outcomes) {
-    nlohmann::ordered_json row = {{"name", outcome.name}};
-    if (!outcome.group.empty()) row["group"] = outcome.group;
-    row["probability"] = outcome.probability;
-    row["interval"] = {outcome.low, outcome.high};
-    outcomes.push_back(row);
-  }
-  nlohmann::ordered_json document = {{"scene", scene.name},
-                                     {"seed", seed},
-                                     {"outcomes", outcomes},
-                                     {"converged", predicted.converged},
-                                     {"instances", predicted.instances},
-                                     {"simulated_seconds", predicted.simulated_seconds},
-                                     {"wall_seconds", predicted.wall_seconds}};
-  const nlohmann::ordered_json whole = belief::to_json(answer);
-  document["final_poses"] = whole.at("predict").at("final_poses");
-  document["typical_runs"] = whole.at("predict").at("typical_runs");
+  nlohmann::ordered_json document = {{"scene", scene.name}, {"seed", seed}};
+  document.update(belief::to_json(answer).at("predict"));
   return document;
 }
 
-std::string text_of(const belief::PredictAnswer& predicted) {
-  std::vector<std::vector<std::string>> rows = {{"outcome", "probability", "95 % interval"}};
+std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
+  std::vector<std::vector<std::string>> rows = {
+      {"outcome", "probability", core::rounded_text(100.0 * confidence) + " % interval"}};
   std::string group;
   for (const belief::OutcomeProbability& outcome : predicted.outcomes) {
     if (outcome.group != group && !outcome.group.empty()) rows.push_back({outcome.group + ":", "", ""});
     group = outcome.group;
-    rows.push_back({(group.empty() ? "" : "  ") + outcome.name, fixed_digits(outcome.probability, 3),
-                    fixed_digits(outcome.low, 3) + " to " + fixed_digits(outcome.high, 3)});
+    rows.push_back({(group.empty() ? "" : "  ") + outcome.name, fixed_text(outcome.probability, 3),
+                    fixed_text(outcome.low, 3) + " to " + fixed_text(outcome.high, 3)});
   }
   return table(rows) + "\n" + std::to_string(predicted.instances) + " instances, " +
-         fixed_digits(predicted.simulated_seconds, 0) + " simulated seconds, " +
-         fixed_digits(predicted.wall_seconds, 1) + " s" +
-         (predicted.converged ? "" : "; not all intervals reached the tolerance") + "\n";
+         fixed_text(predicted.simulated_seconds, 0) + " simulated seconds, " + fixed_text(predicted.wall_seconds, 1) +
+         " s" + (predicted.converged ? "" : "; not all intervals reached the tolerance") + "\n";
 }
 
 core::Status run(const Options& options, VerbContext& context) {
@@ -77,7 +63,7 @@ core::Status run(const Options& options, VerbContext& context) {
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   context.print(document_of(*scene, context.options().seed, answer),
-                text_of(std::get<belief::PredictAnswer>(answer.what)));
+                text_of(std::get<belief::PredictAnswer>(answer.what), options.effort.confidence));
   if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
   return core::ok_status();
 }

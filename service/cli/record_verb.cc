@@ -20,8 +20,8 @@ struct Options {
 
 core::Status record_simulation(const Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, {options.simulate}));
-  PRESCENE_TRY(const auto scene, load_scene(options.simulate, context.log()));
-  PRESCENE_TRY(const std::string text, read_text(options.simulate));
+  PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
+  PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log()));
   PRESCENE_TRY(const auto recording,
                RecordingWriter::create(options.output, {options.simulate, text, context.options().seed, ""}));
   Backends backends(context.pool());

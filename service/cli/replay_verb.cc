@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "prescene/core/text.h"
 #include "prescene/service/bus_replay.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/outside_json.h"
@@ -17,6 +18,7 @@
 namespace prescene::service {
 namespace {
 
+using core::fixed_text;
 using nlohmann::ordered_json;
 
 struct Options {
@@ -82,10 +84,10 @@ std::string tracking_text(const std::vector<ObjectTrackingScore>& rows) {
       {"object", "frames", "visible", "median error, mm", "90 %, mm", "median turn, deg", "tracked", "wrong"}};
   for (const ObjectTrackingScore& row : rows) {
     cells.push_back({row.object, std::to_string(row.frames), std::to_string(row.visible_frames),
-                     fixed_digits(1e3 * row.median_position_error, 1), fixed_digits(1e3 * row.p90_position_error, 1),
-                     fixed_digits(row.median_turn_error * 180.0 / 3.14159265358979, 1),
-                     fixed_digits(100.0 * row.share_tracked, 0) + " %",
-                     fixed_digits(100.0 * row.share_confidently_wrong, 0) + " %"});
+                     fixed_text(1e3 * row.median_position_error, 1), fixed_text(1e3 * row.p90_position_error, 1),
+                     fixed_text(row.median_turn_error * 180.0 / std::numbers::pi, 1),
+                     fixed_text(100.0 * row.share_tracked, 0) + " %",
+                     fixed_text(100.0 * row.share_confidently_wrong, 0) + " %"});
   }
   return "\nTracking against the simulated truth\n" + table(cells);
 }
@@ -97,9 +99,9 @@ std::string supports_text(const std::vector<SupportRow>& rows) {
                                                   "median height, mm", "largest", "points off it, mm"}};
   for (const SupportRow& row : rows) {
     cells.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
-                     fixed_digits(row.median_tilt * kDegrees, 2), fixed_digits(row.largest_tilt * kDegrees, 2),
-                     fixed_digits(1e3 * row.median_height, 1), fixed_digits(1e3 * row.largest_height, 1),
-                     fixed_digits(1e3 * row.median_rms, 1)});
+                     fixed_text(row.median_tilt * kDegrees, 2), fixed_text(row.largest_tilt * kDegrees, 2),
+                     fixed_text(1e3 * row.median_height, 1), fixed_text(1e3 * row.largest_height, 1),
+                     fixed_text(1e3 * row.median_rms, 1)});
   }
   return "\nSupports, each frame's plane against the first one's\n" + table(cells);
 }
@@ -107,13 +109,13 @@ std::string supports_text(const std::vector<SupportRow>& rows) {
 std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) {
   std::string text;
   for (const BusReplayResult::Answered& answered : answers) {
-    text += "\nAsked at " + fixed_digits(answered.at, 1) + " s: " + answered.question + "\n";
+    text += "\nAsked at " + fixed_text(answered.at, 1) + " s: " + answered.question + "\n";
     if (answered.answer.empty()) {
       text += "no answer came\n";
       continue;
     }
     const ordered_json answer = parse_or_discard(answered.answer);
-    text += "answered after " + fixed_digits(answered.seconds, 2) + " s\n" + answer_text(answer);
+    text += "answered after " + fixed_text(answered.seconds, 2) + " s\n" + answer_text(answer);
   }
   return text;
 }

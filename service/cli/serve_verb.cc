@@ -18,11 +18,11 @@ struct Options {
 
 core::Status run(Options& options, VerbContext& context) {
   PRESCENE_TRY(options.settings.tracker.assembler.X_WC, camera_pose_of(options.camera_pose));
-  PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
+  PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
+  PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
   PRESCENE_RETURN_IF_ERROR(check_output("--record", options.record, {options.scene}));
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
-    PRESCENE_TRY(const std::string text, read_text(options.scene));
     PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed, ""}));
   }
   Backends backends(context.pool());

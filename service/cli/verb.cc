@@ -14,8 +14,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/core/text.h"
+
 namespace prescene::service {
 namespace {
+
+using core::fixed_text;
 
 core::LogSink stderr_log(bool quiet) {
   auto logger = std::make_shared<spdlog::logger>("prescene", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
@@ -46,15 +50,9 @@ std::optional<double> finite_number(const std::string& text) {
   return value;
 }
 
-std::string short_number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%g", value);
-  return buffer;
-}
-
 std::string duration_text(double seconds) {
-  if (seconds < 90.0) return fixed_digits(seconds, 0) + " s";
-  return fixed_digits(seconds / 60.0, 1) + " min";
+  if (seconds < 90.0) return fixed_text(seconds, 0) + " s";
+  return fixed_text(seconds / 60.0, 1) + " min";
 }
 
 }  // namespace
@@ -96,7 +94,7 @@ core::ProgressSink VerbContext::progress(const std::string& what) {
     last = step;
     std::string left = progress.seconds_left ? ", about " + duration_text(*progress.seconds_left) + " left" : "";
     if (!progress.text.empty()) left += ", " + progress.text;
-    const std::string percent = fixed_digits(100.0 * fraction, 0) + " %";
+    const std::string percent = fixed_text(100.0 * fraction, 0) + " %";
     if (!terminal) {
       std::fprintf(stderr, "%s: %s%s\n", what.c_str(), percent.c_str(), left.c_str());
       return;
@@ -166,7 +164,7 @@ CLI::Validator positive_number() {
 }
 
 CLI::Validator number_between(double low, double high) {
-  const std::string range = short_number(low) + " to " + short_number(high);
+  const std::string range = core::rounded_text(low) + " to " + core::rounded_text(high);
   return {[low, high, range](std::string& text) -> std::string {
             const std::optional<double> value = finite_number(text);
             return value && *value >= low && *value <= high
@@ -206,12 +204,6 @@ std::string table(const std::vector<std::vector<std::string>>& rows) {
     }
   }
   return text;
-}
-
-std::string fixed_digits(double value, int digits) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, "%.*f", digits, value);
-  return buffer;
 }
 
 }  // namespace prescene::service

@@ -98,7 +98,6 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
 /// Seven numbers x y z qw qx qy qz as a pose; nothing for none. kInvalidInput for a rotation that is not one.
 core::Result<std::optional<geometry::Pose>> camera_pose_of(const std::vector<double>& numbers);
-core::Result<std::string> read_text(const std::string& path);
 
 /// An answer's error as a status: what begins with "cancelled: ", "unavailable: " or "resource exhausted: " could not
 /// be done, everything else is a bad question. `place` goes in front of the text.
@@ -115,7 +114,5 @@ core::Status check_output(const std::string& option, const std::string& output, 
 
 /// Rows of text with columns padded to equal width; the first row is underlined.
 std::string table(const std::vector<std::vector<std::string>>& rows);
-/// "0.1235" with so many digits after the point.
-std::string fixed_digits(double value, int digits);
 
 }  // namespace prescene::service
