@@ -17,12 +17,6 @@ using geometry::Matrix3d;
 
 constexpr double kHereDistance = 0.02;  // m: what "is where the mean says" means in ObjectEstimate::confidence
 
-const Particle& heaviest(const std::vector<Particle>& particles) {
-  PRESCENE_CHECK(!particles.empty());
-  return *std::max_element(particles.begin(), particles.end(),
-                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
-}
-
 Matrix3d cross_matrix(const Vector3d& v) {
   Matrix3d m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
@@ -194,6 +188,12 @@ double effective_sample_size(const std::vector<Particle>& particles) {
   return squares > 0.0 ? sum * sum / squares : 0.0;
 }
 
+const Particle& heaviest(const std::vector<Particle>& particles) {
+  PRESCENE_CHECK(!particles.empty());
+  return *std::max_element(particles.begin(), particles.end(),
+                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
+}
+
 bool normalize(std::vector<Particle>& particles) {
   if (particles.empty()) return false;
   double largest = -std::numeric_limits<double>::infinity();
@@ -252,12 +252,6 @@ WorldState BeliefSampler::draw(std::span<const double> uniforms) const {
   for (std::size_t i = 0; i < objects_.size(); ++i)
     state.objects.push_back(state_of(objects_[i].belief->particles[particles[i]], errors[i]));
   return state;
-}
-
-int start_dimensions(const Belief& belief) { return BeliefSampler(belief).dimensions(); }
-
-WorldState draw_start(const Belief& belief, std::span<const double> uniforms) {
-  return BeliefSampler(belief).draw(uniforms);
 }
 
 std::uint64_t content_hash(const Belief& belief) {

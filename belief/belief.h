@@ -82,10 +82,15 @@ struct ObjectEstimate {
   /// Probability that the object exists and is where the mean says (within 2 cm); 0 when the track is lost.
   double confidence = 0.0;
   double effective_sample_size = 0.0;
+
+  friend bool operator==(const ObjectEstimate&, const ObjectEstimate&) = default;
 };
 ObjectEstimate estimate(const ObjectBelief& object);
 std::optional<int> find_object(const Belief& belief, const std::string& name);
 double effective_sample_size(const std::vector<Particle>& particles);
+
+/// The particle of the largest weight, the first of several. At least one particle (checked).
+const Particle& heaviest(const std::vector<Particle>& particles);
 /// Normalises log weights; false when all are -inf or NaN (then they are made equal).
 bool normalize(std::vector<Particle>& particles);
 /// The world state of the heaviest particle of each object.
@@ -112,9 +117,6 @@ class BeliefSampler {
   Eigen::Index largest_rank_ = 0;
   int dimensions_ = 0;
 };
-/// The same for a single draw.
-int start_dimensions(const Belief& belief);
-WorldState draw_start(const Belief& belief, std::span<const double> uniforms);
 /// A hash over all bits, for determinism checks.
 std::uint64_t content_hash(const Belief& belief);
 

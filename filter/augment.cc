@@ -85,7 +85,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
              const rendering::PoseEvidence& current, const AugmentOptions& options, const WeightOptions& weighting,
              const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
              ObjectBelief& object) {
-  const Particle& last = *std::max_element(object.particles.begin(), object.particles.end(), lighter);
+  const Particle& last = belief::heaviest(object.particles);
   const Pose X_CO = frame.X_CW * last.X_WO;
   const std::vector<Vector3d> points = unexplained_points(frame, terms, options.explained);
   const std::vector<Pose> starts = recovery_starts(X_CO, target, points, options, stream);

@@ -15,11 +15,6 @@ using belief::ObjectBelief;
 using belief::Particle;
 using belief::TrackState;
 
-const Particle& heaviest(const ObjectBelief& object) {
-  return *std::max_element(object.particles.begin(), object.particles.end(),
-                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
-}
-
 const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
   return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
 }
@@ -120,7 +115,7 @@ rendering::FrameTerms ParticleFilter::terms_of(const FilterFrame& frame, const B
   std::vector<const geometry::DepthImage*> others;
   for (std::size_t j = 0; j < depths.size(); ++j)
     if (j != object && hides_others(belief.objects[j])) others.push_back(&depths[j]);
-  const Pose X_CO = frame.X_CW * heaviest(belief.objects[object]).X_WO;
+  const Pose X_CO = frame.X_CW * belief::heaviest(belief.objects[object].particles).X_WO;
   return terms_for_object(frame, others, X_CO * target.centre(), static_cast<double>(target.mesh->radius));
 }
 
@@ -138,7 +133,8 @@ void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& 
     if (reports[i].all_impossible) result.degraded |= kImpossibleWeights;
     for (const ParticleWeight& particle : reports[i].particles) result.counters.hidden_particles += particle.hidden;
     update_track(reports[i], frame.stamp_ns, settings_.track, object);
-    depths[i] = depth_of(target, frame.X_CW * heaviest(object).X_WO, frame.terms.camera, *tools_.renderer);
+    depths[i] =
+        depth_of(target, frame.X_CW * belief::heaviest(object.particles).X_WO, frame.terms.camera, *tools_.renderer);
   }
 }
 
@@ -170,7 +166,8 @@ void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<Wei
     object.existence = std::max(object.existence, 0.5);
     object.frames_unseen = 0;
     object.frames_refuted = 0;
-    depths[i] = depth_of(target, frame.X_CW * heaviest(object).X_WO, frame.terms.camera, *tools_.renderer);
+    depths[i] =
+        depth_of(target, frame.X_CW * belief::heaviest(object.particles).X_WO, frame.terms.camera, *tools_.renderer);
   }
 }
 
@@ -236,7 +233,8 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   std::vector<geometry::DepthImage> depths;
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
     depths.push_back(depth_of(target_of(model_of(belief, i), frame, tools_),
-                              frame.X_CW * heaviest(belief.objects[i]).X_WO, frame.terms.camera, *tools_.renderer));
+                              frame.X_CW * belief::heaviest(belief.objects[i].particles).X_WO, frame.terms.camera,
+                              *tools_.renderer));
   std::vector<WeightReport> reports(belief.objects.size());
   weigh_all(frame, first ? settings_.max_gap : dt, result, depths, reports);
   note("weight", result);
@@ -263,7 +261,9 @@ void number_islands(double gap, MeshCache& meshes, Belief& belief) {
   std::vector<Body> bodies;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     const belief::ObjectModel& model = model_of(belief, i);
-    Body body{meshes.get(model.visual, model.collision, MeshDetail::kLikelihood), heaviest(belief.objects[i]).X_WO, {}};
+    Body body{meshes.get(model.visual, model.collision, MeshDetail::kLikelihood),
+              belief::heaviest(belief.objects[i].particles).X_WO,
+              {}};
     for (const auto& vertex : body.mesh->vertices) body.box.extend(vertex.cast<double>());
     body.box.extend((body.box.max().array() + gap).matrix());
     body.box.extend((body.box.min().array() - gap).matrix());

@@ -128,11 +128,6 @@ belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_W
   return scene;
 }
 
-const Particle& heaviest(const ObjectBelief& object) {
-  return *std::max_element(object.particles.begin(), object.particles.end(),
-                           [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; });
-}
-
 /// Moves the falling particles by the simulator, each with the other objects where they most likely are.
 void simulate(belief::Belief& belief, std::span<const Falling> falling, std::span<const Pose> X_WG, double dt,
               const SimulatorSource& simulators, const core::RandomStream& stream, core::ThreadPool& threads) {
@@ -144,7 +139,7 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, std::spa
   if (!simulator) return;
   belief::WorldState common;
   for (const std::size_t i : objects) {
-    const Particle& particle = heaviest(belief.objects[i]);
+    const Particle& particle = belief::heaviest(belief.objects[i].particles);
     common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, particle.physical});
   }
   std::vector<belief::WorldState> starts;

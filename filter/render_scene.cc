@@ -16,12 +16,6 @@ geometry::Rgb rgb_of(const belief::Color& color) {
   return {channel(color.r), channel(color.g), channel(color.b)};
 }
 
-const belief::Particle& heaviest(const std::vector<belief::Particle>& particles) {
-  PRESCENE_CHECK(!particles.empty());
-  return *std::max_element(particles.begin(), particles.end(),
-                           [](const auto& a, const auto& b) { return a.log_weight < b.log_weight; });
-}
-
 void add(BeliefView& view, const std::string& name, InstanceKind kind, rendering::MeshHandle mesh,
          const belief::Pose& X_WM, const rendering::SurfaceMaterial& material) {
   view.scene.instances.push_back({std::move(mesh), X_WM, material, kind == InstanceKind::kRobot});
@@ -111,8 +105,8 @@ BeliefView render_scene(const belief::Belief& belief, MeshDetail detail, MeshCac
   const belief::Scene& scene = *belief.scene;
   for (const belief::ObjectBelief& object : belief.objects) {
     if (object.existence < min_existence || object.state == belief::TrackState::kLost) continue;
-    add_object(view, object.name, scene.models[static_cast<std::size_t>(object.model)], heaviest(object.particles).X_WO,
-               detail, meshes);
+    add_object(view, object.name, scene.models[static_cast<std::size_t>(object.model)],
+               belief::heaviest(object.particles).X_WO, detail, meshes);
   }
   add_surroundings(view, scene, belief.robot, detail, meshes);
   return view;

@@ -37,10 +37,9 @@ std::shared_ptr<const belief::Belief> joint_hypothesis(const belief::Belief& bel
 }
 
 StartComponent component_of(std::shared_ptr<const belief::Belief> belief, double weight) {
-  const int dimensions = belief::start_dimensions(*belief);
-  return {weight, dimensions, [belief = std::move(belief)](std::span<const double> uniforms) {
-            return belief::draw_start(*belief, uniforms);
-          }};
+  const auto sampler = std::make_shared<const belief::BeliefSampler>(*belief);
+  return {weight, sampler->dimensions(),
+          [belief = std::move(belief), sampler](std::span<const double> uniforms) { return sampler->draw(uniforms); }};
 }
 
 }  // namespace

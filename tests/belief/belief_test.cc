@@ -160,6 +160,12 @@ TEST(DrawStart, ChoosesParticlesByWeightAndSpreadsThemByTheirCovariance) {
   EXPECT_EQ(heavy, 768);
 }
 
+TEST(Heaviest, IsTheFirstOfTheLargestWeight) {
+  std::vector<Particle> particles(4);
+  for (std::size_t i = 0; i < particles.size(); ++i) particles[i].log_weight = i == 0 ? -3.0 : -1.0;
+  EXPECT_EQ(&heaviest(particles), &particles[1]);
+}
+
 TEST(ContentHash, SeesASingleBit) {
   RandomStream stream(4, Purpose::kTest);
   Belief belief;
