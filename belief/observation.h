@@ -20,6 +20,8 @@ struct RgbdFrame {
   std::shared_ptr<const geometry::ColorImage> color;  ///< Null when there is none.
   geometry::PinholeCamera camera;
 };
+/// Images compare by content.
+bool operator==(const RgbdFrame& a, const RgbdFrame& b);
 
 /// Z: a frame, where its camera was, and where the robot's bodies were.
 struct Observation {
@@ -28,6 +30,8 @@ struct Observation {
   Pose X_WC;
   /// Poses X_WG of kinematic bodies by the name of Scene::robot; a body that is not named is where its timeline says.
   std::map<std::string, Pose> robot;
+
+  friend bool operator==(const Observation&, const Observation&) = default;
 };
 
 /// U: what was commanded since the last observation; times of the actions are relative to `begin_ns`.
@@ -35,6 +39,8 @@ struct Control {
   core::TimeNs begin_ns = 0;
   core::TimeNs end_ns = 0;
   std::vector<Action> actions;
+
+  friend bool operator==(const Control&, const Control&) = default;
 };
 
 }  // namespace prescene::belief

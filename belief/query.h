@@ -100,6 +100,8 @@ struct TypicalRun {
   double share = 0.0;
   Timeline timeline;
   Trajectory trajectory;
+
+  friend bool operator==(const TypicalRun&, const TypicalRun&) = default;
 };
 
 struct PredictAnswer {
@@ -110,6 +112,8 @@ struct PredictAnswer {
   double simulated_seconds = 0.0;
   double wall_seconds = 0.0;
   bool converged = false;  ///< All intervals reached the tolerance.
+
+  friend bool operator==(const PredictAnswer&, const PredictAnswer&) = default;
 };
 struct WhereAnswer {
   struct Item {
@@ -118,8 +122,12 @@ struct WhereAnswer {
     ObjectEstimate estimate;
     TrackState state = TrackState::kTracked;
     double existence = 1.0;
+
+    friend bool operator==(const Item&, const Item&) = default;
   };
   std::vector<Item> items;
+
+  friend bool operator==(const WhereAnswer&, const WhereAnswer&) = default;
 };
 struct StabilityAnswer {
   std::string object;
@@ -128,12 +136,16 @@ struct StabilityAnswer {
   int instances = 0;
   double simulated_seconds = 0.0;
   double wall_seconds = 0.0;
+
+  friend bool operator==(const StabilityAnswer&, const StabilityAnswer&) = default;
 };
 struct ViewAnswer {
   geometry::DepthImage depth;  ///< Of the most likely particle.
   geometry::LabelImage labels;
   std::vector<std::string> label_names;
   geometry::Image<float> presence;  ///< Probability per pixel that some object is there.
+
+  friend bool operator==(const ViewAnswer&, const ViewAnswer&) = default;
 };
 
 struct Answer {
@@ -141,6 +153,8 @@ struct Answer {
   std::uint64_t step = 0;  ///< Of the belief that was asked.
   std::string error;       ///< Not empty: could not be answered, and why.
   std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer> what;
+
+  friend bool operator==(const Answer&, const Answer&) = default;
 };
 
 }  // namespace prescene::belief
