@@ -3,27 +3,16 @@
 
 #include <cmath>
 
-#include "prescene/core/check.h"
-
 namespace prescene::geometry {
-
-double add_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth) {
-  PRESCENE_CHECK(!points.empty());
-  const Pose X_ET = X_estimate.inverse() * X_truth;
-  const Matrix3d R_ET = X_ET.rotation.toRotationMatrix();
-  double sum = 0.0;
-  for (const Vector3d& p : points) sum += (R_ET * p + X_ET.translation - p).norm();
-  return sum / static_cast<double>(points.size());
-}
-
-double adds_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth) {
-  return AddsEvaluator(points).adds(X_estimate, X_truth);
-}
 
 AddsEvaluator::AddsEvaluator(std::vector<Vector3d> points) : points_(std::move(points)), tree_(points_) {}
 
 double AddsEvaluator::add(const Pose& X_estimate, const Pose& X_truth) const {
-  return add_error(points_, X_estimate, X_truth);
+  const Pose X_ET = X_estimate.inverse() * X_truth;
+  const Matrix3d R_ET = X_ET.rotation.toRotationMatrix();
+  double sum = 0.0;
+  for (const Vector3d& p : points_) sum += (R_ET * p + X_ET.translation - p).norm();
+  return sum / static_cast<double>(points_.size());
 }
 
 double AddsEvaluator::adds(const Pose& X_estimate, const Pose& X_truth) const {

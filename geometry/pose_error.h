@@ -9,20 +9,17 @@
 
 namespace prescene::geometry {
 
-/// Mean distance of model points under two poses (ADD) [Hinterstoisser et al. 2012], m. At least one point.
-double add_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth);
-/// Mean over points of the true pose of the distance to the nearest point of the estimate (ADD-S) [Xiang et al. 2018],
-/// m. Builds a tree each time; an evaluator of many poses keeps an AddsEvaluator.
-double adds_error(const std::vector<Vector3d>& points, const Pose& X_estimate, const Pose& X_truth);
-
 /// Both measures for many poses of one object. The search tree is over the model's own points, into whose frame the
-/// points of the true pose are brought, so it is built once. adds() is exact and allocates nothing. Const use from any
-/// thread.
+/// points of the true pose are brought, so it is built once. Allocates nothing after that. Const use from any thread.
 class AddsEvaluator {
  public:
+  /// Points of the model's surface in its frame, m: at least one, all finite (checked).
   explicit AddsEvaluator(std::vector<Vector3d> points);
 
+  /// Mean distance of the points under the two poses (ADD) [Hinterstoisser et al. 2012], m.
   double add(const Pose& X_estimate, const Pose& X_truth) const;
+  /// Mean over the points of the true pose of the distance to the nearest point of the estimate (ADD-S)
+  /// [Xiang et al. 2018], m; exact.
   double adds(const Pose& X_estimate, const Pose& X_truth) const;
 
  private:

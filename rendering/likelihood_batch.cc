@@ -3,9 +3,6 @@
 
 #include <utility>
 
-#include "prescene/core/check.h"
-#include "prescene/core/parallel.h"
-
 namespace prescene::rendering {
 
 std::unique_ptr<LikelihoodWorkspace> WorkspacePool::take() {
@@ -23,18 +20,6 @@ std::unique_ptr<LikelihoodWorkspace> WorkspacePool::take() {
 void WorkspacePool::put(std::unique_ptr<LikelihoodWorkspace> workspace) {
   const std::lock_guard lock(mutex_);
   free_.push_back(std::move(workspace));
-}
-
-void evaluate_parallel(const LikelihoodBatch& batch, const FrameTerms& frame,
-                       std::span<const PoseHypothesis> hypotheses, core::ThreadPool& threads, WorkspacePool& workspaces,
-                       std::span<PoseEvidence> evidences) {
-  PRESCENE_CHECK(hypotheses.size() == evidences.size());
-  // About a fifth of a millisecond's work a block, far above what handing it to a thread costs.
-  constexpr std::size_t kBlock = 16;
-  threads.for_blocks(hypotheses.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    const WorkspacePool::Loan workspace(workspaces);
-    batch.evaluate(frame, hypotheses.subspan(begin, end - begin), *workspace, evidences.subspan(begin, end - begin));
-  });
 }
 
 }  // namespace prescene::rendering

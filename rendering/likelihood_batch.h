@@ -23,10 +23,6 @@
 #include "prescene/rendering/render_scene.h"
 #include "prescene/rendering/sensor_model.h"
 
-namespace prescene::core {
-class ThreadPool;
-}
-
 namespace prescene::rendering {
 
 /// A part of the background that is known: a plane, in C, with the convex outline of its known part.
@@ -196,10 +192,5 @@ class WorkspacePool {
   std::mutex mutex_;
   std::vector<std::unique_ptr<LikelihoodWorkspace>> free_;
 };
-
-/// evaluate over the threads of a pool; the same bits as on one thread.
-void evaluate_parallel(const LikelihoodBatch& batch, const FrameTerms& frame,
-                       std::span<const PoseHypothesis> hypotheses, core::ThreadPool& threads, WorkspacePool& workspaces,
-                       std::span<PoseEvidence> evidences);
 
 }  // namespace prescene::rendering

@@ -28,7 +28,6 @@ inline constexpr const char* kDiagnosticsTopic = "/diagnostics";         ///< ou
 std::string pose_topic(const std::string& object);
 
 // In recordings only, as JSON.
-inline constexpr const char* kSceneTopic = "/prescene/scene";  ///< The scene file's text.
 inline constexpr const char* kTruthTopic = "/prescene/truth";  ///< Simulated truth of each frame.
 inline constexpr const char* kStepTopic = "/prescene/step";    ///< One step record a belief step.
 

@@ -10,6 +10,7 @@
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/images/jpeg.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -81,7 +82,7 @@ Result<std::vector<FolderFrame>> list_frames(const fs::path& folder, const Frame
 }
 
 Result<PinholeCamera> find_camera(const fs::path& folder, const FrameFolderOptions& options, const FolderFrame& first) {
-  PRESCENE_TRY(const ImageSize size, read_png_size(first.color, options.limits));
+  PRESCENE_TRY(const ImageSize size, read_png_size(first.depth, options.limits));
   std::error_code error;
   PinholeCamera camera;
   std::string place;
@@ -94,7 +95,7 @@ Result<PinholeCamera> find_camera(const fs::path& folder, const FrameFolderOptio
     place = "camera";
     camera = *options.camera;
     if (camera.width != size.width || camera.height != size.height) {
-      return core::invalid_input(first.color.string() + ": has " + std::to_string(size.width) + " x " +
+      return core::invalid_input(first.depth.string() + ": has " + std::to_string(size.width) + " x " +
                                  std::to_string(size.height) + " pixels, but the camera given has " +
                                  std::to_string(camera.width) + " x " + std::to_string(camera.height));
     }
@@ -146,7 +147,7 @@ Result<RgbdImages> FrameFolder::load(std::size_t index) const {
   PRESCENE_CHECK(index < frames_.size());
   const FolderFrame& frame = frames_[index];
   RgbdImages images;
-  PRESCENE_TRY(images.color, read_png_color(frame.color, options_.limits));
+  PRESCENE_TRY(images.color, read_color(frame.color, options_.limits));
   PRESCENE_TRY(images.depth, read_png_depth(frame.depth, options_.metres_per_unit, options_.limits));
   PRESCENE_RETURN_IF_ERROR(check_size(frame.color, images.color.width(), images.color.height(), camera_));
   PRESCENE_RETURN_IF_ERROR(check_size(frame.depth, images.depth.width(), images.depth.height(), camera_));

@@ -154,10 +154,6 @@ Result<ColorImage> decode_jpeg(std::span<const std::uint8_t> bytes, const ImageL
   return image;
 }
 
-Result<ColorImage> read_jpeg(const std::filesystem::path& path, const ImageLimits& limits) {
-  return decode_file(path, limits, decode_jpeg);
-}
-
 std::vector<std::uint8_t> encode_jpeg(ColorView image, int quality) {
   PRESCENE_CHECK(image.width() > 0 && image.width() <= kMaxSide && image.height() > 0 && image.height() <= kMaxSide);
   PRESCENE_CHECK(quality >= 1 && quality <= 100);
@@ -193,10 +189,6 @@ std::vector<std::uint8_t> encode_jpeg(ColorView image, int quality) {
   std::vector<std::uint8_t> out(buffer, buffer + size);
   std::free(buffer);
   return out;
-}
-
-Status write_jpeg(const std::filesystem::path& path, ColorView image, int quality) {
-  return write_file(path, encode_jpeg(image, quality));
 }
 
 Result<ColorImage> decode_color(std::span<const std::uint8_t> bytes, const ImageLimits& limits) {

@@ -40,7 +40,6 @@ class Problems {
   bool empty() const { return errors_.empty(); }
   const std::vector<Problem>& errors() const { return errors_; }
   const std::vector<Problem>& warnings() const { return warnings_; }
-  std::vector<Problem> take_warnings() { return std::move(warnings_); }
   /// Ok when empty, else kInvalidInput with every error on a line of its own, in the order of the file.
   core::Status status() const;
 

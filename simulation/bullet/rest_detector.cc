@@ -126,7 +126,6 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
     for (int s = 0; s < steps && returns; ++s) {
       if (cancellation && cancellation->requested()) returns = false;
       world.step();
-      ++nudge_steps_;
       for (int i = 0; i < world.object_count() && returns; ++i) returns = !world.free(i) || !runs_away(i);
     }
     world.restore(saved_);

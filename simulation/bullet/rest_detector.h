@@ -22,9 +22,6 @@ class RestDetector {
   bool at_rest(InstanceWorld& world, const core::Cancellation* cancellation = nullptr);
   void reset() { tested_ = false; }
 
-  /// Steps simulated by nudge tests so far.
-  std::int64_t nudge_steps() const { return nudge_steps_; }
-
  private:
   bool stands_firmly(InstanceWorld& world, int object);
   bool returns_after_nudges(InstanceWorld& world, int object, const core::Cancellation* cancellation);
@@ -37,7 +34,6 @@ class RestDetector {
 
   bool tested_ = false;
   bool stable_ = false;
-  std::int64_t nudge_steps_ = 0;
   std::vector<std::uint8_t> saved_;
   std::vector<Before> before_;
 };

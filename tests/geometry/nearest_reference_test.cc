@@ -93,9 +93,9 @@ TEST(PoseError, MatchesItsDefinition) {
     const Pose X_estimate = box_plus(X_truth, d);
     const double add = add_by_definition(points, X_estimate, X_truth);
     const double adds = adds_by_definition(points, X_estimate, X_truth);
-    RC_ASSERT(std::abs(add_error(points, X_estimate, X_truth) - add) < 1e-13);
     RC_ASSERT(std::abs(evaluator.add(X_estimate, X_truth) - add) < 1e-13);
-    RC_ASSERT(std::abs(adds_error(points, X_estimate, X_truth) - adds) < 1e-13);
+    RC_ASSERT(std::abs(evaluator.add(X_estimate, X_truth) - add) < 1e-13);
+    RC_ASSERT(std::abs(evaluator.adds(X_estimate, X_truth) - adds) < 1e-13);
     RC_ASSERT(std::abs(evaluator.adds(X_estimate, X_truth) - adds) < 1e-13);
     RC_ASSERT(adds <= add + 1e-13);
   }));
@@ -125,11 +125,11 @@ TEST(PoseError, AnEvaluatorAllocatesNothing) {
 }
 
 TEST(PoseError, TranslationAloneIsItsLength) {
-  const std::vector<Vector3d> points = surface_points(100, 5);
+  const AddsEvaluator evaluator(surface_points(100, 5));
   const Pose X{exp_rotation({0.2, 0.7, -0.4}), {0.3, 0.2, 0.9}};
   const Pose moved{X.rotation, X.translation + Vector3d(0.003, 0.004, 0.0)};
-  EXPECT_NEAR(add_error(points, moved, X), 0.005, 1e-15);
-  EXPECT_NEAR(adds_error(points, X, X), 0.0, 1e-15);
+  EXPECT_NEAR(evaluator.add(moved, X), 0.005, 1e-15);
+  EXPECT_NEAR(evaluator.adds(X, X), 0.0, 1e-15);
 }
 
 }  // namespace

@@ -345,7 +345,11 @@ TEST_P(LikelihoodContract, GivesTheSameBitsInAnyBatchAndOnAnyThreads) {
     core::ThreadPool pool(threads);
     WorkspacePool workspaces(*batch_);
     std::vector<PoseEvidence> actual(hypotheses.size());
-    evaluate_parallel(*batch_, frame, hypotheses, pool, workspaces, actual);
+    pool.for_blocks(hypotheses.size(), 16, [&](std::size_t begin, std::size_t end) {
+      const WorkspacePool::Loan workspace(workspaces);
+      batch_->evaluate(frame, std::span(hypotheses).subspan(begin, end - begin), *workspace,
+                       std::span(actual).subspan(begin, end - begin));
+    });
     for (std::size_t i = 0; i < actual.size(); ++i) {
       EXPECT_EQ(actual[i].log_ratio, expected[i].log_ratio);
       EXPECT_EQ(actual[i].visible, expected[i].visible);

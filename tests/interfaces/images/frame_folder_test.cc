@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/images/jpeg.h"
 #include "prescene/tests/support/paths.h"
 
 namespace prescene::interfaces {
@@ -134,6 +135,17 @@ TEST_F(FrameFolders, SayWhichImageHasAnotherSizeOrIsBroken) {
   EXPECT_THAT(opened->load(1).status().message(), HasSubstr("b.depth.png: is 8-bit colour, but depth needs"));
   fs::resize_file(folder / "a.color.png", 60);
   EXPECT_THAT(opened->load(0).status().message(), HasSubstr("a.color.png: is cut"));
+}
+
+TEST_F(FrameFolders, TakeColourAsJpegToo) {
+  ASSERT_TRUE(write_file(folder / "b.jpg", encode_jpeg(geometry::ColorImage(8, 6, {9, 8, 7}).view())).ok());
+  write_poses({std::string("b,b.jpg,b.depth.png,") + kTurned});
+  const auto opened = FrameFolder::open(folder);
+  ASSERT_TRUE(opened.ok()) << opened.status().message();
+  const auto images = opened->load(0);
+  ASSERT_TRUE(images.ok()) << images.status().message();
+  for (const int channel : {0, 1, 2})
+    EXPECT_NEAR(images->color(4, 3)[static_cast<std::size_t>(channel)], 9 - channel, 3);
 }
 
 TEST_F(FrameFolders, WorkWithoutPoses) {

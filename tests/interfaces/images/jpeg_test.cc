@@ -42,10 +42,8 @@ TEST(Color, GoesByTheFirstBytesNotTheName) {
   const ColorImage image(4, 4, {1, 2, 3});
   ASSERT_TRUE(write_png(dir.path() / "a.jpg", std::as_const(image).view()).ok());
   EXPECT_EQ(*read_color(dir.path() / "a.jpg"), image);
-  ASSERT_TRUE(write_jpeg(dir.path() / "b.png", std::as_const(image).view()).ok());
+  ASSERT_TRUE(write_file(dir.path() / "b.png", encode_jpeg(std::as_const(image).view())).ok());
   EXPECT_TRUE(read_color(dir.path() / "b.png").ok());
-  EXPECT_TRUE(read_jpeg(dir.path() / "b.png").ok());
-  EXPECT_EQ(read_jpeg(dir.path() / "a.jpg").status().code(), StatusCode::kInvalidInput);
   ASSERT_TRUE(write_file(dir.path() / "c.png", "BM").ok());
   EXPECT_THAT(read_color(dir.path() / "c.png").status().message(), HasSubstr("c.png: is neither a PNG nor a JPEG"));
 }
