@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+// InstanceWorld: which bodies touch in a step, and what that does to them.
+#include <algorithm>
+#include <cmath>
+
+#include "instance_world.h"
+
+namespace prescene::simulation {
+namespace {
+
+// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
+constexpr double kContactMargin = 5e-4;
+
+}  // namespace
+
+void InstanceWorld::sweep(int index) {
+  Moving& m = moving_[static_cast<std::size_t>(index)];
+  const CompiledBody& body = compiled(index);
+  m.low = Vector3d::Constant(1e30);
+  m.high = Vector3d::Constant(-1e30);
+  const Matrix3d absolute = m.X_WO.R.cwiseAbs();
+  for (const Part& part : body.parts) {
+    const Vector3d center = m.X_WO * part.box_center;
+    const Vector3d half = absolute * part.box_half_size;
+    m.low = m.low.cwiseMin(center - half);
+    m.high = m.high.cwiseMax(center + half);
+  }
+  const double speed = std::max(m.velocity.norm(), m.velocity_before.norm());
+  const double spin = std::max(m.spin.norm(), m.spin_before.norm());
+  m.travel = dt() * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));
+  const Vector3d swell = Vector3d::Constant(m.travel + 0.5 * kContactMargin);
+  m.low -= swell;
+  m.high += swell;
+}
+
+void InstanceWorld::find_contacts() {
+  contacts_.clear();
+  contact_keys_.clear();
+  const int count = body_count();
+  for (int a = 0; a < scene_->object_count; ++a) {
+    const Moving& ma = moving_[static_cast<std::size_t>(a)];
+    if (!ma.present) continue;
+    for (int b = a + 1; b < count; ++b) {
+      const Moving& mb = moving_[static_cast<std::size_t>(b)];
+      if (!mb.present || !(ma.dynamic || mb.dynamic)) continue;
+      if ((ma.low.array() > mb.high.array()).any() || (mb.low.array() > ma.high.array()).any()) continue;
+      find_pair(a, b);
+    }
+  }
+}
+
+void InstanceWorld::find_pair(int a, int b) {
+  const Moving& ma = moving_[static_cast<std::size_t>(a)];
+  const Moving& mb = moving_[static_cast<std::size_t>(b)];
+  const CompiledBody& body_a = compiled(a);
+  const CompiledBody& body_b = compiled(b);
+  const double range = ma.travel + mb.travel + kContactMargin;
+  const std::size_t first = contacts_.size();
+  for (std::uint32_t i = 0; i < body_a.parts.size(); ++i) {
+    const Part& part_a = body_a.parts[i];
+    if (!part_a.core) continue;  // surfaces never move by themselves and never meet each other
+    const Vector3d center_a = ma.X_WO * part_a.box_center;
+    const Vector3d half_a = ma.X_WO.R.cwiseAbs() * part_a.box_half_size + Vector3d::Constant(range);
+    for (std::uint32_t j = 0; j < body_b.parts.size(); ++j) {
+      const Part& part_b = body_b.parts[j];
+      const Vector3d center_b = mb.X_WO * part_b.box_center;
+      const Vector3d half_b = mb.X_WO.R.cwiseAbs() * part_b.box_half_size;
+      if (((center_a - center_b).cwiseAbs().array() > (half_a + half_b).array()).any()) continue;
+      points_.clear();
+      if (part_b.core) {
+        finder_.convex_convex(*part_a.core, ma.X_WO * part_a.X_OS, *part_b.core, mb.X_WO * part_b.X_OS, range, points_);
+      } else {
+        finder_.convex_surface(*part_a.core, ma.X_WO * part_a.X_OS, *part_b.surface, mb.X_WO * part_b.X_OS, range,
+                               points_);
+      }
+      add_contacts(a, b, i, j);
+    }
+  }
+  const int robot = b - scene_->robot_body(0);
+  if (robot < 0 || robot >= scene_->robot_count) return;
+  std::uint8_t& parting = parting_[static_cast<std::size_t>(a * scene_->robot_count + robot)];
+  if (!parting) return;
+  const bool overlap = std::any_of(contacts_.begin() + static_cast<std::ptrdiff_t>(first), contacts_.end(),
+                                   [](const SolverContact& c) { return c.gap <= 0.0; });
+  if (overlap) {
+    contacts_.resize(first);
+    contact_keys_.resize(first);
+  } else {
+    parting = 0;
+  }
+}
+
+void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b) {
+  if (points_.empty()) return;
+  const Moving& ma = moving_[static_cast<std::size_t>(a)];
+  const Moving& mb = moving_[static_cast<std::size_t>(b)];
+  const CompiledBody& body_a = compiled(a);
+  const CompiledBody& body_b = compiled(b);
+  const auto friction = [&](int body, const CompiledBody& c) {
+    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.friction : c.friction;
+  };
+  const auto impact_friction = [&](int body, const CompiledBody& c) {
+    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.impact_friction
+                                       : c.impact_friction;
+  };
+  const auto restitution = [&](int body, const CompiledBody& c) {
+    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.restitution : c.restitution;
+  };
+  const std::uint64_t key = (static_cast<std::uint64_t>(a) << 48) | (static_cast<std::uint64_t>(b) << 32) |
+                            (static_cast<std::uint64_t>(part_a & 0xffffu) << 16) | (part_b & 0xffffu);
+  // A contact moves on its bodies by what they slide in a step.
+  const double reach = ma.travel + mb.travel + 1e-3;
+  for (const ContactPoint& point : points_) {
+    SolverContact c;
+    c.body_a = a;
+    c.body_b = b;
+    c.position = point.position;
+    c.normal = point.normal;
+    c.gap = point.gap;
+    c.friction = friction(a, body_a) * friction(b, body_b);
+    c.impact_friction = impact_friction(a, body_a) * impact_friction(b, body_b);
+    c.restitution = restitution(a, body_a) * restitution(b, body_b);
+    c.rolling_arm = std::max(body_a.rolling_arm, body_b.rolling_arm);
+    c.speed_before = point.normal.dot(ma.velocity_before + ma.spin_before.cross(point.position - ma.p_WCm) -
+                                      mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm));
+    const Vector3d p_B = mb.X_WO.inverse_times(point.position);
+    double nearest = reach * reach;
+    for (const Warm& warm : warm_) {
+      if (warm.key != key) continue;
+      const double distance = (warm.position - p_B).squaredNorm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      c.impulse = warm.impulse;
+      c.friction_impulse = warm.friction_impulse;
+    }
+    contacts_.push_back(c);
+    contact_keys_.push_back(key);
+  }
+}
+
+void InstanceWorld::solve() {
+  if (contacts_.empty()) {
+    for (BodyResult& result : results_) result = BodyResult{};
+    warm_.clear();
+    return;
+  }
+  const auto count = static_cast<std::size_t>(body_count());
+  for (std::size_t i = 0; i < count; ++i) {
+    const Moving& m = moving_[i];
+    btRigidBody& body = *rigid_[i];
+    const bool fixed = !m.dynamic && m.velocity.isZero(0.0) && m.spin.isZero(0.0);
+    const CompiledBody& shape = compiled(static_cast<int>(i));
+    if (m.dynamic) {
+      const double mass = objects_[i].physical.mass;
+      body.setMassProps(mass, to_bullet(mass * shape.unit_moments));
+      body.setCollisionFlags(0);
+    } else {
+      body.setMassProps(0.0, btVector3(0, 0, 0));
+      body.setCollisionFlags(fixed ? btCollisionObject::CF_STATIC_OBJECT : btCollisionObject::CF_KINEMATIC_OBJECT);
+    }
+    body.setWorldTransform(to_bullet(m.dynamic ? Matrix3d(m.X_WO.R * shape.R_OP) : m.X_WO.R, m.p_WCm));
+    body.setLinearVelocity(to_bullet(m.velocity));
+    body.setAngularVelocity(to_bullet(m.spin));
+    body.updateInertiaTensor();
+  }
+  solver_.solve_step(rigid_pointers_, contacts_, settings_, dt(), results_);
+  warm_.clear();
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    const SolverContact& c = contacts_[i];
+    if (c.impulse <= 0.0 || c.hit) continue;
+    warm_.push_back({contact_keys_[i], moving_[static_cast<std::size_t>(c.body_b)].X_WO.inverse_times(c.position),
+                     c.impulse, c.friction_impulse});
+  }
+}
+
+void InstanceWorld::note_touches() {
+  touches_.clear();
+  Vector3d normal = Vector3d::Zero();
+  const auto close = [&] {
+    const double norm = normal.norm();
+    if (!touches_.empty()) touches_.back().normal_z = norm > 0.0 ? normal.z() / norm : 0.0;
+    normal.setZero();
+  };
+  // Contacts of a pair lie together, and pairs ascend.
+  for (const SolverContact& c : contacts_) {
+    if (c.impulse <= 0.0 && c.gap > scene_->options.touching_distance) continue;
+    if (touches_.empty() || touches_.back().first != c.body_a || touches_.back().second != c.body_b) {
+      close();
+      touches_.push_back({c.body_a, c.body_b, 0.0, 0.0});
+    }
+    touches_.back().impulse += c.impulse;
+    // The mean is weighted by impulse; touching without pressing counts only where nothing presses.
+    normal += std::max(c.impulse, 1e-12) * c.normal;
+  }
+  close();
+}
+
+}  // namespace prescene::simulation
