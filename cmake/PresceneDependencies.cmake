@@ -14,9 +14,7 @@ find_package(ZLIB REQUIRED)                    # ZLIB::ZLIB
 find_package(LZ4 REQUIRED)                     # LZ4::lz4
 find_package(Zstd REQUIRED)                    # Zstd::zstd
 find_package(assimp REQUIRED)                  # assimp::assimp
-find_package(OpenCV REQUIRED)                  # OpenCV::core, OpenCV::imgproc, OpenCV::ml
 find_package(Bullet64 REQUIRED)                # Bullet::float64, Bullet::hacd
-find_package(Ceres REQUIRED)                   # Ceres::ceres
 find_package(CycloneDDS REQUIRED)              # CycloneDDS::ddsc, idlc_generate()
 find_package(OpenGL REQUIRED COMPONENTS OpenGL EGL)  # OpenGL::OpenGL, OpenGL::EGL
 find_package(CLI11 REQUIRED)                   # CLI11::CLI11

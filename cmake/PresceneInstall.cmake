@@ -11,6 +11,5 @@ configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/prescene-config.cmake
                               "${PROJECT_BINARY_DIR}/prescene-config.cmake" INSTALL_DESTINATION "${_package_dir}")
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/prescene-config-version.cmake" COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/prescene-config.cmake" "${PROJECT_BINARY_DIR}/prescene-config-version.cmake"
-              cmake/FindOpenCV.cmake cmake/FindBullet64.cmake cmake/FindRandom123.cmake cmake/FindLZ4.cmake
-              cmake/FindZstd.cmake
+              cmake/FindBullet64.cmake cmake/FindRandom123.cmake cmake/FindLZ4.cmake cmake/FindZstd.cmake
         DESTINATION "${_package_dir}")
