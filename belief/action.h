@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a robot (or person) does to the scene: the control U. Release, place and push are executed by the simulators;
-// pour, grasp and transport are defined by what they change.
+// What a robot (or person) does to the scene: the control U. Each action is defined by what it changes.
 #pragma once
 
 #include <optional>

@@ -5,8 +5,7 @@
 //   SceneFileOptions options;
 //   options.read_mesh = ...;                              // how meshes are read; see MeshReader
 //   auto scene = read_scene("scenarios/milk_on_bin.yaml", options);
-//   if (!scene) show(scene.status());                     // every mistake, each with file, line, key, reason and
-//   remedy
+//   if (!scene) show(scene.status());                     // every mistake: file, line, key, reason, remedy
 #pragma once
 
 #include <filesystem>

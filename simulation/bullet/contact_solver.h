@@ -3,8 +3,7 @@
 //   - a round friction cone solved as one two-dimensional block, so that friction opposes the slip however it turns
 //     during the impact (Bullet fixes the directions beforehand);
 //   - Newton's restitution measured on the velocity before the step's gravity, so a gap that closes within the step
-//   loses
-//     nothing and a body at rest does not bounce;
+//     loses nothing and a body at rest does not bounce;
 //   - a gap that stays open only limits the approach to what closes it (no impulse at a distance);
 //   - overlap is pushed out by pseudo velocities that add no energy;
 //   - warm starts come with the contacts, so that a step is a function of its arguments.

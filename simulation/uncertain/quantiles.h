@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distribution functions and quantiles that intervals are made of. Deterministic: no libm function with several
-// results.
+// Distribution functions and quantiles that intervals are made of.
 #pragma once
 
 namespace prescene::simulation {
@@ -16,8 +15,8 @@ double beta_quantile(double p, double a, double b);
 /// The t with P(T <= t) == p of Student's distribution; p in (0, 1), degrees_of_freedom > 0, not necessarily whole.
 double student_t_quantile(double p, double degrees_of_freedom);
 
-/// Logarithm of the gamma function for x > 0 (Stirling's series above 16, recurrence below); relative error about
-/// 1e-14.
+/// Logarithm of the gamma function for x > 0 (Stirling's series above 16, recurrence below; the C library's own writes
+/// a global); relative error about 1e-14.
 double log_gamma(double x);
 
 }  // namespace prescene::simulation
