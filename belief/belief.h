@@ -50,8 +50,8 @@ struct ObjectBelief {
   /// Evidence of the last frame: nats per visible pixel in favour of the pose against the object's absence.
   double evidence_per_pixel = 0.0;
   double visible_share = 0.0;  ///< Share of its pixels that were neither hidden by known occluders nor missing.
-  int frames_unseen = 0;   ///< Since it was tracked last.
-  int frames_refuted = 0;  ///< Since the evidence last did not speak against the pose.
+  int frames_unseen = 0;       ///< Since it was tracked last.
+  int frames_refuted = 0;      ///< Since the evidence last did not speak against the pose.
   core::TimeNs last_seen_ns = 0;
   int island = 0;  ///< Objects of equal number touch each other.
   friend bool operator==(const ObjectBelief&, const ObjectBelief&) = default;
