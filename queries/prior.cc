@@ -81,7 +81,7 @@ Prior prior_of(const belief::Belief& belief) {
   return prior;
 }
 
-Prior prior_of(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) {
+Prior prior_of(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed) {
   Prior prior{scene,
               simulation::start_of(scene),
               belief::mean_start(*scene),

@@ -26,7 +26,7 @@ bool is_present(const belief::ObjectBelief& object);
 
 /// Objects as the belief has them; robot bodies stand where they stood at the belief's step, times count from there.
 Prior prior_of(const belief::Belief& belief);
-Prior prior_of(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed);
+Prior prior_of(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed);
 
 /// The prior's scene with other actions and outcomes; fails with the reason when a name or value in them is wrong.
 core::Result<std::shared_ptr<const belief::Scene>> with_question(const belief::Scene& scene,

@@ -19,7 +19,7 @@ core::Result<std::unique_ptr<rendering::Renderer>> Backends::make_renderer() {
 
 queries::QueryContext Backends::query_context(core::ThreadPool& pool) {
   queries::QueryContext context;
-  context.make_simulator = [this](std::shared_ptr<const belief::Scene> scene) { return make_simulator(*scene); };
+  context.make_simulator = [this](const std::shared_ptr<const belief::Scene>& scene) { return make_simulator(*scene); };
   context.make_renderer = [this] { return make_renderer(); };
   context.pool = &pool;
   context.meshes = &meshes_;

@@ -193,14 +193,14 @@ std::string timeline_svg(const TimelineBlock& block) {
       begin = std::min(begin, interval.begin);
       end = std::max(end, interval.end);
     }
-    LaneKey key{interval.relation, interval.subject, interval.other};
+    const LaneKey key{interval.relation, interval.subject, interval.other};
     const auto [found, added] = index.try_emplace(key, lanes.size());
     if (added && lanes.size() == kMostLanes) {
       index.erase(found);
       ++left_out;
       continue;
     }
-    if (added) lanes.push_back({std::move(key), {}});
+    if (added) lanes.push_back({key, {}});
     lanes[found->second].second.push_back(&interval);
   }
   std::tie(begin, end) = widened(begin, end);

@@ -49,7 +49,7 @@ class ActionReader {
 
   // The name of an object that is held now.
   std::string held_name(Binder& fields, std::string_view key) {
-    const std::string name = object_name(fields, key);
+    std::string name = object_name(fields, key);
     if (!name.empty() && !held_.count(name)) {
       const LocatedValue& at = *fields.find(key);
       problems_.add(at.place, at.path, interfaces::quote(name) + " is not held at that time",

@@ -18,7 +18,7 @@
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/service/topics.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
 class App;
 class Validator;
 }  // namespace CLI
