@@ -2,6 +2,7 @@
 #include "prescene/service/tracking_score.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "prescene/geometry/symmetry.h"
@@ -15,7 +16,7 @@ constexpr double kWrong = 0.05;  // m
 /// The value below which the share lies; 0 for no values.
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto place = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), place, values.end());
   return *place;
 }

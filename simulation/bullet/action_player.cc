@@ -180,7 +180,7 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
     if (!object || !kinematic(*object)) return;
     Hold& hold = objects_[static_cast<std::size_t>(*object)];
     // It leaves with the velocity that the hand is about to have, without the retreat that begins now.
-    const Pose X_now = poses[static_cast<std::size_t>(*object)];
+    const Pose& X_now = poses[static_cast<std::size_t>(*object)];
     const Pose X_next = object_pose(*object, time + dt) * (object_pose(*object, time).inverse() * X_now);
     Twist V_WO;
     V_WO.linear = (X_next.translation - X_now.translation) / dt;

@@ -24,7 +24,7 @@ struct Worker {
 
 class BulletInstance : public Instance {
  public:
-  BulletInstance(std::shared_ptr<const CompiledScene> scene, std::vector<belief::Action> actions,
+  BulletInstance(const std::shared_ptr<const CompiledScene>& scene, std::vector<belief::Action> actions,
                  const core::RandomStream& stream)
       : world_(scene), actions_(std::move(actions)), stream_(stream) {
     set_state(belief::mean_start(scene->scene));

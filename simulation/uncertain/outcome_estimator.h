@@ -34,7 +34,8 @@ struct Variable {
 };
 /// One variable an exclusive group (its classes end with "other"), one of two classes (name, "not name") an outcome, in
 /// this order. Refers to `scene` by shared ownership.
-std::vector<Variable> variables_of(std::shared_ptr<const belief::Scene> scene, std::vector<belief::Outcome> outcomes,
+std::vector<Variable> variables_of(const std::shared_ptr<const belief::Scene>& scene,
+                                   std::vector<belief::Outcome> outcomes,
                                    std::vector<belief::ExclusiveOutcomes> exclusive_outcomes);
 
 struct EstimatorOptions {

@@ -31,7 +31,7 @@ std::shared_ptr<const belief::Belief> joint_hypothesis(const belief::Belief& bel
     index /= object.particles.size();
     *weight *= std::exp(chosen.log_weight);
     chosen.log_weight = 0.0;
-    object.particles.assign(1, std::move(chosen));
+    object.particles.assign(1, chosen);
   }
   return one;
 }

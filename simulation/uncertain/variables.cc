@@ -6,7 +6,8 @@
 
 namespace prescene::simulation {
 
-std::vector<Variable> variables_of(std::shared_ptr<const belief::Scene> scene, std::vector<belief::Outcome> outcomes,
+std::vector<Variable> variables_of(const std::shared_ptr<const belief::Scene>& scene,
+                                   std::vector<belief::Outcome> outcomes,
                                    std::vector<belief::ExclusiveOutcomes> exclusive_outcomes) {
   std::vector<Variable> variables;
   for (belief::ExclusiveOutcomes& group : exclusive_outcomes) {

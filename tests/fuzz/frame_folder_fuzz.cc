@@ -12,19 +12,19 @@
 using namespace prescene::interfaces;  // NOLINT(google-build-using-namespace)
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const prescene::tests::ScratchDir scratch;
-  static const bool prepared = [] {
+  static const prescene::tests::ScratchDir kScratch;
+  static const bool kPrepared = [] {
     const prescene::geometry::ColorImage color(4, 3);
     const prescene::geometry::DepthImage depth(4, 3, 1.0F);
-    return write_png(scratch.path() / "a.color.png", color.view()).ok() &&
-           write_png_depth(scratch.path() / "a.depth.png", depth.view(), 0.001).ok();
+    return write_png(kScratch.path() / "a.color.png", color.view()).ok() &&
+           write_png_depth(kScratch.path() / "a.depth.png", depth.view(), 0.001).ok();
   }();
-  PRESCENE_CHECK(prepared);
+  PRESCENE_CHECK(kPrepared);
   const std::uint8_t* middle = std::find(data, data + size, 0);
   const std::uint8_t* second = middle == data + size ? middle : middle + 1;
-  PRESCENE_CHECK(write_file(scratch.path() / "camera_poses.csv", std::span(data, middle)).ok());
-  PRESCENE_CHECK(write_file(scratch.path() / "intrinsics.K.txt", std::span(second, data + size)).ok());
-  const auto folder = FrameFolder::open(scratch.path());
+  PRESCENE_CHECK(write_file(kScratch.path() / "camera_poses.csv", std::span(data, middle)).ok());
+  PRESCENE_CHECK(write_file(kScratch.path() / "intrinsics.K.txt", std::span(second, data + size)).ok());
+  const auto folder = FrameFolder::open(kScratch.path());
   if (!folder) {
     PRESCENE_CHECK(!folder.status().message().empty());
     return 0;
