@@ -34,11 +34,11 @@ class FrameFolders : public testing::Test {
   void add_images(const std::string& name, int width, int height) const {
     const geometry::ColorImage color(width, height, {9, 8, 7});
     const geometry::DepthImage depth(width, height, 1.25F);
-    ASSERT_TRUE(write_png(folder / (name + ".color.png"), color.view()).ok());
-    ASSERT_TRUE(write_png_depth(folder / (name + ".depth.png"), depth.view(), 0.001).ok());
+    ASSERT_TRUE(write_png(folder_ / (name + ".color.png"), color.view()).ok());
+    ASSERT_TRUE(write_png_depth(folder_ / (name + ".depth.png"), depth.view(), 0.001).ok());
   }
   void add_text(const std::string& name, const std::string& text) const {
-    ASSERT_TRUE(write_file(folder / name, std::string_view(text)).ok());
+    ASSERT_TRUE(write_file(folder_ / name, std::string_view(text)).ok());
   }
   void write_poses(const std::vector<std::string>& rows, const std::string& columns = kColumns) const {
     std::string text = columns + "\r\n";
@@ -46,15 +46,15 @@ class FrameFolders : public testing::Test {
     add_text("camera_poses.csv", text);
   }
   std::string message(const FrameFolderOptions& options = {}) const {
-    return FrameFolder::open(folder, options).status().message();
+    return FrameFolder::open(folder_, options).status().message();
   }
 
-  tests::ScratchDir scratch;
-  fs::path folder = scratch.path();
+  tests::ScratchDir scratch_;
+  fs::path folder_ = scratch_.path();
 };
 
 TEST_F(FrameFolders, ListFramesWithPosesStampsAndImages) {
-  const auto opened = FrameFolder::open(folder, {.frames_per_second = 4.0, .first_stamp_ns = 7});
+  const auto opened = FrameFolder::open(folder_, {.frames_per_second = 4.0, .first_stamp_ns = 7});
   ASSERT_TRUE(opened.ok()) << opened.status().message();
   EXPECT_EQ(opened->camera(), (PinholeCamera{8, 6, 10.0, 11.0, 3.5, 2.5}));
   ASSERT_EQ(opened->frames().size(), 2U);
@@ -73,7 +73,7 @@ TEST_F(FrameFolders, TakeStampsFromTheFile) {
   const std::string columns = std::string(kColumns) + ",stamp_ns";
   const std::string a = std::string("a,a.color.png,a.depth.png,") + kTurned;
   write_poses({a + ",100", a + ",200"}, columns);
-  EXPECT_EQ(FrameFolder::open(folder)->frames()[1].stamp_ns, 200);
+  EXPECT_EQ(FrameFolder::open(folder_)->frames()[1].stamp_ns, 200);
   write_poses({a + ",100", a + ",100"}, columns);
   EXPECT_THAT(message(), HasSubstr("camera_poses.csv: line 3: stamp 100 ns is not after"));
   write_poses({a + ",1e3"}, columns);
@@ -117,7 +117,7 @@ TEST_F(FrameFolders, CheckTheCamera) {
   EXPECT_THAT(message(), HasSubstr("only fx, fy, cx and cy may be set"));
   add_text("intrinsics.K.txt", "-10 0 3.5\n0 11 2.5\n0 0 1\n");
   EXPECT_THAT(message(), HasSubstr("intrinsics.K.txt: "));
-  fs::remove(folder / "intrinsics.K.txt");
+  fs::remove(folder_ / "intrinsics.K.txt");
   EXPECT_THAT(message(),
               HasSubstr("there is no intrinsics.K.txt; put the 3x3 camera matrix there, or give the camera"));
   EXPECT_EQ(message({.camera = PinholeCamera{8, 6, 10, 10, 4, 3}}), "");
@@ -127,20 +127,20 @@ TEST_F(FrameFolders, CheckTheCamera) {
 
 TEST_F(FrameFolders, SayWhichImageHasAnotherSizeOrIsBroken) {
   add_images("b", 8, 7);
-  auto opened = FrameFolder::open(folder);
+  auto opened = FrameFolder::open(folder_);
   ASSERT_TRUE(opened.ok());
   EXPECT_TRUE(opened->load(0).ok());
   EXPECT_THAT(opened->load(1).status().message(), HasSubstr("b.color.png: has 8 x 7 pixels, but the camera has 8 x 6"));
-  fs::copy_file(folder / "a.color.png", folder / "b.depth.png", fs::copy_options::overwrite_existing);
+  fs::copy_file(folder_ / "a.color.png", folder_ / "b.depth.png", fs::copy_options::overwrite_existing);
   EXPECT_THAT(opened->load(1).status().message(), HasSubstr("b.depth.png: is 8-bit colour, but depth needs"));
-  fs::resize_file(folder / "a.color.png", 60);
+  fs::resize_file(folder_ / "a.color.png", 60);
   EXPECT_THAT(opened->load(0).status().message(), HasSubstr("a.color.png: is cut"));
 }
 
 TEST_F(FrameFolders, TakeColourAsJpegToo) {
-  ASSERT_TRUE(write_file(folder / "b.jpg", encode_jpeg(geometry::ColorImage(8, 6, {9, 8, 7}).view())).ok());
+  ASSERT_TRUE(write_file(folder_ / "b.jpg", encode_jpeg(geometry::ColorImage(8, 6, {9, 8, 7}).view())).ok());
   write_poses({std::string("b,b.jpg,b.depth.png,") + kTurned});
-  const auto opened = FrameFolder::open(folder);
+  const auto opened = FrameFolder::open(folder_);
   ASSERT_TRUE(opened.ok()) << opened.status().message();
   const auto images = opened->load(0);
   ASSERT_TRUE(images.ok()) << images.status().message();
@@ -149,27 +149,27 @@ TEST_F(FrameFolders, TakeColourAsJpegToo) {
 }
 
 TEST_F(FrameFolders, WorkWithoutPoses) {
-  fs::remove(folder / "camera_poses.csv");
-  const auto opened = FrameFolder::open(folder);
+  fs::remove(folder_ / "camera_poses.csv");
+  const auto opened = FrameFolder::open(folder_);
   ASSERT_TRUE(opened.ok()) << opened.status().message();
   ASSERT_EQ(opened->frames().size(), 2U);
   EXPECT_EQ(opened->frames()[1].name, "b");
   EXPECT_EQ(opened->frames()[1].X_WC, geometry::Pose::identity());
-  fs::remove(folder / "b.depth.png");
+  fs::remove(folder_ / "b.depth.png");
   EXPECT_THAT(message(), HasSubstr("b.depth.png: is missing"));
 }
 
 TEST_F(FrameFolders, HoldASingleFrame) {
-  const fs::path single = folder / "single";
+  const fs::path single = folder_ / "single";
   fs::create_directory(single);
   EXPECT_THAT(FrameFolder::open(single).status().message(), HasSubstr("has no frames; put camera_poses.csv"));
-  fs::copy_file(folder / "a.color.png", single / "color.png");
-  fs::copy_file(folder / "a.depth.png", single / "depth.png");
+  fs::copy_file(folder_ / "a.color.png", single / "color.png");
+  fs::copy_file(folder_ / "a.depth.png", single / "depth.png");
   const auto opened = FrameFolder::open(single, {.camera = PinholeCamera{8, 6, 10, 10, 4, 3}});
   ASSERT_TRUE(opened.ok()) << opened.status().message();
   EXPECT_EQ(opened->frames().at(0).name, "single");
   EXPECT_TRUE(opened->load(0).ok());
-  EXPECT_EQ(FrameFolder::open(folder / "nowhere").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(FrameFolder::open(folder_ / "nowhere").status().code(), StatusCode::kNotFound);
 }
 
 TEST(RealFrameFolders, TheRecordedSequence) {

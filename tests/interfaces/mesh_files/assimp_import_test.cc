@@ -36,10 +36,10 @@ std::string collada(const std::string& up_axis) {
 class AssimpImport : public testing::Test {
  protected:
   core::Result<LoadedMesh> read(const char* name, std::string_view text, const MeshReadOptions& options = {}) const {
-    EXPECT_TRUE(write_file(scratch.path() / name, text).ok());
-    return read_mesh(scratch.path() / name, options);
+    EXPECT_TRUE(write_file(scratch_.path() / name, text).ok());
+    return read_mesh(scratch_.path() / name, options);
   }
-  tests::ScratchDir scratch;
+  tests::ScratchDir scratch_;
 };
 
 TEST_F(AssimpImport, TurnsGltfFromYUpToZUpAndAppliesItsNodes) {
@@ -75,7 +75,7 @@ TEST_F(AssimpImport, SaysWhatIsWrong) {
 
 TEST_F(AssimpImport, KnowsTheExtensions) {
   EXPECT_THAT(read("a.step", "").status().message(), HasSubstr("extension '.step' cannot be read; use .ply"));
-  EXPECT_EQ(read_mesh(scratch.path() / "none.PLY").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(read_mesh(scratch_.path() / "none.PLY").status().code(), StatusCode::kNotFound);
   EXPECT_EQ(mesh_format("a/b.Stl"), MeshFormat::kStl);
   EXPECT_EQ(mesh_format("ply"), std::nullopt);
 }
