@@ -13,7 +13,7 @@ namespace {
 template <class Message>
 class CdrLaws : public testing::Test {
  protected:
-  const tests::Schema schema = tests::parse_schema(ros_type<Message>().name, ros2msg_schema(ros_type<Message>()));
+  const tests::Schema schema_ = tests::parse_schema(ros_type<Message>().name, ros2msg_schema(ros_type<Message>()));
 };
 
 using AllMessages =
@@ -28,11 +28,11 @@ TYPED_TEST_SUITE(CdrLaws, AllMessages);
 TYPED_TEST(CdrLaws, DecodingAndEncodingGivesTheBytesBackAndBothByteOrdersTheSameValues) {
   EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
     const core::RandomStream stream(seed, core::Purpose::kTest);
-    const auto little = tests::random_cdr(this->schema, stream, std::endian::little);
+    const auto little = tests::random_cdr(this->schema_, stream, std::endian::little);
     const auto message = decode_cdr<TypeParam>(little);
     RC_ASSERT(message.ok());
     RC_ASSERT(encode_cdr(*message) == little);
-    const auto big = decode_cdr<TypeParam>(tests::random_cdr(this->schema, stream, std::endian::big));
+    const auto big = decode_cdr<TypeParam>(tests::random_cdr(this->schema_, stream, std::endian::big));
     RC_ASSERT(big.ok());
     RC_ASSERT(*big == *message);
   }));
@@ -41,7 +41,7 @@ TYPED_TEST(CdrLaws, DecodingAndEncodingGivesTheBytesBackAndBothByteOrdersTheSame
 TYPED_TEST(CdrLaws, EveryCutIsAClearError) {
   const core::RandomStream stream(7, core::Purpose::kTest);
   for (std::uint64_t step = 0; step < 4; ++step) {
-    const auto bytes = tests::random_cdr(this->schema, stream.at(step), std::endian::little);
+    const auto bytes = tests::random_cdr(this->schema_, stream.at(step), std::endian::little);
     for (std::size_t length = 0; length < bytes.size(); ++length) {
       const auto status = decode_cdr<TypeParam>(std::span(bytes).first(length)).status();
       ASSERT_EQ(status.code(), core::StatusCode::kDataLoss) << length << " of " << bytes.size();
@@ -53,7 +53,7 @@ TYPED_TEST(CdrLaws, EveryCutIsAClearError) {
 TYPED_TEST(CdrLaws, RandomDamageNeverCrashesAndWhatDecodesEncodesToASoundMessage) {
   EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
-    auto bytes = tests::random_cdr(this->schema, stream, std::endian::little);
+    auto bytes = tests::random_cdr(this->schema_, stream, std::endian::little);
     for (int i = 0; i < 3; ++i) {
       bytes[stream.uniform_below(bytes.size())] = static_cast<std::uint8_t>(stream.uniform_below(256));
     }
