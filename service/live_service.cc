@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/answering_desk.h"
@@ -227,7 +228,7 @@ void LiveService::Impl::publish_diagnostics(core::TimeNs now_ns) {
                    {"refused messages", std::to_string(refused)},
                    {"dropped in the inbox", std::to_string(inbox.dropped())},
                    {"lost on the bus", std::to_string(node->dropped_samples())},
-                   {"last step, s", std::to_string(step_seconds)},
+                   {"last step, s", core::rounded_text(step_seconds)},
                    {"last refusal", last_refusal}};
   const core::Status sent =
       node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(now_ns), ""}, {status}});

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/topics.h"
@@ -80,7 +81,7 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
     std::unique_lock lock(mutex_);
     if (changed_.wait_for(lock, kPollInterval, [&] { return answers_.contains(id); })) return answers_[id];
   }
-  const std::string waited = " within " + std::to_string(timeout) + " s";
+  const std::string waited = " within " + core::rounded_text(timeout) + " s";
   return core::unavailable(found_service
                                ? "no answer came" + waited + ": raise --timeout, or give the question less effort"
                                : "no service was found" + waited +

@@ -68,6 +68,16 @@ core::Result<StepRecord> step_record_from_json(const std::string& text) {
   return record;
 }
 
+std::filesystem::path unused_recording_path(const std::filesystem::path& path) {
+  std::filesystem::path unused = path;
+  std::error_code none;
+  for (int i = 2; std::filesystem::is_regular_file(unused, none); ++i) {
+    unused = path;
+    unused.replace_filename(path.stem().string() + "-" + std::to_string(i) + path.extension().string());
+  }
+  return unused;
+}
+
 core::Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std::filesystem::path& path,
                                                                        const RecordingInfo& info) {
   PRESCENE_TRY(auto mcap, interfaces::McapWriter::create(path, {}));

@@ -45,6 +45,10 @@ struct StepRecord {
 nlohmann::ordered_json to_json(const StepRecord& record);
 core::Result<StepRecord> step_record_from_json(const std::string& text);
 
+/// Where to record a robot: `path`, or where that is a file already, "run-2.mcap", "run-3.mcap", ... beside it. What a
+/// robot saw can't be seen again, so nothing live is written over it.
+std::filesystem::path unused_recording_path(const std::filesystem::path& path);
+
 /// Writes one recording. Not thread-safe: owned by the thread that steps the belief.
 class RecordingWriter {
  public:

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/core/text.h"
+
 namespace prescene::service {
 namespace {
 
@@ -98,13 +100,13 @@ core::Result<geometry::Pose> TfBuffer::edge_pose(const std::string& child, const
   const auto& samples = edge.samples;
   if (stamp_ns < samples.front().first) {
     return core::unavailable("transform " + edge.parent + " -> " + child + " begins " +
-                             std::to_string(core::seconds_of(samples.front().first - stamp_ns)) +
+                             core::rounded_text(core::seconds_of(samples.front().first - stamp_ns)) +
                              " s after the asked time");
   }
   if (stamp_ns > samples.back().first) {
     if (stamp_ns - samples.back().first > ns_of(settings_.max_extrapolation_s)) {
       return core::unavailable("transform " + edge.parent + " -> " + child + " is " +
-                               std::to_string(core::seconds_of(stamp_ns - samples.back().first)) +
+                               core::rounded_text(core::seconds_of(stamp_ns - samples.back().first)) +
                                " s older than the asked time");
     }
     return samples.back().second;

@@ -35,11 +35,12 @@ core::Status record_simulation(const Options& options, VerbContext& context) {
 }
 
 core::Status record_bus(const Options& options, VerbContext& context) {
-  PRESCENE_TRY(const auto recording, RecordingWriter::create(options.output, {"", "", context.options().seed, ""}));
+  const std::string output = live_recording_path(options.output, context);
+  PRESCENE_TRY(const auto recording, RecordingWriter::create(output, {"", "", context.options().seed, ""}));
   PRESCENE_TRY(const std::uint64_t messages,
                record_topics(options.dds, options.topics, context.cancellation(), context.log(), *recording));
-  context.print({{"recording", options.output}, {"messages", messages}, {"simulated", false}},
-                "recorded " + std::to_string(messages) + " messages to " + options.output + "\n");
+  context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},
+                "recorded " + std::to_string(messages) + " messages to " + output + "\n");
   return core::ok_status();
 }
 

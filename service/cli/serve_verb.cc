@@ -23,6 +23,7 @@ core::Status run(Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("--record", options.record, {options.scene}));
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
+    options.record = live_recording_path(options.record, context);
     PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed, ""}));
   }
   Backends backends(context.pool());

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "prescene/core/text.h"
+#include "prescene/service/recording.h"
 
 namespace prescene::service {
 namespace {
@@ -172,6 +173,12 @@ CLI::Validator number_between(double low, double high) {
                        : "a number from " + range + " is needed, not '" + text + "'";
           },
           range};
+}
+
+std::string live_recording_path(const std::string& asked, VerbContext& context) {
+  const std::string unused = unused_recording_path(asked).string();
+  if (unused != asked) core::log(context.log(), core::LogLevel::kWarning, asked + " exists: recording to " + unused);
+  return unused;
 }
 
 core::Status check_output(const std::string& option, const std::string& output,

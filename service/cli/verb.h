@@ -109,6 +109,8 @@ std::string answer_text(const nlohmann::ordered_json& answer);
 /// Checks of options: finite numbers only (CLI11's own let NaN pass).
 CLI::Validator positive_number();
 CLI::Validator number_between(double low, double high);
+/// Where to record a robot live, see unused_recording_path(); says so when it is another file than the one asked for.
+std::string live_recording_path(const std::string& asked, VerbContext& context);
 /// kInvalidInput if `output`, named by `option`, would overwrite one of the inputs. Empty names are no files.
 core::Status check_output(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 

@@ -48,6 +48,19 @@ TEST(StepRecord, RefusesWhatIsNotOne) {
   EXPECT_FALSE(step_record_from_json("[1]").ok());
 }
 
+TEST(Recording, IsNeverWrittenOverALiveOne) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  EXPECT_EQ(unused_recording_path(path), path);
+  for (const char* name : {"run.mcap", "run-2.mcap"}) {
+    const auto recording = RecordingWriter::create(unused_recording_path(path), {});
+    ASSERT_TRUE(recording.ok()) << recording.status().message();
+    EXPECT_TRUE(std::filesystem::exists(folder.path() / name)) << name;
+  }
+  EXPECT_EQ(unused_recording_path(path), folder.path() / "run-3.mcap");
+  EXPECT_EQ(unused_recording_path("/dev/null"), "/dev/null") << "no file that holds anything";
+}
+
 TEST(Recording, KeepsMessagesInOrderWithTheirNumbers) {
   const tests::ScratchDir folder;
   const auto path = folder.path() / "run.mcap";
