@@ -14,6 +14,7 @@ namespace {
 // Bounds of what waits: the newest frame wins, so more would never be used. 8 frames are 0.27 s at 30 Hz.
 constexpr std::size_t kMaxWaiting = 8;
 constexpr std::size_t kMaxColors = 8;
+constexpr std::size_t kMaxSkippedKept = 1000;
 // A stamp this much older than the last one taken means that the sender's clock was set back (a looped recording).
 constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
 
@@ -162,10 +163,15 @@ std::optional<core::TimeNs> FrameAssembler::next_deadline() const {
   return deadline;
 }
 
-std::vector<SkippedFrame> FrameAssembler::take_skipped() { return std::exchange(skipped_, {}); }
+std::vector<SkippedFrame> FrameAssembler::take_skipped() {
+  const std::deque<SkippedFrame> taken = std::exchange(skipped_, {});
+  return {taken.begin(), taken.end()};
+}
 
 void FrameAssembler::skip(const Waiting& waiting, std::string reason) {
   skipped_.push_back({waiting.index, waiting.stamp_ns, std::move(reason)});
+  if (skipped_.size() > kMaxSkippedKept) skipped_.pop_front();
+  ++skipped_count_;
 }
 
 void FrameAssembler::clock_jumped_back() {

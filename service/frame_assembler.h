@@ -66,8 +66,12 @@ class FrameAssembler {
   std::optional<AssembledFrame> take(core::TimeNs now_ns);
   /// When take() should be asked again although nothing has come in; empty if nothing waits.
   std::optional<core::TimeNs> next_deadline() const;
-  /// What was skipped since the last call.
+  /// What was skipped since the last call, oldest first; of more than a thousand, the newest.
   std::vector<SkippedFrame> take_skipped();
+  /// Why the newest of them was; "" if there are none.
+  std::string last_skip() const { return skipped_.empty() ? "" : skipped_.back().reason; }
+  /// Since the start.
+  std::uint64_t skipped_count() const { return skipped_count_; }
 
  private:
   struct Waiting {
@@ -101,7 +105,8 @@ class FrameAssembler {
   std::optional<geometry::PinholeCamera> camera_;
   MessageIndex camera_index_ = 0;
   std::optional<core::TimeNs> last_taken_ns_;
-  std::vector<SkippedFrame> skipped_;
+  std::deque<SkippedFrame> skipped_;  // not taken yet, bounded
+  std::uint64_t skipped_count_ = 0;
 };
 
 }  // namespace prescene::service

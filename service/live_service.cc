@@ -6,12 +6,13 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "prescene/core/text.h"
+#include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/answering_desk.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/inbox.h"
+#include "prescene/service/service_health.h"
 
 namespace prescene::service {
 namespace {
@@ -66,6 +67,8 @@ struct LiveService::Impl {
   void publish(const TrackerStep& step);
   void publish_diagnostics(core::TimeNs now_ns);
   core::TimeNs now();
+  ServiceHealth health() const;
+  void tell_when_tracking_begins_or_ends(const ServiceHealth& health);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -82,11 +85,13 @@ struct LiveService::Impl {
   MessageIndex next_index = 0;
   core::TimeNs last_now_ns = 0;
   std::uint64_t steps = 0;
-  std::uint64_t skipped = 0;
   std::uint64_t refused = 0;
   double step_seconds = 0.0;
   std::vector<std::string> degraded;
   std::string last_refusal;
+  std::optional<core::Stopwatch> since_frame;
+  bool was_tracking = false;
+  bool told_why_not = false;
   std::mutex answered_mutex;  // guards what the desk hands over to the recording
   std::vector<std::string> answered;
 
@@ -215,23 +220,40 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   record(kStepTopic, to_json(step.record).dump());
 }
 
+ServiceHealth LiveService::Impl::health() const {
+  ServiceHealth health;
+  health.depth_topic = settings.tracker.topics.depth;
+  health.steps = steps;
+  health.skipped_frames = tracker->skipped_count();
+  health.refused_messages = refused;
+  health.dropped_in_inbox = inbox.dropped();
+  health.lost_on_bus = node->dropped_samples();
+  if (since_frame) health.seconds_since_frame = since_frame->seconds();
+  health.last_step_seconds = step_seconds;
+  health.degraded = degraded;
+  health.last_skip = tracker->last_skip();
+  health.last_refusal = last_refusal;
+  return health;
+}
+
+void LiveService::Impl::tell_when_tracking_begins_or_ends(const ServiceHealth& health) {
+  const bool tracking = is_tracking(health);
+  if (tracking && !was_tracking) {
+    core::log(log, core::LogLevel::kInfo, "frames come: tracking");
+  } else if (!tracking && (was_tracking || (!told_why_not && !health.last_skip.empty()))) {
+    core::log(log, core::LogLevel::kWarning, health_text(health));
+    told_why_not = !health.last_skip.empty();
+  }
+  if (tracking) told_why_not = false;
+  was_tracking = tracking;
+}
+
 void LiveService::Impl::publish_diagnostics(core::TimeNs now_ns) {
-  interfaces::RosDiagnosticStatus status;
-  status.name = "prescene: tracking";
-  status.hardware_id = settings.dds.node_name;
-  status.level = static_cast<std::uint8_t>(degraded.empty() ? interfaces::RosDiagnosticLevel::kOk
-                                                            : interfaces::RosDiagnosticLevel::kWarn);
-  status.message = steps == 0 ? "waiting for frames on " + settings.tracker.topics.depth : "tracking";
-  for (const std::string& word : degraded) status.message += "; " + word;
-  status.values = {{"steps", std::to_string(steps)},
-                   {"skipped frames", std::to_string(skipped)},
-                   {"refused messages", std::to_string(refused)},
-                   {"dropped in the inbox", std::to_string(inbox.dropped())},
-                   {"lost on the bus", std::to_string(node->dropped_samples())},
-                   {"last step, s", core::rounded_text(step_seconds)},
-                   {"last refusal", last_refusal}};
+  const ServiceHealth now = health();
+  tell_when_tracking_begins_or_ends(now);
   const core::Status sent =
-      node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(now_ns), ""}, {status}});
+      node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(now_ns), ""},
+                                                                {to_diagnostic(now, settings.dds.node_name)}});
   if (!sent.ok()) core::log(log, core::LogLevel::kWarning, sent.message());
 }
 
@@ -256,11 +278,10 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     for (const std::string& answer : answered) impl.record(kAnswerTopic, answer);
     if (const auto step = impl.tracker->step(now_ns)) {
       ++impl.steps;
-      impl.skipped += step->record.skipped.size();
+      impl.since_frame.emplace();
       impl.step_seconds = step->record.seconds;
       impl.degraded = step->record.degraded;
       impl.publish(*step);
-      if (impl.steps == 1) core::log(impl.log, core::LogLevel::kInfo, "first frame: tracking");
     }
     if (impl.diagnostics_limit.due()) impl.publish_diagnostics(now_ns);
   }

@@ -48,6 +48,12 @@ class Replay {
     return core::ok_status();
   }
 
+  ReplaySummary take_summary() {
+    summary_.skipped = tracker_.skipped_count();
+    summary_.last_skip = tracker_.last_skip();
+    return std::move(summary_);
+  }
+
   core::Status follow(const StepRecord& recorded) {
     auto step = tracker_.step(recorded.now_ns);
     ++summary_.compared;
@@ -68,7 +74,6 @@ class Replay {
 
   core::Status deliver(const TrackerStep& step) {
     ++summary_.steps;
-    summary_.skipped += step.record.skipped.size();
     return on_step_ ? on_step_(step, tracker_) : core::ok_status();
   }
 
@@ -109,7 +114,7 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
   }
   if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
   replay.summary().loss = reader->loss().text();
-  return replay.summary();
+  return replay.take_summary();
 }
 
 core::Result<ReplaySummary> replay_folder(const interfaces::FrameFolder& folder, Tracker& tracker,
@@ -145,7 +150,7 @@ core::Result<ReplaySummary> replay_folder(const interfaces::FrameFolder& folder,
     if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(folder.frames().size()), {}, frame.name});
   }
   if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
-  return replay.summary();
+  return replay.take_summary();
 }
 
 }  // namespace prescene::service

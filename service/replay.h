@@ -26,6 +26,7 @@ struct ReplaySummary {
   std::string first_refusal;
   std::uint64_t steps = 0;
   std::uint64_t skipped = 0;  ///< Frames.
+  std::string last_skip;      ///< Why the last frame was, if no step came after it.
   bool followed_step_records = false;
   std::uint64_t compared = 0;  ///< Steps whose belief was compared with the recorded one.
   std::uint64_t different = 0;

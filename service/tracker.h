@@ -53,6 +53,10 @@ class Tracker {
   /// When step() should be tried again although nothing came in.
   std::optional<core::TimeNs> next_deadline() const { return assembler_.next_deadline(); }
 
+  /// Frames that were not used, since the start, and why the newest since the last step was not ("" = none was).
+  std::uint64_t skipped_count() const { return assembler_.skipped_count(); }
+  std::string last_skip() const { return assembler_.last_skip(); }
+
   /// The newest belief; a snapshot that never changes. Safe from any thread.
   std::shared_ptr<const belief::Belief> belief() const;
   const TrackerSettings& settings() const { return settings_; }

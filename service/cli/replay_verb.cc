@@ -173,6 +173,14 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
+/// kInvalidInput with the reason if no frame was of use.
+core::Status check_steps(const ReplaySummary& summary, const InputTopics& topics) {
+  if (summary.steps > 0) return core::ok_status();
+  if (!summary.last_skip.empty()) return core::invalid_input("no frame could be used: " + summary.last_skip);
+  if (!summary.first_refusal.empty()) return core::invalid_input("no frame could be used: " + summary.first_refusal);
+  return core::invalid_input("no depth image on " + topics.depth + ": name the recording's topics (--help)");
+}
+
 core::Status run_here(Options& options, VerbContext& context) {
   const bool is_folder = std::filesystem::is_directory(options.input);
   RecordingInfo info;
@@ -265,7 +273,7 @@ core::Status run_here(Options& options, VerbContext& context) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
                              " is the first that differs from the recording: another version, machine or setting?");
   }
-  return core::ok_status();
+  return check_steps(*summary, options.tracker.topics).at(options.input);
 }
 
 }  // namespace

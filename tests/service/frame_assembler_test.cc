@@ -83,6 +83,22 @@ TEST(FrameAssembler, SkipsWithAReasonWhatStaysIncomplete) {
   EXPECT_NE(skipped[0].reason.find("'camera'"), std::string::npos) << skipped[0].reason;
 }
 
+TEST(FrameAssembler, CountsWhatItSkipsForDaysAndKeepsTheNewestReasonsOnly) {
+  FrameAssembler assembler(without_color(), {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  constexpr int kFrames = 3000;
+  for (int i = 0; i < kFrames; ++i) {
+    ASSERT_TRUE(assembler.add_depth(depth_at((100 + i) * kMs), 2u + i, (100 + i) * kMs).ok());
+    EXPECT_FALSE(assembler.take((200 + i) * kMs).has_value());
+  }
+  EXPECT_EQ(assembler.skipped_count(), kFrames);
+  EXPECT_FALSE(assembler.last_skip().empty());
+  const auto kept = assembler.take_skipped();
+  EXPECT_EQ(kept.size(), 1000u);
+  EXPECT_EQ(kept.back().depth, 1u + kFrames);
+  EXPECT_EQ(assembler.last_skip(), "");
+}
+
 TEST(FrameAssembler, TheNewestFrameWinsAndOlderOnesAreCounted) {
   FrameAssembler assembler(without_color(), {});
   ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
