@@ -79,8 +79,7 @@ class ShapeReader {
     return primitive(geometry::Sphere{number(binder, "radius", "give the radius in metres")});
   }
 
-  BodyShape read_mesh_shape(const LocatedValue& value) {
-    Binder binder(value, problems_);
+  MeshUse read_use(Binder& binder) {
     MeshUse use = MeshUse::kConvexHull;
     binder.read_enum("use", use, kMeshUses);
     if (use == MeshUse::kSurface && may_move_) {
@@ -88,6 +87,12 @@ class ShapeReader {
       problems_.add(at.place, at.path, "a surface of triangles can't move",
                     "use convex_hull, convex_parts or decompose");
     }
+    return use;
+  }
+
+  BodyShape read_mesh_shape(const LocatedValue& value) {
+    Binder binder(value, problems_);
+    const MeshUse use = read_use(binder);
     BodyShape shape;
     if (MeshPtr mesh = read_mesh_file(binder)) {
       check_extent(value, *mesh);
@@ -138,9 +143,8 @@ class ShapeReader {
   BodyShape read_lathe(const LocatedValue& value) {
     Binder binder(value, problems_);
     int segments = 32;
-    MeshUse use = MeshUse::kConvexHull;
     binder.read("segments", segments, 8, 256);
-    binder.read_enum("use", use, kMeshUses);
+    const MeshUse use = read_use(binder);
     const LocatedValue* at = binder.require("profile", "give points [radius, z] from bottom to top");
     if (!at) return {};
     std::vector<Eigen::Vector2d> profile;

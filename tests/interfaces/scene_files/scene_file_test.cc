@@ -232,6 +232,10 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
               HasSubstr("runs backwards"));
   EXPECT_THAT(error_of("objects:\n  a b: {}\n"), HasSubstr("characters that names can't have"));
   EXPECT_THAT(error_of(small("robot:\n  table: {sphere: 0.1, pose: {}}\n")), HasSubstr("the name is taken on line"));
+  for (const char* shape : {"mesh: {file: a.ply, use: surface}", "lathe: {profile: [[0, 0], [1, 1]], use: surface}"}) {
+    EXPECT_THAT(error_of("models:\n  m: {" + std::string(shape) + ", mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n"),
+                HasSubstr("a surface of triangles can't move"));
+  }
   EXPECT_THAT(error_of("models:\n  m: {mesh: {file: a.obj}, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n"),
               HasSubstr("a.obj: no such file"));
   EXPECT_THAT(error_of("name: x\n"), HasSubstr("the key 'objects' is missing"));
