@@ -4,8 +4,8 @@
 //
 //   PRESCENE_TRY(auto node, DdsNode::create(options, log));
 //   PRESCENE_RETURN_IF_ERROR(node->subscribe("/camera/depth", "sensor_msgs/msg/Image", TopicQos::kSensor, on_image));
-//   PRESCENE_TRY(auto poses, node->advertise("/poses", "geometry_msgs/msg/PoseArray", TopicQos::kReliable));
-//   node->publish(poses, message);
+//   PRESCENE_TRY(auto notes, node->advertise("/note", "std_msgs/msg/String", TopicQos::kReliable));
+//   node->publish(notes, RosString{"hello"});
 #pragma once
 
 #include <cstdint>
