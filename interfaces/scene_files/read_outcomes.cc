@@ -155,13 +155,17 @@ class ConditionReader {
   Problems& problems_;
 };
 
-// The object that is judged: named, or the only one.
-std::string read_judged(Binder& binder, const std::string& default_object, SceneContext& context) {
+// The object that is judged where it is clear: named, the group's, or the only one.
+std::string find_judged(Binder& binder, const std::string& group_object, SceneContext& context) {
   if (const LocatedValue* at = binder.find("object")) return context.read_name(*at, context.objects, "an object");
-  if (!default_object.empty()) return default_object;
-  if (context.objects.size() == 1) return context.objects[0];
-  binder.require("object", "name the object that is judged");
-  return {};
+  if (group_object.empty() && context.objects.size() == 1) return context.objects[0];
+  return group_object;
+}
+
+std::string require_judged(Binder& binder, const std::string& group_object, SceneContext& context) {
+  const std::string object = find_judged(binder, group_object, context);
+  if (object.empty()) binder.require("object", "name the object that is judged");
+  return object;
 }
 
 }  // namespace
@@ -169,7 +173,7 @@ std::string read_judged(Binder& binder, const std::string& default_object, Scene
 belief::Outcome read_outcome(const LocatedValue& value, const std::string& name, const std::string& default_object,
                              SceneContext& context) {
   Binder binder(value, context.problems);
-  belief::Outcome outcome{name, read_judged(binder, default_object, context), {}};
+  belief::Outcome outcome{name, require_judged(binder, default_object, context), {}};
   ConditionReader reader(context);
   outcome.all_of = reader.read_keys(binder);
   if (const LocatedValue* list = binder.find("all_of")) {
@@ -189,7 +193,7 @@ belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::s
   Problems& problems = context.problems;
   belief::ExclusiveOutcomes group{name, {}};
   Binder binder(value, problems);
-  const std::string object = read_judged(binder, "", context);
+  const std::string object = find_judged(binder, "", context);  // else each outcome names its own
   std::string which;
   const LocatedValue* at =
       binder.one_of({"outcomes", "face_up"},
@@ -198,7 +202,7 @@ belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::s
   if (which == "face_up") {
     if (!read_bool(*at, problems).value_or(true))
       problems.add(at->place, at->path, "'face_up: false' says nothing", "write face_up: true, or give 'outcomes'");
-    return belief::which_face_up(name, object);
+    return belief::which_face_up(name, require_judged(binder, object, context));
   }
   if (at->kind != LocatedValue::Kind::kMap || at->keys.empty()) {
     report_type(*at, problems, "give a map of named outcomes");

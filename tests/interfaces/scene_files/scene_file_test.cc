@@ -208,6 +208,21 @@ TEST(SceneFile, GuessesWrongUnits) {
               HasSubstr("did you mean 'euler_deg'?"));
 }
 
+TEST(SceneFile, OutcomesOfAGroupMayJudgeDifferentObjects) {
+  const std::string second =
+      "    pose: {position: [0, 0, 0.2]}\n  other_block: {model: block, pose: {position: [0.5, 0, 0.2]}}\n";
+  const auto group = [&](const std::string& text) {
+    return small("exclusive_outcomes:\n  g: " + text + "\n", "", second);
+  };
+  const Scene scene =
+      scene_of(group("{outcomes: {a: {object: block, below: 0.1}, b: {object: other_block, below: 0.1}}}"));
+  ASSERT_EQ(scene.exclusive_outcomes.size(), 1U);
+  EXPECT_EQ(scene.exclusive_outcomes[0].outcomes[0].object, "block");
+  EXPECT_EQ(scene.exclusive_outcomes[0].outcomes[1].object, "other_block");
+  for (const char* unclear : {"{outcomes: {a: {object: block, below: 0.1}, b: {below: 0.1}}}", "{face_up: true}"})
+    EXPECT_THAT(error_of(group(unclear)), HasSubstr("name the object that is judged")) << unclear;
+}
+
 TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
   EXPECT_THAT(error_of(small("", "    density: 5\n    mass: 1\n")),
               HasSubstr("'density' and 'mass' exclude each other"));
