@@ -128,7 +128,7 @@ TEST(Mechanics, ACoinThrownAlikeOnBothSidesShowsHeadsHalfTheTime) {
   };
   scene->exclusive_outcomes.push_back({"coin", {up("heads", 1.0), up("tails", -1.0)}});
   // A coin's two rims are so close that contact impulses need some hundred iterations to settle; before that the rim
-  // that the solver takes first has the advantage, and with 60 iterations heads come up 0.46 of the time.
+  // that the solver takes first has the advantage, and with 60 iterations heads come up 0.47 of the time.
   simulation::BulletOptions settled;
   settled.solver_iterations = 1000;
   settled.solver_accuracy = 1e-7;
