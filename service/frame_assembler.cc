@@ -35,11 +35,16 @@ core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, Messag
   }
   interfaces::ImageRules rules;
   rules.mono16_is_depth = settings_.mono16_is_depth;
-  PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules));
+  interfaces::DepthImageReport report;
+  PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules, &report));
 
   if (last_taken_ns_ && stamp_ns + kClockJumpNs < *last_taken_ns_) clock_jumped_back();
-  Waiting entry{index, stamp_ns, received_ns, std::move(frame_id),
-                std::make_shared<geometry::DepthImage>(std::move(depth))};
+  Waiting entry{index,
+                stamp_ns,
+                received_ns,
+                std::move(frame_id),
+                std::make_shared<geometry::DepthImage>(std::move(depth)),
+                std::move(report.warnings)};
   if (last_taken_ns_ && stamp_ns <= *last_taken_ns_) {
     skip(entry, "not newer than the frame before it");
     return core::ok_status();
@@ -64,8 +69,12 @@ core::Status FrameAssembler::add_color(const interfaces::RosImage& image, Messag
 }
 
 core::Status FrameAssembler::add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index) {
-  PRESCENE_TRY(camera_, interfaces::to_camera(info));
+  interfaces::CameraReport report;
+  interfaces::CameraRules rules;
+  rules.rectified = settings_.rectified;
+  PRESCENE_TRY(camera_, interfaces::to_camera(info, rules, &report));
   camera_index_ = index;
+  camera_doubts_ = std::move(report.warnings);
   return core::ok_status();
 }
 
@@ -103,6 +112,8 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
   frame.depth = waiting.index;
   frame.camera_info = camera_index_;
   frame.tf_until = tf_until_;
+  frame.doubts = waiting.doubts;
+  frame.doubts.insert(frame.doubts.end(), camera_doubts_.begin(), camera_doubts_.end());
   belief::Observation& observation = frame.observation;
   observation.stamp_ns = waiting.stamp_ns;
   observation.frame.depth = waiting.depth;

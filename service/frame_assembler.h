@@ -28,6 +28,7 @@ struct AssemblerSettings {
   double max_wait_s = 0.05;               ///< How long a depth image waits for its colour image, camera info and tf.
   double max_stamp_difference_s = 0.017;  ///< Between a depth image and its colour image.
   bool use_color = true;
+  bool rectified = false;        ///< The images are rectified: the camera is P of the camera info instead of K.
   bool mono16_is_depth = false;  ///< Take `mono16` depth images as millimetres.
 };
 
@@ -41,6 +42,7 @@ struct AssembledFrame {
   MessageIndex camera_info = 0;
   /// All tf messages up to this number had been taken in when the poses were looked up.
   MessageIndex tf_until = 0;
+  std::vector<std::string> doubts;  ///< Of its depth image and camera info: an unlikely unit, a distorting lens.
 };
 
 struct SkippedFrame {
@@ -80,6 +82,7 @@ class FrameAssembler {
     core::TimeNs received_ns;
     std::string frame_id;
     std::shared_ptr<const geometry::DepthImage> depth;
+    std::vector<std::string> doubts;
   };
   struct Color {
     MessageIndex index;
@@ -104,6 +107,7 @@ class FrameAssembler {
   std::deque<Color> colors_;     // newest last, bounded
   std::optional<geometry::PinholeCamera> camera_;
   MessageIndex camera_index_ = 0;
+  std::vector<std::string> camera_doubts_;
   std::optional<core::TimeNs> last_taken_ns_;
   std::deque<SkippedFrame> skipped_;  // not taken yet, bounded
   std::uint64_t skipped_count_ = 0;

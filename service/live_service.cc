@@ -68,7 +68,7 @@ struct LiveService::Impl {
   void publish_diagnostics(core::TimeNs now_ns);
   core::TimeNs now();
   ServiceHealth health() const;
-  void tell_when_tracking_begins_or_ends(const ServiceHealth& health);
+  void tell_what_changed(const ServiceHealth& health);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -91,6 +91,7 @@ struct LiveService::Impl {
   std::string last_refusal;
   std::optional<core::Stopwatch> since_frame;
   bool was_tracking = false;
+  bool was_degraded = false;
   bool told_why_not = false;
   std::mutex answered_mutex;  // guards what the desk hands over to the recording
   std::vector<std::string> answered;
@@ -236,21 +237,24 @@ ServiceHealth LiveService::Impl::health() const {
   return health;
 }
 
-void LiveService::Impl::tell_when_tracking_begins_or_ends(const ServiceHealth& health) {
+void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
   const bool tracking = is_tracking(health);
   if (tracking && !was_tracking) {
-    core::log(log, core::LogLevel::kInfo, "frames come: tracking");
+    core::log(log, core::LogLevel::kInfo, "frames come: " + health_text(health));
+  } else if (tracking && !health.degraded.empty() && !was_degraded) {
+    core::log(log, core::LogLevel::kWarning, health_text(health));
   } else if (!tracking && (was_tracking || (!told_why_not && !health.last_skip.empty()))) {
     core::log(log, core::LogLevel::kWarning, health_text(health));
     told_why_not = !health.last_skip.empty();
   }
   if (tracking) told_why_not = false;
   was_tracking = tracking;
+  was_degraded = !health.degraded.empty();
 }
 
 void LiveService::Impl::publish_diagnostics(core::TimeNs now_ns) {
   const ServiceHealth now = health();
-  tell_when_tracking_begins_or_ends(now);
+  tell_what_changed(now);
   const core::Status sent =
       node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(now_ns), ""},
                                                                 {to_diagnostic(now, settings.dds.node_name)}});

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -36,6 +37,12 @@ core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const 
   return interfaces::decode_cdr<Message>(message.cdr);
 }
 
+/// Frames do not wait for the colour of a topic that nobody named.
+TrackerSettings settled(TrackerSettings settings) {
+  settings.assembler.use_color = settings.assembler.use_color && !settings.topics.color.empty();
+  return settings;
+}
+
 std::vector<std::string> degraded_words(const filter::StepResult& result) {
   std::vector<std::string> words;
   if (result.degraded != 0) words.push_back(filter::degraded_text(result.degraded));
@@ -55,7 +62,7 @@ core::Result<std::unique_ptr<Tracker>> Tracker::create(std::shared_ptr<const bel
 
 Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
                  Backends& backends, std::unique_ptr<rendering::Renderer> renderer)
-    : settings_(settings),
+    : settings_(settled(settings)),
       renderer_(std::move(renderer)),
       likelihood_(rendering::make_reference_likelihood_batch()),
       filter_(*likelihood_, *renderer_, backends.pool(), settings.filter,
@@ -63,7 +70,7 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
                 auto simulator = backends.make_simulator(simulated);
                 return simulator ? *std::move(simulator) : nullptr;
               }),
-      assembler_(settings.assembler, robot_names(*scene), settings.tf),
+      assembler_(settings_.assembler, robot_names(*scene), settings.tf),
       scene_(std::move(scene)),
       belief_(std::make_shared<belief::Belief>(filter_.start(scene_, seed))) {}
 
@@ -152,6 +159,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.record.tf_until = frame->tf_until;
   step.record.skipped = assembler_.take_skipped();
   step.record.degraded = degraded_words(result);
+  std::ranges::move(frame->doubts, std::back_inserter(step.record.degraded));
   if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
   step.record.step = result.belief.step;
   step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));

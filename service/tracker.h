@@ -16,16 +16,9 @@
 #include "prescene/rendering/likelihood_batch.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/recording.h"
-#include "prescene/service/topics.h"
+#include "prescene/service/tracker_settings.h"
 
 namespace prescene::service {
-
-struct TrackerSettings {
-  InputTopics topics;
-  AssemblerSettings assembler;
-  TfBufferSettings tf;
-  filter::FilterSettings filter;
-};
 
 /// One belief step as it happened.
 struct TrackerStep {

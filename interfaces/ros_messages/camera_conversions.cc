@@ -90,7 +90,7 @@ void report_distortion(const RosCameraInfo& info, const PinholeCamera& camera, C
   if (report->max_distortion > 1.0) {
     report->warnings.push_back("d: the lens distortion moves the image corners by up to " +
                                std::to_string(std::lround(report->max_distortion)) +
-                               " pixels and is ignored; send rectified images (image_proc) and use P");
+                               " pixels and is ignored; send rectified images (image_proc), and say so (--rectified)");
   }
 }
 

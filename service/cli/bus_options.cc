@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 
@@ -32,13 +33,39 @@ void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& t
   group->add_option("--tf-static-topic", topics.tf_static)->capture_default_str();
 }
 
-core::Result<std::optional<geometry::Pose>> camera_pose_of(const std::vector<double>& numbers) {
-  if (numbers.empty()) return std::optional<geometry::Pose>();
-  geometry::Pose X_WC{{numbers[3], numbers[4], numbers[5], numbers[6]}, {numbers[0], numbers[1], numbers[2]}};
-  if (!X_WC.is_finite() || std::abs(X_WC.rotation.norm() - 1.0) > 0.01) {
-    return core::invalid_input("--camera-pose x y z qw qx qy qz: the last four are a unit quaternion, real part first");
-  }
-  return std::optional<geometry::Pose>(geometry::normalized(X_WC));
+void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
+  auto* group = verb.add_option_group("Camera", "Where the camera is");
+  group->add_option("--world-frame", assembler.world_frame, "Frame of the scene in tf")->capture_default_str();
+  group
+      ->add_option_function<std::vector<double>>(
+          "--camera-pose",
+          [&assembler](const std::vector<double>& numbers) {
+            const geometry::Pose X_WC{{numbers[3], numbers[4], numbers[5], numbers[6]},
+                                      {numbers[0], numbers[1], numbers[2]}};
+            if (!X_WC.is_finite() || std::abs(X_WC.rotation.norm() - 1.0) > 0.01) {
+              throw CLI::ValidationError("--camera-pose",
+                                         "x y z qw qx qy qz: the last four are a unit quaternion, real part first");
+            }
+            assembler.X_WC = geometry::normalized(X_WC);
+          },
+          "Pose of the camera where tf has none: x y z qw qx qy qz (m)")
+      ->expected(7);
+  group->add_flag("--rectified", assembler.rectified, "The images are rectified: use P of the camera info, not K");
+}
+
+TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given) {
+  const auto take = [&verb](const char* option, auto& to, const auto& from) {
+    if (verb.get_option(option)->count() > 0) to = from;
+  };
+  take("--depth-topic", settings.topics.depth, given.topics.depth);
+  take("--color-topic", settings.topics.color, given.topics.color);
+  take("--camera-info-topic", settings.topics.camera_info, given.topics.camera_info);
+  take("--tf-topic", settings.topics.tf, given.topics.tf);
+  take("--tf-static-topic", settings.topics.tf_static, given.topics.tf_static);
+  take("--world-frame", settings.assembler.world_frame, given.assembler.world_frame);
+  take("--camera-pose", settings.assembler.X_WC, given.assembler.X_WC);
+  take("--rectified", settings.assembler.rectified, given.assembler.rectified);
+  return settings;
 }
 
 }  // namespace prescene::service

@@ -31,6 +31,7 @@ struct Options {
   double depth_scale = 0.001;
   double frame_rate = 30.0;
   TrackerSettings tracker;
+  const CLI::App* verb = nullptr;
 };
 
 /// "SECONDS:JSON".
@@ -120,9 +121,18 @@ std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) 
   return text;
 }
 
+/// What the recording was made with, but for what the command line says otherwise.
+core::Result<TrackerSettings> settings_of(const Options& options, const RecordingInfo& info) {
+  if (info.settings.empty()) return options.tracker;
+  auto recorded = with_recorded({}, parse_or_discard(info.settings));
+  if (!recorded) return recorded.status().at(options.input + ": recorded settings");
+  return with_given(*options.verb, *std::move(recorded), options.tracker);
+}
+
 core::Status run_over_dds(Options& options, VerbContext& context) {
   PRESCENE_TRY(const auto info_reader, RecordingReader::open(options.input));
   PRESCENE_TRY(const auto scene, scene_of(options, info_reader->info(), context));
+  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, info_reader->info()));
   for (const std::string& text : options.questions) {
     PRESCENE_TRY(TimedQuestion question, timed_question(text));
     options.bus.questions.push_back(std::move(question));
@@ -130,7 +140,7 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
                    [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
   TrackingScore score(scene);
-  SessionReport report(scene, options.tracker.topics);
+  SessionReport report(scene, settings.topics);
   PRESCENE_TRY(BusReplayResult result,
                replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
                                context.log(), [&](const RecordedEntry& entry) {
@@ -196,13 +206,14 @@ core::Status run_here(Options& options, VerbContext& context) {
   if (!scene) {
     PRESCENE_TRY(scene, scene_of(options, info, context));
   }
+  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, info));
   Backends backends(context.pool());
   // A recording's own seed repeats its bits.
   const std::uint64_t seed = context.options().seed_given || info.seed == 0 ? context.options().seed : info.seed;
-  PRESCENE_TRY(const auto tracker, Tracker::create(scene, options.tracker, seed, backends));
+  PRESCENE_TRY(const auto tracker, Tracker::create(scene, settings, seed, backends));
   TrackingScore score(scene);
   SupportScore supports;
-  SessionReport report(scene, options.tracker.topics);
+  SessionReport report(scene, settings.topics);
   ordered_json steps = ordered_json::array();
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
     const BeliefSummary summary = summary_of(*at.belief());
@@ -273,7 +284,7 @@ core::Status run_here(Options& options, VerbContext& context) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
                              " is the first that differs from the recording: another version, machine or setting?");
   }
-  return check_steps(*summary, options.tracker.topics).at(options.input);
+  return check_steps(*summary, settings.topics).at(options.input);
 }
 
 }  // namespace
@@ -302,6 +313,8 @@ Verb add_replay_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
   add_bus_options(*verb, options->bus.dds, options->tracker.topics);
+  add_camera_options(*verb, options->tracker.assembler);
+  options->verb = verb;
   verb->footer(
       "Examples: prescene replay milk.mcap --report milk.html\n"
       "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");

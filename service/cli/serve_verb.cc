@@ -13,18 +13,17 @@ struct Options {
   std::string scene;
   std::string record;
   LiveSettings settings;
-  std::vector<double> camera_pose;
 };
 
 core::Status run(Options& options, VerbContext& context) {
-  PRESCENE_TRY(options.settings.tracker.assembler.X_WC, camera_pose_of(options.camera_pose));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
   PRESCENE_RETURN_IF_ERROR(check_output("--record", options.record, {options.scene}));
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
-    PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed, ""}));
+    PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed,
+                                                                     to_json(options.settings.tracker).dump()}));
   }
   Backends backends(context.pool());
   PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,
@@ -42,10 +41,6 @@ Verb add_serve_verb(CLI::App& app) {
   verb->add_option("--scene", options->scene, "Scene file: models, supports, robot, objects (docs/scene_files.md)")
       ->required();
   verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)");
-  verb->add_option("--world-frame", options->settings.tracker.assembler.world_frame, "Frame of the scene in tf")
-      ->capture_default_str();
-  verb->add_option("--camera-pose", options->camera_pose, "Pose of the camera where tf has none: x y z qw qx qy qz (m)")
-      ->expected(7);
   verb->add_option("--question-seconds", options->settings.desk.default_seconds,
                    "Time that a question without limits of its own may take, s")
       ->check(number_between(1e-3, 3600.0))
@@ -55,6 +50,7 @@ Verb add_serve_verb(CLI::App& app) {
       ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();
   add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
+  add_camera_options(*verb, options->settings.tracker.assembler);
   verb->footer(
       "Runs until Ctrl-C. Topics: docs/ros2.md\n"
       "Example: prescene serve --scene scenarios/milk_on_bin.yaml");

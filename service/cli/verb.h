@@ -16,7 +16,7 @@
 #include "prescene/core/status.h"
 #include "prescene/geometry/pose.h"
 #include "prescene/interfaces/dds/dds_node.h"
-#include "prescene/service/topics.h"
+#include "prescene/service/tracker_settings.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
 class App;
@@ -96,8 +96,10 @@ Verb add_ask_verb(CLI::App& app);
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 /// The same and the names of the robot's topics.
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
-/// Seven numbers x y z qw qx qy qz as a pose; nothing for none. kInvalidInput for a rotation that is not one.
-core::Result<std::optional<geometry::Pose>> camera_pose_of(const std::vector<double>& numbers);
+/// --world-frame and --camera-pose.
+void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
+/// `settings` (of a recording) with those of the options above that were on the command line.
+TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given);
 
 /// An answer's error as a status: what begins with "cancelled: ", "unavailable: " or "resource exhausted: " could not
 /// be done, everything else is a bad question. `place` goes in front of the text.

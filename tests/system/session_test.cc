@@ -84,6 +84,35 @@ TEST_F(Session, ACutRecordingIsReadToItsLastWholeMessage) {
   EXPECT_EQ(run_program({"replay", path("noise.mcap")}).exit_code, 2);
 }
 
+TEST_F(Session, ReplaysWithTheSettingsThatItWasRecordedWith) {
+  {
+    // No tf knows this frame, so the camera is where the command line says.
+    BackgroundProgram service({"serve", "--scene", path("scene.yaml"), "--record", path("session.mcap"),
+                               "--world-frame", "hall", "--camera-pose", "0", "0", "0.9", "0", "1", "0", "0"},
+                              bus_);
+    const Finished played = run_program({"replay", path("run.mcap"), "--over-dds", "--json"}, bus_);
+    EXPECT_EQ(played.exit_code, 0) << played.err;
+    EXPECT_EQ(service.stop(SIGINT), 0);
+  }
+  const Finished again = run_program({"replay", path("session.mcap"), "--json"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_GT(parsed(again)["compared_steps"].get<int>(), 3);
+  EXPECT_EQ(parsed(again)["different_steps"], 0);
+  // Where the camera is makes the belief, so another place is another belief.
+  const Finished elsewhere =
+      run_program({"replay", path("session.mcap"), "--camera-pose", "0", "0", "0.8", "0", "1", "0", "0"});
+  EXPECT_EQ(elsewhere.exit_code, 1) << elsewhere.out;
+}
+
+TEST_F(Session, AReplayWithoutAFrameOfUseSaysWhy) {
+  const Finished unconnected = run_program({"replay", path("run.mcap"), "--world-frame", "hall", "--json"});
+  EXPECT_EQ(unconnected.exit_code, 2) << unconnected.out;
+  EXPECT_NE(unconnected.err.find("hall"), std::string::npos) << unconnected.err;
+  const Finished unnamed = run_program({"replay", path("run.mcap"), "--depth-topic", "/nobody/depth"});
+  EXPECT_EQ(unnamed.exit_code, 2) << unnamed.out;
+  EXPECT_NE(unnamed.err.find("/nobody/depth"), std::string::npos) << unnamed.err;
+}
+
 TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
   const std::vector<std::string> serve = {"serve", "--scene", path("scene.yaml")};
   const std::vector<std::string> replay = {"replay", path("run.mcap"), "--over-dds",

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracker_settings.h"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+using ::testing::HasSubstr;
+
+TrackerSettings unusual() {
+  TrackerSettings settings;
+  settings.topics = {"/d", "/c", "/i", "/t", "/ts"};
+  settings.assembler = {
+      "base", "lens", geometry::normalized(geometry::Pose{{0.3, 0.1, -0.7, 0.2}, {0.1, 1.0 / 3.0, 2}}),
+      0.07,   0.02,   false,
+      true,   true};
+  settings.tf = {12.5, 77, 0.3};
+  return settings;
+}
+
+TEST(TrackerSettings, ComeBackAsTheSameBits) {
+  const std::string text = to_json(unusual()).dump();
+  const auto read = with_recorded({}, ordered_json::parse(text));
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(to_json(*read).dump(), text);
+  EXPECT_EQ(read->topics, unusual().topics);
+  EXPECT_EQ(*read->assembler.X_WC, *unusual().assembler.X_WC);
+  EXPECT_EQ(read->assembler.max_wait_s, 0.07);
+  EXPECT_TRUE(read->assembler.rectified);
+  EXPECT_EQ(read->tf.max_frames, 77);
+  // Every key says something: without it the default stays.
+  const ordered_json whole = to_json(unusual());
+  const ordered_json defaults = to_json(TrackerSettings{});
+  for (const auto& [key, value] : whole.items()) EXPECT_NE(value, defaults.at(key)) << key;
+}
+
+TEST(TrackerSettings, OfOtherVersionsAreTakenAsFarAsTheyGo) {
+  const auto read = with_recorded(unusual(), {{"world_frame", "map"}, {"something_new", {1, 2}}});
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(read->assembler.world_frame, "map");
+  EXPECT_EQ(read->topics, unusual().topics);
+}
+
+TEST(TrackerSettings, RefuseWhatIsNoSettingAndNameIt) {
+  const ordered_json whole = to_json(unusual());
+  for (const auto& [key, value] : whole.items()) {
+    for (const ordered_json& wrong : {ordered_json{{"a", 1}}, ordered_json(-1), ordered_json("1e999")}) {
+      if (value.is_string() && wrong.is_string()) continue;
+      const auto read = with_recorded({}, {{key, wrong}});
+      ASSERT_FALSE(read.ok()) << key << " = " << wrong;
+      EXPECT_THAT(read.status().message(), HasSubstr(key));
+    }
+  }
+  EXPECT_FALSE(with_recorded({}, ordered_json::array()).ok());
+}
+
+}  // namespace
+}  // namespace prescene::service
