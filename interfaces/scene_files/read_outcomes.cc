@@ -163,7 +163,7 @@ std::string find_judged(Binder& binder, const std::string& group_object, SceneCo
 }
 
 std::string require_judged(Binder& binder, const std::string& group_object, SceneContext& context) {
-  const std::string object = find_judged(binder, group_object, context);
+  std::string object = find_judged(binder, group_object, context);
   if (object.empty()) binder.require("object", "name the object that is judged");
   return object;
 }

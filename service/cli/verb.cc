@@ -176,7 +176,7 @@ CLI::Validator number_between(double low, double high) {
 }
 
 std::string live_recording_path(const std::string& asked, VerbContext& context) {
-  const std::string unused = unused_recording_path(asked).string();
+  std::string unused = unused_recording_path(asked).string();
   if (unused != asked) core::log(context.log(), core::LogLevel::kWarning, asked + " exists: recording to " + unused);
   return unused;
 }
