@@ -65,19 +65,20 @@ std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, s
   return face_of;
 }
 
-}  // namespace
-
-core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm,
-                                                     double flatness) {
-  PRESCENE_TRY(TriangleMesh hull, convex_hull(mesh.vertices));
-  for (Vector3d& vertex : hull.vertices) vertex -= p_BoBcm;  // from here on about the centre of mass
+/// What lies beyond the edge of a triangle is found by the edge the other way round.
+std::map<Edge, std::size_t> triangles_by_edge(const TriangleMesh& hull) {
   std::map<Edge, std::size_t> triangle_of_edge;
   for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) triangle_of_edge[{hull.triangles[t][k], hull.triangles[t][(k + 1) % 3]}] = t;
   }
-  const std::vector<int> face_of = merge_coplanar(hull, triangle_of_edge, flatness);
+  return triangle_of_edge;
+}
 
-  std::vector<Face> faces(static_cast<std::size_t>(*std::max_element(face_of.begin(), face_of.end())) + 1);
+/// How a body whose centre of mass is the origin stands on each face, and where it rolls from those that don't carry
+/// it.
+std::vector<Face> measure_faces(const TriangleMesh& hull, const std::map<Edge, std::size_t>& triangle_of_edge,
+                                const std::vector<int>& face_of) {
+  std::vector<Face> faces(static_cast<std::size_t>(*std::ranges::max_element(face_of)) + 1);
   for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
     Face& face = faces[static_cast<std::size_t>(face_of[t])];
     const auto& [a, b, c] = hull.triangles[t];
@@ -92,9 +93,6 @@ core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, c
     for (const std::size_t t : face.triangles) {
       for (const std::uint32_t v : hull.triangles[t])
         face.height = std::max(face.height, face.normal.dot(hull.vertices[v]));
-    }
-    if (face.height <= 0.0) {
-      return core::invalid_input("the centre of mass is not inside of the convex hull: correct one of them");
     }
     double least = std::numeric_limits<double>::max();
     for (const std::size_t t : face.triangles) {
@@ -114,15 +112,58 @@ core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, c
     }
     face.tip_angle = std::atan2(least, face.height);
   }
+  return faces;
+}
 
-  // Each face's share goes to the face on which the body comes to lie; rolling lowers the centre of mass, so it ends.
-  std::vector<double> share(faces.size(), 0.0);
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    std::size_t at = f;
-    for (std::size_t rolls = 0; faces[at].tip_angle < 0.0 && rolls < faces.size(); ++rolls) {
+/// Rolling lowers the centre of mass, so it ends; but not among faces that were made of nearly coplanar triangles: of
+/// two such each may send the body to the other. Those carry it together. True if any were joined.
+bool join_faces_that_roll_in_circles(const std::vector<Face>& faces, std::vector<int>& face_of) {
+  constexpr int kOpen = -1, kDone = -2;
+  std::vector<int> reached_from(faces.size(), kOpen);  // the start of the walk that came here
+  std::vector<int> joined(faces.size());
+  std::iota(joined.begin(), joined.end(), 0);
+  bool any = false;
+  for (std::size_t start = 0; start < faces.size(); ++start) {
+    std::vector<std::size_t> walk;
+    std::size_t at = start;
+    while (reached_from[at] == kOpen && faces[at].tip_angle < 0.0) {
+      reached_from[at] = static_cast<int>(start);
+      walk.push_back(at);
       at = static_cast<std::size_t>(faces[at].rolls_to);
     }
-    share[at] += faces[f].solid_angle / (4.0 * std::numbers::pi);
+    if (faces[at].tip_angle < 0.0 && reached_from[at] == static_cast<int>(start)) {
+      for (auto member = std::ranges::find(walk, at); member != walk.end(); ++member)
+        joined[*member] = static_cast<int>(at);
+      any = true;
+    }
+    for (const std::size_t passed : walk) reached_from[passed] = kDone;
+  }
+  if (!any) return false;
+  std::map<int, int> renumbered;
+  for (int& face : face_of)
+    face =
+        renumbered.emplace(joined[static_cast<std::size_t>(face)], static_cast<int>(renumbered.size())).first->second;
+  return true;
+}
+
+}  // namespace
+
+core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm,
+                                                     double flatness) {
+  PRESCENE_TRY(TriangleMesh hull, convex_hull(mesh.vertices));
+  for (Vector3d& vertex : hull.vertices) vertex -= p_BoBcm;  // from here on about the centre of mass
+  const std::map<Edge, std::size_t> triangle_of_edge = triangles_by_edge(hull);
+  std::vector<int> face_of = merge_coplanar(hull, triangle_of_edge, flatness);
+  std::vector<Face> faces = measure_faces(hull, triangle_of_edge, face_of);
+  while (join_faces_that_roll_in_circles(faces, face_of)) faces = measure_faces(hull, triangle_of_edge, face_of);
+  if (std::ranges::any_of(faces, [](const Face& face) { return face.height <= 0.0; }))
+    return core::invalid_input("the centre of mass is not inside of the convex hull: correct one of them");
+
+  std::vector<double> share(faces.size(), 0.0);
+  for (const Face& face : faces) {
+    const Face* at = &face;
+    while (at->tip_angle < 0.0) at = &faces[static_cast<std::size_t>(at->rolls_to)];
+    share[static_cast<std::size_t>(at - faces.data())] += face.solid_angle / (4.0 * std::numbers::pi);
   }
   std::vector<RestingPose> poses;
   for (std::size_t f = 0; f < faces.size(); ++f) {

@@ -46,6 +46,12 @@ std::string text_of(const MeshInspection& found) {
                       fixed_text(1e3 * pose.height, 1)});
     }
     text += "\n" + table(rows);
+    double rest = 0.0;
+    for (std::size_t i = rows.size() - 1; i < found.resting_poses.size(); ++i)
+      rest += found.resting_poses[i].probability;
+    if (rest > 0.0)
+      text += "and " + std::to_string(found.resting_poses.size() + 1 - rows.size()) + " more, together " +
+              fixed_text(rest, 3) + "\n";
   }
   for (const std::string& remark : found.remarks) text += "remark: " + remark + "\n";
   return text;

@@ -5,8 +5,10 @@
 
 #include <cmath>
 
+#include "prescene/core/random.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/primitives.h"
+#include "prescene/geometry/sampling.h"
 
 namespace prescene::geometry {
 namespace {
@@ -59,6 +61,24 @@ TEST(RestingPoses, AThinStickDoesNotStandOnASlantedEnd) {
   ASSERT_TRUE(poses.ok());
   EXPECT_EQ(poses->size(), 4u);
   EXPECT_NEAR(sum(*poses), 1.0, 1e-9);
+}
+
+TEST(RestingPoses, OfRoundedBodiesTakeUpEveryRotation) {
+  // Cut into many small facets that are merged generously: a body may not roll in circles among them and be lost.
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    core::RandomStream stream(seed, core::Purpose::kTest);
+    TriangleMesh pebble;
+    for (int i = 0; i < 400; ++i) {
+      const Vector3d direction = uniform_direction(stream);
+      pebble.vertices.push_back(direction.cwiseProduct(Vector3d(0.03, 0.045, 0.1)));
+    }
+    for (const double flatness : {0.02, 0.1, 0.3}) {
+      const auto poses = resting_poses(pebble, Vector3d(0.0, 0.002, 0.005), flatness);
+      ASSERT_TRUE(poses.ok()) << poses.status().message();
+      EXPECT_NEAR(sum(*poses), 1.0, 1e-9) << "seed " << seed << ", flatness " << flatness;
+      for (const RestingPose& pose : *poses) EXPECT_GE(pose.tip_angle, 0.0);
+    }
+  }
 }
 
 TEST(RestingPoses, DoNotDependOnTheBodyFrame) {
