@@ -188,13 +188,14 @@ struct AnswerJson {
     for (const FinalPoses& final_poses : predict.final_poses) poses.push_back(final_poses_json(final_poses));
     for (const TypicalRun& run : predict.typical_runs)
       runs.push_back({{"outcome", run.outcome},
+                      {"group", run.group},
                       {"share", run.share},
                       {"timeline", to_json(run.timeline)},
                       {"trajectory", to_json(run.trajectory)}});
     return {{"outcomes", std::move(outcomes)},      {"converged", predict.converged},
             {"instances", predict.instances},       {"simulated_seconds", predict.simulated_seconds},
             {"wall_seconds", predict.wall_seconds}, {"final_poses", std::move(poses)},
-            {"typical_runs", std::move(runs)}};
+            {"typical_runs", std::move(runs)},      {"left_out", predict.left_out}};
   }
   Json operator()(const StabilityAnswer& stability) const {
     return {{"object", stability.object},

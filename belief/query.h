@@ -97,6 +97,7 @@ struct FinalPoses {
 /// A typical run of an outcome: the instance nearest to the middle of those that ended so.
 struct TypicalRun {
   std::string outcome;
+  std::string group;  ///< Of exclusive outcomes; "" = none.
   double share = 0.0;
   Timeline timeline;
   Trajectory trajectory;
@@ -108,6 +109,8 @@ struct PredictAnswer {
   std::vector<OutcomeProbability> outcomes;
   std::vector<FinalPoses> final_poses;
   std::vector<TypicalRun> typical_runs;
+  /// The scene's outcomes (groups by their name) that need an object which is lost or was never found.
+  std::vector<std::string> left_out;
   int instances = 0;
   double simulated_seconds = 0.0;
   double wall_seconds = 0.0;

@@ -93,6 +93,8 @@ std::optional<int> find_robot_body(const Scene& scene, const std::string& name);
 
 /// Names unique, indices and names in actions and outcomes resolve, times ordered, every model valid.
 core::Status validate(const Scene& scene);
+/// One outcome: its names resolve in the scene and its values make sense.
+core::Status validate(const Scene& scene, const Outcome& outcome);
 
 /// How many uniform numbers one start of the scene takes (poses, twists, physical parameters). What is random in
 /// actions is drawn by whoever executes them.

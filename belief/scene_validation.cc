@@ -229,4 +229,6 @@ Status validate(const Scene& scene) {
   return check_outcomes(scene);
 }
 
+Status validate(const Scene& scene, const Outcome& outcome) { return check_outcome(scene, outcome); }
+
 }  // namespace prescene::belief

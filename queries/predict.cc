@@ -111,6 +111,7 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
     if (!trajectory) break;  // stopped: the probabilities are there, which matter most
     belief::TypicalRun& run = runs.emplace_back();
     run.outcome = foresight.variables[candidate.variable].classes[static_cast<std::size_t>(candidate.which)];
+    run.group = foresight.variables[candidate.variable].name;
     run.share = candidate.share;
     run.trajectory = *std::move(trajectory);
     run.timeline = belief::timeline_of(scene, run.trajectory);
@@ -139,6 +140,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   answer.instances = static_cast<int>(foresight.estimate.instances.size());
   answer.simulated_seconds = foresight.estimate.simulated_seconds;
   answer.wall_seconds = foresight.estimate.wall_seconds;
+  if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.converged = foresight.estimate.converged;
   return answer;
 }

@@ -29,18 +29,24 @@ std::optional<std::string> holder_of(const belief::Scene& scene, const belief::O
   return nearest;
 }
 
-/// Outcomes about objects that are not there can't be judged.
-void drop_outcomes_of_absent_objects(belief::Scene& scene) {
-  const auto absent = [&](const belief::Outcome& outcome) {
-    return !belief::find_object(scene, outcome.object).has_value();
-  };
-  std::erase_if(scene.outcomes, absent);
-  std::erase_if(scene.exclusive_outcomes, [&](const belief::ExclusiveOutcomes& group) {
-    return std::any_of(group.outcomes.begin(), group.outcomes.end(), absent);
+/// Outcomes that need objects which are not there can't be judged; returns their names and those of their groups.
+std::vector<std::string> drop_outcomes_of_absent_objects(belief::Scene& scene) {
+  std::vector<std::string> dropped;
+  const auto can_be_judged = [&](const belief::Outcome& outcome) { return belief::validate(scene, outcome).ok(); };
+  std::erase_if(scene.outcomes, [&](const belief::Outcome& outcome) {
+    if (can_be_judged(outcome)) return false;
+    dropped.push_back(outcome.name);
+    return true;
   });
+  std::erase_if(scene.exclusive_outcomes, [&](const belief::ExclusiveOutcomes& group) {
+    if (std::ranges::all_of(group.outcomes, can_be_judged)) return false;
+    dropped.push_back(group.name);
+    return true;
+  });
+  return dropped;
 }
 
-std::shared_ptr<const belief::Scene> scene_of(const belief::Belief& belief) {
+std::shared_ptr<belief::Scene> scene_of(const belief::Belief& belief) {
   auto scene = std::make_shared<belief::Scene>(*belief.scene);
   std::vector<belief::Pose> X_WG = belief.robot;
   if (X_WG.size() != scene->robot.size()) {
@@ -58,7 +64,6 @@ std::shared_ptr<const belief::Scene> scene_of(const belief::Belief& belief) {
   for (std::size_t i = 0; i < X_WG.size(); ++i) scene->robot[i].timeline = {{0.0, X_WG[i]}};
   if (scene->camera) scene->camera->X_WC = belief.X_WC;
   scene->actions.clear();
-  drop_outcomes_of_absent_objects(*scene);
   return scene;
 }
 
@@ -71,12 +76,15 @@ bool is_present(const belief::ObjectBelief& object) {
 Prior prior_of(const belief::Belief& belief) {
   auto present = std::make_shared<belief::Belief>(belief);
   std::erase_if(present->objects, [](const belief::ObjectBelief& object) { return !is_present(object); });
-  Prior prior{scene_of(*present),
+  const auto scene = scene_of(*present);
+  std::vector<std::string> left_out = drop_outcomes_of_absent_objects(*scene);
+  Prior prior{scene,
               {},
               belief::most_likely_state(*present),
               core::RandomStream(belief.seed, core::Purpose::kStartBelief, belief.step),
               belief.X_WC,
-              true};
+              true,
+              std::move(left_out)};
   prior.starts = simulation::start_of(std::shared_ptr<const belief::Belief>(std::move(present)));
   return prior;
 }
@@ -87,7 +95,8 @@ Prior prior_of(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t 
               belief::mean_start(*scene),
               core::RandomStream(seed, core::Purpose::kStartBelief),
               scene->camera ? scene->camera->X_WC : belief::Pose{},
-              false};
+              false,
+              {}};
   return prior;
 }
 

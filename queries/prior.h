@@ -18,7 +18,8 @@ struct Prior {
   belief::WorldState likeliest;
   core::RandomStream stream;
   belief::Pose X_WC;
-  bool seen = false;  ///< From a belief: the scene's own actions are past.
+  bool seen = false;                  ///< From a belief: the scene's own actions are past.
+  std::vector<std::string> left_out;  ///< Names of the scene's outcomes and groups that can't be judged.
 };
 
 /// Whether the object takes part in what is foreseen.

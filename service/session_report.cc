@@ -106,7 +106,8 @@ void add_prediction(const ordered_json& predict, const belief::Scene& scene, int
   }
   for (const ordered_json& run : predict.value("typical_runs", ordered_json::array())) {
     interfaces::TimelineBlock block;
-    block.caption = "A typical run that ends " + run.value("outcome", "") + " (" +
+    const std::string group = run.value("group", "");
+    block.caption = "A typical run that ends " + (group.empty() ? "" : group + ": ") + run.value("outcome", "") + " (" +
                     fixed_text(100.0 * run.value("share", 0.0), 0) + " %)";
     block.timeline = timeline_from(run.value("timeline", ordered_json::array()));
     section.blocks.push_back(std::move(block));

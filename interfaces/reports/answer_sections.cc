@@ -86,7 +86,7 @@ std::vector<ReportSection> sections_of(const belief::PredictAnswer& answer, cons
     section.title = "Typical runs";
     for (const belief::TypicalRun& run : answer.typical_runs) {
       TimelineBlock block;
-      block.caption = run.outcome + " (" + percent(run.share) + ")";
+      block.caption = (run.group.empty() ? "" : run.group + ": ") + run.outcome + " (" + percent(run.share) + ")";
       block.timeline = run.timeline;
       if (!run.trajectory.states.empty()) {
         block.begin = run.trajectory.start().time;

@@ -133,12 +133,30 @@ TEST(Predict, SimulatesTheBeliefsObjectsAndRobotAtTheSnapshot) {
   belief::Belief belief = two_hypotheses();
   belief.objects[0].particles[0].mode = belief.objects[0].particles[1].mode = belief::MotionMode::kHeld;
   belief.objects[1].state = belief::TrackState::kLost;
-  ASSERT_EQ(queries::answer(belief, {"", PredictQuery{}}, context).error, "");
+  const Answer answer = queries::answer(belief, {"", PredictQuery{}}, context);
+  ASSERT_EQ(answer.error, "");
+  EXPECT_EQ(std::get<PredictAnswer>(answer.what).left_out.size(), 1u);
   ASSERT_EQ(simulated->objects.size(), 1u);  // the cup is lost
   EXPECT_EQ(simulated->objects[0].held_by, "hand");
   EXPECT_EQ(belief::pose_at(simulated->robot[0], 1.0), belief.robot[0]);
   EXPECT_TRUE(simulated->outcomes.empty());  // the one about the cup can't be judged
   EXPECT_EQ(simulated->exclusive_outcomes.size(), 1u);
+}
+
+TEST(Predict, AnOutcomeThatNeedsALostObjectIsLeftOutAndTheOthersAreAnswered) {
+  core::ThreadPool pool(1);
+  belief::Belief belief = two_hypotheses();
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  scene->outcomes.push_back({"hits the cup", "carton", {belief::Condition{belief::Touched{"cup"}}}});
+  scene->exclusive_outcomes.push_back(
+      {"how", {{"into the cup", "carton", {belief::Condition{belief::Touched{"cup"}, belief::When::kEver, false}}}}});
+  belief.scene = scene;
+  belief.objects[1].state = belief::TrackState::kLost;
+  const Answer answer = queries::answer(belief, {"", PredictQuery{}}, context_with(slide, pool));
+  ASSERT_EQ(answer.error, "");
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  EXPECT_THAT(predicted.left_out, ::testing::IsSupersetOf({"hits the cup", "how"}));
+  EXPECT_GT(named(predicted, "slides").probability, 0.0);
 }
 
 TEST(Predict, AnswersOtherOutcomesThanTheScenes) {
