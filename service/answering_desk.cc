@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "prescene/belief/json.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
@@ -57,19 +58,22 @@ AnsweringDesk::~AnsweringDesk() {
 }
 
 void AnsweringDesk::ask(std::string question_json) {
-  std::string id = question_json.size() <= kLongestWithId ? id_of(question_json) : "";
+  const bool readable = question_json.size() <= kLongestWithId;
+  std::string id = readable ? id_of(question_json) : "";
+  const bool is_quick = readable && parse_or_discard(question_json).contains("where");
   {
     const std::lock_guard lock(mutex_);
     const auto is_same = [&id](const Waiting& other) { return other.id == id; };
     if (!id.empty() && (id == id_in_work_ || std::any_of(waiting_.begin(), waiting_.end(), is_same))) return;
     if (waiting_.size() < settings_.max_waiting) {
-      waiting_.push_back({std::move(id), std::move(question_json)});
+      const auto place = is_quick ? std::ranges::find(waiting_, false, &Waiting::is_quick) : waiting_.end();
+      waiting_.insert(place, {std::move(id), std::move(question_json), is_quick});
       changed_.notify_all();
       return;
     }
   }
-  on_answer_(question_json, error_answer(question_json, "unavailable: " + std::to_string(settings_.max_waiting) +
-                                                            " questions wait already: ask again later"));
+  on_answer_(question_json, error_answer(question_json, "unavailable: " + std::to_string(settings_.max_waiting) + " " +
+                                                            kQuestionsWait + ": ask again later"));
 }
 
 void AnsweringDesk::work() {
@@ -100,8 +104,14 @@ std::string AnsweringDesk::answer(const std::string& question_json) {
   const core::Cancellation limit(stop_, deadline_after(settings_.most_seconds));
   context.cancellation = &limit;
   try {
-    return belief::to_json(queries::answer(*snapshot_(), *query, context))
-        .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    const std::shared_ptr<const belief::Belief> belief = snapshot_();
+    // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
+    const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, *query, context)
+                                                    : queries::answer(*belief, *query, context);
+    std::string text = belief::to_json(answer).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    if (text.size() <= interfaces::CdrLimits().max_string_bytes) return text;
+    return error_answer(question_json, "resource exhausted: the answer has " + std::to_string(text.size() >> 20) +
+                                           " MiB, more than clients take: ask for less at a time");
   } catch (const std::bad_alloc&) {
     return error_answer(question_json, "resource exhausted: the answer does not fit into the memory: ask for less");
   }

@@ -23,6 +23,9 @@ struct DeskSettings {
   double most_seconds = 10.0;    ///< Time that any question may take: questions are answered one after the other.
 };
 
+/// In the error of a question that came when too many waited.
+inline constexpr const char* kQuestionsWait = "questions wait already";
+
 /// A question's text as JSON and its answer's. Called on the desk's thread.
 using AnswerSink = std::function<void(const std::string& question, const std::string& answer)>;
 
@@ -36,8 +39,9 @@ class AnsweringDesk {
   AnsweringDesk(const AnsweringDesk&) = delete;
   AnsweringDesk& operator=(const AnsweringDesk&) = delete;
 
-  /// Takes a question; one that is not understood or comes when too many wait gets an answer that says so. A question
-  /// that waits or is being answered is not taken again under the same id: clients ask again when an answer is late.
+  /// Takes a question. `where` comes before what has to be simulated. One that is not understood or comes when too many
+  /// wait gets an answer that says so. A question that waits or is being answered is not taken again under the same id:
+  /// clients ask again when an answer is late.
   void ask(std::string question_json);
 
  private:
@@ -55,6 +59,7 @@ class AnsweringDesk {
   struct Waiting {
     std::string id;
     std::string question;
+    bool is_quick = false;
   };
   std::deque<Waiting> waiting_;
   std::string id_in_work_;

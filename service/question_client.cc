@@ -9,6 +9,7 @@
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/answering_desk.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/topics.h"
 
@@ -20,6 +21,15 @@ using std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kPollInterval(20);
 // A service that was killed took the question with it: it is asked again after this time.
 constexpr std::chrono::seconds kAskAgain(2);
+
+// How long a service is left alone that has too many questions.
+constexpr std::chrono::milliseconds kBusyPause(300);
+
+bool says_ask_again(const std::string& answer) {
+  const auto json = parse_or_discard(answer);
+  return json.is_object() && json.contains("error") && json["error"].is_string() &&
+         json["error"].get<std::string>().find(kQuestionsWait) != std::string::npos;
+}
 
 std::string new_id() {
   static std::atomic<unsigned> count{0};
@@ -37,9 +47,9 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
   PRESCENE_TRY(client->node_, interfaces::DdsNode::create(options, log));
   PRESCENE_RETURN_IF_ERROR(
       client->node_->subscribe(kAnswerTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
-                               [raw](interfaces::ReceivedMessage&& message) {
+                               [raw, log](interfaces::ReceivedMessage&& message) {
                                  const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
-                                 if (!text) return;
+                                 if (!text) return core::log(log, core::LogLevel::kWarning, text.status().message());
                                  const auto answer = parse_or_discard(text->data);
                                  if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
                                  const std::lock_guard lock(raw->mutex_);
@@ -69,6 +79,7 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
       steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>(timeout));
   auto ask_at = steady_clock::now();
   bool found_service = false;
+  bool was_busy = false;
   while (steady_clock::now() < deadline) {
     if (cancellation.requested()) return core::cancelled("stopped on request");
     // Both ways must be open, or the answer would be lost.
@@ -79,9 +90,16 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
       ask_at = steady_clock::now() + kAskAgain;
     }
     std::unique_lock lock(mutex_);
-    if (changed_.wait_for(lock, kPollInterval, [&] { return answers_.contains(id); })) return answers_[id];
+    if (!changed_.wait_for(lock, kPollInterval, [&] { return answers_.contains(id); })) continue;
+    const std::string answer = std::exchange(answers_[id], {});
+    answers_.clear();
+    if (!says_ask_again(answer)) return answer;
+    was_busy = true;
+    ask_at = steady_clock::now() + kBusyPause;
   }
   const std::string waited = " within " + core::rounded_text(timeout) + " s";
+  if (was_busy)
+    return core::unavailable("the service had too many questions waiting" + waited + ": ask fewer at a time");
   return core::unavailable(found_service
                                ? "no answer came" + waited + ": raise --timeout, or give the question less effort"
                                : "no service was found" + waited +

@@ -19,7 +19,7 @@ namespace prescene::interfaces {
 /// What a sender may make us allocate. Every sequence is checked against the bytes that remain as well.
 struct CdrLimits {
   std::size_t max_message_bytes = std::size_t{256} << 20;
-  std::size_t max_string_bytes = std::size_t{1} << 20;
+  std::size_t max_string_bytes = std::size_t{64} << 20;
 };
 
 /// Little endian, header 00 01 00 00.

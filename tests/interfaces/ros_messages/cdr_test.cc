@@ -99,6 +99,7 @@ TEST(Cdr, NamesTheElementOfASequence) {
 }
 
 TEST(Cdr, KeepsToItsLimits) {
+  EXPECT_EQ(decode_status<RosString>(encode_cdr(RosString{std::string(16 << 20, 'x')})).code(), StatusCode::kOk);
   EXPECT_EQ(decode_status<RosString>(encode_cdr(RosString{"four"}), {.max_string_bytes = 4}).code(), StatusCode::kOk);
   const auto status = decode_status<RosString>(encode_cdr(RosString{"fives"}), {.max_string_bytes = 4});
   EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
