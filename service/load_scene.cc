@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/load_scene.h"
 
+#include <algorithm>
+
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
+#include "prescene/interfaces/scene_files/located_value.h"
+#include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 
 namespace prescene::service {
@@ -49,6 +53,19 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
                                                                    const core::LogSink& log) {
   interfaces::FileReport report;
   return shared(interfaces::parse_scene(text, path.string(), options(log), &report), report, log);
+}
+
+bool is_model_file(const std::filesystem::path& path) {
+  const auto document = interfaces::read_yaml(path, {});
+  if (!document || document->kind != interfaces::LocatedValue::Kind::kMap) return false;
+  const auto has = [&](const char* name) {
+    return std::ranges::any_of(document->keys, [&](const auto& key) { return key.name == name; });
+  };
+  return has("model") && !has("models") && !has("objects");
+}
+
+core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log) {
+  return interfaces::read_model(path, path.stem().string(), options(log));
 }
 
 std::shared_ptr<const belief::Scene> unknown_scene(const std::filesystem::path& folder, const geometry::Pose& X_WC) {

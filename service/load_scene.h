@@ -25,6 +25,11 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
                                                                    const std::filesystem::path& path,
                                                                    const core::LogSink& log);
 
+/// Whether a YAML file describes one model and no scene; false where it can't be read.
+bool is_model_file(const std::filesystem::path& path);
+/// Reads a model file, as `inspect` writes them, and its mesh; errors as those of load_scene.
+core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log);
+
 /// A scene of which nothing is known, named after the folder that it was seen in: its support is found and followed. Up
 /// is taken to be where a camera at X_WC has it that is held upright and looks down at 45 degrees; the search for the
 /// support allows 34 degrees about that.

@@ -92,7 +92,7 @@ std::vector<std::string> nearest_words(std::string_view word, const std::vector<
     if (distance > best) continue;
     if (distance < best) nearest.clear();
     best = distance;
-    nearest.push_back(candidate);
+    if (std::ranges::find(nearest, candidate) == nearest.end()) nearest.push_back(candidate);
   }
   if (!nearest.empty()) return nearest;
   // Half a key, or a key with something added: "euler" for "euler_deg", "mass_kg" for "mass".

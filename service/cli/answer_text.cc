@@ -16,16 +16,29 @@ std::string interval(const nlohmann::ordered_json& p) {
          fixed_text(limits.at(1), 3) + ")";
 }
 
+/// What a probability rests on: few instances, wide intervals.
+std::string basis(const nlohmann::ordered_json& answer) {
+  return "from " + std::to_string(answer.value("instances", 0)) + " instances, " +
+         fixed_text(answer.value("wall_seconds", 0.0), 1) + " s\n";
+}
+
 std::string short_form(const nlohmann::ordered_json& answer) {
   if (const auto stability = answer.find("stability"); stability != answer.end()) {
-    return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n";
+    return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n" +
+           basis(*stability);
   }
   if (const auto predict = answer.find("predict"); predict != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"outcome", "group", "probability"}};
     for (const auto& outcome : predict->at("outcomes")) {
       rows.push_back({outcome.value("name", ""), outcome.value("group", ""), interval(outcome)});
     }
-    return table(rows);
+    std::string text = table(rows) + basis(*predict);
+    if (const auto names = predict->value("left_out", std::vector<std::string>{}); !names.empty()) {
+      text += "not judged, as an object that they need is lost or was not found:";
+      for (const std::string& name : names) text += " " + name;
+      text += "\n";
+    }
+    return text;
   }
   if (const auto where = answer.find("where"); where != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"object", "state", "confidence", "position, m"}};
@@ -45,7 +58,8 @@ std::string short_form(const nlohmann::ordered_json& answer) {
 
 std::string answer_text(const nlohmann::ordered_json& answer) {
   try {
-    return short_form(answer);
+    const bool nothing_seen = !answer.contains("step") || answer.at("step") == 0;
+    return short_form(answer) + (nothing_seen ? "no frame was seen yet: this is what the scene file says\n" : "");
   } catch (const nlohmann::ordered_json::exception&) {  // somebody else's answer, of another form
     return answer.dump(2) + "\n";
   } catch (const std::out_of_range&) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/interfaces/scene_files/problems.h"
 #include "verb.h"
 
 namespace {
@@ -30,6 +31,18 @@ prescene::core::Status run(const prescene::service::Verb& verb, prescene::servic
   } catch (const std::bad_alloc&) {
     return prescene::core::resource_exhausted("the memory is used up: give smaller images, meshes or limits");
   }
+}
+
+/// CLI11 only says that a verb is missing.
+void check_verb(const CLI::App& app, const std::string& word) {
+  if (word.empty() || word.front() == '-') return;
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (verb->get_name() == word) return;
+    verbs.push_back(verb->get_name());
+  }
+  throw CLI::ExtrasError("there is no verb '" + word + "': " + prescene::interfaces::suggestion(word, verbs),
+                         CLI::ExitCodes::ExtrasError);
 }
 
 void add_common_options(CLI::App& verb, prescene::service::CommonOptions& options) {
@@ -75,6 +88,7 @@ int main(int argc, char** argv) {
   for (const service::Verb& verb : verbs) add_common_options(*verb.app, options);
 
   try {
+    if (argc > 1) check_verb(app, argv[1]);
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
     const int code = app.exit(success);

@@ -38,9 +38,18 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
     rows.push_back({(group.empty() ? "" : "  ") + outcome.name, fixed_text(outcome.probability, 3),
                     fixed_text(outcome.low, 3) + " to " + fixed_text(outcome.high, 3)});
   }
-  return table(rows) + "\n" + std::to_string(predicted.instances) + " instances, " +
-         fixed_text(predicted.simulated_seconds, 0) + " simulated seconds, " + fixed_text(predicted.wall_seconds, 1) +
-         " s" + (predicted.converged ? "" : "; not all intervals reached the tolerance") + "\n";
+  std::string text = table(rows) + "\n";
+  if (predicted.outcomes.empty()) {
+    text = "The scene names no outcomes to judge (docs/scene_files.md); mean final positions:\n";
+    for (const belief::FinalPoses& poses : predicted.final_poses) {
+      const geometry::Vector3d& p = poses.mean_position;
+      text += "  " + poses.object + ": " + fixed_text(p.x(), 3) + " " + fixed_text(p.y(), 3) + " " +
+              fixed_text(p.z(), 3) + " m\n";
+    }
+  }
+  return text + std::to_string(predicted.instances) + " instances, " + fixed_text(predicted.simulated_seconds, 0) +
+         " simulated seconds, " + fixed_text(predicted.wall_seconds, 1) + " s" +
+         (predicted.converged ? "" : "; not all intervals reached the tolerance") + "\n";
 }
 
 core::Status run(const Options& options, VerbContext& context) {
@@ -84,7 +93,7 @@ Verb add_predict_verb(CLI::App& app) {
       ->check(CLI::Range(1, 1 << 22))
       ->capture_default_str();
   verb->add_option("--max-seconds", options->max_seconds,
-                   "Most wall time, s; the answer then depends on the machine's speed")
+                   "Wall time, s, after which no more instances begin; the answer then depends on the machine's speed")
       ->check(positive_number());
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
       ->check(positive_number());

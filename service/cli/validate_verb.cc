@@ -6,33 +6,57 @@
 #include "verb.h"
 
 namespace prescene::service {
+namespace {
+
+struct Checked {
+  core::Status status;
+  nlohmann::ordered_json document;
+  std::string text;
+};
+
+Checked bad(const std::string& file, const core::Status& status) {
+  return {status, {{"file", file}, {"valid", false}, {"errors", status.message()}}, status.message()};
+}
+
+Checked check_scene(const std::string& file, VerbContext& context) {
+  const auto scene = load_scene(file, context.log());
+  if (!scene) return bad(file, scene.status());
+  const int dimensions = start_dimensions(**scene);
+  return {{},
+          {{"file", file},
+           {"valid", true},
+           {"name", (*scene)->name},
+           {"models", (*scene)->models.size()},
+           {"objects", (*scene)->objects.size()},
+           {"actions", (*scene)->actions.size()},
+           {"uncertain_dimensions", dimensions}},
+          file + ": valid: " + std::to_string((*scene)->objects.size()) + " objects, " + std::to_string(dimensions) +
+              " uncertain dimensions"};
+}
+
+Checked check_model(const std::string& file, VerbContext& context) {
+  const auto model = load_model(file, context.log());
+  if (!model) return bad(file, model.status());
+  return {{}, {{"file", file}, {"valid", true}, {"model", model->name}}, file + ": valid: a model file"};
+}
+
+}  // namespace
 
 Verb add_validate_verb(CLI::App& app) {
-  auto* verb = app.add_subcommand("validate", "Check scene files: every mistake with its line and the remedy");
+  auto* verb =
+      app.add_subcommand("validate", "Check scene and model files: every mistake with its line and the remedy");
   auto files = std::make_shared<std::vector<std::string>>();
-  verb->add_option("FILE", *files, "Scene files (docs/scene_files.md)")->required();
+  verb->add_option("FILE", *files, "Scene or model files (docs/scene_files.md)")->required();
   verb->footer("Example: prescene validate scenarios/milk_on_bin.yaml");
   return {verb, [files](VerbContext& context) -> core::Status {
             nlohmann::ordered_json documents = nlohmann::ordered_json::array();
             std::string text;
             core::Status first_bad;
             for (const std::string& file : *files) {
-              const auto scene = load_scene(file, context.log());
-              nlohmann::ordered_json document = {{"file", file}, {"valid", scene.ok()}};
-              if (scene) {
-                document["name"] = (*scene)->name;
-                document["models"] = (*scene)->models.size();
-                document["objects"] = (*scene)->objects.size();
-                document["actions"] = (*scene)->actions.size();
-                document["uncertain_dimensions"] = start_dimensions(**scene);
-                text += file + ": valid: " + std::to_string((*scene)->objects.size()) + " objects, " +
-                        std::to_string(start_dimensions(**scene)) + " uncertain dimensions\n";
-              } else {
-                document["errors"] = scene.status().message();
-                text += scene.status().message() + "\n";
-                if (first_bad.ok()) first_bad = scene.status();
-              }
-              documents.push_back(document);
+              const Checked checked = is_model_file(file) ? check_model(file, context) : check_scene(file, context);
+              documents.push_back(checked.document);
+              text += checked.text + "\n";
+              if (first_bad.ok()) first_bad = checked.status;
             }
             context.print({{"files", documents}}, text);
             if (first_bad.ok()) return first_bad;

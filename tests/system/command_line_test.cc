@@ -57,6 +57,12 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
   }
 }
 
+TEST(CommandLine, AMistypedVerbIsNamedWithTheNearest) {
+  const Finished finished = run_program({"inspec", "cup.ply"});
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_NE(finished.err.find("'inspec': did you mean 'inspect'?"), std::string::npos) << finished.err;
+}
+
 TEST(CommandLine, MissingFilesAreNamed) {
   for (const std::vector<std::string>& args :
        std::vector<std::vector<std::string>>{{"predict", "no/such.yaml"},
@@ -186,6 +192,7 @@ TEST(CommandLine, InspectMakesAModelThatASceneCanUse) {
                                      "1000", "-o", (folder.path() / "cube.yaml").string(), "--report",
                                      (folder.path() / "cube.html").string(), "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(run_program({"validate", (folder.path() / "cube.yaml").string()}).exit_code, 0);
   const ordered_json found = parsed(made);
   EXPECT_NEAR(found["volume"].get<double>(), 1e-3, 1e-12);
   EXPECT_NEAR(found["solid"]["mass"].get<double>(), 1.0, 1e-9);
