@@ -8,38 +8,10 @@
 #include "prescene/core/check.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/symmetry.h"
+#include "prescene/geometry/triangle_distance.h"
 
 namespace prescene::geometry {
 namespace {
-
-// Closest point of a triangle by the region of the plane that q falls into [Ericson 2005, section 5.1.5].
-double squared_distance(const Vector3d& q, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Vector3d ab = b - a;
-  const Vector3d ac = c - a;
-  const Vector3d ap = q - a;
-  const double d1 = ab.dot(ap);
-  const double d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return ap.squaredNorm();
-  const Vector3d bp = q - b;
-  const double d3 = ab.dot(bp);
-  const double d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return bp.squaredNorm();
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return (ap - d1 / (d1 - d3) * ab).squaredNorm();
-  const Vector3d cp = q - c;
-  const double d5 = ab.dot(cp);
-  const double d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return cp.squaredNorm();
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return (ap - d2 / (d2 - d6) * ac).squaredNorm();
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0) {
-    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return (bp - t * (c - b)).squaredNorm();
-  }
-  const double sum = va + vb + vc;
-  return (ap - vb / sum * ab - vc / sum * ac).squaredNorm();
-}
 
 // The surface of a mesh for queries "is there a triangle within this distance?".
 class Surface {
@@ -52,7 +24,8 @@ class Surface {
     tree_.search(q, bound, [&](std::size_t leaf, std::uint32_t begin) {
       for (std::uint32_t i = begin; i < tree_.leaf_begins()[leaf + 1] && !found; ++i) {
         const auto& t = mesh_.triangles[tree_.order()[i]];
-        found = squared_distance(q, mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]) <= bound;
+        found =
+            squared_distance_to_triangle(q, mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]) <= bound;
       }
       if (found) bound = -1.0;
     });

@@ -58,9 +58,10 @@ AnsweringDesk::~AnsweringDesk() {
 }
 
 void AnsweringDesk::ask(std::string question_json) {
-  const bool readable = question_json.size() <= kLongestWithId;
-  std::string id = readable ? id_of(question_json) : "";
-  const bool is_quick = readable && parse_or_discard(question_json).contains("where");
+  const auto question =
+      question_json.size() <= kLongestWithId ? parse_or_discard(question_json) : nlohmann::ordered_json();
+  std::string id = id_of_document(question);
+  const bool is_quick = question.contains("where");
   {
     const std::lock_guard lock(mutex_);
     const auto is_same = [&id](const Waiting& other) { return other.id == id; };

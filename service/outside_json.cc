@@ -18,8 +18,9 @@ nlohmann::ordered_json parse_or_discard(std::string_view text) {
   return document ? *std::move(document) : nlohmann::ordered_json(nlohmann::ordered_json::value_t::discarded);
 }
 
-std::string id_of(std::string_view text) {
-  const nlohmann::ordered_json document = parse_or_discard(text);
+std::string id_of(std::string_view text) { return id_of_document(parse_or_discard(text)); }
+
+std::string id_of_document(const nlohmann::ordered_json& document) {
   if (!document.is_object()) return "";
   const auto id = document.find("id");
   return id != document.end() && id->is_string() ? id->get<std::string>() : "";

@@ -51,54 +51,51 @@ core::Status read_value(const ordered_json& json, const std::string& key, std::o
   return core::ok_status();
 }
 
-/// Reads `key` of an object where it is there.
+ordered_json value_json(const std::optional<geometry::Pose>& pose) {
+  return pose ? belief::to_json(*pose) : ordered_json();
+}
 template <class Value>
-core::Status read(const ordered_json& json, const char* key, Value& value) {
-  const auto found = json.find(key);
-  return found == json.end() ? core::ok_status() : read_value(*found, key, value);
+ordered_json value_json(const Value& value) {
+  return value;
+}
+
+/// Calls visit(key, value) for each setting that recordings hold; `settings` may be const.
+template <class Settings, class Visit>
+void for_each_setting(Settings& settings, const Visit& visit) {
+  visit("depth_topic", settings.topics.depth);
+  visit("color_topic", settings.topics.color);
+  visit("camera_info_topic", settings.topics.camera_info);
+  visit("tf_topic", settings.topics.tf);
+  visit("tf_static_topic", settings.topics.tf_static);
+  visit("world_frame", settings.assembler.world_frame);
+  visit("camera_frame", settings.assembler.camera_frame);
+  visit("X_WC", settings.assembler.X_WC);
+  visit("max_wait_s", settings.assembler.max_wait_s);
+  visit("max_stamp_difference_s", settings.assembler.max_stamp_difference_s);
+  visit("use_color", settings.assembler.use_color);
+  visit("rectified", settings.assembler.rectified);
+  visit("mono16_is_depth", settings.assembler.mono16_is_depth);
+  visit("tf_history_s", settings.tf.history_s);
+  visit("tf_max_frames", settings.tf.max_frames);
+  visit("tf_max_extrapolation_s", settings.tf.max_extrapolation_s);
 }
 
 }  // namespace
 
 ordered_json to_json(const TrackerSettings& settings) {
-  const AssemblerSettings& assembler = settings.assembler;
-  return {{"depth_topic", settings.topics.depth},
-          {"color_topic", settings.topics.color},
-          {"camera_info_topic", settings.topics.camera_info},
-          {"tf_topic", settings.topics.tf},
-          {"tf_static_topic", settings.topics.tf_static},
-          {"world_frame", assembler.world_frame},
-          {"camera_frame", assembler.camera_frame},
-          {"X_WC", assembler.X_WC ? belief::to_json(*assembler.X_WC) : ordered_json()},
-          {"max_wait_s", assembler.max_wait_s},
-          {"max_stamp_difference_s", assembler.max_stamp_difference_s},
-          {"use_color", assembler.use_color},
-          {"rectified", assembler.rectified},
-          {"mono16_is_depth", assembler.mono16_is_depth},
-          {"tf_history_s", settings.tf.history_s},
-          {"tf_max_frames", settings.tf.max_frames},
-          {"tf_max_extrapolation_s", settings.tf.max_extrapolation_s}};
+  ordered_json json = ordered_json::object();
+  for_each_setting(settings, [&](const char* key, const auto& value) { json[key] = value_json(value); });
+  return json;
 }
 
 core::Result<TrackerSettings> with_recorded(TrackerSettings settings, const ordered_json& json) {
   if (!json.is_object()) return core::invalid_input("an object is needed");
-  AssemblerSettings& assembler = settings.assembler;
-  PRESCENE_RETURN_IF_ERROR(read(json, "depth_topic", settings.topics.depth));
-  PRESCENE_RETURN_IF_ERROR(read(json, "color_topic", settings.topics.color));
-  PRESCENE_RETURN_IF_ERROR(read(json, "camera_info_topic", settings.topics.camera_info));
-  PRESCENE_RETURN_IF_ERROR(read(json, "tf_topic", settings.topics.tf));
-  PRESCENE_RETURN_IF_ERROR(read(json, "tf_static_topic", settings.topics.tf_static));
-  PRESCENE_RETURN_IF_ERROR(read(json, "world_frame", assembler.world_frame));
-  PRESCENE_RETURN_IF_ERROR(read(json, "camera_frame", assembler.camera_frame));
-  PRESCENE_RETURN_IF_ERROR(read(json, "X_WC", assembler.X_WC));
-  PRESCENE_RETURN_IF_ERROR(read(json, "max_wait_s", assembler.max_wait_s));
-  PRESCENE_RETURN_IF_ERROR(read(json, "max_stamp_difference_s", assembler.max_stamp_difference_s));
-  PRESCENE_RETURN_IF_ERROR(read(json, "use_color", assembler.use_color));
-  PRESCENE_RETURN_IF_ERROR(read(json, "rectified", assembler.rectified));
-  PRESCENE_RETURN_IF_ERROR(read(json, "mono16_is_depth", assembler.mono16_is_depth));
-  PRESCENE_RETURN_IF_ERROR(read(json, "tf_history_s", settings.tf.history_s));
-  PRESCENE_RETURN_IF_ERROR(read(json, "tf_max_frames", settings.tf.max_frames));
-  PRESCENE_RETURN_IF_ERROR(read(json, "tf_max_extrapolation_s", settings.tf.max_extrapolation_s));
+  core::Status first_bad;
+  for_each_setting(settings, [&](const char* key, auto& value) {
+    const auto found = json.find(key);
+    if (found != json.end() && first_bad.ok()) first_bad = read_value(*found, key, value);
+  });
+  PRESCENE_RETURN_IF_ERROR(first_bad);
   return settings;
 }
 

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "prescene/geometry/refine.h"
+#include "prescene/geometry/triangle_distance.h"
 
 namespace prescene::simulation {
 namespace {
@@ -20,24 +21,6 @@ constexpr double kLongestEdge = 0.1;
 constexpr std::size_t kMaxRefinedTriangles = 2000;
 // HACD measures concavity on data scaled to this size.
 constexpr double kScale = 1000.0;
-
-/// Of a point to a triangle [Ericson 2005, section 5.1.5].
-double squared_distance(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Vector3d normal = (b - a).cross(c - a);
-  const bool above = normal.dot((b - a).cross(p - a)) >= 0.0 && normal.dot((c - b).cross(p - b)) >= 0.0 &&
-                     normal.dot((a - c).cross(p - c)) >= 0.0;
-  if (above && normal.squaredNorm() > 0.0) {
-    const double height = normal.dot(p - a);
-    return height * height / normal.squaredNorm();
-  }
-  const auto to_edge = [&](const Vector3d& from, const Vector3d& to) {
-    const Vector3d along = to - from;
-    const double length = along.squaredNorm();
-    const double t = length > 0.0 ? std::clamp(along.dot(p - from) / length, 0.0, 1.0) : 0.0;
-    return (p - from - t * along).squaredNorm();
-  };
-  return std::min({to_edge(a, b), to_edge(b, c), to_edge(c, a)});
-}
 
 /// A mesh and its triangles' clusters, which become parts.
 class PartMaker {
@@ -109,7 +92,8 @@ class PartMaker {
 
   bool far_from_surface(const Vector3d& p, double distance) const {
     for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
-      if (squared_distance(p, corner(i, 0), corner(i, 1), corner(i, 2)) < distance * distance) return false;
+      if (geometry::squared_distance_to_triangle(p, corner(i, 0), corner(i, 1), corner(i, 2)) < distance * distance)
+        return false;
     }
     return true;
   }
