@@ -6,6 +6,7 @@ find_package(Eigen3 REQUIRED NO_MODULE)        # Eigen3::Eigen
 find_package(tl-expected REQUIRED)             # tl::expected
 find_package(TBB REQUIRED)                     # TBB::tbb
 find_package(Random123 REQUIRED)               # Random123::Random123
+find_package(hwy REQUIRED)                     # hwy::hwy
 find_package(nlohmann_json REQUIRED)           # nlohmann_json::nlohmann_json
 find_package(yaml-cpp REQUIRED)                # yaml-cpp
 find_package(PNG REQUIRED)                     # PNG::PNG
