@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/collision/spheres/sphere_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "prescene/core/check.h"
+
+namespace prescene::collision {
+namespace {
+
+constexpr std::size_t kAlignment = 64;  // Bytes: a cache line, and the widest vector.
+
+struct AlignedDelete {
+  void operator()(float* values) const { ::operator delete[](values, std::align_val_t{kAlignment}); }
+};
+
+// How the spheres are grouped: node 0 is the root, the children of a node are consecutive and come after it.
+struct Hierarchy {
+  struct Node {
+    std::uint32_t begin = 0;  // Range of `order` below this node.
+    std::uint32_t end = 0;
+    std::uint32_t first_child = 0;
+    std::uint32_t child_count = 0;
+    bool is_leaf() const { return child_count == 0; }
+  };
+  std::vector<std::uint32_t> order;
+  std::vector<Node> nodes;
+};
+
+std::shared_ptr<float> aligned_floats(std::size_t count) {
+  return {static_cast<float*>(::operator new[](count * sizeof(float), std::align_val_t{kAlignment})), AlignedDelete()};
+}
+
+// Cuts a range of spheres into `parts` of about equal numbers by halving along the longest axis of the centres.
+class Cutter {
+ public:
+  explicit Cutter(std::span<const PackedSphere> spheres) : spheres_(spheres) {}
+
+  // Appends the ends of the parts of order[begin, end) to `ends`.
+  void cut(std::span<std::uint32_t> order, std::size_t begin, std::size_t end, std::size_t parts,
+           std::vector<std::size_t>& ends) const {
+    if (parts == 1) {
+      ends.push_back(end);
+      return;
+    }
+    Eigen::AlignedBox3f box;
+    for (std::size_t i = begin; i < end; ++i) box.extend(spheres_[order[i]].centre);
+    Eigen::Index axis = 0;
+    box.sizes().maxCoeff(&axis);
+    const std::size_t first_parts = parts / 2;
+    const std::size_t middle = begin + (end - begin) * first_parts / parts;
+    const auto before = [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(spheres_[a].centre[axis], a) < std::pair(spheres_[b].centre[axis], b);
+    };
+    const auto at = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
+    std::nth_element(at(begin), at(middle), at(end), before);
+    cut(order, begin, middle, first_parts, ends);
+    cut(order, middle, end, parts - first_parts, ends);
+  }
+
+ private:
+  std::span<const PackedSphere> spheres_;
+};
+
+Hierarchy group(std::span<const PackedSphere> spheres, std::size_t branching) {
+  Hierarchy shape;
+  shape.order.resize(spheres.size());
+  std::iota(shape.order.begin(), shape.order.end(), 0U);
+  shape.nodes.push_back({0, static_cast<std::uint32_t>(spheres.size()), 0, 0});
+  const Cutter cutter(spheres);
+  std::vector<std::size_t> ends;
+  for (std::size_t node = 0; node < shape.nodes.size(); ++node) {
+    const std::size_t begin = shape.nodes[node].begin;
+    const std::size_t end = shape.nodes[node].end;
+    if (end - begin <= branching) continue;
+    ends.clear();
+    cutter.cut(shape.order, begin, end, std::min(branching, (end - begin + branching - 1) / branching), ends);
+    shape.nodes[node].first_child = static_cast<std::uint32_t>(shape.nodes.size());
+    shape.nodes[node].child_count = static_cast<std::uint32_t>(ends.size());
+    std::size_t from = begin;
+    for (const std::size_t to : ends) {
+      shape.nodes.push_back({static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to), 0, 0});
+      from = to;
+    }
+  }
+  return shape;
+}
+
+std::vector<PackedSphere> in_order(const Array<PackedSphere>& spheres, std::span<const std::uint32_t> order) {
+  std::vector<PackedSphere> result(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) result[i] = spheres[order[i]];
+  return result;
+}
+
+int depth_of(const std::vector<SphereTree::Node>& nodes) {
+  std::vector<int> depths(nodes.size(), 1);
+  int deepest = 1;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    deepest = std::max(deepest, depths[i]);
+    if (nodes[i].is_bottom()) continue;
+    for (std::uint32_t k = 0; k < nodes[i].count; ++k) depths[nodes[i].first + k] = depths[i] + 1;
+  }
+  return deepest;
+}
+
+void set_lane(float* lanes, std::size_t branching, std::size_t lane, const PackedSphere& sphere) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    lanes[axis * branching + lane] = sphere.centre[static_cast<Eigen::Index>(axis)];
+  lanes[3 * branching + lane] = sphere.radius;
+}
+
+}  // namespace
+
+PackedSphere bounding_sphere(std::span<const PackedSphere> spheres) {
+  PRESCENE_CHECK(!spheres.empty());
+  if (spheres.size() == 1) return spheres[0];
+  using Eigen::Vector3d;
+  Eigen::AlignedBox3d box;
+  for (const PackedSphere& sphere : spheres) {
+    const Vector3d reach = Vector3d::Constant(static_cast<double>(sphere.radius));
+    box.extend(sphere.centre.cast<double>() - reach);
+    box.extend(sphere.centre.cast<double>() + reach);
+  }
+  // Towards the farthest sphere by shrinking steps [Badoiu and Clarkson 2003]. The centre is one that a float can hold.
+  constexpr int kSteps = 120;
+  constexpr double kShrink = 0.94;
+  Vector3d centre = box.center();
+  double step = 0.25 * box.sizes().maxCoeff();
+  Vector3f best = Vector3f::Zero();
+  double best_radius = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kSteps; ++i) {
+    const Vector3f rounded = centre.cast<float>();
+    const Vector3d from = rounded.cast<double>();
+    double radius = 0.0;
+    const PackedSphere* farthest = nullptr;
+    for (const PackedSphere& sphere : spheres) {
+      const double reach = (sphere.centre.cast<double>() - from).norm() + static_cast<double>(sphere.radius);
+      if (reach > radius) {
+        radius = reach;
+        farthest = &sphere;
+      }
+    }
+    if (radius < best_radius) {
+      best_radius = radius;
+      best = rounded;
+    }
+    const Vector3d away = farthest->centre.cast<double>() - from;
+    const double length = away.norm();
+    if (length == 0.0) break;
+    centre = from + away * (std::min(step, length) / length);
+    step *= kShrink;
+  }
+  auto radius = static_cast<float>(best_radius * (1.0 + 1e-15));
+  if (static_cast<double>(radius) < best_radius * (1.0 + 1e-15))
+    radius = std::nextafter(radius, std::numeric_limits<float>::infinity());
+  return {best, radius};
+}
+
+core::Result<std::shared_ptr<const SphereTree>> SphereTree::make(std::shared_ptr<const SpherePacking> packing,
+                                                                 const SphereTreeOptions& options,
+                                                                 core::ThreadPool& pool) {
+  PRESCENE_CHECK(packing != nullptr);
+  if (options.branching != 4 && options.branching != 8 && options.branching != 16) {
+    return core::invalid_input("sphere tree of '" + packing->name() + "': a branching of " +
+                               std::to_string(options.branching) + "; choose 4, 8 or 16");
+  }
+  const auto branching = static_cast<std::size_t>(options.branching);
+  std::shared_ptr<SphereTree> tree(new SphereTree());
+  tree->packing_ = packing;
+  tree->options_ = options;
+  Hierarchy shape = group(packing->spheres().span(), branching);
+  const std::vector<PackedSphere> spheres = in_order(packing->spheres(), shape.order);
+
+  std::vector<Node> nodes(shape.nodes.size());
+  const std::size_t floats_a_node = 4 * branching;
+  const std::shared_ptr<float> lanes = aligned_floats(nodes.size() * floats_a_node);
+  pool.for_blocks(nodes.size(), 16, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Hierarchy::Node& node = shape.nodes[i];
+      const bool bottom = node.is_leaf();
+      const std::uint32_t count = bottom ? node.end - node.begin : node.child_count;
+      nodes[i] = {bottom ? node.begin : node.first_child, static_cast<std::uint16_t>(count),
+                  static_cast<std::uint16_t>(bottom ? 1 : 0)};
+      for (std::size_t k = 0; k < branching; ++k) {
+        PackedSphere lane{Vector3f::Constant(kUnusedCentre), 0.0F};
+        if (k < count && bottom) lane = spheres[node.begin + k];
+        if (k < count && !bottom) {
+          const Hierarchy::Node& child = shape.nodes[node.first_child + k];
+          lane = bounding_sphere(std::span(spheres).subspan(child.begin, child.end - child.begin));
+        }
+        set_lane(lanes.get() + i * floats_a_node, branching, k, lane);
+      }
+    }
+  });
+  tree->root_ = bounding_sphere(spheres);
+  tree->depth_ = depth_of(nodes);
+  tree->lanes_ = Array<float>(std::span<const float>(lanes.get(), nodes.size() * floats_a_node), lanes);
+  tree->nodes_ = Array<Node>(std::move(nodes));
+  tree->order_ = Array<std::uint32_t>(std::move(shape.order));
+  return std::shared_ptr<const SphereTree>(std::move(tree));
+}
+
+}  // namespace prescene::collision
