@@ -116,51 +116,63 @@ void set_lane(float* lanes, std::size_t branching, std::size_t lane, const Packe
   lanes[3 * branching + lane] = sphere.radius;
 }
 
+using Eigen::Vector3d;
+
+struct Reach {
+  double distance = 0.0;
+  std::size_t index = 0;
+};
+
+// The sphere with the point that is farthest from `centre`.
+Reach farthest_reach(std::span<const PackedSphere> spheres, const Vector3d& centre) {
+  Reach farthest;
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    const double distance = (spheres[i].centre.cast<double>() - centre).norm() + static_cast<double>(spheres[i].radius);
+    if (distance > farthest.distance) farthest = {distance, i};
+  }
+  return farthest;
+}
+
+// Not inlined: where g++ 12 sees both conversions of a vector, from double to float and back, its vectorizer drops them
+// and measures from a centre that a float cannot hold.
+[[gnu::noinline]] PackedSphere sphere_about(const Vector3f& centre, std::span<const PackedSphere> spheres) {
+  const double exact = farthest_reach(spheres, centre.cast<double>()).distance * (1.0 + 1e-15);
+  auto radius = static_cast<float>(exact);
+  if (static_cast<double>(radius) < exact) radius = std::nextafter(radius, std::numeric_limits<float>::infinity());
+  return {centre, radius};
+}
+
 }  // namespace
 
 PackedSphere bounding_sphere(std::span<const PackedSphere> spheres) {
   PRESCENE_CHECK(!spheres.empty());
   if (spheres.size() == 1) return spheres[0];
-  using Eigen::Vector3d;
   Eigen::AlignedBox3d box;
   for (const PackedSphere& sphere : spheres) {
     const Vector3d reach = Vector3d::Constant(static_cast<double>(sphere.radius));
     box.extend(sphere.centre.cast<double>() - reach);
     box.extend(sphere.centre.cast<double>() + reach);
   }
-  // Towards the farthest sphere by shrinking steps [Badoiu and Clarkson 2003]. The centre is one that a float can hold.
+  // Towards the farthest sphere by shrinking steps [Badoiu and Clarkson 2003].
   constexpr int kSteps = 120;
   constexpr double kShrink = 0.94;
   Vector3d centre = box.center();
-  double step = 0.25 * box.sizes().maxCoeff();
-  Vector3f best = Vector3f::Zero();
+  Vector3d best = centre;
   double best_radius = std::numeric_limits<double>::infinity();
+  double step = 0.25 * box.sizes().maxCoeff();
   for (int i = 0; i < kSteps; ++i) {
-    const Vector3f rounded = centre.cast<float>();
-    const Vector3d from = rounded.cast<double>();
-    double radius = 0.0;
-    const PackedSphere* farthest = nullptr;
-    for (const PackedSphere& sphere : spheres) {
-      const double reach = (sphere.centre.cast<double>() - from).norm() + static_cast<double>(sphere.radius);
-      if (reach > radius) {
-        radius = reach;
-        farthest = &sphere;
-      }
+    const Reach farthest = farthest_reach(spheres, centre);
+    if (farthest.distance < best_radius) {
+      best_radius = farthest.distance;
+      best = centre;
     }
-    if (radius < best_radius) {
-      best_radius = radius;
-      best = rounded;
-    }
-    const Vector3d away = farthest->centre.cast<double>() - from;
+    const Vector3d away = spheres[farthest.index].centre.cast<double>() - centre;
     const double length = away.norm();
     if (length == 0.0) break;
-    centre = from + away * (std::min(step, length) / length);
+    centre += away * (std::min(step, length) / length);
     step *= kShrink;
   }
-  auto radius = static_cast<float>(best_radius * (1.0 + 1e-15));
-  if (static_cast<double>(radius) < best_radius * (1.0 + 1e-15))
-    radius = std::nextafter(radius, std::numeric_limits<float>::infinity());
-  return {best, radius};
+  return sphere_about(best.cast<float>(), spheres);
 }
 
 core::Result<std::shared_ptr<const SphereTree>> SphereTree::make(std::shared_ptr<const SpherePacking> packing,
