@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string>
 
+#include "prescene/collision/exact_triangles.h"
 #include "prescene/core/hash.h"
 
 namespace prescene::collision {
@@ -44,15 +45,6 @@ core::Status check(const std::vector<Vector3f>& vertices, const std::vector<Tria
     }
   }
   return core::ok_status();
-}
-
-// Exact: differences and products of single-precision numbers in double lose at most what decides nothing, except
-// where the exponents lie far apart; there the double's own rounding is below the smallest float step of the product.
-bool is_degenerate(const std::array<Vector3f, 3>& corners) {
-  const Eigen::Vector3d a = corners[0].cast<double>();
-  const Eigen::Vector3d u = corners[1].cast<double>() - a;
-  const Eigen::Vector3d v = corners[2].cast<double>() - a;
-  return u.cross(v).isZero(0.0);
 }
 
 MeshReport examine(const std::vector<Vector3f>& vertices, const std::vector<TriangleIndices>& triangles) {
