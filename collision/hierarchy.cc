@@ -96,6 +96,23 @@ void join(std::vector<Node>& nodes, const std::vector<Root>& roots, const std::v
   });
 }
 
+std::unique_ptr<Splitter> make_splitter(std::span<const Item> items, const HierarchyOptions& options,
+                                        core::ThreadPool& pool) {
+  switch (options.builder) {
+    case Builder::kLongestAxis:
+    case Builder::kExtendedLongestAxis:
+    case Builder::kMiddle:
+    case Builder::kMedian:
+      return axis_splitter(items, options);
+    case Builder::kSurfaceAreaHeuristic:
+      return surface_area_splitter(items, options, pool);
+    case Builder::kNeuralGas:
+    case Builder::kWeightedNeuralGas:
+      return neural_gas_splitter(items, options);
+  }
+  PRESCENE_CHECK(!"a builder");
+}
+
 }  // namespace
 
 std::string_view to_string(Builder builder) {
@@ -130,8 +147,7 @@ Hierarchy build_hierarchy(std::span<const Item> items, const HierarchyOptions& o
   PRESCENE_CHECK(!items.empty());
   PRESCENE_CHECK(options.branching >= 2 && options.branching <= kMostChildren);
   PRESCENE_CHECK(options.leaf_items >= 1 && options.leaf_items <= 64);
-  PRESCENE_CHECK(options.builder == Builder::kSurfaceAreaHeuristic);
-  const std::unique_ptr<Splitter> splitter = surface_area_splitter(items, options, pool);
+  const std::unique_ptr<Splitter> splitter = make_splitter(items, options, pool);
   const Grower grower{*splitter, static_cast<std::uint32_t>(options.leaf_items),
                       static_cast<std::uint32_t>(options.branching)};
 

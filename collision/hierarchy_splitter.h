@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "prescene/collision/hierarchy.h"
 
@@ -34,7 +35,32 @@ class Splitter {
   virtual std::uint32_t item(std::size_t i) const = 0;
 };
 
+/// What the builders that look at centres only keep of an item.
+struct Centre {
+  std::array<float, 3> position = {};  ///< Divided by the largest coordinate of all.
+  float weight = 0.0F;                 ///< Divided by the largest.
+  std::uint32_t item = 0;
+};
+std::vector<Centre> centres_of(std::span<const Item> items);
+
+struct CentreBox {
+  std::array<float, 3> low;
+  std::array<float, 3> high;
+
+  float extent(std::size_t axis) const { return high[axis] - low[axis]; }
+  /// Axes, longest first; the first of equally long ones first.
+  std::array<std::size_t, 3> axes_by_length() const;
+};
+CentreBox box_of(std::span<const Centre> centres);
+
+/// The middle of a range, after its lower half along the axis was put first; equal positions in the order of items.
+std::uint32_t halve_at_median(std::span<Centre> centres, std::uint32_t begin, std::uint32_t end, std::size_t axis);
+
 std::unique_ptr<Splitter> surface_area_splitter(std::span<const Item> items, const HierarchyOptions& options,
                                                 core::ThreadPool& pool);
+/// Longest axis, extended longest axis, middle and median.
+std::unique_ptr<Splitter> axis_splitter(std::span<const Item> items, const HierarchyOptions& options);
+/// Neural gas, with and without weights.
+std::unique_ptr<Splitter> neural_gas_splitter(std::span<const Item> items, const HierarchyOptions& options);
 
 }  // namespace prescene::collision

@@ -79,12 +79,11 @@ class HierarchyLaws : public ::testing::TestWithParam<Builder> {
   core::ThreadPool pool_{2};
 };
 
-INSTANTIATE_TEST_SUITE_P(Builders, HierarchyLaws, ::testing::Values(Builder::kSurfaceAreaHeuristic),
-                         [](const auto& builder) {
-                           std::string name(to_string(builder.param));
-                           std::replace(name.begin(), name.end(), ' ', '_');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Builders, HierarchyLaws, ::testing::ValuesIn(kAllBuilders), [](const auto& builder) {
+  std::string name(to_string(builder.param));
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+});
 
 TEST_P(HierarchyLaws, EveryItemIsInOneLeaf) {
   for (const std::size_t count : {1U, 2U, 3U, 16U, 17U, 100U, 5000U}) {
