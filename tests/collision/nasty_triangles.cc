@@ -71,6 +71,13 @@ TrianglePair edge_pair(core::RandomStream& random) {
   return pair;
 }
 
+TrianglePair almost_touching_pair(core::RandomStream& random) {
+  TrianglePair pair = random.uniform_below(2) == 0 ? touching_pair(random) : edge_pair(random);
+  const Vector3d shift = power_of_ten(random, -9.0, -4.0) * cube_point(random);
+  for (Vector3f& p : pair.b) p += shift.cast<float>();
+  return pair;
+}
+
 void make_needle(Triangle& t, core::RandomStream& random) {
   const Vector3d a = t[0].cast<double>();
   const Vector3d b = t[1].cast<double>();
@@ -186,6 +193,8 @@ TrianglePair make(Nastiness nastiness, core::RandomStream& random) {
       return grid_pair(random);
     case Nastiness::kTouching:
       return touching_pair(random);
+    case Nastiness::kAlmost:
+      return almost_touching_pair(random);
     case Nastiness::kEdges:
       return edge_pair(random);
     case Nastiness::kNeedle:
@@ -216,8 +225,8 @@ TrianglePair make(Nastiness nastiness, core::RandomStream& random) {
 
 std::string_view to_string(Nastiness nastiness) {
   constexpr std::array<std::string_view, kAllNastiness.size()> kNames = {
-      "plain",    "grid",        "touching",   "edges",    "needle", "shared corner", "shared edge",
-      "coplanar", "mixed scale", "degenerate", "denormal", "far",    "huge",          "scaled grid"};
+      "plain",    "grid",        "touching",   "almost",   "edges", "needle", "shared corner", "shared edge",
+      "coplanar", "mixed scale", "degenerate", "denormal", "far",   "huge",   "scaled grid"};
   return kNames[static_cast<std::size_t>(nastiness)];
 }
 

@@ -15,6 +15,7 @@ enum class Nastiness {
   kPlain,         ///< Corners uniform in a cube.
   kGrid,          ///< Coordinates 0, 1 or 2.
   kTouching,      ///< A corner of one rounded onto the other's face.
+  kAlmost,        ///< The same, then moved by 1e-9 to 1e-4 of the size.
   kEdges,         ///< An edge of one through a rounded point of the other's edge.
   kNeedle,        ///< One or both 1e-3 to 1e-8 as wide as long.
   kSharedCorner,  ///< As neighbours in a mesh.
@@ -27,11 +28,11 @@ enum class Nastiness {
   kHuge,        ///< Up to kLargestCoordinate, with small ones.
   kGridScaled,  ///< A grid whose axes have powers of two of their own as steps.
 };
-inline constexpr std::array<Nastiness, 14> kAllNastiness = {
-    Nastiness::kPlain,      Nastiness::kGrid,         Nastiness::kTouching,   Nastiness::kEdges,
-    Nastiness::kNeedle,     Nastiness::kSharedCorner, Nastiness::kSharedEdge, Nastiness::kCoplanar,
-    Nastiness::kMixedScale, Nastiness::kDegenerate,   Nastiness::kDenormal,   Nastiness::kFar,
-    Nastiness::kHuge,       Nastiness::kGridScaled};
+inline constexpr std::array<Nastiness, 15> kAllNastiness = {
+    Nastiness::kPlain,    Nastiness::kGrid,       Nastiness::kTouching,     Nastiness::kAlmost,
+    Nastiness::kEdges,    Nastiness::kNeedle,     Nastiness::kSharedCorner, Nastiness::kSharedEdge,
+    Nastiness::kCoplanar, Nastiness::kMixedScale, Nastiness::kDegenerate,   Nastiness::kDenormal,
+    Nastiness::kFar,      Nastiness::kHuge,       Nastiness::kGridScaled};
 std::string_view to_string(Nastiness nastiness);
 
 struct TrianglePair {

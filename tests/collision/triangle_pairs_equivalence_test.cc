@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kernels for 16 pairs of triangles, on every instruction set of the machine, against exact arithmetic and against
+// their scalar twin.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "triangle_pairs_equivalence_test.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "prescene/collision/triangle_pairs-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace prescene::collision::HWY_NAMESPACE {
+namespace {
+
+PairVerdict pairs(const float* a, const float* b, std::uint32_t active) { return test_pairs(a, b, active); }
+PairVerdict one_against_16(const float* one, const float* b, std::uint32_t active) {
+  return test_one_against_16(one, 1, b, active);
+}
+PairVerdict four_against_4(const float* a, const float* b, std::uint32_t active) {
+  return test_4_against_4(a, b, active);
+}
+
+}  // namespace
+}  // namespace prescene::collision::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <string>
+
+#include "nasty_triangles.h"
+
+namespace prescene::collision {
+namespace {
+
+HWY_EXPORT(pairs);
+HWY_EXPORT(one_against_16);
+HWY_EXPORT(four_against_4);
+
+template <std::size_t kCount>
+using Rows = std::array<float, 9 * kCount>;
+
+TriangleCoordinates coordinates(const Triangle& t) {
+  return {t[0].x(), t[0].y(), t[0].z(), t[1].x(), t[1].y(), t[1].z(), t[2].x(), t[2].y(), t[2].z()};
+}
+
+template <std::size_t kCount>
+void put(Rows<kCount>& rows, std::size_t i, const Triangle& t) {
+  const TriangleCoordinates c = coordinates(t);
+  for (std::size_t r = 0; r < 9; ++r) rows[r * kCount + i] = c[r];
+}
+
+bool bit(std::uint32_t bits, std::size_t i) { return (bits >> i & 1U) != 0; }
+
+struct Counts {
+  int pairs = 0;
+  int hits = 0;
+  int unsure = 0;
+};
+
+// No sure answer is wrong, and where the twin is sure as well they agree.
+void check_pair(const PairVerdict& verdict, std::size_t lane, const Triangle& a, const Triangle& b, Counts& counts) {
+  ++counts.pairs;
+  const bool hit = bit(verdict.hit, lane);
+  const bool unsure = bit(verdict.unsure, lane);
+  ASSERT_FALSE(hit && unsure);
+  counts.hits += hit ? 1 : 0;
+  counts.unsure += unsure ? 1 : 0;
+  if (unsure) return;
+  ASSERT_EQ(hit, triangles_intersect(a, b));
+  const PairVerdict twin = test_triangle_pair(coordinates(a), coordinates(b));
+  if (twin.unsure == 0) {
+    ASSERT_EQ(hit, twin.hit == 1);
+  }
+}
+
+void check_batch(Nastiness nastiness, core::RandomStream& random, Counts& counts) {
+  std::array<TrianglePair, 16> batch;
+  alignas(64) Rows<16> a{};
+  alignas(64) Rows<16> b{};
+  alignas(64) Rows<4> four_a{};
+  alignas(64) Rows<4> four_b{};
+  for (std::size_t i = 0; i < 16; ++i) {
+    batch[i] = nasty_pair(nastiness, random);
+    put<16>(a, i, batch[i].a);
+    put<16>(b, i, batch[i].b);
+    if (i < 4) put<4>(four_a, i, batch[i].a);
+    if (i < 4) put<4>(four_b, i, batch[i].b);
+  }
+  const std::uint32_t active = random.next_u32() & 0xFFFFU;
+  const TriangleCoordinates one = coordinates(batch[0].a);
+  const PairVerdict each = HWY_DYNAMIC_DISPATCH(pairs)(a.data(), b.data(), 0xFFFF);
+  const PairVerdict against = HWY_DYNAMIC_DISPATCH(one_against_16)(one.data(), b.data(), active);
+  const PairVerdict four = HWY_DYNAMIC_DISPATCH(four_against_4)(four_a.data(), four_b.data(), 0xFFFF);
+  ASSERT_EQ((against.hit | against.unsure) & ~active, 0U);
+  for (std::size_t i = 0; i < 16; ++i) {
+    check_pair(each, i, batch[i].a, batch[i].b, counts);
+    if (bit(active, i)) check_pair(against, i, batch[0].a, batch[i].b, counts);
+    check_pair(four, i, batch[i / 4].a, batch[i % 4].b, counts);
+    if (testing::Test::HasFatalFailure()) return;
+  }
+}
+
+class TrianglePairs : public testing::TestWithParam<std::int64_t> {
+ protected:
+  void SetUp() override { choose(GetParam()); }
+  void TearDown() override { choose(0); }
+
+ private:
+  static void choose(std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().DeInit();
+  }
+};
+
+TEST_P(TrianglePairs, AreNeverSureAndWrong) {
+  constexpr int kBatches = 2000;  // Of 16 pairs, times 40 to 48 tests, times the distributions.
+  for (const Nastiness nastiness : kAllNastiness) {
+    core::RandomStream random(23, core::Purpose::kTest, static_cast<std::uint64_t>(nastiness));
+    Counts counts;
+    for (int i = 0; i < kBatches && !HasFatalFailure(); ++i) check_batch(nastiness, random, counts);
+    ASSERT_FALSE(HasFatalFailure()) << hwy::TargetName(GetParam()) << ", " << to_string(nastiness);
+    std::printf("%s, %s: %d pairs, %d hits, %d unsure\n", hwy::TargetName(GetParam()),
+                std::string(to_string(nastiness)).c_str(), counts.pairs, counts.hits, counts.unsure);
+    if (nastiness == Nastiness::kPlain) {
+      EXPECT_LT(counts.unsure, counts.pairs / 5000);
+    }
+  }
+}
+
+std::vector<std::int64_t> targets() {
+  hwy::SetSupportedTargetsForTest(0);
+  return hwy::SupportedAndGeneratedTargets();
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, TrianglePairs, testing::ValuesIn(targets()),
+                         [](const auto& target) { return std::string(hwy::TargetName(target.param)); });
+
+}  // namespace
+}  // namespace prescene::collision
+#endif  // HWY_ONCE
