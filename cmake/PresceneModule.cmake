@@ -81,7 +81,8 @@ function(prescene_module name)
 endfunction()
 
 # prescene_benchmark(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...) makes the program bench_<name> at
-# the top of the build folder, a Google Benchmark program that `./dev bench <name>` runs.
+# the top of the build folder, which `./dev bench <name>` runs: a Google Benchmark program, or one that writes a Report
+# (benchmarks/report.h) to the path given as --benchmark_out=PATH.
 function(prescene_benchmark name)
   cmake_parse_arguments(PARSE_ARGV 1 B "" "" "SOURCES;USES;PRIVATE_LINKS")
   list(TRANSFORM B_USES PREPEND prescene::)

@@ -11,7 +11,7 @@ usage: ./dev VERB
   build [PRESET] [TARGET]...   build (default preset: release)
   test [--preset P] [FILTER]   build, then run all tests, or those whose name matches FILTER (a regular expression)
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
-  bench [NAME]                 run the benchmark NAME (default: all); results in build/bench/NAME.json
+  bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE]...               format, layer and clang-tidy checks
   format [FILE]...             format the sources in place
   fuzz [TARGET] [SECONDS]      run libFuzzer on one target or all, 60 s each
@@ -141,19 +141,21 @@ verb_demo() {
   timed "demo" tools/demo build/release/prescene build/demo
 }
 
+# Each program obeys --benchmark_out, be it of Google Benchmark or one of ours that compares with targets.
 verb_bench() {
   local names=() name
   verb_build release
   if [ $# -gt 0 ]; then
     names=("$1")
     [ -x "build/release/bench_$1" ] || fail "no benchmark '$1'; there are: $(list_benchmarks)"
+    shift
   else
     read -r -a names <<< "$(list_benchmarks)"
     [ ${#names[@]} -gt 0 ] || fail "there are no benchmarks"
   fi
   mkdir -p build/bench
   for name in "${names[@]}"; do
-    timed "benchmark $name" "build/release/bench_$name" "--benchmark_out=build/bench/$name.json" --benchmark_out_format=json
+    timed "benchmark $name" "build/release/bench_$name" "--benchmark_out=build/bench/$name.json" "$@"
     say "results in build/bench/$name.json"
   done
 }
