@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What queries on trees share: memory that is kept from query to query, and counts of the work done.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace prescene::collision {
+
+/// Work of a query; added to, never reset.
+struct QueryCounts {
+  std::uint64_t node_pairs = 0;      ///< Pairs of nodes whose children were tested against each other.
+  std::uint64_t volume_tests = 0;    ///< Pairs of bounding volumes.
+  std::uint64_t triangle_tests = 0;  ///< Pairs of triangles.
+  std::uint64_t exact_tests = 0;     ///< Pairs of triangles that single precision could not decide.
+};
+
+/// Two nodes whose children are to be tested against each other, and which of their children.
+struct NodePair {
+  std::uint32_t a;
+  std::uint32_t b;
+  std::uint16_t a_children;
+  std::uint16_t b_children;
+};
+
+/// Memory that a query works in. One a thread; after the first queries nothing is allocated any more.
+class QueryScratch {
+ public:
+  std::vector<NodePair>& node_pairs() { return node_pairs_; }
+
+ private:
+  std::vector<NodePair> node_pairs_;
+};
+
+}  // namespace prescene::collision

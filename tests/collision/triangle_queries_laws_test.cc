@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// Collision queries against brute force by the exact test, and the laws that any answer obeys.
+#include "prescene/collision/triangle_queries.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "prescene/collision/exact_triangles.h"
+#include "prescene/tests/support/allocations.h"
+#include "prescene/tests/support/generators.h"
+
+namespace prescene::collision {
+namespace {
+
+std::shared_ptr<const Mesh> to_mesh(const geometry::TriangleMesh& mesh) {
+  auto made = Mesh::make(mesh, "mesh");
+  RC_ASSERT(made.ok());
+  return *made;
+}
+
+TriangleTree tree_of(const geometry::TriangleMesh& mesh) {
+  core::ThreadPool pool(1);
+  return TriangleTree::build(to_mesh(mesh), {}, pool);
+}
+
+std::vector<TrianglePair> brute_force_pairs(const Mesh& a, const Mesh& b, const Transform& X_AB) {
+  std::vector<TrianglePair> pairs;
+  for (std::uint32_t k = 0; k < b.triangle_count(); ++k) {
+    Triangle placed = b.corners(k);
+    for (Vector3f& p : placed) p = X_AB * p;
+    for (std::uint32_t i = 0; i < a.triangle_count(); ++i) {
+      if (triangles_intersect(a.corners(i), placed)) pairs.push_back({i, k});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+/// A pose of B that brings a random vertex of each body together, so that they touch or overlap a little.
+Transform touching_pose(const Mesh& a, const Mesh& b) {
+  geometry::Pose X_AB;
+  X_AB.rotation = *tests::rotations();
+  const auto pick = [](const Mesh& mesh) {
+    return mesh.vertices()[*rc::gen::inRange<std::size_t>(0, mesh.vertices().size())].cast<double>().eval();
+  };
+  const geometry::Vector3d meet = pick(a);
+  X_AB.translation = meet - X_AB.rotation * pick(b) + *tests::vectors(0.01);
+  const auto made = to_transform(X_AB);
+  RC_ASSERT(made.ok());
+  return *made;
+}
+
+TEST(TriangleQueries, FindWhatBruteForceFinds) {
+  int configurations = 0;
+  int intersecting = 0;
+  EXPECT_TRUE(rc::check([&] {
+    const TriangleTree a = tree_of(*tests::closed_meshes());
+    const TriangleTree b = tree_of(*tests::closed_meshes());
+    QueryScratch scratch;
+    for (int i = 0; i < 4; ++i) {
+      const Transform X_AB = touching_pose(a.mesh(), b.mesh());
+      const std::vector<TrianglePair> expected = brute_force_pairs(a.mesh(), b.mesh(), X_AB);
+      RC_ASSERT(collide(a, b, X_AB, scratch) == !expected.empty());
+      const auto first = first_pair(a, b, X_AB, scratch);
+      RC_ASSERT(first.has_value() == !expected.empty());
+      if (first) RC_ASSERT(std::binary_search(expected.begin(), expected.end(), *first));
+      std::vector<TrianglePair> pairs;
+      RC_ASSERT(all_pairs(a, b, X_AB, expected.size(), &pairs, scratch));
+      std::sort(pairs.begin(), pairs.end());
+      RC_ASSERT(pairs == expected);
+      if (!expected.empty()) {
+        pairs.clear();
+        RC_ASSERT(!all_pairs(a, b, X_AB, expected.size() - 1, &pairs, scratch));
+        RC_ASSERT(pairs.size() == expected.size() - 1);
+      }
+      ++configurations;
+      intersecting += expected.empty() ? 0 : 1;
+    }
+  }));
+  std::printf("%d configurations compared with brute force, %d of them in contact\n", configurations, intersecting);
+  EXPECT_GT(intersecting, configurations / 10);
+  EXPECT_LT(intersecting, configurations);
+}
+
+TEST(TriangleQueries, DoNotAllocateOnceWarm) {
+  if (!tests::can_count_allocations()) GTEST_SKIP() << "allocations cannot be counted in this build";
+  const TriangleTree a = tree_of(geometry::make_mesh(geometry::Sphere{0.1}, 64));
+  const TriangleTree b = tree_of(geometry::make_mesh(geometry::Cylinder{0.05, 0.2}, 64));
+  QueryScratch scratch;
+  std::vector<TrianglePair> pairs;
+  const auto X_AB = to_transform(geometry::Pose::from_translation({0.12, 0.01, 0.02}));
+  ASSERT_TRUE(X_AB.ok());
+  for (const bool warm : {false, true}) {
+    const std::uint64_t before = tests::allocation_count();
+    pairs.clear();
+    EXPECT_TRUE(collide(a, b, *X_AB, scratch));
+    EXPECT_TRUE(first_pair(a, b, *X_AB, scratch).has_value());
+    EXPECT_TRUE(all_pairs(a, b, *X_AB, 100000, &pairs, scratch));
+    EXPECT_TRUE(!warm || tests::allocation_count() == before);
+  }
+}
+
+}  // namespace
+}  // namespace prescene::collision
