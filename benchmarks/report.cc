@@ -24,16 +24,16 @@ std::string number_text(double value) {
   return text.data();
 }
 
-std::string cell_text(const Cell& cell) {
-  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
-  if (const auto* count = std::get_if<std::int64_t>(&cell)) return std::to_string(*count);
-  return number_text(std::get<double>(cell));
+std::string figure_text(const Figure& figure) {
+  if (const auto* text = std::get_if<std::string>(&figure)) return *text;
+  if (const auto* count = std::get_if<std::int64_t>(&figure)) return std::to_string(*count);
+  return number_text(std::get<double>(figure));
 }
 
-bool is_number(const Cell& cell) { return !std::holds_alternative<std::string>(cell); }
+bool is_number(const Figure& figure) { return !std::holds_alternative<std::string>(figure); }
 
-std::string csv_text(const Cell& cell) {
-  if (const auto* text = std::get_if<std::string>(&cell)) {
+std::string csv_text(const Figure& figure) {
+  if (const auto* text = std::get_if<std::string>(&figure)) {
     std::string quoted = "\"";
     for (const char c : *text) {
       if (c == '"') quoted += '"';
@@ -41,18 +41,18 @@ std::string csv_text(const Cell& cell) {
     }
     return quoted + '"';
   }
-  if (const auto* count = std::get_if<std::int64_t>(&cell)) return std::to_string(*count);
-  const double value = std::get<double>(cell);
+  if (const auto* count = std::get_if<std::int64_t>(&figure)) return std::to_string(*count);
+  const double value = std::get<double>(figure);
   if (std::isnan(value)) return "";
   std::array<char, 32> text;
   std::snprintf(text.data(), text.size(), "%.9g", value);
   return text.data();
 }
 
-Json json_of(const Cell& cell) {
-  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
-  if (const auto* count = std::get_if<std::int64_t>(&cell)) return *count;
-  const double value = std::get<double>(cell);
+Json json_of(const Figure& figure) {
+  if (const auto* text = std::get_if<std::string>(&figure)) return *text;
+  if (const auto* count = std::get_if<std::int64_t>(&figure)) return *count;
+  const double value = std::get<double>(figure);
   return std::isnan(value) ? Json(nullptr) : Json(value);
 }
 
@@ -134,7 +134,7 @@ void Report::add(Target target) {
 }
 
 void Report::add(Table table) {
-  for (const std::vector<Cell>& row : table.rows) PRESCENE_CHECK_MSG(row.size() == table.columns.size(), table.name);
+  for (const std::vector<Figure>& row : table.rows) PRESCENE_CHECK_MSG(row.size() == table.columns.size(), table.name);
   tables_.push_back(std::move(table));
 }
 
@@ -163,7 +163,7 @@ core::Status Report::write(const std::filesystem::path& path) const {
     Json rows = Json::array();
     std::string csv;
     for (std::size_t i = 0; i < table.columns.size(); ++i) csv += (i == 0 ? "" : ",") + csv_text(table.columns[i]);
-    for (const std::vector<Cell>& row : table.rows) {
+    for (const std::vector<Figure>& row : table.rows) {
       Json values = Json::object();
       csv += "\n";
       for (std::size_t i = 0; i < row.size(); ++i) {
@@ -183,13 +183,13 @@ core::Status Report::write(const std::filesystem::path& path) const {
 std::string text_of(const Table& table) {
   std::vector<std::size_t> widths;
   for (const std::string& column : table.columns) widths.push_back(column.size());
-  for (const std::vector<Cell>& row : table.rows)
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], cell_text(row[i]).size());
+  for (const std::vector<Figure>& row : table.rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], figure_text(row[i]).size());
   std::string text;
-  const auto line = [&](const std::vector<Cell>& row) {
+  const auto line = [&](const std::vector<Figure>& row) {
     std::string words;
     for (std::size_t i = 0; i < row.size(); ++i) {
-      const std::string word = cell_text(row[i]);
+      const std::string word = figure_text(row[i]);
       const std::string space(widths[i] - word.size(), ' ');
       words += (i == 0 ? "" : "  ") + (is_number(row[i]) ? space + word : word + space);
     }
@@ -197,7 +197,7 @@ std::string text_of(const Table& table) {
     text += words + "\n";
   };
   line({table.columns.begin(), table.columns.end()});
-  for (const std::vector<Cell>& row : table.rows) line(row);
+  for (const std::vector<Figure>& row : table.rows) line(row);
   return text;
 }
 

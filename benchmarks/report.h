@@ -48,12 +48,12 @@ inline Goal at_most(double high) { return {0.0, high}; }
 /// Whether a target that was measured meets a goal.
 bool meets(const Target& target, const Goal& goal);
 
-using Cell = std::variant<std::string, double, std::int64_t>;  ///< NaN is written as null, empty in CSV.
+using Figure = std::variant<std::string, double, std::int64_t>;  ///< NaN is written as null, empty in CSV.
 
 struct Table {
   std::string name;  ///< Lower case, for file names.
   std::vector<std::string> columns;
-  std::vector<std::vector<Cell>> rows;  ///< As many cells as columns (checked).
+  std::vector<std::vector<Figure>> rows;  ///< As many as columns (checked).
 };
 
 class Report {

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/benchmarks/collision_targets.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "prescene/benchmarks/collision_algorithms.h"
+#include "prescene/benchmarks/collision_tables.h"
+#include "prescene/benchmarks/statistics.h"
+#include "prescene/collision/triangle_tree.h"
+#include "prescene/tests/support/collision_meshes.h"
+
+namespace prescene::benchmarks {
+namespace {
+
+constexpr std::array<double, 3> kNearShares = {0.0, 0.01, 0.05};
+constexpr std::array<double, 2> kDistanceShares = {0.0, 0.01};
+// Small meshes have partly filled nodes: memory is told for those that need it.
+constexpr std::uint32_t kLeastTriangles = 10000;
+
+void set_reached(const std::optional<Ratio>& ratio, Target* target) {
+  if (!ratio) {
+    target->why = "not measured in this run";
+    return;
+  }
+  target->reached = ratio->value;
+  target->n = ratio->n;
+  target->baseline += ", geometric mean over " + std::to_string(ratio->pairs) + " pairs";
+}
+
+Target ratio_target(std::string work, std::optional<double> must, std::optional<double> aim, std::string baseline,
+                    const std::optional<Ratio>& ratio) {
+  Target target;
+  target.work = std::move(work);
+  if (must) target.must = at_least(*must);
+  if (aim) target.aim = at_least(*aim);
+  target.unit = "x";
+  target.baseline = std::move(baseline);
+  set_reached(ratio, &target);
+  return target;
+}
+
+}  // namespace
+
+void add_build_targets(Report* report) {
+  const std::shared_ptr<const collision::Mesh> mesh =
+      tests::collision_mesh(tests::make_bumpy_sphere(0.1, 200'000), "bumpy_sphere_200k");
+  core::ThreadPool two(2);
+  std::vector<double> seconds;
+  for (int i = 0; i < 5; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    collision::TriangleTree::build(mesh, {}, two);
+    seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  Target target;
+  target.work = "build, default tree, 200k triangles, 2 threads";
+  target.better = Better::kLower;
+  target.must = at_most(0.3);
+  target.aim = at_most(0.1);
+  target.reached = median(seconds);
+  target.unit = "s";
+  target.n = static_cast<std::int64_t>(seconds.size());
+  target.baseline = "none: median of the builds of a bumpy sphere";
+  report->add(target);
+}
+
+void add_query_targets(const Measurements& measurements, Report* report) {
+  const auto boolean = [&](std::string_view baseline) {
+    return speed_ratio(measurements, kDefaultTree, baseline, Query::kCollide, kNearShares);
+  };
+  const std::string near = " at 0, 1 % and 5 %";
+  report->add(
+      ratio_target("boolean vs FCL", 20.0, 40.0, "FCL, OBBRSS, double precision, one contact" + near, boolean(kFcl)));
+  report->add(ratio_target("boolean vs Bullet GImpact", 25.0, 60.0,
+                           "GImpact, no margin, first contact, one-sided triangles" + near, boolean(kGimpact)));
+  report->add(ratio_target("boolean vs scalar binary k-DOP tree", 10.0, 20.0, "ours, k = 32, longest axis" + near,
+                           boolean(kScalarDops)));
+  report->add(ratio_target("boolean vs ODE", std::nullopt, std::nullopt, "ODE's trimesh" + near, boolean(kOde)));
+  report->add(
+      ratio_target("boolean vs Embree", std::nullopt, std::nullopt, "rtcCollide with refit" + near, boolean(kEmbree)));
+  report->add(ratio_target("boolean, batch of 16 near vs singles", 2.0, 3.0, "the same 16 one by one" + near,
+                           batch_ratio(measurements, kDefaultTree, kNearShares)));
+  report->add(ratio_target("exact distance vs FCL", 15.0, 30.0, "FCL, OBBRSS, at 0 and 1 %",
+                           speed_ratio(measurements, kDefaultTree, kFcl, Query::kDistance, kDistanceShares)));
+}
+
+void add_memory_targets(const Measurements& measurements, Report* report) {
+  Target target;
+  target.work = "default tree, nodes and triangle references";
+  target.better = Better::kLower;
+  target.must = at_most(24.0);
+  target.aim = at_most(16.0);
+  target.unit = "bytes a triangle";
+  target.reached = bytes_a_triangle(measurements, kDefaultTree, kLeastTriangles);
+  target.baseline = "all measured meshes of 10,000 triangles and more";
+  target.n = static_cast<std::int64_t>(std::count_if(
+      measurements.costs.begin(), measurements.costs.end(),
+      [](const MeshCost& cost) { return cost.algorithm == kDefaultTree && cost.triangles >= kLeastTriangles; }));
+  if (!target.reached) target.why = "no such mesh was measured";
+  report->add(target);
+}
+
+}  // namespace prescene::benchmarks

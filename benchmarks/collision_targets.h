@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the collision library is meant to reach, and what it reached.
+#pragma once
+
+#include "prescene/benchmarks/collision_measure.h"
+#include "prescene/benchmarks/report.h"
+
+namespace prescene::benchmarks {
+
+/// Building trees; uses two threads.
+void add_build_targets(Report* report);
+/// Queries against other libraries and against each other.
+void add_query_targets(const Measurements& measurements, Report* report);
+/// Bytes of trees.
+void add_memory_targets(const Measurements& measurements, Report* report);
+
+}  // namespace prescene::benchmarks
