@@ -129,9 +129,12 @@ verb_test() {
 }
 
 run_tests() {
-  local preset=$1
+  local preset=$1 code=0
   shift
-  ctest --test-dir "build/$preset" -j "$jobs" --output-on-failure --no-tests=error --progress "$@"
+  ctest --test-dir "build/$preset" -j "$jobs" --output-on-failure --no-tests=error --progress "$@" || code=$?
+  # What tests have to say although they pass.
+  grep -h '^compared: ' "build/$preset/Testing/Temporary/LastTest.log" || true
+  return "$code"
 }
 
 # ---------------------------------------------------------------------------------------------------- demo, bench

@@ -199,6 +199,15 @@ std::vector<Transform> ContactConfigurations::scattered(int count) {
   return found;
 }
 
+std::vector<Transform> ContactConfigurations::around(const Transform& X_AB, int count) {
+  std::vector<Transform> found(static_cast<std::size_t>(count), X_AB);
+  for (Transform& X : found) {
+    const Vector3d moved = size_ * std::pow(10.0, stream_.uniform(-8.0, -2.0)) * geometry::uniform_direction(stream_);
+    for (int k = 0; k < 3; ++k) X.translation[static_cast<std::size_t>(k)] += static_cast<float>(moved[k]);
+  }
+  return found;
+}
+
 std::array<Transform, 16> ContactConfigurations::near(const Transform& X_AB) {
   Eigen::Matrix3d matrix;
   for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = static_cast<double>(X_AB.rotation[static_cast<std::size_t>(i)]);

@@ -62,6 +62,10 @@ class ContactConfigurations {
   /// Uniform orientations, B's centre uniform where the boxes of the two can meet: some collide, most are near.
   std::vector<collision::Transform> scattered(int count);
 
+  /// `X_AB` moved by a distance whose logarithm is uniform between 1e-8 and 1e-2 of size(), in a direction drawn
+  /// uniformly.
+  std::vector<collision::Transform> around(const collision::Transform& X_AB, int count);
+
   /// 16 poses within 1 % of size() and 1 degree of each other, about `X_AB` (turned about the centre of B's box).
   std::array<collision::Transform, 16> near(const collision::Transform& X_AB);
 

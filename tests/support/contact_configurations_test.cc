@@ -92,6 +92,19 @@ TEST_F(ContactConfigurationsTest, BatchesAreNear) {
   }
 }
 
+TEST_F(ContactConfigurationsTest, StayAroundAPose) {
+  ContactConfigurations configurations = make(7);
+  const Transform X_AB = configurations.at_distance(0.0, 1, PlacementMethod::kSphere).at(0);
+  int colliding = 0;
+  for (const Transform& X : configurations.around(X_AB, 200)) {
+    EXPECT_EQ(X.rotation, X_AB.rotation);
+    EXPECT_LT(gap(X), 0.0101 * configurations.size());
+    colliding += gap(X) == 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(colliding, 60);
+  EXPECT_LT(colliding, 140);
+}
+
 TEST_F(ContactConfigurationsTest, FollowTheSeed) {
   ContactConfigurations first = make(5), again = make(5), other = make(6);
   const std::vector<Transform> scattered = first.scattered(20);
