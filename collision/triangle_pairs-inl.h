@@ -224,71 +224,93 @@ HWY_INLINE Corners<D> placed(D d, const Transform& X_AB, const Corners<D>& corne
   return {place(corners_B[0]), place(corners_B[1]), place(corners_B[2])};
 }
 
-/// `a` and `b` give the corners of the pairs `first` and on; 16 pairs in all.
+HWY_INLINE hn::Mask<PairTag> mask_of_bits(PairTag d, std::uint32_t bits) {
+  alignas(8) const std::array<std::uint8_t, 8> bytes = {static_cast<std::uint8_t>(bits),
+                                                        static_cast<std::uint8_t>(bits >> 8U)};
+  return hn::LoadMaskBits(d, bytes.data());
+}
+
+HWY_INLINE std::uint32_t bits_of_mask(PairTag d, hn::Mask<PairTag> mask) {
+  alignas(8) std::array<std::uint8_t, 8> bytes = {};
+  hn::StoreMaskBits(d, mask, bytes.data());
+  return static_cast<std::uint32_t>(bytes[0] | (bytes[1] << 8U));
+}
+
+// Where the triangles of pairs come from: each loads those of the pairs `first` and on.
+
+/// Triangle i of float[9][16] for pair i.
+struct SixteenOf {
+  const float* rows;
+  HWY_INLINE Corners<PairTag> operator()(PairTag d, std::size_t first) const {
+    return load_corners(d, rows, 16, first);
+  }
+};
+
+/// The same triangle for all pairs; nine coordinates `stride` floats apart.
+struct OneOf {
+  const float* coordinates;
+  std::size_t stride;
+  HWY_INLINE Corners<PairTag> operator()(PairTag d, std::size_t /*first*/) const {
+    return broadcast_corners(d, coordinates, stride);
+  }
+};
+
+/// Triangle i / 4 of float[9][4] for pair i.
+struct EachOfFour {
+  const float* rows;
+  HWY_INLINE Corners<PairTag> operator()(PairTag d, std::size_t first) const {
+#if HWY_TARGET == HWY_SCALAR
+    return broadcast_corners(d, rows + first / 4, 4);
+#else
+    const auto lanes = hn::Iota(hn::RebindToSigned<PairTag>(), static_cast<std::int32_t>(first));
+    const auto indices = hn::IndicesFromVec(d, hn::ShiftRight<2>(lanes));
+    return corners_of_rows(
+        d, [&](std::size_t r) HWY_ATTR { return hn::TableLookupLanes(hn::LoadDup128(d, rows + 4 * r), indices); });
+#endif
+  }
+};
+
+/// Triangle i modulo 4 of float[9][4] for pair i.
+struct AllOfFour {
+  const float* rows;
+  HWY_INLINE Corners<PairTag> operator()(PairTag d, std::size_t first) const {
+#if HWY_TARGET == HWY_SCALAR
+    return broadcast_corners(d, rows + first % 4, 4);
+#else
+    static_cast<void>(first);
+    return corners_of_rows(d, [&](std::size_t r) HWY_ATTR { return hn::LoadDup128(d, rows + 4 * r); });
+#endif
+  }
+};
+
 template <class LoadA, class LoadB>
-HWY_INLINE PairVerdict test_16(const LoadA& a, const LoadB& b, std::uint32_t active) {
+HWY_INLINE PairVerdict test_16(const LoadA& load_a, const LoadB& load_b, std::uint32_t active) {
   const PairTag d;
   PairVerdict verdict;
   for (std::size_t first = 0; first < 16; first += hn::Lanes(d)) {
-    const std::uint32_t wanted = active >> first;
-    alignas(8) std::array<std::uint8_t, 8> bits = {static_cast<std::uint8_t>(wanted),
-                                                   static_cast<std::uint8_t>(wanted >> 8U)};
-    const auto mask = hn::LoadMaskBits(d, bits.data());
-    if (hn::AllFalse(d, mask)) continue;
-    const LaneVerdict<PairTag> lanes = test_lanes(d, a(d, first), b(d, first), mask);
-    const auto word = [&](hn::Mask<PairTag> m) HWY_ATTR {
-      bits = {};
-      hn::StoreMaskBits(d, m, bits.data());
-      return static_cast<std::uint32_t>(bits[0] | (bits[1] << 8U)) << first;
-    };
-    verdict.hit |= word(lanes.hit);
-    verdict.unsure |= word(lanes.unsure);
+    const auto wanted = mask_of_bits(d, active >> first);
+    if (hn::AllFalse(d, wanted)) continue;
+    const LaneVerdict<PairTag> lanes = test_lanes(d, load_a(d, first), load_b(d, first), wanted);
+    verdict.hit |= bits_of_mask(d, lanes.hit) << first;
+    verdict.unsure |= bits_of_mask(d, lanes.unsure) << first;
   }
   return verdict;
 }
 
 /// Pair i: triangle i of a and of b, both float[9][16].
 HWY_INLINE PairVerdict test_pairs(const float* a, const float* b, std::uint32_t active = 0xFFFF) {
-  return test_16([a](PairTag d, std::size_t first) HWY_ATTR { return load_corners(d, a, 16, first); },
-                 [b](PairTag d, std::size_t first) HWY_ATTR { return load_corners(d, b, 16, first); }, active);
+  return test_16(SixteenOf{a}, SixteenOf{b}, active);
 }
 
 /// Pair i: `one`, nine floats that are `stride` apart, and triangle i of b, float[9][16].
 HWY_INLINE PairVerdict test_one_against_16(const float* one, std::size_t stride, const float* b,
                                            std::uint32_t active = 0xFFFF) {
-  return test_16([=](PairTag d, std::size_t) HWY_ATTR { return broadcast_corners(d, one, stride); },
-                 [b](PairTag d, std::size_t first) HWY_ATTR { return load_corners(d, b, 16, first); }, active);
+  return test_16(OneOf{one, stride}, SixteenOf{b}, active);
 }
-
-// Lane l of a row of four: number l / 4 of it, or number l modulo 4.
-#if HWY_TARGET == HWY_SCALAR
-HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const float* row, std::size_t first) {
-  return hn::Set(d, row[first / 4]);
-}
-HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const float* row, std::size_t first) {
-  return hn::Set(d, row[first % 4]);
-}
-#else
-HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const float* row, std::size_t first) {
-  const auto lanes = hn::Iota(hn::RebindToSigned<PairTag>(), static_cast<std::int32_t>(first));
-  return hn::TableLookupLanes(hn::LoadDup128(d, row), hn::IndicesFromVec(d, hn::ShiftRight<2>(lanes)));
-}
-HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const float* row, std::size_t /*first*/) {
-  return hn::LoadDup128(d, row);
-}
-#endif
 
 /// Pair 4 i + k: triangle i of a and triangle k of b, both float[9][4].
 HWY_INLINE PairVerdict test_4_against_4(const float* a, const float* b, std::uint32_t active = 0xFFFF) {
-  const auto load_a = [a](PairTag d, std::size_t first) HWY_ATTR {
-    const auto row = [&](std::size_t r) HWY_ATTR { return each_of_four(d, a + 4 * r, first); };
-    return corners_of_rows(d, row);
-  };
-  const auto load_b = [b](PairTag d, std::size_t first) HWY_ATTR {
-    const auto row = [&](std::size_t r) HWY_ATTR { return all_of_four(d, b + 4 * r, first); };
-    return corners_of_rows(d, row);
-  };
-  return test_16(load_a, load_b, active);
+  return test_16(EachOfFour{a}, AllOfFour{b}, active);
 }
 
 }  // namespace prescene::collision::HWY_NAMESPACE

@@ -22,7 +22,10 @@ using TriangleCoordinates = std::array<float, 9>;
 /// additions, the kernel is sure of a few pairs more or less; where both are sure they agree.
 PairVerdict test_triangle_pair(const TriangleCoordinates& a, const TriangleCoordinates& b);
 
-/// The error bounds of both, derived in triangle_pairs-inl.h.
+/// Of the kernels of triangle_distance-inl.h, times the largest side of the box about both triangles.
+inline constexpr float kDistanceError = 16.0F / 16777216.0F;
+
+/// The error bounds of intersection tests, derived in triangle_pairs-inl.h.
 inline constexpr float kDeterminantError = 49.0F / 16777216.0F;  // 49 u, u = 2^-24
 inline constexpr float kUnderflowError = 0x1p-122F;
 

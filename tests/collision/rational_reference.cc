@@ -3,7 +3,9 @@
 
 #include <gmpxx.h>
 
+#include <array>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace prescene::collision {
@@ -71,7 +73,90 @@ class Simplex {
   std::vector<std::optional<std::size_t>> basis_;  // Nothing: the row's artificial variable.
 };
 
+using RationalVector = std::array<mpq_class, 3>;
+
+RationalVector rational(const Vector3f& p) {
+  return {mpq_class(static_cast<double>(p.x())), mpq_class(static_cast<double>(p.y())),
+          mpq_class(static_cast<double>(p.z()))};
+}
+
+RationalVector minus(const RationalVector& p, const RationalVector& q) {
+  return {mpq_class(p[0] - q[0]), mpq_class(p[1] - q[1]), mpq_class(p[2] - q[2])};
+}
+
+mpq_class dot(const RationalVector& p, const RationalVector& q) { return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]; }
+
+// Gauss and Jordan; nothing when singular.
+std::optional<std::vector<mpq_class>> solve(std::vector<std::vector<mpq_class>> rows) {
+  const std::size_t n = rows.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    std::size_t pivot = i;
+    while (pivot < n && sgn(rows[pivot][i]) == 0) ++pivot;
+    if (pivot == n) return std::nullopt;
+    std::swap(rows[i], rows[pivot]);
+    for (std::size_t row = 0; row < n; ++row) {
+      if (row == i) continue;
+      const mpq_class factor = rows[row][i] / rows[i][i];
+      for (std::size_t column = i; column <= n; ++column) rows[row][column] -= factor * rows[i][column];
+    }
+  }
+  std::vector<mpq_class> x(n);
+  for (std::size_t i = 0; i < n; ++i) x[i] = rows[i][n] / rows[i][i];
+  return x;
+}
+
+// Corners of one face, edge or corner of a triangle.
+using Feature = std::vector<RationalVector>;
+
+std::vector<Feature> features(const Triangle& t) {
+  std::vector<Feature> all;
+  for (unsigned subset = 1; subset < 8; ++subset) {
+    Feature feature;
+    for (unsigned i = 0; i < 3; ++i) {
+      if ((subset >> i & 1U) != 0) feature.push_back(rational(t[i]));
+    }
+    all.push_back(std::move(feature));
+  }
+  return all;
+}
+
+// Of the planes, lines or points through the features, when the nearest points are within both.
+std::optional<mpq_class> squared_distance(const Feature& a, const Feature& b) {
+  std::vector<RationalVector> directions;
+  for (std::size_t i = 1; i < a.size(); ++i) directions.push_back(minus(a[i], a[0]));
+  for (std::size_t i = 1; i < b.size(); ++i) directions.push_back(minus(b[0], b[i]));
+  RationalVector rest = minus(b[0], a[0]);
+  const std::size_t n = directions.size();
+  std::vector<std::vector<mpq_class>> normal(n, std::vector<mpq_class>(n + 1));
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = 0; k < n; ++k) normal[i][k] = dot(directions[i], directions[k]);
+    normal[i][n] = dot(directions[i], rest);
+  }
+  const auto x = solve(std::move(normal));
+  if (!x) return std::nullopt;  // Flat: the nearest points are also on features of lower dimension.
+  mpq_class in_a = 1;
+  mpq_class in_b = 1;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (sgn((*x)[i]) < 0) return std::nullopt;
+    (i + 1 < a.size() ? in_a : in_b) -= (*x)[i];
+    for (std::size_t axis = 0; axis < 3; ++axis) rest[axis] -= (*x)[i] * directions[i][axis];
+  }
+  if (sgn(in_a) < 0 || sgn(in_b) < 0) return std::nullopt;
+  return dot(rest, rest);
+}
+
 }  // namespace
+
+double rational_distance(const Triangle& a, const Triangle& b) {
+  std::optional<mpq_class> best;
+  for (const Feature& feature_a : features(a)) {
+    for (const Feature& feature_b : features(b)) {
+      const auto square = squared_distance(feature_a, feature_b);
+      if (square && (!best || *square < *best)) best = square;
+    }
+  }
+  return mpf_class(sqrt(mpf_class(*best, 512))).get_d();
+}
 
 bool rational_hulls_meet(std::span<const Vector3f> a, std::span<const Vector3f> b) {
   Simplex programme(5, a.size() + b.size());

@@ -31,6 +31,7 @@ HWY_AFTER_NAMESPACE();
 #include <string>
 
 #include "nasty_triangles.h"
+#include "triangle_lanes.h"
 
 namespace prescene::collision {
 namespace {
@@ -38,21 +39,6 @@ namespace {
 HWY_EXPORT(pairs);
 HWY_EXPORT(one_against_16);
 HWY_EXPORT(four_against_4);
-
-template <std::size_t kCount>
-using Rows = std::array<float, 9 * kCount>;
-
-TriangleCoordinates coordinates(const Triangle& t) {
-  return {t[0].x(), t[0].y(), t[0].z(), t[1].x(), t[1].y(), t[1].z(), t[2].x(), t[2].y(), t[2].z()};
-}
-
-template <std::size_t kCount>
-void put(Rows<kCount>& rows, std::size_t i, const Triangle& t) {
-  const TriangleCoordinates c = coordinates(t);
-  for (std::size_t r = 0; r < 9; ++r) rows[r * kCount + i] = c[r];
-}
-
-bool bit(std::uint32_t bits, std::size_t i) { return (bits >> i & 1U) != 0; }
 
 struct Counts {
   int pairs = 0;
@@ -77,43 +63,22 @@ void check_pair(const PairVerdict& verdict, std::size_t lane, const Triangle& a,
 }
 
 void check_batch(Nastiness nastiness, core::RandomStream& random, Counts& counts) {
-  std::array<TrianglePair, 16> batch;
-  alignas(64) Rows<16> a{};
-  alignas(64) Rows<16> b{};
-  alignas(64) Rows<4> four_a{};
-  alignas(64) Rows<4> four_b{};
-  for (std::size_t i = 0; i < 16; ++i) {
-    batch[i] = nasty_pair(nastiness, random);
-    put<16>(a, i, batch[i].a);
-    put<16>(b, i, batch[i].b);
-    if (i < 4) put<4>(four_a, i, batch[i].a);
-    if (i < 4) put<4>(four_b, i, batch[i].b);
-  }
+  const LaneBatch batch = nasty_batch(nastiness, random);
   const std::uint32_t active = random.next_u32() & 0xFFFFU;
-  const TriangleCoordinates one = coordinates(batch[0].a);
-  const PairVerdict each = HWY_DYNAMIC_DISPATCH(pairs)(a.data(), b.data(), 0xFFFF);
-  const PairVerdict against = HWY_DYNAMIC_DISPATCH(one_against_16)(one.data(), b.data(), active);
-  const PairVerdict four = HWY_DYNAMIC_DISPATCH(four_against_4)(four_a.data(), four_b.data(), 0xFFFF);
+  const TriangleCoordinates one = coordinates(batch.pairs[0].a);
+  const PairVerdict each = HWY_DYNAMIC_DISPATCH(pairs)(batch.a.data(), batch.b.data(), 0xFFFF);
+  const PairVerdict against = HWY_DYNAMIC_DISPATCH(one_against_16)(one.data(), batch.b.data(), active);
+  const PairVerdict four = HWY_DYNAMIC_DISPATCH(four_against_4)(batch.four_a.data(), batch.four_b.data(), 0xFFFF);
   ASSERT_EQ((against.hit | against.unsure) & ~active, 0U);
   for (std::size_t i = 0; i < 16; ++i) {
-    check_pair(each, i, batch[i].a, batch[i].b, counts);
-    if (bit(active, i)) check_pair(against, i, batch[0].a, batch[i].b, counts);
-    check_pair(four, i, batch[i / 4].a, batch[i % 4].b, counts);
+    check_pair(each, i, batch.pairs[i].a, batch.pairs[i].b, counts);
+    if (bit(active, i)) check_pair(against, i, batch.pairs[0].a, batch.pairs[i].b, counts);
+    check_pair(four, i, batch.pairs[i / 4].a, batch.pairs[i % 4].b, counts);
     if (testing::Test::HasFatalFailure()) return;
   }
 }
 
-class TrianglePairs : public testing::TestWithParam<std::int64_t> {
- protected:
-  void SetUp() override { choose(GetParam()); }
-  void TearDown() override { choose(0); }
-
- private:
-  static void choose(std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().DeInit();
-  }
-};
+class TrianglePairs : public TargetTest {};
 
 TEST_P(TrianglePairs, AreNeverSureAndWrong) {
   constexpr int kBatches = 2000;  // Of 16 pairs, times 40 to 48 tests, times the distributions.
@@ -130,13 +95,7 @@ TEST_P(TrianglePairs, AreNeverSureAndWrong) {
   }
 }
 
-std::vector<std::int64_t> targets() {
-  hwy::SetSupportedTargetsForTest(0);
-  return hwy::SupportedAndGeneratedTargets();
-}
-
-INSTANTIATE_TEST_SUITE_P(Targets, TrianglePairs, testing::ValuesIn(targets()),
-                         [](const auto& target) { return std::string(hwy::TargetName(target.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, TrianglePairs, testing::ValuesIn(all_targets()), target_name);
 
 }  // namespace
 }  // namespace prescene::collision
