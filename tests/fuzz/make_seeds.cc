@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "prescene/collision/tree_file.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/interfaces/bytes/file.h"
@@ -80,6 +81,19 @@ void write_mesh_seeds() {
   write_seed("stl", "text", encode_stl(box, MeshEncoding::kText));
 }
 
+void write_tree_file_seeds() {
+  const collision::TreeFileKey key{.kind = "fuzz", .layout = 1, .mesh_hash = 1, .settings_hash = 2};
+  const std::vector<std::uint32_t> words = {1, 2, 3, 4, 5};
+  const std::vector<std::uint64_t> longs(17, 9);
+  const std::vector<std::uint8_t> bytes(65, 7);
+  write_seed("tree_file", "empty", collision::TreeFileWriter(key).bytes());
+  write_seed("tree_file", "one", collision::TreeFileWriter(key).add(std::span(words)).bytes());
+  collision::TreeFileWriter three(key);
+  three.add(std::span(longs)).add(std::span<const std::uint32_t>()).add(std::span(bytes));
+  write_seed("tree_file", "three", three.bytes());
+  write_seed("tree_file", "other_kind", collision::TreeFileWriter({.kind = "other"}).add(std::span(words)).bytes());
+}
+
 void write_recording_seed(const std::string& name, McapCompression compression, std::size_t chunk_bytes) {
   const tests::ScratchDir scratch;
   auto writer = McapWriter::create(scratch.path() / "a", {.compression = compression, .chunk_bytes = chunk_bytes});
@@ -132,6 +146,7 @@ int main(int argc, char** argv) {
   corpus = argv[1];
   write_image_seeds();
   write_mesh_seeds();
+  write_tree_file_seeds();
   write_recording_seed("none", McapCompression::kNone, 600);
   write_recording_seed("lz4", McapCompression::kLz4, 1500);
   write_recording_seed("zstd", McapCompression::kZstd, 1500);
