@@ -11,6 +11,7 @@
 
 #include "prescene/collision/array.h"
 #include "prescene/collision/mesh.h"
+#include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
 
 namespace prescene::collision {
@@ -59,5 +60,43 @@ class SpherePacking {
   double volume_ = 0.0;
   std::uint64_t content_hash_ = 0;
 };
+
+struct PackingOptions {
+  int max_spheres = 5000;
+  double volume_share = 1.0;     ///< Packing ends when the spheres fill this share of the body's volume: (0, 1].
+  double smallest_radius = 0.0;  ///< m; 0: a hundred-thousandth of the body's size.
+  /// m; 0: none. No point of the body's surface is further than this from the convex hull of the packing, and where
+  /// the hull would be further from a corner there is a sphere with its centre within this distance of the corner, so
+  /// that bodies rest and tip on edges as they should.
+  double edge_fidelity = 0.0;
+  bool close_holes = false;  ///< Cover the holes of an open mesh instead of refusing it.
+
+  friend bool operator==(const PackingOptions&, const PackingOptions&) = default;
+};
+
+/// How well a packing fills a body.
+struct PackingReport {
+  double body_volume = 0.0;    ///< m^3, with covered holes.
+  double packed_volume = 0.0;  ///< m^3.
+  int edge_spheres = 0;        ///< Placed for the edge fidelity.
+  double edge_gap = 0.0;       ///< m; largest distance of the surface from the packing's hull, when that was asked for.
+  int closed_holes = 0;        ///< Loops of open edges that were covered.
+  int open_edges = 0;          ///< Before.
+
+  double share() const { return packed_volume / body_volume; }
+  std::string text() const;  ///< One line for a person.
+  friend bool operator==(const PackingReport&, const PackingReport&) = default;
+};
+struct PackedMesh {
+  std::shared_ptr<const SpherePacking> packing;  ///< Large spheres first, but for those of the edges.
+  PackingReport report;
+};
+
+/// Fills a closed mesh with spheres that neither overlap each other nor leave it, always about the largest that fits:
+/// ProtoSphere's idea [Weller and Zachmann 2010] with an octree that finds the prototypes' places. The same bits for
+/// any number of threads. Fails with kInvalidInput, naming the mesh, when it is open (with a place and the number of
+/// open edges), turned inside out, too thin for a single sphere, or an option is out of range; with kResourceExhausted
+/// when the edge fidelity needs more spheres than are allowed.
+core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& options, core::ThreadPool& pool);
 
 }  // namespace prescene::collision

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "edge_spheres.h"
+#include "hull_gap.h"
+#include "mesh_holes.h"
+#include "prescene/collision/spheres/sphere_packing.h"
+#include "surface_search.h"
+#include "void_search.h"
+
+namespace prescene::collision {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kSmallestShare = 1e-5;  // Of the body's size: the default smallest radius.
+
+core::Status refuse(const Mesh& mesh, const std::string& what) {
+  return core::invalid_input("mesh '" + mesh.name() + "': " + what);
+}
+
+std::string text_of(const Vector3d& p) {
+  std::ostringstream out;
+  out << std::setprecision(4) << "(" << p.x() << ", " << p.y() << ", " << p.z() << ") m";
+  return out.str();
+}
+
+core::Status check(const Mesh& mesh, const PackingOptions& options) {
+  constexpr int kMostSpheres = 10'000'000;
+  if (options.max_spheres < 1 || options.max_spheres > kMostSpheres) {
+    return refuse(mesh, "a packing of at most " + std::to_string(options.max_spheres) +
+                            " spheres; set max_spheres to between 1 and " + std::to_string(kMostSpheres));
+  }
+  if (!(options.volume_share > 0.0) || !(options.volume_share <= 1.0))
+    return refuse(mesh, "a volume_share of " + std::to_string(options.volume_share) + "; it is above 0 and at most 1");
+  for (const double length : {options.smallest_radius, options.edge_fidelity}) {
+    if (!(length >= 0.0) || !std::isfinite(length))
+      return refuse(mesh,
+                    "smallest_radius and edge_fidelity are lengths in m, at least 0; one is " + std::to_string(length));
+  }
+  return core::ok_status();
+}
+
+double enclosed_volume(const ClosedMesh& mesh) {
+  const Vector3d origin = mesh.vertices[mesh.triangles[0][0]].cast<double>();
+  double six_volumes = 0.0;
+  for (const TriangleIndices& t : mesh.triangles) {
+    const Vector3d a = mesh.vertices[t[0]].cast<double>() - origin;
+    const Vector3d b = mesh.vertices[t[1]].cast<double>() - origin;
+    six_volumes += a.dot(b.cross(mesh.vertices[t[2]].cast<double>() - origin));
+  }
+  return six_volumes / 6.0;
+}
+
+core::Result<ClosedMesh> closed(const Mesh& mesh, bool close, PackingReport& report) {
+  const OpenEdges open = open_edges(mesh);
+  report.open_edges = static_cast<int>(open.edges.size());
+  if (!open.edges.empty() && !close) {
+    const Vector3d from = mesh.vertices()[open.edges[0].from].cast<double>();
+    const Vector3d to = mesh.vertices()[open.edges[0].to].cast<double>();
+    return refuse(mesh, "it is open, or its triangles are of mixed orientation: " + std::to_string(open.edges.size()) +
+                            " open edges, one at " + text_of(0.5 * (from + to)) +
+                            "; mend it, or set close_holes to have the holes covered");
+  }
+  ClosedMesh result = close_holes(mesh, open);
+  report.closed_holes = result.holes;
+  report.body_volume = enclosed_volume(result);
+  if (!(report.body_volume > 0.0)) {
+    return refuse(mesh, "it encloses a volume of " + std::to_string(report.body_volume) +
+                            " m^3; turn its triangles so that they are counter-clockwise seen from outside");
+  }
+  return result;
+}
+
+std::vector<SurfaceAnchor> anchors_of(const std::vector<PackedSphere>& spheres, const SurfaceSearch& surface,
+                                      core::ThreadPool& pool) {
+  std::vector<SurfaceAnchor> anchors(spheres.size());
+  pool.for_blocks(spheres.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vector3d centre = spheres[i].centre.cast<double>();
+      const Vector3d point = surface.nearest(centre).point;
+      anchors[i] = {point.cast<float>(), (point - centre).normalized().cast<float>()};
+    }
+  });
+  return anchors;
+}
+
+core::Status place_edges(const Mesh& mesh, const ClosedMesh& body, const SurfaceSearch& surface,
+                         const PackingOptions& options, double smallest, VoidSearch& voids, PackingReport& report,
+                         core::ThreadPool& pool) {
+  const std::vector<Vector3d> corners = hull_corners(body.vertices);
+  const EdgeResult result = place_edge_spheres(voids, surface, corners, options.edge_fidelity, smallest,
+                                               static_cast<std::size_t>(options.max_spheres), pool);
+  report.edge_spheres = result.placed;
+  if (result.too_thin) {
+    return refuse(mesh, "near " + text_of(*result.too_thin) + " it is thinner than the smallest radius of " +
+                            std::to_string(smallest) + " m; allow a larger edge_fidelity or smaller spheres");
+  }
+  if (result.unserved > 0) {
+    return core::resource_exhausted(
+        "mesh '" + mesh.name() + "': with " + std::to_string(options.max_spheres) + " spheres, " +
+        std::to_string(result.unserved) + " corners of its hull are further than the edge_fidelity of " +
+        std::to_string(options.edge_fidelity) + " m from the packing; allow more spheres or a larger distance");
+  }
+  return core::ok_status();
+}
+
+double largest_gap(const ClosedMesh& body, const std::vector<PackedSphere>& spheres, core::ThreadPool& pool) {
+  const std::vector<Vector3d> corners = hull_corners(body.vertices);
+  return pool.reduce_blocks(
+      corners.size(), 16, 0.0,
+      [&](std::size_t begin, std::size_t end) {
+        double largest = 0.0;
+        for (std::size_t i = begin; i < end; ++i) largest = std::max(largest, hull_gap(corners[i], spheres).high);
+        return largest;
+      },
+      [](double a, double b) { return std::max(a, b); });
+}
+
+}  // namespace
+
+std::string PackingReport::text() const {
+  std::ostringstream out;
+  out << std::setprecision(3) << "spheres fill " << 100.0 * share() << " % of " << 1e6 * body_volume << " cm^3";
+  if (edge_spheres > 0) out << ", " << edge_spheres << " of them at edges (gap " << 1e3 * edge_gap << " mm)";
+  if (closed_holes > 0) out << ", " << closed_holes << " holes with " << open_edges << " open edges were covered";
+  return out.str();
+}
+
+core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& options, core::ThreadPool& pool) {
+  PRESCENE_RETURN_IF_ERROR(check(mesh, options));
+  PackedMesh packed;
+  PackingReport& report = packed.report;
+  PRESCENE_TRY(const ClosedMesh body, closed(mesh, options.close_holes, report));
+  const SurfaceSearch surface(body.vertices, body.triangles);
+  const double smallest =
+      options.smallest_radius > 0.0 ? options.smallest_radius : kSmallestShare * static_cast<double>(mesh.size());
+  VoidSearch voids(surface, smallest, pool);
+  const auto most = static_cast<std::size_t>(options.max_spheres);
+  const auto grow_to = [&](std::size_t count) {
+    while (voids.spheres().size() < count && voids.volume() < options.volume_share * report.body_volume &&
+           voids.grow(count - voids.spheres().size())) {
+    }
+  };
+  const bool edges = options.edge_fidelity > 0.0;
+  grow_to(edges ? (most + 1) / 2 : most);
+  if (voids.spheres().empty()) {
+    return refuse(mesh, "no sphere with a radius of " + std::to_string(smallest) +
+                            " m fits into it; it has no thickness, or smallest_radius is too large");
+  }
+  if (edges) {
+    PRESCENE_RETURN_IF_ERROR(place_edges(mesh, body, surface, options, smallest, voids, report, pool));
+    grow_to(most);
+    report.edge_gap = largest_gap(body, voids.spheres(), pool);
+  }
+  report.packed_volume = voids.volume();
+  std::vector<SurfaceAnchor> anchors = anchors_of(voids.spheres(), surface, pool);
+  PRESCENE_TRY(packed.packing, SpherePacking::make(voids.spheres(), std::move(anchors), mesh.name()));
+  return packed;
+}
+
+}  // namespace prescene::collision
