@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every tree answers as trying all pairs of triangles does.
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <cstdio>
+
+#include "dop_cases.h"
+#include "prescene/collision/dops/dop_tree.h"
+#include "prescene/collision/dops/simdop_tree.h"
+#include "prescene/tests/support/allocations.h"
+#include "prescene/tests/support/collision_meshes.h"
+
+namespace prescene::collision {
+namespace {
+
+void use_target(std::int64_t target) {
+  hwy::SetSupportedTargetsForTest(target);
+  hwy::GetChosenTarget().DeInit();
+}
+
+class DopTrees : public ::testing::Test {
+ protected:
+  ~DopTrees() override {
+    use_target(0);
+    std::printf("%d poses compared, %d of them colliding\n", compared_, colliding_);
+  }
+
+  // `query`(X_AB) is asked about all poses of a case.
+  template <class Query>
+  void expect_right(const DopCase& pair, const Query& query) {
+    for (const PosedPair& pose : pair.poses) {
+      ASSERT_EQ(query(pose.X_AB), pose.collides) << pair.name;
+      ++compared_;
+      colliding_ += pose.collides ? 1 : 0;
+    }
+  }
+
+  void expect_simdop_right(const SimdopOptions& options) {
+    SCOPED_TRACE("k " + std::to_string(options.k) + ", branching " + std::to_string(options.branching) + ", " +
+                 std::string(to_string(options.builder)));
+    for (const DopCase& pair : dop_cases()) {
+      const SimdopTree a = SimdopTree::build(pair.a, options, pool_);
+      const SimdopTree b = SimdopTree::build(pair.b, options, pool_);
+      expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB, scratch_); });
+      if (HasFatalFailure()) return;
+    }
+  }
+
+  core::ThreadPool pool_{2};
+  QueryScratch scratch_;
+  int compared_ = 0;
+  int colliding_ = 0;
+};
+
+TEST_F(DopTrees, BinaryTreeIsExact) {
+  for (const int k : kDopSizes) {
+    for (const DopCase& pair : dop_cases()) {
+      const DopTreeOptions options{.k = k, .leaf_items = k == 14 ? 3 : 1};
+      const DopTree a = DopTree::build(pair.a, options, pool_);
+      const DopTree b = DopTree::build(pair.b, options, pool_);
+      expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB); });
+      ASSERT_FALSE(HasFatalFailure()) << "k " << k;
+    }
+  }
+}
+
+TEST_F(DopTrees, SimdopIsExactForAllSizes) {
+  for (const int k : kDopSizes) {
+    for (const int branching : {2, 4, 8, 16}) {
+      for (const PlanePrecision precision : {PlanePrecision::kSingle, PlanePrecision::kHalf}) {
+        SimdopOptions options{.k = k, .branching = branching, .leaf_items = k == 18 ? 5 : 1, .precision = precision};
+        expect_simdop_right(options);
+        options.traversal = SimdopTraversal::kOneVersusOne;
+        expect_simdop_right(options);
+        if (branching == 4) {
+          options.traversal = SimdopTraversal::kFourVersusFour;
+          expect_simdop_right(options);
+        }
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+TEST_F(DopTrees, SimdopIsExactForAllBuilders) {
+  for (const Builder builder : kAllBuilders) {
+    expect_simdop_right({.k = 26, .branching = 16, .builder = builder});
+    expect_simdop_right({.k = 46, .branching = 4, .builder = builder, .traversal = SimdopTraversal::kFourVersusFour});
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST_F(DopTrees, SimdopIsExactForEveryInstructionSet) {
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    use_target(target);
+    for (const PlanePrecision precision : {PlanePrecision::kSingle, PlanePrecision::kHalf}) {
+      for (const int branching : {2, 4, 8, 16}) {
+        expect_simdop_right({.k = 46, .branching = branching, .leaf_items = 2, .precision = precision});
+        expect_simdop_right(
+            {.k = 14, .branching = branching, .precision = precision, .traversal = SimdopTraversal::kOneVersusOne});
+      }
+      expect_simdop_right(
+          {.k = 32, .branching = 4, .precision = precision, .traversal = SimdopTraversal::kFourVersusFour});
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
+TEST_F(DopTrees, CountsDoNotChangeAnswers) {
+  const DopCase& pair = dop_cases().front();
+  const SimdopTree a = SimdopTree::build(pair.a, {}, pool_);
+  const SimdopTree b = SimdopTree::build(pair.b, {}, pool_);
+  const DopTree scalar_a = DopTree::build(pair.a, {}, pool_);
+  const DopTree scalar_b = DopTree::build(pair.b, {}, pool_);
+  QueryCounts counts;
+  QueryCounts scalar_counts;
+  expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB, scratch_, &counts); });
+  expect_right(pair, [&](const Transform& X_AB) { return collide(scalar_a, scalar_b, X_AB, &scalar_counts); });
+  for (const QueryCounts& c : {counts, scalar_counts}) {
+    EXPECT_GT(c.node_pairs, 0U);
+    EXPECT_GT(c.volume_tests, c.node_pairs);
+    EXPECT_GT(c.triangle_tests, 0U);
+    EXPECT_LE(c.exact_tests, c.triangle_tests);
+  }
+}
+
+TEST_F(DopTrees, QueriesDoNotAllocateOnceWarm) {
+  if (!tests::can_count_allocations()) GTEST_SKIP() << "allocations cannot be counted in this build";
+  const DopCase& pair = dop_cases().front();
+  const SimdopTree a = SimdopTree::build(pair.a, {}, pool_);
+  const SimdopTree b = SimdopTree::build(pair.b, {}, pool_);
+  const auto ask_all = [&] {
+    int hits = 0;
+    for (const PosedPair& pose : pair.poses) hits += collide(a, b, pose.X_AB, scratch_) ? 1 : 0;
+    return hits;
+  };
+  const int first = ask_all();
+  const std::uint64_t before = tests::allocation_count();
+  const int second = ask_all();
+  EXPECT_EQ(tests::allocation_count(), before);
+  EXPECT_EQ(first, second);
+}
+
+TEST_F(DopTrees, HalfPrecisionTakesHalfTheMemory) {
+  const auto mesh = tests::collision_mesh(tests::make_bumpy_sphere(0.1, 3000), "bumpy sphere");
+  const SimdopTree half = SimdopTree::build(mesh, {.precision = PlanePrecision::kHalf}, pool_);
+  const SimdopTree single = SimdopTree::build(mesh, {.precision = PlanePrecision::kSingle}, pool_);
+  EXPECT_EQ(2 * half.plane_bytes(), single.plane_bytes());
+  ASSERT_EQ(half.half_planes().size(), single.single_planes().size());
+  for (std::size_t i = 0; i < half.half_planes().size(); ++i)
+    ASSERT_GE(from_half(half.half_planes()[i]), single.single_planes()[i]);
+}
+
+}  // namespace
+}  // namespace prescene::collision
