@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/collision/dops/simdop_tree.h"
+#include "prescene/collision/hierarchy.h"
 #include "prescene/collision/mesh.h"
 #include "prescene/collision/transform.h"
 #include "prescene/core/parallel.h"
@@ -72,7 +74,11 @@ inline constexpr std::string_view kEmbree = "Embree rtcCollide";
 
 /// Other people's libraries.
 std::vector<Algorithm> peer_algorithms();
-/// The trees of our library.
+/// The trees of our library, each with its default settings.
 std::vector<Algorithm> our_algorithms();
+/// The same with other settings, one changed at a time; begins with the default tree.
+std::vector<Algorithm> study_algorithms();
+std::string simdop_name(const collision::SimdopOptions& options);
+std::string builder_name(collision::Builder builder);
 
 }  // namespace prescene::benchmarks

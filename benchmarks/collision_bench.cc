@@ -3,7 +3,8 @@
 //
 //   bench_collision [--quick] [--only=NAME[,NAME]...] [--benchmark_out=PATH]
 //
-// --quick takes about a minute; --only measures just the algorithms whose name contains one of the NAMEs, and FCL.
+// --quick takes about a minute; --only measures just the algorithms whose name contains one of the NAMEs, and FCL, and
+// leaves out the study of settings.
 #include <sched.h>
 
 #include <hwy/targets.h>
@@ -64,10 +65,8 @@ std::vector<Algorithm> chosen_algorithms(const Arguments& arguments) {
   return algorithms;
 }
 
-std::string simd_target() {
-  const std::int64_t supported = hwy::SupportedTargets();
-  return hwy::TargetName(supported & -supported);  // the lowest bit is the best one
-}
+/// The best instruction set that the machine has and the kernels are compiled for.
+std::string simd_target() { return hwy::TargetName(hwy::SupportedAndGeneratedTargets().front()); }
 
 /// Queries run on one processor, the first that this program may use.
 void stay_on_one_processor() {
@@ -82,6 +81,43 @@ void stay_on_one_processor() {
     return;
   }
 }
+
+Measurements measure(const std::vector<tests::MeshPair>& pairs, const std::vector<Algorithm>& algorithms,
+                     const std::vector<double>& shares, const MeasureOptions& options) {
+  Measurements measurements;
+  for (const tests::MeshPair& pair : pairs) {
+    std::fprintf(stderr, "%s (%u and %u triangles): %zu algorithms\n", pair.name.c_str(), pair.a->triangle_count(),
+                 pair.b->triangle_count(), algorithms.size());
+    measure_pair(pair, algorithms, shares, options, &measurements);
+  }
+  return measurements;
+}
+
+/// Other settings of our trees, on a few pairs of middle size.
+Measurements measure_study(const std::vector<tests::MeshPair>& pairs, const Arguments& arguments) {
+  MeasureOptions options;
+  options.configurations = arguments.quick ? 4 : 16;
+  options.rounds = 3;
+  std::vector<tests::MeshPair> chosen;
+  for (const tests::MeshPair& pair : pairs) {
+    const std::uint32_t triangles = pair.a->triangle_count() + pair.b->triangle_count();
+    if (triangles > 20'000 && triangles < 150'000) chosen.push_back(pair);
+  }
+  if (arguments.quick) chosen.resize(std::min<std::size_t>(chosen.size(), 2));
+  std::vector<Algorithm> algorithms = study_algorithms();
+  // Whose distances place the bodies.
+  for (Algorithm& peer : peer_algorithms())
+    if (peer.name == kFcl) algorithms.push_back(std::move(peer));
+  return measure(chosen, algorithms, {0.0, 0.01, 0.05}, options);
+}
+
+/// Only the queries by themselves.
+Table without_turns(Table table) {
+  std::erase_if(table.rows, [](const std::vector<Figure>& row) { return row[1] != Figure("boolean"); });
+  return table;
+}
+
+void show(const char* title, const Table& table) { std::printf("%s\n%s\n", title, text_of(table).c_str()); }
 
 int run(const Arguments& arguments) {
   Report report("collision", simd_target());
@@ -100,28 +136,33 @@ int run(const Arguments& arguments) {
     options.rounds = 3;
     shares = {0.0, 0.01, 0.05, -0.01};
   }
-  const std::vector<Algorithm> algorithms = chosen_algorithms(arguments);
-  Measurements measurements;
-  for (const tests::MeshPair& pair : pairs) {
-    std::fprintf(stderr, "%s (%u and %u triangles)\n", pair.name.c_str(), pair.a->triangle_count(),
-                 pair.b->triangle_count());
-    measure_pair(pair, algorithms, shares, options, &measurements);
-  }
+  const Measurements measurements = measure(pairs, chosen_algorithms(arguments), shares, options);
   add_query_targets(measurements, &report);
   add_memory_targets(measurements, &report);
+  Measurements study;
+  if (arguments.only.empty()) {
+    study = measure_study(pairs, arguments);
+    add_study_targets(study, &report);
+  }
 
   std::puts(report.text().c_str());
-  const Table summary = summary_table(measurements), answers = wrong_answer_counts(measurements);
-  std::printf("Median times in microseconds, geometric means over %zu pairs\n%s\n", pairs.size(),
-              text_of(summary).c_str());
-  std::printf("Answers against the exact reference\n%s\n", text_of(answers).c_str());
+  show("Median times in microseconds, geometric means over pairs", summary_table(measurements));
+  if (!study.cells.empty())
+    show("Other settings, likewise over pairs of 20,000 to 150,000 triangles", without_turns(summary_table(study)));
+  show("Default tree by instruction set, queries in turn, microseconds", target_table(measurements));
+  show("Answers against the exact reference", wrong_answer_counts(measurements));
   if (arguments.out.empty()) return 0;
-  report.add(summary);
-  report.add(answers);
-  report.add(ratio_table(measurements));
-  report.add(query_table(measurements));
-  report.add(cost_table(measurements));
-  report.add(wrong_answer_table(measurements));
+
+  for (Table table : {summary_table(measurements), wrong_answer_counts(measurements), target_table(measurements),
+                      ratio_table(measurements), query_table(measurements), cost_table(measurements),
+                      wrong_answer_table(measurements)})
+    report.add(std::move(table));
+  for (Table table : {summary_table(study), wrong_answer_counts(study), query_table(study), cost_table(study)}) {
+    table.name = "study_" + table.name;
+    report.add(std::move(table));
+  }
+  report.add(summary_plot(measurements));
+  report.add(ratio_plot(measurements));
   const core::Status status = report.write(arguments.out);
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.message().c_str());
   return status.ok() ? 0 : 1;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/benchmarks/collision_measure.h"
 
+#include <hwy/targets.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -114,6 +116,48 @@ void time_singles(std::span<const Algorithm> algorithms, const Solvers& solvers,
   }
 }
 
+void time_in_turn(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
+                  Cell* cell) {
+  std::vector<std::function<void()>> passes;
+  std::vector<std::size_t> of;
+  for (std::size_t k = 0; k < algorithms.size(); ++k) {
+    cell->timings[k].in_turn = kNone;
+    if (algorithms[k].slow) continue;
+    passes.emplace_back([solver = solvers[k].get(), cell] {
+      for (const Transform& X_AB : cell->configurations) solver->collide(X_AB);
+    });
+    of.push_back(k);
+  }
+  const std::vector<double> seconds = time_interleaved(passes, options);
+  for (std::size_t p = 0; p < passes.size(); ++p)
+    cell->timings[of[p]].in_turn = seconds[p] / static_cast<double>(cell->configurations.size());
+}
+
+void use_targets(std::int64_t allowed) {
+  hwy::SetSupportedTargetsForTest(allowed);
+  hwy::GetChosenTarget().DeInit();
+}
+
+void time_targets(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
+                  Cell* cell) {
+  const auto chosen = std::find_if(algorithms.begin(), algorithms.end(),
+                                   [](const Algorithm& algorithm) { return algorithm.name == kDefaultTree; });
+  if (chosen == algorithms.end()) return;
+  PairSolver* solver = solvers[static_cast<std::size_t>(chosen - algorithms.begin())].get();
+  std::vector<std::function<void()>> passes;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    cell->targets.push_back({hwy::TargetName(target), 0.0});
+    passes.emplace_back([solver, cell, target] {
+      use_targets(target);
+      for (const Transform& X_AB : cell->configurations) solver->collide(X_AB);
+    });
+  }
+  const std::vector<double> seconds = time_interleaved(passes, options);
+  use_targets(0);
+  for (std::size_t i = 0; i < seconds.size(); ++i)
+    cell->targets[i].in_turn = seconds[i] / static_cast<double>(cell->configurations.size());
+}
+
 void time_batches(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
                   ContactConfigurations& make, Cell* cell) {
   const std::size_t count = cell->configurations.size();
@@ -206,6 +250,8 @@ void measure_pair(const tests::MeshPair& pair, std::span<const Algorithm> algori
     ask(algorithms, solvers, options, &cell);
     decide(pair, algorithms, &cell, measurements);
     time_singles(algorithms, solvers, options, &cell);
+    time_in_turn(algorithms, solvers, options, &cell);
+    time_targets(algorithms, solvers, options, &cell);
     time_batches(algorithms, solvers, options, make, &cell);
     measurements->cells.push_back(std::move(cell));
   }

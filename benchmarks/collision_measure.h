@@ -33,8 +33,15 @@ struct Timings {
   std::vector<double> distance;      ///< s; empty without distances.
   std::vector<double> distances;     ///< m
   std::vector<WorkCounts> counts;    ///< Empty without counts.
+  double in_turn = 0.0;              ///< s a query while one configuration comes after another; NaN if slow.
   std::vector<double> batch;         ///< s for all 16 of a batch, an entry a batch; empty without batches.
   std::vector<double> batch_single;  ///< s for the same 16 one by one.
+};
+
+/// The default tree with fewer instructions than the machine has.
+struct TargetTiming {
+  std::string target;    ///< As Highway calls it; the best one first.
+  double in_turn = 0.0;  ///< s a query.
 };
 
 /// A pair of meshes at one distance.
@@ -46,6 +53,7 @@ struct Cell {
   std::vector<bool> collides;    ///< The truth: what all algorithms say, or the exact reference where they differ.
   int decided_by_reference = 0;  ///< Configurations.
   std::vector<Timings> timings;  ///< In the order of the algorithms.
+  std::vector<TargetTiming> targets;
 };
 
 /// What building a mesh takes.

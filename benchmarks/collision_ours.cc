@@ -1,16 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
+#include <string>
+#include <type_traits>
 #include <utility>
 
 #include "prescene/benchmarks/collision_algorithms.h"
+#include "prescene/collision/dops/dop_tree.h"
+#include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/collision/triangle_tree.h"
 
 namespace prescene::benchmarks {
 namespace {
 
+using collision::Builder;
+using collision::DopTree;
+using collision::DopTreeOptions;
+using collision::PlanePrecision;
 using collision::QueryCounts;
 using collision::QueryScratch;
+using collision::SimdopOptions;
+using collision::SimdopTraversal;
+using collision::SimdopTree;
 using collision::Transform;
 using collision::TriangleTree;
 using collision::TriangleTreeOptions;
@@ -19,49 +30,130 @@ double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-class TriangleTreeSolver : public PairSolver {
+template <class Tree>
+std::size_t bytes_of(const Tree& tree) {
+  if constexpr (std::is_same_v<Tree, TriangleTree>)
+    return tree.memory().node_bytes + tree.memory().reference_bytes;
+  else
+    return tree.bytes();
+}
+
+/// Trees of one kind of both meshes, built with one thread.
+template <class Tree, class Options>
+class TreeSolver : public PairSolver {
  public:
-  TriangleTreeSolver(const CollisionMesh& a, const CollisionMesh& b, const TriangleTreeOptions& options)
+  TreeSolver(const CollisionMesh& a, const CollisionMesh& b, const Options& options)
       : a_(build(a, options, &cost_a)), b_(build(b, options, &cost_b)) {}
 
-  bool collide(const Transform& X_AB) override { return collision::collide(a_, b_, X_AB, scratch_); }
+  bool collide(const Transform& X_AB) override { return ask(X_AB, nullptr); }
+
   WorkCounts count(const Transform& X_AB) override {
     QueryCounts counts;
-    collision::collide(a_, b_, X_AB, scratch_, &counts);
+    ask(X_AB, &counts);
     return {static_cast<double>(counts.volume_tests), static_cast<double>(counts.triangle_tests)};
   }
 
  private:
-  static TriangleTree build(const CollisionMesh& mesh, const TriangleTreeOptions& options, BuildCost* cost) {
+  bool ask(const Transform& X_AB, QueryCounts* counts) {
+    if constexpr (std::is_same_v<Tree, DopTree>)
+      return collision::collide(a_, b_, X_AB, counts);
+    else
+      return collision::collide(a_, b_, X_AB, scratch_, counts);
+  }
+
+  static Tree build(const CollisionMesh& mesh, const Options& options, BuildCost* cost) {
     core::ThreadPool one(1);
     const double start = seconds_now();
-    TriangleTree tree = TriangleTree::build(mesh, options, one);
+    Tree tree = Tree::build(mesh, options, one);
     cost->seconds = seconds_now() - start;
-    cost->bytes = static_cast<double>(tree.memory().node_bytes + tree.memory().reference_bytes);
+    cost->bytes = static_cast<double>(bytes_of(tree));
     return tree;
   }
 
-  TriangleTree a_, b_;
+  Tree a_, b_;
   QueryScratch scratch_;
 };
 
-Algorithm triangle_tree(std::string_view name, const TriangleTreeOptions& options) {
+template <class Tree, class Options>
+Algorithm algorithm_of(std::string name, const Options& options) {
   Algorithm algorithm;
-  algorithm.name = name;
+  algorithm.name = std::move(name);
   algorithm.ours = true;
   algorithm.has_counts = true;
   algorithm.make = [options](const CollisionMesh& a, const CollisionMesh& b) {
-    return std::make_unique<TriangleTreeSolver>(a, b, options);
+    return std::make_unique<TreeSolver<Tree, Options>>(a, b, options);
   };
   return algorithm;
 }
 
+Algorithm triangle_tree(std::string_view name, const TriangleTreeOptions& options) {
+  return algorithm_of<TriangleTree>(std::string(name), options);
+}
+
+std::string name_of(SimdopTraversal traversal) {
+  switch (traversal) {
+    case SimdopTraversal::kOneVersusOne:
+      return "1 vs 1";
+    case SimdopTraversal::kOneVersusAll:
+      return "1 vs n";
+    case SimdopTraversal::kFourVersusFour:
+      return "4 vs 4";
+  }
+  return "";
+}
+
 }  // namespace
+
+std::string simdop_name(const SimdopOptions& options) {
+  return "SIMDop k=" + std::to_string(options.k) + " n=" + std::to_string(options.branching) + " " +
+         name_of(options.traversal) + (options.precision == PlanePrecision::kHalf ? " 16 bit" : " 32 bit") + ", " +
+         std::string(collision::to_string(options.builder));
+}
+
+std::string builder_name(Builder builder) {
+  return std::string(kDefaultTree) + ", " + std::string(collision::to_string(builder));
+}
 
 std::vector<Algorithm> our_algorithms() {
   std::vector<Algorithm> algorithms;
   algorithms.push_back(triangle_tree(kDefaultTree, {}));
   algorithms.push_back(triangle_tree("default tree, frames not rotated", {.rotated_frames = false}));
+  algorithms.push_back(algorithm_of<SimdopTree>("SIMDop", SimdopOptions{}));
+  algorithms.push_back(algorithm_of<DopTree>(std::string(kScalarDops), DopTreeOptions{}));
+  return algorithms;
+}
+
+std::vector<Algorithm> study_algorithms() {
+  std::vector<Algorithm> algorithms;
+  algorithms.push_back(triangle_tree(kDefaultTree, {}));
+  const auto add_simdop = [&](const SimdopOptions& options) {
+    algorithms.push_back(algorithm_of<SimdopTree>(simdop_name(options), options));
+  };
+  for (const Builder builder : collision::kAllBuilders) {
+    if (builder != TriangleTreeOptions{}.builder)
+      algorithms.push_back(triangle_tree(builder_name(builder), {.builder = builder}));
+    SimdopOptions options;
+    options.builder = builder;
+    add_simdop(options);
+  }
+  for (const int k : collision::kDopSizes) {
+    SimdopOptions options;
+    if (k == options.k) continue;
+    options.k = k;
+    add_simdop(options);
+  }
+  for (const int branching : {2, 4, 8}) {
+    SimdopOptions options;
+    options.branching = branching;
+    add_simdop(options);
+  }
+  add_simdop({.precision = PlanePrecision::kSingle});
+  add_simdop({.traversal = SimdopTraversal::kOneVersusOne});
+  add_simdop({.branching = 4, .traversal = SimdopTraversal::kFourVersusFour});
+  algorithms.push_back(algorithm_of<DopTree>(std::string(kScalarDops), DopTreeOptions{}));
+  algorithms.push_back(algorithm_of<DopTree>("scalar binary k-DOP tree, surface area heuristic",
+                                             DopTreeOptions{.builder = Builder::kSurfaceAreaHeuristic}));
+  algorithms.push_back(algorithm_of<DopTree>("scalar binary k-DOP tree, k=14", DopTreeOptions{.k = 14}));
   return algorithms;
 }
 

@@ -55,6 +55,10 @@ std::optional<Ratio> speed_ratio(const Measurements& measurements, std::string_v
   for (const Cell& cell : measurements.cells) {
     if (!contains(shares, cell.share)) continue;
     const Timings &of_fast = cell.timings[*fast], &of_slow = cell.timings[*slow];
+    if (query == Query::kCollideInTurn) {
+      ratio.add(cell, {of_slow.in_turn}, {of_fast.in_turn}, {true});
+      continue;
+    }
     std::vector<bool> right(cell.configurations.size(), true);
     for (std::size_t i = 0; i < right.size(); ++i)
       right[i] = query == Query::kDistance ||

@@ -105,28 +105,97 @@ Table ratio_table(const Measurements& measurements) {
   return table;
 }
 
+namespace {
+
+/// Medians of a cell, or the one value; nothing where it was not measured.
+std::optional<double> typical_seconds(const Timings& timings, Query query) {
+  if (query == Query::kCollideInTurn) {
+    if (std::isnan(timings.in_turn)) return std::nullopt;
+    return timings.in_turn;
+  }
+  const std::vector<double> seconds = measured(query == Query::kCollide ? timings.collide : timings.distance);
+  if (seconds.empty()) return std::nullopt;
+  return median(seconds);
+}
+
+/// Microseconds, geometric mean over pairs; NaN for none.
+double typical_microseconds(const Measurements& measurements, std::size_t algorithm, Query query, double share) {
+  std::vector<double> each;
+  for (const Cell& cell : measurements.cells) {
+    if (cell.share != share) continue;
+    if (const std::optional<double> seconds = typical_seconds(cell.timings[algorithm], query))
+      each.push_back(1e6 * *seconds);
+  }
+  return each.empty() ? kNone : geometric_mean(each);
+}
+
+}  // namespace
+
 Table summary_table(const Measurements& measurements) {
   const std::vector<double> shares = shares_of(measurements);
   Table table{"summary", {"algorithm", "query"}, {}};
   for (const double share : shares) table.columns.push_back(share_text(share));
   for (std::size_t k = 0; k < measurements.algorithms.size(); ++k) {
-    for (const auto& [query, seconds_of] :
-         {std::pair("boolean", &Timings::collide), std::pair("distance", &Timings::distance)}) {
-      std::vector<Figure> row = {measurements.algorithms[k], std::string(query)};
+    for (const auto& [name, query] :
+         {std::pair("boolean", Query::kCollide), std::pair("boolean, in turn", Query::kCollideInTurn),
+          std::pair("distance", Query::kDistance)}) {
+      std::vector<Figure> row = {measurements.algorithms[k], std::string(name)};
       bool any = false;
       for (const double share : shares) {
-        std::vector<double> medians;
-        for (const Cell& cell : measurements.cells) {
-          const std::vector<double> seconds = measured(cell.timings[k].*seconds_of);
-          if (cell.share == share && !seconds.empty()) medians.push_back(1e6 * median(seconds));
-        }
-        any = any || !medians.empty();
-        row.emplace_back(medians.empty() ? kNone : geometric_mean(medians));
+        const double value = typical_microseconds(measurements, k, query, share);
+        any = any || !std::isnan(value);
+        row.emplace_back(value);
       }
       if (any) table.rows.push_back(std::move(row));
     }
   }
   return table;
+}
+
+Table target_table(const Measurements& measurements) {
+  const std::vector<double> shares = shares_of(measurements);
+  Table table{"instruction_sets", {"target"}, {}};
+  for (const double share : shares) table.columns.push_back(share_text(share));
+  if (measurements.cells.empty()) return table;
+  for (std::size_t t = 0; t < measurements.cells.front().targets.size(); ++t) {
+    std::vector<Figure> row = {measurements.cells.front().targets[t].target};
+    for (const double share : shares) {
+      std::vector<double> each;
+      for (const Cell& cell : measurements.cells)
+        if (cell.share == share) each.push_back(1e6 * cell.targets[t].in_turn);
+      row.emplace_back(geometric_mean(each));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Plot summary_plot(const Measurements& measurements) {
+  std::vector<double> shares = shares_of(measurements);
+  std::sort(shares.begin(), shares.end());
+  Plot plot{"times", "Boolean queries: median time, geometric mean over pairs", "microseconds", {}, {}};
+  for (const double share : shares) plot.x_labels.push_back(share_text(share));
+  for (std::size_t k = 0; k < measurements.algorithms.size(); ++k) {
+    Series series{measurements.algorithms[k], {}, !measurements.ours[k]};
+    for (const double share : shares)
+      series.values.push_back(typical_microseconds(measurements, k, Query::kCollide, share));
+    plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
+Plot ratio_plot(const Measurements& measurements) {
+  Plot plot{"ratios", "Default tree: how many times faster than FCL", "ratio", {}, {}};
+  const Table table = ratio_table(measurements);
+  for (std::size_t column = 2; column < table.columns.size(); ++column)
+    plot.series.push_back({table.columns[column], {}, false});
+  for (const std::vector<Figure>& row : table.rows) {
+    if (std::get<std::string>(row[1]) != kDefaultTree) continue;
+    plot.x_labels.push_back(std::get<std::string>(row[0]));
+    for (std::size_t column = 2; column < row.size(); ++column)
+      plot.series[column - 2].values.push_back(std::get<double>(row[column]));
+  }
+  return plot;
 }
 
 Table cost_table(const Measurements& measurements) {

@@ -17,6 +17,8 @@
 namespace prescene::benchmarks {
 namespace {
 
+using collision::Builder;
+
 constexpr std::array<double, 3> kNearShares = {0.0, 0.01, 0.05};
 constexpr std::array<double, 2> kDistanceShares = {0.0, 0.01};
 // Small meshes have partly filled nodes: memory is told for those that need it.
@@ -79,6 +81,8 @@ void add_query_targets(const Measurements& measurements, Report* report) {
                            "GImpact, no margin, first contact, one-sided triangles" + near, boolean(kGimpact)));
   report->add(ratio_target("boolean vs scalar binary k-DOP tree", 10.0, 20.0, "ours, k = 32, longest axis" + near,
                            boolean(kScalarDops)));
+  report->add(ratio_target("boolean vs FCL, configurations in turn", std::nullopt, std::nullopt, "FCL, OBBRSS" + near,
+                           speed_ratio(measurements, kDefaultTree, kFcl, Query::kCollideInTurn, kNearShares)));
   report->add(ratio_target("boolean vs ODE", std::nullopt, std::nullopt, "ODE's trimesh" + near, boolean(kOde)));
   report->add(
       ratio_target("boolean vs Embree", std::nullopt, std::nullopt, "rtcCollide with refit" + near, boolean(kEmbree)));
@@ -86,6 +90,41 @@ void add_query_targets(const Measurements& measurements, Report* report) {
                            batch_ratio(measurements, kDefaultTree, kNearShares)));
   report->add(ratio_target("exact distance vs FCL", 15.0, 30.0, "FCL, OBBRSS, at 0 and 1 %",
                            speed_ratio(measurements, kDefaultTree, kFcl, Query::kDistance, kDistanceShares)));
+}
+
+void add_study_targets(const Measurements& study, Report* report) {
+  const collision::SimdopOptions half{.precision = collision::PlanePrecision::kHalf};
+  const collision::SimdopOptions single{.precision = collision::PlanePrecision::kSingle};
+  report->add(ratio_target("half-float nodes vs 32 bit: time", 1.0, 1.0 / 0.9,
+                           simdop_name(single) + ", at 0, 1 % and 5 %",
+                           speed_ratio(study, simdop_name(half), simdop_name(single), Query::kCollide, kNearShares)));
+  for (const bool simdop : {true, false}) {
+    const auto name = [simdop](Builder builder) {
+      collision::SimdopOptions options;
+      options.builder = builder;
+      return simdop                                                ? simdop_name(options)
+             : builder == collision::TriangleTreeOptions{}.builder ? std::string(kDefaultTree)
+                                                                   : builder_name(builder);
+    };
+    for (const Builder gas : {Builder::kNeuralGas, Builder::kWeightedNeuralGas}) {
+      std::optional<Ratio> worst;
+      std::string worst_name;
+      for (const Builder builder : collision::kAllBuilders) {
+        if (builder == Builder::kNeuralGas || builder == Builder::kWeightedNeuralGas) continue;
+        const std::optional<Ratio> ratio = speed_ratio(study, name(gas), name(builder), Query::kCollide, kNearShares);
+        if (!ratio || (worst && worst->value >= ratio->value)) continue;
+        worst = ratio;
+        worst_name = collision::to_string(builder);
+      }
+      const std::string tree = simdop ? "SIMDop" : "default tree";
+      report->add(ratio_target(std::string(collision::to_string(gas)) + " vs the worst split, " + tree, std::nullopt,
+                               std::nullopt, worst_name + ", at 0, 1 % and 5 %", worst));
+      report->add(ratio_target(
+          std::string(collision::to_string(gas)) + " vs surface area heuristic, " + tree, std::nullopt, std::nullopt,
+          "surface area heuristic, at 0, 1 % and 5 %",
+          speed_ratio(study, name(gas), name(Builder::kSurfaceAreaHeuristic), Query::kCollide, kNearShares)));
+    }
+  }
 }
 
 void add_memory_targets(const Measurements& measurements, Report* report) {

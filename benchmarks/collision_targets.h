@@ -11,6 +11,8 @@ namespace prescene::benchmarks {
 void add_build_targets(Report* report);
 /// Queries against other libraries and against each other.
 void add_query_targets(const Measurements& measurements, Report* report);
+/// Settings of our trees against each other.
+void add_study_targets(const Measurements& study, Report* report);
 /// Bytes of trees.
 void add_memory_targets(const Measurements& measurements, Report* report);
 

@@ -138,6 +138,8 @@ void Report::add(Table table) {
   tables_.push_back(std::move(table));
 }
 
+void Report::add(Plot plot) { plots_.push_back(std::move(plot)); }
+
 void Report::note(std::string sentence) { notes_.push_back(std::move(sentence)); }
 
 std::string Report::text() const {
@@ -176,6 +178,10 @@ core::Status Report::write(const std::filesystem::path& path) const {
     std::filesystem::path csv_path = path;
     if (!table.rows.empty())
       PRESCENE_RETURN_IF_ERROR(write_file(csv_path.replace_extension(table.name + ".csv"), csv + "\n"));
+  }
+  for (const Plot& plot : plots_) {
+    std::filesystem::path svg_path = path;
+    PRESCENE_RETURN_IF_ERROR(write_file(svg_path.replace_extension(plot.name + ".svg"), svg_of(plot)));
   }
   return write_file(path, json.dump(1) + "\n");
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a benchmark has to say: targets with what was wanted and what was reached, and tables of raw figures. Becomes a
-// table to read, a JSON file and CSV files.
+// table to read, a JSON file, CSV files and plots.
 //
 //   Report report("collision", "AVX3");
 //   report.add({.work = "boolean vs FCL", .must = at_least(20), .aim = at_least(40), .reached = 31.5, .unit = "x",
@@ -18,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "prescene/benchmarks/plot.h"
 #include "prescene/core/status.h"
 
 namespace prescene::benchmarks {
@@ -64,6 +65,7 @@ class Report {
   /// Checks that a target without a figure says why.
   void add(Target target);
   void add(Table table);
+  void add(Plot plot);
   /// A sentence for the reader.
   void note(std::string sentence);
 
@@ -71,7 +73,8 @@ class Report {
 
   /// The targets as a table with a mark each: "aim", "must", "MISSED", "-" where nothing was asked or measured.
   std::string text() const;
-  /// `path` and, for each table with rows, `path` with ".TABLE.csv" instead of its extension. Fails as writing does.
+  /// `path` and, for each table with rows, `path` with ".TABLE.csv" instead of its extension;
+  /// plots likewise with ".PLOT.svg". Fails as writing does.
   core::Status write(const std::filesystem::path& path) const;
 
  private:
@@ -81,6 +84,7 @@ class Report {
   std::vector<std::string> notes_;
   std::vector<Target> targets_;
   std::vector<Table> tables_;
+  std::vector<Plot> plots_;
 };
 
 /// Aligned columns, numbers to four digits.

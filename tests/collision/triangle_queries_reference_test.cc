@@ -42,13 +42,6 @@ struct Compared {
   int targets_differ = 0;  ///< Configurations that instruction sets answer differently.
 };
 
-/// Instruction sets of this machine, the best one first.
-std::vector<std::int64_t> targets() {
-  std::vector<std::int64_t> each;
-  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) each.push_back(left & -left);
-  return each;
-}
-
 void use_targets(std::int64_t allowed) {
   hwy::SetSupportedTargetsForTest(allowed);
   hwy::GetChosenTarget().DeInit();
@@ -96,7 +89,7 @@ Compared compare(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<con
     }
   }
   compared.configurations = static_cast<int>(configurations.size());
-  for (const std::int64_t target : targets()) {
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     use_targets(target);
     const std::vector<bool> again = answers(tree_a, tree_b, configurations);
     for (std::size_t i = 0; i < again.size(); ++i) compared.targets_differ += again[i] != by_tree[i] ? 1 : 0;
