@@ -80,6 +80,15 @@ function(prescene_module name)
   endif()
 endfunction()
 
+# prescene_simd_sources(<target>): its sources may be compiled once for each instruction set, through Highway. They then
+# include themselves by their name, so their folder is searched for headers. Left out are SSSE3, which is of no use beside
+# SSE4, and the vectors of unknown length of SVE, which cannot be members of the structs of our kernels.
+function(prescene_simd_sources target)
+  target_compile_definitions(${target} PRIVATE
+    "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+  target_include_directories(${target} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+endfunction()
+
 # prescene_benchmark(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...) makes the program bench_<name> at
 # the top of the build folder, which `./dev bench <name>` runs: a Google Benchmark program, or one that writes a Report
 # (benchmarks/report.h) to the path given as --benchmark_out=PATH.

@@ -73,7 +73,8 @@ TrianglePair edge_pair(core::RandomStream& random) {
 
 TrianglePair almost_touching_pair(core::RandomStream& random) {
   TrianglePair pair = random.uniform_below(2) == 0 ? touching_pair(random) : edge_pair(random);
-  const Vector3d shift = power_of_ten(random, -9.0, -4.0) * cube_point(random);
+  const double size = power_of_ten(random, -9.0, -4.0);  // A statement for each draw fixes their order.
+  const Vector3d shift = size * cube_point(random);
   for (Vector3f& p : pair.b) p += shift.cast<float>();
   return pair;
 }
@@ -82,7 +83,8 @@ void make_needle(Triangle& t, core::RandomStream& random) {
   const Vector3d a = t[0].cast<double>();
   const Vector3d b = t[1].cast<double>();
   const double width = power_of_ten(random, -8.0, -3.0);
-  t[2] = (a + random.uniform() * (b - a) + width * cube_point(random)).cast<float>();
+  const double along = random.uniform();
+  t[2] = (a + along * (b - a) + width * cube_point(random)).cast<float>();
 }
 
 TrianglePair needle_pair(core::RandomStream& random) {
@@ -165,15 +167,19 @@ TrianglePair denormal_pair(core::RandomStream& random) {
 }
 
 TrianglePair far_pair(core::RandomStream& random) {
-  const Vector3d centre = power_of_ten(random, 0.0, 8.0) * cube_point(random);
+  const double distance = power_of_ten(random, 0.0, 8.0);
+  const Vector3d centre = distance * cube_point(random);
   const double size = power_of_ten(random, -3.0, 0.0);
   return {plain_triangle(random, size, centre), plain_triangle(random, size, centre)};
 }
 
 TrianglePair huge_pair(core::RandomStream& random) {
   TrianglePair pair{plain_triangle(random, 1e9), plain_triangle(random, 1e9)};
-  if (random.uniform_below(2) == 0)
-    pair.b = plain_triangle(random, power_of_ten(random, -9.0, 9.0), inner_point(pair.a, random).cast<double>());
+  if (random.uniform_below(2) == 0) {
+    const double size = power_of_ten(random, -9.0, 9.0);
+    const Vector3f centre = inner_point(pair.a, random);
+    pair.b = plain_triangle(random, size, centre.cast<double>());
+  }
   return pair;
 }
 
