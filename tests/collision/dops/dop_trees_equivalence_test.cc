@@ -6,6 +6,8 @@
 #include <cstdio>
 
 #include "dop_cases.h"
+#include "prescene/collision/dops/boxtree.h"
+#include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/dop_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/tests/support/allocations.h"
@@ -47,8 +49,30 @@ class DopTrees : public ::testing::Test {
     }
   }
 
+  void expect_bvhlite_right(const BvhLiteOptions& options, QueryCounts* counts = nullptr) {
+    SCOPED_TRACE("k " + std::to_string(options.k) + ", " + std::to_string(options.bits) + " bits, branching " +
+                 std::to_string(options.branching));
+    for (const DopCase& pair : dop_cases()) {
+      const BvhLiteTree a = BvhLiteTree::build(pair.a, options, pool_);
+      const BvhLiteTree b = BvhLiteTree::build(pair.b, options, pool_);
+      expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB, lite_scratch_, counts); });
+      if (HasFatalFailure()) return;
+    }
+  }
+
+  void expect_boxtree_right(const BoxtreeOptions& options) {
+    SCOPED_TRACE(to_string(options.builder));
+    for (const DopCase& pair : dop_cases()) {
+      const Boxtree a = Boxtree::build(pair.a, options, pool_);
+      const Boxtree b = Boxtree::build(pair.b, options, pool_);
+      expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB); });
+      if (HasFatalFailure()) return;
+    }
+  }
+
   core::ThreadPool pool_{2};
   QueryScratch scratch_;
+  BvhLiteScratch lite_scratch_;
   int compared_ = 0;
   int colliding_ = 0;
 };
@@ -108,17 +132,65 @@ TEST_F(DopTrees, SimdopIsExactForEveryInstructionSet) {
   }
 }
 
+TEST_F(DopTrees, BvhLiteIsExact) {
+  for (const int bits : {4, 6, 8}) {
+    for (const int k : kDopSizes) expect_bvhlite_right({.k = k, .bits = bits, .leaf_items = k == 46 ? 4 : 1});
+    for (const int branching : {2, 7, 16}) expect_bvhlite_right({.k = 46, .bits = bits, .branching = branching});
+    if (HasFatalFailure()) return;
+  }
+  for (const Builder builder : kAllBuilders) expect_bvhlite_right({.k = 26, .builder = builder});
+}
+
+TEST_F(DopTrees, BvhLiteDoesTheSameWithEveryInstructionSet) {
+  for (const int bits : {4, 6, 8}) {
+    QueryCounts usual;
+    expect_bvhlite_right({.bits = bits}, &usual);
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      use_target(target);
+      QueryCounts counts;
+      expect_bvhlite_right({.bits = bits}, &counts);
+      if (HasFatalFailure()) return;
+      EXPECT_EQ(counts.volume_tests, usual.volume_tests);
+      EXPECT_EQ(counts.node_pairs, usual.node_pairs);
+    }
+    use_target(0);
+  }
+}
+
+TEST_F(DopTrees, BoxtreesAreExact) {
+  for (const Builder builder : kAllBuilders) {
+    for (const int leaf_items : {1, 4}) expect_boxtree_right({.builder = builder, .leaf_items = leaf_items});
+    if (HasFatalFailure()) return;
+  }
+  for (const DopCase& pair : dop_cases()) {
+    const PlainBoxtree a = PlainBoxtree::build(pair.a, Builder::kMedian, pool_);
+    const PlainBoxtree b = PlainBoxtree::build(pair.b, Builder::kMedian, pool_);
+    expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB); });
+  }
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    use_target(target);
+    expect_boxtree_right({});
+  }
+}
+
 TEST_F(DopTrees, CountsDoNotChangeAnswers) {
   const DopCase& pair = dop_cases().front();
   const SimdopTree a = SimdopTree::build(pair.a, {}, pool_);
   const SimdopTree b = SimdopTree::build(pair.b, {}, pool_);
   const DopTree scalar_a = DopTree::build(pair.a, {}, pool_);
   const DopTree scalar_b = DopTree::build(pair.b, {}, pool_);
-  QueryCounts counts;
-  QueryCounts scalar_counts;
-  expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB, scratch_, &counts); });
-  expect_right(pair, [&](const Transform& X_AB) { return collide(scalar_a, scalar_b, X_AB, &scalar_counts); });
-  for (const QueryCounts& c : {counts, scalar_counts}) {
+  const BvhLiteTree lite_a = BvhLiteTree::build(pair.a, {}, pool_);
+  const BvhLiteTree lite_b = BvhLiteTree::build(pair.b, {}, pool_);
+  const Boxtree boxes_a = Boxtree::build(pair.a, {}, pool_);
+  const Boxtree boxes_b = Boxtree::build(pair.b, {}, pool_);
+  std::array<QueryCounts, 4> counts;
+  expect_right(pair, [&](const Transform& X_AB) { return collide(a, b, X_AB, scratch_, &counts[0]); });
+  expect_right(pair, [&](const Transform& X_AB) { return collide(scalar_a, scalar_b, X_AB, &counts[1]); });
+  expect_right(pair, [&](const Transform& X_AB) { return collide(lite_a, lite_b, X_AB, lite_scratch_, &counts[2]); });
+  expect_right(pair, [&](const Transform& X_AB) { return collide(boxes_a, boxes_b, X_AB, &counts[3]); });
+  for (const QueryCounts& c : counts) {
     EXPECT_GT(c.node_pairs, 0U);
     EXPECT_GT(c.volume_tests, c.node_pairs);
     EXPECT_GT(c.triangle_tests, 0U);
@@ -131,9 +203,18 @@ TEST_F(DopTrees, QueriesDoNotAllocateOnceWarm) {
   const DopCase& pair = dop_cases().front();
   const SimdopTree a = SimdopTree::build(pair.a, {}, pool_);
   const SimdopTree b = SimdopTree::build(pair.b, {}, pool_);
+  const BvhLiteTree lite_a = BvhLiteTree::build(pair.a, {}, pool_);
+  const BvhLiteTree lite_b = BvhLiteTree::build(pair.b, {}, pool_);
+  const DopTree scalar = DopTree::build(pair.a, {}, pool_);
+  const Boxtree boxes = Boxtree::build(pair.a, {}, pool_);
   const auto ask_all = [&] {
     int hits = 0;
-    for (const PosedPair& pose : pair.poses) hits += collide(a, b, pose.X_AB, scratch_) ? 1 : 0;
+    for (const PosedPair& pose : pair.poses) {
+      hits += collide(a, b, pose.X_AB, scratch_) ? 1 : 0;
+      hits += collide(lite_a, lite_b, pose.X_AB, lite_scratch_) ? 1 : 0;
+      hits += collide(scalar, scalar, pose.X_AB) ? 1 : 0;
+      hits += collide(boxes, boxes, pose.X_AB) ? 1 : 0;
+    }
     return hits;
   };
   const int first = ask_all();
