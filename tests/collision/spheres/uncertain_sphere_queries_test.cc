@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: Apache-2.0
+// Answers about uncertain poses against a million drawn poses each, on packings small enough for all pairs.
+#include "prescene/collision/spheres/uncertain_sphere_queries.h"
+
+#include <gmock/gmock.h>
+
+#include <hwy/highway.h>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "prescene/core/parallel.h"
+#include "prescene/core/random.h"
+#include "prescene/tests/support/allocations.h"
+
+namespace prescene::collision {
+namespace {
+
+using core::RandomStream;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using geometry::Matrix6d;
+using geometry::Pose;
+using geometry::Vector6d;
+
+constexpr double kStiffness = 1000.0;
+
+std::shared_ptr<const SphereTree> tree_of(const std::vector<PackedSphere>& spheres, int branching = 4) {
+  const std::vector<SurfaceAnchor> anchors(spheres.size(), {Vector3f::Zero(), Vector3f::UnitZ()});
+  const auto packing = SpherePacking::make(spheres, anchors, "test");
+  EXPECT_TRUE(packing.ok());
+  core::ThreadPool pool(1);
+  const auto tree = SphereTree::make(*packing, {branching}, pool);
+  EXPECT_TRUE(tree.ok());
+  return *tree;
+}
+
+/// Spheres that touch each other on a grid about `middle`.
+std::vector<PackedSphere> grid(int nx, int ny, int nz, float radius, const Vector3f& middle = Vector3f::Zero()) {
+  std::vector<PackedSphere> spheres;
+  const Vector3f corner(static_cast<float>(nx - 1), static_cast<float>(ny - 1), static_cast<float>(nz - 1));
+  for (int x = 0; x < nx; ++x) {
+    for (int y = 0; y < ny; ++y) {
+      for (int z = 0; z < nz; ++z) {
+        const Vector3f place(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+        spheres.push_back({middle + 2.0F * radius * (place - 0.5F * corner), radius});
+      }
+    }
+  }
+  return spheres;
+}
+
+std::vector<PackedSphere> joined(std::vector<PackedSphere> a, const std::vector<PackedSphere>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+Matrix6d diagonal(const Vector3d& rotation, const Vector3d& translation) {
+  Vector6d deviations;
+  deviations << rotation, translation;
+  return deviations.cwiseAbs2().asDiagonal();
+}
+
+/// Of a body that turns about a place in the world, far from its origin.
+Matrix6d turning_about(const Vector3d& arm, double turn, double shift) {
+  Matrix6d about = Matrix6d::Identity();
+  // p = place + exp(phi) (-arm): the translation moves by -phi x arm.
+  about.bottomLeftCorner<3, 3>() << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
+  return about * diagonal(Vector3d::Constant(turn), Vector3d::Constant(shift)) * about.transpose();
+}
+
+struct Setting {
+  std::string name;
+  std::vector<PackedSphere> a;
+  std::vector<PackedSphere> b;
+  UncertainPose pose_a;
+  UncertainPose pose_b;
+  OverlapState state = OverlapState::kPossible;
+  double moments_off =
+      0.0;  ///< Relative error of the wrench's covariance that is allowed; 0: only bounds are compared.
+  int draws = 1'000'000;
+};
+
+struct Sampled {
+  double touching = 0.0;
+  double noise = 0.0;  ///< Three standard errors.
+  Vector6d mean = Vector6d::Zero();
+  Matrix6d covariance = Matrix6d::Zero();
+  double pairs = 0.0;
+};
+
+Matrix6d factor_of(const Matrix6d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+Vector6d normals(RandomStream& stream) {
+  Vector6d z;
+  for (int i = 0; i < 6; ++i) z[i] = stream.normal();
+  return z;
+}
+
+/// Draws poses and adds up what each pair does, in double precision.
+Sampled sample(const Setting& setting) {
+  RandomStream stream(7, core::Purpose::kTest);
+  const Matrix6d L_A = factor_of(setting.pose_a.covariance);
+  const Matrix6d L_B = factor_of(setting.pose_b.covariance);
+  const bool moves_a = !L_A.isZero(0.0);
+  const bool moves_b = !L_B.isZero(0.0);
+  std::vector<Vector3d> a;
+  std::vector<Vector3d> b(setting.b.size());
+  for (const PackedSphere& sphere : setting.a) a.push_back(sphere.centre.cast<double>());
+  Sampled sampled;
+  for (int i = 0; i < setting.draws; ++i) {
+    const Pose X_WA = moves_a ? box_plus(setting.pose_a.X_WB, L_A * normals(stream)) : setting.pose_a.X_WB;
+    const Pose X_WB = moves_b ? box_plus(setting.pose_b.X_WB, L_B * normals(stream)) : setting.pose_b.X_WB;
+    const Pose X_AB = X_WA.inverse() * X_WB;
+    const Matrix3d R_AB = X_AB.rotation.toRotationMatrix();
+    Vector6d wrench = Vector6d::Zero();
+    int pairs = 0;
+    for (std::size_t k = 0; k < setting.b.size(); ++k) {
+      const Vector3d p = R_AB * setting.b[k].centre.cast<double>() + X_AB.translation;
+      for (std::size_t j = 0; j < a.size(); ++j) {
+        const Vector3d g = p - a[j];
+        const double radii = static_cast<double>(setting.a[j].radius) + static_cast<double>(setting.b[k].radius);
+        if (g.squaredNorm() > radii * radii) continue;
+        ++pairs;
+        const double distance = g.norm();
+        const Vector3d force = -kStiffness * 0.5 * (radii - distance) * g / distance;
+        wrench.head<3>() += force;
+        wrench.tail<3>() += a[j].cross(force);
+      }
+    }
+    if (pairs == 0) continue;
+    sampled.touching += 1.0;
+    sampled.pairs += pairs;
+    sampled.mean += wrench;
+    sampled.covariance += wrench * wrench.transpose();
+  }
+  const double n = setting.draws;
+  sampled.touching /= n;
+  sampled.pairs /= n;
+  sampled.mean /= n;
+  sampled.covariance = sampled.covariance / n - sampled.mean * sampled.mean.transpose();
+  sampled.noise = 3.0 * std::sqrt(std::max(sampled.touching * (1.0 - sampled.touching), 1.0 / n) / n);
+  return sampled;
+}
+
+std::vector<Setting> settings() {
+  const std::vector<PackedSphere> slab = grid(4, 4, 1, 0.02F);
+  const std::vector<PackedSphere> block = grid(2, 2, 2, 0.015F);
+  const std::vector<PackedSphere> ball = {{Vector3f(0.01F, 0, 0), 0.03F}};
+  const auto above = [](double gap, double half) { return Pose::from_translation({0.004, -0.003, 0.02 + half + gap}); };
+  const Matrix6d none = Matrix6d::Zero();
+  const Matrix6d millimetres = diagonal(Vector3d::Zero(), Vector3d::Constant(0.001));
+  const Matrix6d usual = diagonal(Vector3d::Constant(0.01), Vector3d::Constant(0.001));
+  const Pose tilted = {geometry::exp_rotation({0.3, -0.2, 0.5}), {0.004, 0.002, 0.052}};
+  const Pose world = {geometry::exp_rotation({-0.4, 1.1, 0.3}), {1.0, -2.0, 0.5}};
+  const UncertainPose fixed = {Pose::identity(), none};
+  constexpr OverlapState kNone = OverlapState::kNone;
+  constexpr OverlapState kPossible = OverlapState::kPossible;
+  constexpr OverlapState kCertain = OverlapState::kCertain;
+  std::vector<Setting> s;
+  s.push_back({"far", slab, block, fixed, {above(0.2, 0.03), usual}, kNone, 0.01});
+  s.push_back({"near, translation", slab, block, fixed, {above(-0.0005, 0.03), millimetres}, kPossible, 0.15});
+  s.push_back({"touching, translation", slab, block, fixed, {above(-0.004, 0.03), millimetres}, kCertain, 0.02});
+  s.push_back({"shallow, usual", slab, block, fixed, {above(-0.0065, 0.03), usual}, kCertain, 0.03});
+  s.push_back({"deep, usual", slab, block, fixed, {above(-0.015, 0.03), usual}, kCertain, 0.03});
+  s.push_back({"sideways", slab, block, fixed, {above(-0.004, 0.03), diagonal({0, 0, 0}, {0.008, 0.002, 1e-4})}});
+  s.push_back({"rotation alone",
+               slab,
+               grid(4, 1, 1, 0.02F),
+               fixed,
+               {above(-0.0005, 0.02), diagonal({0.02, 0.02, 0.02}, {0, 0, 0})},
+               kPossible,
+               0.3});
+  s.push_back({"turns about a far place",
+               slab,
+               block,
+               fixed,
+               {above(-0.006, 0.03), turning_about({0.0, 0.3, 0.1}, 0.004, 0.0003)},
+               kCertain,
+               0.02});
+  s.push_back({"both, tilted", slab, block, {world, usual}, {world * tilted, usual}, kPossible, 0.35});
+  s.push_back({"one direction",
+               ball,
+               ball,
+               fixed,
+               {Pose::from_translation({0.03, 0.045, 0}), diagonal({0, 0, 0}, {0.02, 0, 0})}});
+  s.push_back({"error as large as spheres",
+               ball,
+               block,
+               fixed,
+               {Pose::from_translation({0.03, 0.05, 0}), diagonal({0, 0, 0}, {0.03, 0.02, 0.03})}});
+  s.push_back({"peg between plates",
+               joined(grid(3, 3, 1, 0.02F, {0, 0, -0.041F}), grid(3, 3, 1, 0.02F, {0, 0, 0.041F})),
+               grid(1, 1, 1, 0.02F),
+               fixed,
+               {Pose::identity(), millimetres},
+               kPossible,
+               0.1});
+  s.push_back({"large rotations of both",
+               slab,
+               block,
+               {world, diagonal({0.2, 0.2, 0.2}, {0.002, 0.002, 0.002})},
+               {world * tilted, diagonal({0.3, 0.3, 0.3}, {0.002, 0.002, 0.002})}});
+  s.push_back({"more pairs than are kept",
+               grid(10, 10, 2, 0.005F),
+               grid(8, 8, 2, 0.005F),
+               fixed,
+               {{geometry::exp_rotation({0.003, -0.002, 0.4}), {0.001, 0.0005, 0.0195}}, usual},
+               kPossible,
+               0.25,
+               50'000});
+  return s;
+}
+
+TEST(UncertainSphereQueries, BoundsHoldAndMomentsAgreeWithDraws) {
+  UncertainScratch scratch;
+  for (const Setting& setting : settings()) {
+    SCOPED_TRACE(setting.name);
+    const auto between = RelativeUncertainty::make(setting.pose_a, setting.pose_b);
+    ASSERT_TRUE(between.ok()) << between.status().message();
+    const auto a = tree_of(setting.a);
+    const auto b = tree_of(setting.b, 16);
+    const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
+    const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+    const Sampled drawn = sample(setting);
+    Vector6d mean;
+    mean << wrench.force, wrench.torque;
+    const double deviation = std::sqrt(drawn.covariance.topLeftCorner<3, 3>().trace()) + 1e-9;
+    const double mean_off = (mean - drawn.mean).head<3>().norm() / deviation;
+    const double covariance_off = (wrench.covariance - drawn.covariance).norm() / (drawn.covariance.norm() + 1e-9);
+    std::printf("%-26s drawn %.4f in [%.4f, %.4f], estimate %.4f +- %.4f; mean %.3f deviations off, covariance %.3f\n",
+                setting.name.c_str(), drawn.touching, overlap.lower, overlap.upper, overlap.probability,
+                overlap.probability_error, mean_off, covariance_off);
+    EXPECT_EQ(overlap.state, setting.state);
+    EXPECT_LE(overlap.lower, drawn.touching + drawn.noise);
+    EXPECT_GE(overlap.upper, drawn.touching - drawn.noise);
+    EXPECT_LE(overlap.lower, overlap.probability);
+    EXPECT_GE(overlap.upper, overlap.probability);
+    if (setting.moments_off == 0.0) continue;
+    EXPECT_NEAR(overlap.probability, drawn.touching, drawn.noise + overlap.probability_error + 1e-3);
+    EXPECT_LE(mean_off, 0.02);
+    EXPECT_LE(covariance_off, setting.moments_off);
+    EXPECT_NEAR(wrench.expected_pairs, drawn.pairs, 0.02 * drawn.pairs + 2.0 * drawn.noise);
+  }
+}
+
+void use_target(std::int64_t target) {
+  hwy::SetSupportedTargetsForTest(target);
+  hwy::GetChosenTarget().DeInit();
+}
+
+TEST(UncertainSphereQueries, EveryInstructionSetAnswersAlike) {
+  UncertainScratch scratch;
+  for (const Setting& setting : settings()) {
+    SCOPED_TRACE(setting.name);
+    const auto between = RelativeUncertainty::make(setting.pose_a, setting.pose_b);
+    ASSERT_TRUE(between.ok());
+    for (const int branching : {4, 8, 16}) {
+      const auto a = tree_of(setting.a, branching);
+      const auto b = tree_of(setting.b, branching);
+      use_target(0);
+      const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
+      const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+      for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        SCOPED_TRACE(hwy::TargetName(target));
+        use_target(target);
+        const UncertainOverlap again = uncertain_overlap(*a, *b, *between, scratch);
+        EXPECT_EQ(again.state, overlap.state);
+        EXPECT_EQ(again.critical_pairs, overlap.critical_pairs);
+        EXPECT_EQ(again.lower, overlap.lower);
+        EXPECT_EQ(again.upper, overlap.upper);
+        EXPECT_NEAR(again.probability, overlap.probability, 1e-4);
+        const UncertainWrench other = uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+        EXPECT_LE((other.force - wrench.force).norm(), 1e-5 * wrench.force.norm() + 1e-7);
+        EXPECT_LE((other.covariance - wrench.covariance).norm(), 1e-4 * wrench.covariance.norm() + 1e-9);
+      }
+    }
+  }
+  use_target(0);
+}
+
+TEST(UncertainSphereQueries, KnownPosesAnswerAsTheyAre) {
+  UncertainScratch scratch;
+  const auto a = tree_of(grid(3, 3, 3, 0.02F));
+  const auto b = tree_of(grid(2, 2, 2, 0.02F));
+  for (const double gap : {0.001, -0.002}) {
+    const UncertainPose at = {Pose::from_translation({0.0, 0.0, 0.1 + gap}), Matrix6d::Zero()};
+    const auto between = RelativeUncertainty::make({Pose::identity(), Matrix6d::Zero()}, at);
+    ASSERT_TRUE(between.ok());
+    const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
+    const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, 1.0, scratch);
+    // Each sphere of the lower layer rests between four of the upper one.
+    const double distance = std::hypot(0.02 * std::sqrt(2.0), 0.04 + gap);
+    const double depth = std::max(0.0, 0.04 - distance);
+    EXPECT_EQ(overlap.state, depth > 0.0 ? OverlapState::kCertain : OverlapState::kNone);
+    EXPECT_NEAR(wrench.force.norm(), 4.0 * 4.0 * 0.5 * depth * (0.04 + gap) / distance, 1e-7);
+    EXPECT_LE(wrench.covariance.norm(), 1e-12);
+  }
+}
+
+TEST(UncertainSphereQueries, RefusesWhatIsNoCovariance) {
+  const auto refusal = [](const Matrix6d& covariance, double confidence = 0.997) {
+    const auto made =
+        RelativeUncertainty::make({Pose::identity(), covariance}, {Pose::identity(), Matrix6d::Zero()}, confidence);
+    EXPECT_FALSE(made.ok());
+    return made.ok() ? std::string() : made.status().message();
+  };
+  Matrix6d covariance = Matrix6d::Identity();
+  covariance(2, 3) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(refusal(covariance), testing::HasSubstr("body A is not finite"));
+  covariance(2, 3) = 0.5;
+  EXPECT_THAT(refusal(covariance), testing::HasSubstr("not symmetric"));
+  covariance(3, 2) = 0.5;
+  covariance(4, 4) = -1.0;
+  EXPECT_THAT(refusal(covariance), testing::HasSubstr("not positive semidefinite"));
+  covariance(4, 4) = 1.0;
+  covariance(2, 3) = covariance(3, 2) = 1.5;
+  EXPECT_THAT(refusal(covariance), testing::HasSubstr("not positive semidefinite"));
+  EXPECT_THAT(refusal(Matrix6d::Identity(), 1.0), testing::HasSubstr("confidence"));
+  EXPECT_THAT(refusal(Matrix6d::Identity(), 0.2), testing::HasSubstr("confidence"));
+}
+
+TEST(UncertainSphereQueries, FirstOrderAndRemainderBoundTheDisplacement) {
+  RandomStream stream(11, core::Purpose::kTest);
+  for (const Setting& setting : settings()) {
+    SCOPED_TRACE(setting.name);
+    const auto between = RelativeUncertainty::make(setting.pose_a, setting.pose_b);
+    ASSERT_TRUE(between.ok());
+    const Pose X_AB = setting.pose_a.X_WB.inverse() * setting.pose_b.X_WB;
+    const Matrix6d L_A = factor_of(setting.pose_a.covariance);
+    const Matrix6d L_B = factor_of(setting.pose_b.covariance);
+    for (int i = 0; i < 2000; ++i) {
+      const Vector6d d_A = L_A * normals(stream);
+      const Vector6d d_B = L_B * normals(stream);
+      const Vector3d p_BQ(stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1));
+      const Vector3d p = X_AB * p_BQ;
+      const Pose X_AB_drawn = box_plus(setting.pose_a.X_WB, d_A).inverse() * box_plus(setting.pose_b.X_WB, d_B);
+      const Vector3d moved = X_AB_drawn * p_BQ - p;
+      // The same to first order, from the definition.
+      const Matrix3d R_AW = setting.pose_a.X_WB.rotation.toRotationMatrix().transpose();
+      const Vector3d phi_B = X_AB.rotation * Vector3d(d_B.head<3>());
+      const Vector3d linear =
+          R_AW * (d_B.tail<3>() - d_A.tail<3>()) + phi_B.cross(p - X_AB.translation) - Vector3d(d_A.head<3>()).cross(p);
+      const double distance = (p - between->pivot()).norm();
+      ASSERT_LE((moved - linear).norm(), between->remainder(distance));
+      ASSERT_GE(between->deviation_bound(distance) * (1.0 + 1e-9), std::sqrt(between->covariance_at(p).trace() / 3.0));
+    }
+  }
+}
+
+TEST(UncertainSphereQueries, DoNotAllocateOnceWarm) {
+  if (!tests::can_count_allocations()) GTEST_SKIP() << "allocations are not counted in this build";
+  const Setting setting = settings().back();
+  const auto between = RelativeUncertainty::make(setting.pose_a, setting.pose_b);
+  ASSERT_TRUE(between.ok());
+  const auto a = tree_of(setting.a);
+  const auto b = tree_of(setting.b, 16);
+  UncertainScratch scratch;
+  uncertain_overlap(*a, *b, *between, scratch);
+  const auto before = tests::allocation_count();
+  uncertain_overlap(*a, *b, *between, scratch);
+  uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+  EXPECT_EQ(tests::allocation_count(), before);
+}
+
+}  // namespace
+}  // namespace prescene::collision
