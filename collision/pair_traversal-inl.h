@@ -17,51 +17,46 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::collision::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Lanes16 = hn::CappedTag<float, 16>;
-using V16 = hn::Vec<Lanes16>;
+
+// Sixteen bytes or integers at once to look at all children of a node, eight floats at once for those that are left.
+using Bytes16 = hn::CappedTag<std::uint8_t, 16>;
+using Ints16 = hn::CappedTag<std::int32_t, 16>;
+using Floats16 = hn::CappedTag<float, 16>;
+using V16 = hn::Vec<Floats16>;
 
 /// Bits of a mask of at most 16 lanes.
-HWY_INLINE std::uint32_t mask_bits(Lanes16 d, hn::Mask<Lanes16> mask) {
-  std::uint8_t bytes[8] = {};
+template <class D>
+HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
+  std::uint8_t bytes[8];
   hn::StoreMaskBits(d, mask, bytes);
-  return static_cast<std::uint32_t>(bytes[0]) | (static_cast<std::uint32_t>(bytes[1]) << 8U);
+  if constexpr (hn::MaxLanes(d) <= 8) {
+    return bytes[0];
+  } else {
+    std::uint16_t bits;
+    std::memcpy(&bits, bytes, sizeof bits);
+    return bits;
+  }
 }
 
-/// Boxes of the children of one node of a pair.
-struct ChildBoxes {
-  HWY_ALIGN float centre[3][16];  ///< In the node's own frame.
-  HWY_ALIGN float half[3][16];
-  HWY_ALIGN float other_centre[3][16];  ///< In the frame of the other node.
-  HWY_ALIGN float other_half[3][16];    ///< Of the boxes about them there, with slack.
-};
-
-/// Roundings of lengths within the nodes: of their axes, and of sums along them.
-inline constexpr float kLocalSlack = 16.0F * std::numeric_limits<float>::epsilon();
-
-/// Where node b's frame is in node a's, and their boxes in each other's frames.
-struct PairFrame {
-  HWY_ALIGN float R_ab[3][4];  ///< [column][row]
-  HWY_ALIGN float R_ba[3][4];
-  HWY_ALIGN float p_ab[4];
-  HWY_ALIGN float p_ba[4];
-  HWY_ALIGN float centre_a_b[4];  ///< Of a's box in b's frame.
-  HWY_ALIGN float half_a_b[4];    ///< Of the box about it there, with slack.
-  HWY_ALIGN float centre_b_a[4];
-  HWY_ALIGN float half_b_a[4];
-  float slack;  ///< What rounding may have done to a coordinate, m.
-};
+template <class D>
+HWY_INLINE hn::Mask<D> mask_of(D d, std::uint64_t bits) {
+  std::uint8_t bytes[8];
+  std::memcpy(bytes, &bits, sizeof bits);
+  return hn::LoadMaskBits(d, bytes);
+}
 
 /// Of a query on two trees, for all of its pairs of nodes.
 struct QueryFrame {
   HWY_ALIGN float R_AB[3][4];  ///< [column][row]
   HWY_ALIGN float p_AB[4];
-  float slack;
+  float slack;  ///< What rounding may have done to a coordinate, m.
 };
 
 inline QueryFrame make_query_frame(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB) {
@@ -78,174 +73,267 @@ inline QueryFrame make_query_frame(const TriangleTree& a, const TriangleTree& b,
   return frame;
 }
 
+/// Roundings of lengths within the nodes: of their axes, and of sums along them.
+inline constexpr float kLocalSlack = 18.0F * std::numeric_limits<float>::epsilon();
+
+/// So many pairs of nodes share the instructions that put them into each other's frames.
+inline constexpr std::size_t kAtOnce = 4;
+
+/// Where node b's frame is in node a's, and about where their boxes are in each other's steps; four floats a pair.
+struct PairFrames {
+  HWY_ALIGN float R_ab[3][4 * kAtOnce];  ///< [column][row]
+  HWY_ALIGN float R_ba[3][4 * kAtOnce];
+  HWY_ALIGN float p_ab[4 * kAtOnce];
+  HWY_ALIGN float p_ba[4 * kAtOnce];
+  HWY_ALIGN float slack[4 * kAtOnce];  ///< Four times the same, m.
+  // Boxes, with slack, rounded outwards and clamped to what bytes can say.
+  HWY_ALIGN std::uint8_t low_of_b[4 * kAtOnce];  ///< In a's steps.
+  HWY_ALIGN std::uint8_t high_of_b[4 * kAtOnce];
+  HWY_ALIGN std::uint8_t low_of_a[4 * kAtOnce];
+  HWY_ALIGN std::uint8_t high_of_a[4 * kAtOnce];
+};
+
+using Nodes = const TriangleTreeNode* [kAtOnce];
+
 #if HWY_TARGET == HWY_SCALAR
 
+HWY_INLINE void set_in_steps(const TriangleTreeNode& node, std::size_t k, float centre, float half, std::uint8_t* low,
+                             std::uint8_t* high) {
+  const float scale = node.steps_per_metre[k];
+  *low = static_cast<std::uint8_t>(std::clamp((centre - half) * scale + 1.0F, 0.0F, 255.0F));
+  *high = static_cast<std::uint8_t>(std::clamp((centre + half) * scale + 2.0F, 0.0F, 255.0F));
+}
+
 HWY_INLINE void make_pair_frame(const QueryFrame& query, const TriangleTreeNode& a, const TriangleTreeNode& b,
-                                PairFrame* pair) {
+                                std::size_t at, PairFrames* frames) {
   float from_a[3];
   for (int c = 0; c < 3; ++c) {
     from_a[c] = query.p_AB[c] - a.origin[c];
     for (int m = 0; m < 3; ++m) from_a[c] += query.R_AB[m][c] * b.origin[m];
   }
-  pair->slack = query.slack + kLocalSlack * (a.diagonal + b.diagonal);
-  for (int k = 0; k < 3; ++k) {
-    pair->p_ab[k] = a.frame[0][k] * from_a[0] + a.frame[1][k] * from_a[1] + a.frame[2][k] * from_a[2];
-    pair->centre_b_a[k] = pair->p_ab[k];
-    pair->half_b_a[k] = pair->slack;
-    for (int m = 0; m < 3; ++m) {
-      float sum = 0.0F;
-      for (int c = 0; c < 3; ++c) {
-        sum += a.frame[c][k] *
-               (query.R_AB[0][c] * b.frame[0][m] + query.R_AB[1][c] * b.frame[1][m] + query.R_AB[2][c] * b.frame[2][m]);
+  const float slack = query.slack + kLocalSlack * (a.diagonal + b.diagonal);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const float p = a.axes_x[k] * from_a[0] + a.axes_y[k] * from_a[1] + a.axes_z[k] * from_a[2];
+    float centre = p;
+    float half = slack;
+    for (std::size_t m = 0; m < 3; ++m) {
+      float axis_A[3];
+      for (std::size_t c = 0; c < 3; ++c) {
+        axis_A[c] = query.R_AB[0][c] * b.axes_x[m] + query.R_AB[1][c] * b.axes_y[m] + query.R_AB[2][c] * b.axes_z[m];
       }
-      pair->R_ab[m][k] = sum;
-      pair->R_ba[k][m] = sum;
-      pair->centre_b_a[k] += sum * b.half_extent[m];
-      pair->half_b_a[k] += std::abs(sum) * b.half_extent[m];
+      const float cosine = a.axes_x[k] * axis_A[0] + a.axes_y[k] * axis_A[1] + a.axes_z[k] * axis_A[2];
+      frames->R_ab[m][at + k] = cosine;
+      frames->R_ba[k][at + m] = cosine;
+      centre += cosine * b.half_extent[m];
+      half += std::abs(cosine) * b.half_extent[m];
     }
+    frames->p_ab[at + k] = p;
+    frames->slack[at + k] = slack;
+    set_in_steps(a, k, centre, half, &frames->low_of_b[at + k], &frames->high_of_b[at + k]);
   }
-  for (int m = 0; m < 3; ++m) {
-    pair->p_ba[m] = 0.0F;
-    pair->centre_a_b[m] = 0.0F;
-    pair->half_a_b[m] = pair->slack;
-    for (int k = 0; k < 3; ++k) {
-      pair->p_ba[m] -= pair->R_ab[m][k] * pair->p_ab[k];
-      pair->centre_a_b[m] += pair->R_ab[m][k] * (a.half_extent[k] - pair->p_ab[k]);
-      pair->half_a_b[m] += std::abs(pair->R_ab[m][k]) * a.half_extent[k];
+  for (std::size_t m = 0; m < 3; ++m) {
+    float p = 0.0F;
+    float centre = 0.0F;
+    float half = slack;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float cosine = frames->R_ab[m][at + k];
+      p -= cosine * frames->p_ab[at + k];
+      centre += cosine * (a.half_extent[k] - frames->p_ab[at + k]);
+      half += std::abs(cosine) * a.half_extent[k];
     }
+    frames->p_ba[at + m] = p;
+    set_in_steps(b, m, centre, half, &frames->low_of_a[at + m], &frames->high_of_a[at + m]);
   }
+}
+
+template <class D>
+HWY_INLINE void make_pair_frames(D, const QueryFrame& query, const Nodes& a, const Nodes& b, std::size_t count,
+                                 PairFrames* frames) {
+  for (std::size_t i = 0; i < count; ++i) make_pair_frame(query, *a[i], *b[i], 4 * i, frames);
 }
 
 #else
 
-HWY_INLINE void make_pair_frame(const QueryFrame& query, const TriangleTreeNode& a, const TriangleTreeNode& b,
-                                PairFrame* pair) {
-  const hn::CappedTag<float, 4> d;
-  using V4 = hn::Vec<hn::CappedTag<float, 4> >;
-  const V4 r0 = hn::Load(d, query.R_AB[0]);
-  const V4 r1 = hn::Load(d, query.R_AB[1]);
-  const V4 r2 = hn::Load(d, query.R_AB[2]);
-  const V4 a0 = hn::LoadU(d, a.frame[0]);
-  const V4 a1 = hn::LoadU(d, a.frame[1]);
-  const V4 a2 = hn::LoadU(d, a.frame[2]);
-  const auto in_a = [&](V4 v_A) HWY_ATTR {
-    const V4 v = hn::MulAdd(a1, hn::Broadcast<1>(v_A), hn::Mul(a0, hn::Broadcast<0>(v_A)));
-    return hn::MulAdd(a2, hn::Broadcast<2>(v_A), v);
+/// Four floats of each node, from the first on for which a vector has room.
+template <class D, class Field>
+HWY_INLINE hn::Vec<D> load_of_each(D d, const Nodes& nodes, std::size_t first, const Field& field) {
+  const hn::CappedTag<float, 4> d4;
+  if constexpr (hn::MaxLanes(d) == 16) {
+    const hn::CappedTag<float, 8> d8;
+    return hn::Combine(d, hn::Combine(d8, hn::LoadU(d4, field(*nodes[3])), hn::LoadU(d4, field(*nodes[2]))),
+                       hn::Combine(d8, hn::LoadU(d4, field(*nodes[1])), hn::LoadU(d4, field(*nodes[0]))));
+  } else if constexpr (hn::MaxLanes(d) == 8) {
+    return hn::Combine(d, hn::LoadU(d4, field(*nodes[first + 1])), hn::LoadU(d4, field(*nodes[first])));
+  } else {
+    return hn::LoadU(d, field(*nodes[first]));
+  }
+}
+
+/// Stores the box about a centre in steps, whose lowest is number 1.
+template <class D>
+HWY_INLINE void store_in_steps(D d, hn::Vec<D> centre, hn::Vec<D> half, hn::Vec<D> steps_per_metre, std::uint8_t* low,
+                               std::uint8_t* high) {
+  const hn::Rebind<std::int32_t, D> di;
+  const hn::Rebind<std::uint8_t, D> d8;
+  const auto zero = hn::Zero(d);
+  const auto most = hn::Set(d, 255.0F);
+  const auto from = hn::MulAdd(hn::Sub(centre, half), steps_per_metre, hn::Set(d, 1.0F));
+  const auto to = hn::MulAdd(hn::Add(centre, half), steps_per_metre, hn::Set(d, 2.0F));
+  hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, hn::Min(hn::Max(from, zero), most))), d8, low);
+  hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(di, hn::Min(hn::Max(to, zero), most))), d8, high);
+}
+
+/// Of `count` pairs, rounded up to what a vector of D holds.
+template <class D>
+HWY_INLINE void make_pair_frames(D d, const QueryFrame& query, const Nodes& a, const Nodes& b, std::size_t count,
+                                 PairFrames* frames) {
+  using V = hn::Vec<D>;
+  const hn::RepartitionToWide<D> d64;
+  const V r0 = hn::LoadDup128(d, query.R_AB[0]);
+  const V r1 = hn::LoadDup128(d, query.R_AB[1]);
+  const V r2 = hn::LoadDup128(d, query.R_AB[2]);
+  const V p_AB = hn::LoadDup128(d, query.p_AB);
+  const auto combine = [](V x0, V x1, V x2, V v) HWY_ATTR {
+    return hn::MulAdd(x2, hn::Broadcast<2>(v), hn::MulAdd(x1, hn::Broadcast<1>(v), hn::Mul(x0, hn::Broadcast<0>(v))));
   };
-  const auto in_A = [&](float x, float y, float z) HWY_ATTR {
-    return hn::MulAdd(r2, hn::Set(d, z), hn::MulAdd(r1, hn::Set(d, y), hn::Mul(r0, hn::Set(d, x))));
-  };
-  const V4 c0 = in_a(in_A(b.frame[0][0], b.frame[1][0], b.frame[2][0]));
-  const V4 c1 = in_a(in_A(b.frame[0][1], b.frame[1][1], b.frame[2][1]));
-  const V4 c2 = in_a(in_A(b.frame[0][2], b.frame[1][2], b.frame[2][2]));
-  const V4 origin_A = hn::Add(in_A(b.origin[0], b.origin[1], b.origin[2]), hn::Load(d, query.p_AB));
-  // The fourth lane of a's origin holds something else.
-  const V4 p_ab = in_a(hn::IfThenElseZero(hn::FirstN(d, 3), hn::Sub(origin_A, hn::LoadU(d, a.origin))));
-  // Transposed.
-  const V4 xy = hn::InterleaveLower(d, c0, c1);
-  const V4 z = hn::InterleaveLower(d, c2, c2);
-  const V4 b0 = hn::ConcatLowerLower(d, z, xy);
-  const V4 b1 = hn::ConcatUpperUpper(d, z, xy);
-  const V4 b2 = hn::ConcatLowerLower(d, hn::InterleaveUpper(d, c2, c2), hn::InterleaveUpper(d, c0, c1));
-  const auto in_b = [&](V4 v_a) HWY_ATTR {
-    const V4 v = hn::MulAdd(b1, hn::Broadcast<1>(v_a), hn::Mul(b0, hn::Broadcast<0>(v_a)));
-    return hn::MulAdd(b2, hn::Broadcast<2>(v_a), v);
-  };
-  pair->slack = query.slack + kLocalSlack * (a.diagonal + b.diagonal);
-  const V4 slack = hn::Set(d, pair->slack);
-  const V4 half_a = hn::LoadU(d, a.half_extent);
-  const V4 half_b0 = hn::Set(d, b.half_extent[0]);
-  const V4 half_b1 = hn::Set(d, b.half_extent[1]);
-  const V4 half_b2 = hn::Set(d, b.half_extent[2]);
-  const V4 centre_b = hn::MulAdd(c0, half_b0, hn::MulAdd(c1, half_b1, hn::MulAdd(c2, half_b2, p_ab)));
-  const V4 extent_b =
-      hn::MulAdd(hn::Abs(c0), half_b0, hn::MulAdd(hn::Abs(c1), half_b1, hn::MulAdd(hn::Abs(c2), half_b2, slack)));
-  const V4 extent_a = hn::MulAdd(
-      hn::Abs(b0), hn::Broadcast<0>(half_a),
-      hn::MulAdd(hn::Abs(b1), hn::Broadcast<1>(half_a), hn::MulAdd(hn::Abs(b2), hn::Broadcast<2>(half_a), slack)));
-  hn::Store(c0, d, pair->R_ab[0]);
-  hn::Store(c1, d, pair->R_ab[1]);
-  hn::Store(c2, d, pair->R_ab[2]);
-  hn::Store(b0, d, pair->R_ba[0]);
-  hn::Store(b1, d, pair->R_ba[1]);
-  hn::Store(b2, d, pair->R_ba[2]);
-  hn::Store(p_ab, d, pair->p_ab);
-  hn::Store(hn::Neg(in_b(p_ab)), d, pair->p_ba);
-  hn::Store(centre_b, d, pair->centre_b_a);
-  hn::Store(extent_b, d, pair->half_b_a);
-  hn::Store(in_b(hn::Sub(half_a, p_ab)), d, pair->centre_a_b);
-  hn::Store(extent_a, d, pair->half_a_b);
+  const auto in_A = [&](V x, V y, V z) HWY_ATTR { return hn::MulAdd(r2, z, hn::MulAdd(r1, y, hn::Mul(r0, x))); };
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d) / 4) {
+    const V a0 = load_of_each(d, a, i, [](const TriangleTreeNode& n) { return n.axes_x; });
+    const V a1 = load_of_each(d, a, i, [](const TriangleTreeNode& n) { return n.axes_y; });
+    const V a2 = load_of_each(d, a, i, [](const TriangleTreeNode& n) { return n.axes_z; });
+    const V bx = load_of_each(d, b, i, [](const TriangleTreeNode& n) { return n.axes_x; });
+    const V by = load_of_each(d, b, i, [](const TriangleTreeNode& n) { return n.axes_y; });
+    const V bz = load_of_each(d, b, i, [](const TriangleTreeNode& n) { return n.axes_z; });
+    const V origin_a = load_of_each(d, a, i, [](const TriangleTreeNode& n) { return n.origin; });
+    const V origin_b = load_of_each(d, b, i, [](const TriangleTreeNode& n) { return n.origin; });
+    const V half_a = load_of_each(d, a, i, [](const TriangleTreeNode& n) { return n.half_extent; });
+    const V half_b = load_of_each(d, b, i, [](const TriangleTreeNode& n) { return n.half_extent; });
+    const V steps_a = load_of_each(d, a, i, [](const TriangleTreeNode& n) { return n.steps_per_metre; });
+    const V steps_b = load_of_each(d, b, i, [](const TriangleTreeNode& n) { return n.steps_per_metre; });
+
+    const V c0 = combine(a0, a1, a2, in_A(hn::Broadcast<0>(bx), hn::Broadcast<0>(by), hn::Broadcast<0>(bz)));
+    const V c1 = combine(a0, a1, a2, in_A(hn::Broadcast<1>(bx), hn::Broadcast<1>(by), hn::Broadcast<1>(bz)));
+    const V c2 = combine(a0, a1, a2, in_A(hn::Broadcast<2>(bx), hn::Broadcast<2>(by), hn::Broadcast<2>(bz)));
+    const V p_ab = combine(a0, a1, a2, hn::Sub(hn::Add(combine(r0, r1, r2, origin_b), p_AB), origin_a));
+    // Transposed, by pairs of floats.
+    const auto xy_low = hn::BitCast(d64, hn::InterleaveLower(d, c0, c1));
+    const auto xy_high = hn::BitCast(d64, hn::InterleaveUpper(d, c0, c1));
+    const auto z_low = hn::BitCast(d64, hn::InterleaveLower(d, c2, c2));
+    const auto z_high = hn::BitCast(d64, hn::InterleaveUpper(d, c2, c2));
+    const V b0 = hn::BitCast(d, hn::InterleaveLower(d64, xy_low, z_low));
+    const V b1 = hn::BitCast(d, hn::InterleaveUpper(d64, xy_low, z_low));
+    const V b2 = hn::BitCast(d, hn::InterleaveLower(d64, xy_high, z_high));
+
+    const V diagonals = hn::Broadcast<3>(hn::Add(origin_a, origin_b));
+    const V slack = hn::MulAdd(hn::Set(d, kLocalSlack), diagonals, hn::Set(d, query.slack));
+    const V centre_b = hn::Add(combine(c0, c1, c2, half_b), p_ab);
+    const V extent_b = hn::Add(combine(hn::Abs(c0), hn::Abs(c1), hn::Abs(c2), half_b), slack);
+    const V centre_a = combine(b0, b1, b2, hn::Sub(half_a, p_ab));
+    const V extent_a = hn::Add(combine(hn::Abs(b0), hn::Abs(b1), hn::Abs(b2), half_a), slack);
+    const std::size_t at = 4 * i;
+    store_in_steps(d, centre_b, extent_b, steps_a, frames->low_of_b + at, frames->high_of_b + at);
+    store_in_steps(d, centre_a, extent_a, steps_b, frames->low_of_a + at, frames->high_of_a + at);
+    hn::Store(c0, d, frames->R_ab[0] + at);
+    hn::Store(c1, d, frames->R_ab[1] + at);
+    hn::Store(c2, d, frames->R_ab[2] + at);
+    hn::Store(b0, d, frames->R_ba[0] + at);
+    hn::Store(b1, d, frames->R_ba[1] + at);
+    hn::Store(b2, d, frames->R_ba[2] + at);
+    hn::Store(p_ab, d, frames->p_ab + at);
+    hn::Store(hn::Neg(combine(b0, b1, b2, p_ab)), d, frames->p_ba + at);
+    hn::Store(slack, d, frames->slack + at);
+  }
 }
 
 #endif
 
-/// Decodes the boxes of one coordinate k of a node.
-HWY_INLINE void decode(const TriangleTreeNode& node, int k, std::size_t lane, V16* centre, V16* half) {
-  const Lanes16 d;
-  const hn::RebindToSigned<Lanes16> di;
-  const hn::Rebind<std::uint8_t, Lanes16> d8;
-  const auto low = hn::PromoteTo(di, hn::LoadU(d8, node.low[k] + lane));
-  const auto high = hn::PromoteTo(di, hn::LoadU(d8, node.high[k] + lane));
-  const V16 half_step = hn::Set(d, node.frame[k][3]);
-  *centre = hn::Mul(hn::ConvertTo(d, hn::Add(low, high)), half_step);
-  *half = hn::Mul(hn::ConvertTo(d, hn::Sub(high, low)), half_step);
+/// Which boxes of a node's children meet the box [low, high] in its steps.
+HWY_INLINE std::uint32_t children_that_meet(const TriangleTreeNode& node, const std::uint8_t* low,
+                                            const std::uint8_t* high) {
+  const Bytes16 d;
+  std::uint32_t meet = 0;
+  for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
+    auto apart = hn::Zero(d);
+    for (int k = 0; k < 3; ++k) {
+      apart = hn::Or(apart, hn::SaturatedSub(hn::LoadU(d, node.low[k] + lane), hn::Set(d, high[k])));
+      apart = hn::Or(apart, hn::SaturatedSub(hn::Set(d, low[k]), hn::LoadU(d, node.high[k] + lane)));
+    }
+    meet |= mask_bits(d, hn::Eq(apart, hn::Zero(d))) << lane;
+  }
+  return meet;
 }
 
-/// |centre - point| <= half + reach, for a box and the extent of another along one axis.
-HWY_INLINE hn::Mask<Lanes16> reaches(V16 centre, V16 half, float point, float reach) {
-  const Lanes16 d;
-  return hn::Le(hn::Abs(hn::Sub(centre, hn::Set(d, point))), hn::Add(half, hn::Set(d, reach)));
+/// Boxes of some children of one node of a pair, side by side.
+struct ChildBoxes {
+  HWY_ALIGN float centre[3][16];  ///< In the node's own frame.
+  HWY_ALIGN float half[3][16];
+  HWY_ALIGN float other_centre[3][16];  ///< In the frame of the other node.
+  HWY_ALIGN float other_half[3][16];    ///< Of the boxes about them there, with slack.
+};
+
+/// |centre - point| - half - reach: positive where a box and the extent of another are apart along one axis.
+template <class D>
+HWY_INLINE hn::Vec<D> gap(D d, hn::Vec<D> centre, hn::Vec<D> half, float point, float reach) {
+  return hn::Sub(hn::Abs(hn::Sub(centre, hn::Set(d, point))), hn::Add(half, hn::Set(d, reach)));
 }
 
-/// Which boxes of a node's children reach the box about the other node's, in this node's frame.
-HWY_INLINE std::uint32_t reaching_children(const TriangleTreeNode& node, const float* other_centre,
-                                           const float* other_half) {
-  const Lanes16 d;
+/// Three rows of a rotation and a translation, for the boxes of one node in the frame of the other.
+struct Placement {
+  const float* rows[3];
+  const float* position;
+  float slack;
+};
+
+/// Puts boxes, given in steps, into their own node's frame and the other's, at `lane` of `boxes`, and tells which reach
+/// the other node's box, which has a corner at the origin and its centre at `mid`.
+template <class D, class I = hn::Vec<hn::RebindToSigned<D>>>
+HWY_INLINE std::uint32_t place_lanes(D d, const I (&low)[3], const I (&high)[3], const TriangleTreeNode& node,
+                                     const Placement& X, const float* mid, std::size_t lane, ChildBoxes* boxes) {
+  using V = hn::Vec<D>;
+  const hn::RebindToSigned<D> di;
+  V centre[3];
+  V half[3];
+  for (int k = 0; k < 3; ++k) {
+    const V scale = hn::Set(d, half_step(node.half_extent[k]));
+    centre[k] = hn::Mul(hn::ConvertTo(d, hn::Sub(hn::Add(low[k], high[k]), hn::Set(di, 2))), scale);
+    half[k] = hn::Mul(hn::ConvertTo(d, hn::Sub(high[k], low[k])), scale);
+    hn::Store(centre[k], d, boxes->centre[k] + lane);
+    hn::Store(half[k], d, boxes->half[k] + lane);
+  }
+  V worst = hn::Set(d, -1.0F);
+  for (int k = 0; k < 3; ++k) {
+    const float* row = X.rows[k];
+    V c = hn::MulAdd(centre[0], hn::Set(d, row[0]), hn::Set(d, X.position[k]));
+    c = hn::MulAdd(centre[1], hn::Set(d, row[1]), c);
+    c = hn::MulAdd(centre[2], hn::Set(d, row[2]), c);
+    V h = hn::MulAdd(half[0], hn::Set(d, std::abs(row[0])), hn::Set(d, X.slack));
+    h = hn::MulAdd(half[1], hn::Set(d, std::abs(row[1])), h);
+    h = hn::MulAdd(half[2], hn::Set(d, std::abs(row[2])), h);
+    hn::Store(c, d, boxes->other_centre[k] + lane);
+    hn::Store(h, d, boxes->other_half[k] + lane);
+    worst = hn::Max(worst, gap(d, c, h, mid[k], mid[k]));
+  }
+  return mask_bits(d, hn::Le(worst, hn::Zero(d))) << lane;
+}
+
+/// Places the children in `mask`.
+HWY_INLINE std::uint32_t place_children(const TriangleTreeNode& node, std::uint32_t mask, const Placement& X,
+                                        const float* mid, ChildBoxes* boxes) {
+  const Floats16 d;
+  const hn::RebindToSigned<Floats16> di;
+  const hn::Rebind<std::uint8_t, Floats16> d8;
+  using I = hn::Vec<hn::RebindToSigned<Floats16>>;
   std::uint32_t reach = 0;
   for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
-    hn::Mask<Lanes16> in;
+    I low[3];
+    I high[3];
     for (int k = 0; k < 3; ++k) {
-      V16 centre;
-      V16 half;
-      decode(node, k, lane, &centre, &half);
-      const auto along = reaches(centre, half, other_centre[k], other_half[k]);
-      in = k == 0 ? along : hn::And(in, along);
+      low[k] = hn::PromoteTo(di, hn::LoadU(d8, node.low[k] + lane));
+      high[k] = hn::PromoteTo(di, hn::LoadU(d8, node.high[k] + lane));
     }
-    reach |= mask_bits(d, in) << lane;
+    reach |= place_lanes(d, low, high, node, X, mid, lane, boxes);
   }
-  return reach;
-}
-
-/// Puts the boxes of a node's children into its own frame and the other node's, and tells which reach the other node's
-/// box, which has its low corner at the origin and its centre at `mid`. R[k] is the row of coordinate k.
-HWY_INLINE std::uint32_t place_children(const TriangleTreeNode& node, const float (&R)[3][4], const float* p,
-                                        float slack, const float* mid, ChildBoxes* boxes) {
-  const Lanes16 d;
-  std::uint32_t reach = 0;
-  for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
-    V16 centre[3];
-    V16 half[3];
-    for (int k = 0; k < 3; ++k) {
-      decode(node, k, lane, &centre[k], &half[k]);
-      hn::Store(centre[k], d, boxes->centre[k] + lane);
-      hn::Store(half[k], d, boxes->half[k] + lane);
-    }
-    hn::Mask<Lanes16> in;
-    for (int k = 0; k < 3; ++k) {
-      V16 c = hn::MulAdd(centre[0], hn::Set(d, R[k][0]), hn::Set(d, p[k]));
-      c = hn::MulAdd(centre[1], hn::Set(d, R[k][1]), c);
-      c = hn::MulAdd(centre[2], hn::Set(d, R[k][2]), c);
-      V16 h = hn::MulAdd(half[0], hn::Set(d, std::abs(R[k][0])), hn::Set(d, slack));
-      h = hn::MulAdd(half[1], hn::Set(d, std::abs(R[k][1])), h);
-      h = hn::MulAdd(half[2], hn::Set(d, std::abs(R[k][2])), h);
-      hn::Store(c, d, boxes->other_centre[k] + lane);
-      hn::Store(h, d, boxes->other_half[k] + lane);
-      const auto along = reaches(c, h, mid[k], mid[k]);
-      in = k == 0 ? along : hn::And(in, along);
-    }
-    reach |= mask_bits(d, in) << lane;
-  }
-  return reach;
+  return reach & mask;
 }
 
 /// What the nine axes across edges need, for rows of `p` against lanes of `q`.
@@ -255,28 +343,30 @@ struct CrossTerms {
 };
 
 /// R[i][k]: coordinate i in q's frame of p's axis k.
-HWY_INLINE void make_cross_terms(const float (&R)[3][4], float slack, const ChildBoxes& p, const ChildBoxes& q,
+HWY_INLINE void make_cross_terms(const float* const (&R)[3], float slack, const ChildBoxes& p, const ChildBoxes& q,
                                  CrossTerms* terms) {
-  const Lanes16 d;
+  const Floats16 d;
   for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
-    V16 hp[3];
-    V16 hq[3];
-    for (int k = 0; k < 3; ++k) {
-      hp[k] = hn::Load(d, p.half[k] + lane);
-      hq[k] = hn::Load(d, q.half[k] + lane);
+    const V16 half[3] = {hn::Load(d, p.half[0] + lane), hn::Load(d, p.half[1] + lane), hn::Load(d, p.half[2] + lane)};
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        const int k1 = (k + 1) % 3;
+        const int k2 = (k + 2) % 3;
+        hn::Store(hn::MulAdd(half[k1], hn::Set(d, std::abs(R[i][k2])),
+                             hn::MulAdd(half[k2], hn::Set(d, std::abs(R[i][k1])), hn::Set(d, slack))),
+                  d, terms->row[3 * i + k] + lane);
+      }
     }
+  }
+  for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
+    const V16 half[3] = {hn::Load(d, q.half[0] + lane), hn::Load(d, q.half[1] + lane), hn::Load(d, q.half[2] + lane)};
     for (int i = 0; i < 3; ++i) {
       const int i1 = (i + 1) % 3;
       const int i2 = (i + 2) % 3;
       for (int k = 0; k < 3; ++k) {
-        const int k1 = (k + 1) % 3;
-        const int k2 = (k + 2) % 3;
-        const V16 row = hn::MulAdd(hp[k1], hn::Set(d, std::abs(R[i][k2])),
-                                   hn::MulAdd(hp[k2], hn::Set(d, std::abs(R[i][k1])), hn::Set(d, slack)));
-        const V16 other =
-            hn::MulAdd(hq[i1], hn::Set(d, std::abs(R[i2][k])), hn::Mul(hq[i2], hn::Set(d, std::abs(R[i1][k]))));
-        hn::Store(row, d, terms->row[3 * i + k] + lane);
-        hn::Store(other, d, terms->lane[3 * i + k] + lane);
+        hn::Store(
+            hn::MulAdd(half[i1], hn::Set(d, std::abs(R[i2][k])), hn::Mul(half[i2], hn::Set(d, std::abs(R[i1][k])))), d,
+            terms->lane[3 * i + k] + lane);
       }
     }
   }
@@ -284,20 +374,15 @@ HWY_INLINE void make_cross_terms(const float (&R)[3][4], float slack, const Chil
 
 /// Which boxes of q overlap box `row` of p along the six axes of the faces.
 HWY_INLINE std::uint32_t overlap_on_faces(const ChildBoxes& p, std::uint32_t row, const ChildBoxes& q) {
-  const Lanes16 d;
+  const Floats16 d;
   std::uint32_t bits = 0;
   for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
-    V16 worst = hn::Sub(hn::Abs(hn::Sub(hn::Load(d, q.centre[0] + lane), hn::Set(d, p.other_centre[0][row]))),
-                        hn::Add(hn::Load(d, q.half[0] + lane), hn::Set(d, p.other_half[0][row])));
-    for (int k = 1; k < 3; ++k) {
-      worst =
-          hn::Max(worst, hn::Sub(hn::Abs(hn::Sub(hn::Load(d, q.centre[k] + lane), hn::Set(d, p.other_centre[k][row]))),
-                                 hn::Add(hn::Load(d, q.half[k] + lane), hn::Set(d, p.other_half[k][row]))));
-    }
+    V16 worst = hn::Set(d, -1.0F);
     for (int k = 0; k < 3; ++k) {
-      worst =
-          hn::Max(worst, hn::Sub(hn::Abs(hn::Sub(hn::Load(d, q.other_centre[k] + lane), hn::Set(d, p.centre[k][row]))),
-                                 hn::Add(hn::Load(d, q.other_half[k] + lane), hn::Set(d, p.half[k][row]))));
+      worst = hn::Max(worst, gap(d, hn::Load(d, q.centre[k] + lane), hn::Load(d, q.half[k] + lane),
+                                 p.other_centre[k][row], p.other_half[k][row]));
+      worst = hn::Max(worst, gap(d, hn::Load(d, q.other_centre[k] + lane), hn::Load(d, q.other_half[k] + lane),
+                                 p.centre[k][row], p.half[k][row]));
     }
     bits |= mask_bits(d, hn::Le(worst, hn::Zero(d))) << lane;
   }
@@ -305,9 +390,9 @@ HWY_INLINE std::uint32_t overlap_on_faces(const ChildBoxes& p, std::uint32_t row
 }
 
 /// The same along the nine axes across edges.
-HWY_INLINE std::uint32_t overlap_across_edges(const float (&R)[3][4], const CrossTerms& terms, const ChildBoxes& p,
+HWY_INLINE std::uint32_t overlap_across_edges(const float* const (&R)[3], const CrossTerms& terms, const ChildBoxes& p,
                                               std::uint32_t row, const ChildBoxes& q) {
-  const Lanes16 d;
+  const Floats16 d;
   std::uint32_t bits = 0;
   for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
     V16 apart[3];
@@ -317,7 +402,7 @@ HWY_INLINE std::uint32_t overlap_across_edges(const float (&R)[3][4], const Cros
       const int i1 = (i + 1) % 3;
       const int i2 = (i + 2) % 3;
       for (int k = 0; k < 3; ++k) {
-        const V16 along = hn::Sub(hn::Mul(apart[i2], hn::Set(d, R[i1][k])), hn::Mul(apart[i1], hn::Set(d, R[i2][k])));
+        const V16 along = hn::MulSub(apart[i2], hn::Set(d, R[i1][k]), hn::Mul(apart[i1], hn::Set(d, R[i2][k])));
         const V16 reach = hn::Add(hn::Load(d, terms.lane[3 * i + k] + lane), hn::Set(d, terms.row[3 * i + k][row]));
         worst = hn::Max(worst, hn::Sub(hn::Abs(along), reach));
       }
@@ -333,28 +418,29 @@ HWY_INLINE std::uint32_t rank_below(std::uint32_t mask, std::uint32_t bit) {
 
 /// Child i of a node, which is a node itself.
 HWY_INLINE std::uint32_t child_node(const TriangleTreeNode& node, std::uint32_t i) {
-  return node.first_child + rank_below(static_cast<std::uint32_t>(node.child_mask & ~node.leaf_mask), i);
+  return node.first_child() + rank_below(node.child_mask() & ~node.leaf_mask(), i);
 }
 /// Block of child i of a node, which is a leaf.
 HWY_INLINE std::uint32_t child_block(const TriangleTreeNode& node, std::uint32_t i) {
-  return node.first_leaf + rank_below(node.leaf_mask, i);
+  return node.first_leaf() + rank_below(node.leaf_mask(), i);
 }
 
 /// The children of two nodes against each other: what overlaps is pushed, or is a pair of leaves. Returns whether a
-/// leaf ended it.
+/// leaf ended it. `at` is the place of the pair in `frames`.
 template <bool kCount, class Leaf>
-HWY_INLINE bool descend(const NodePair& at, const PairFrame& pair, const TriangleTreeNode* nodes_a,
+HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::size_t at, const TriangleTreeNode* nodes_a,
                         const TriangleTreeNode* nodes_b, std::vector<NodePair>* stack, QueryCounts* counts,
                         const Leaf& leaf) {
-  const TriangleTreeNode& a = nodes_a[at.a];
-  const TriangleTreeNode& b = nodes_b[at.b];
+  const TriangleTreeNode& a = nodes_a[pair.a];
+  const TriangleTreeNode& b = nodes_b[pair.b];
+  const float slack = frames.slack[at];
+  const Placement X_ab = {{frames.R_ba[0] + at, frames.R_ba[1] + at, frames.R_ba[2] + at}, frames.p_ab + at, slack};
+  const Placement X_ba = {{frames.R_ab[0] + at, frames.R_ab[1] + at, frames.R_ab[2] + at}, frames.p_ba + at, slack};
   ChildBoxes boxes_a;
   ChildBoxes boxes_b;
-  const std::uint32_t in_a =
-      at.a_children & place_children(a, pair.R_ab, pair.p_ba, pair.slack, b.half_extent, &boxes_a);
+  const std::uint32_t in_a = place_children(a, pair.a_children, X_ba, b.half_extent, &boxes_a);
   if (in_a == 0) return false;
-  const std::uint32_t in_b =
-      at.b_children & place_children(b, pair.R_ba, pair.p_ab, pair.slack, a.half_extent, &boxes_b);
+  const std::uint32_t in_b = place_children(b, pair.b_children, X_ab, a.half_extent, &boxes_b);
   if (in_b == 0) return false;
 
   // Rows are the side with fewer children left.
@@ -366,7 +452,7 @@ HWY_INLINE bool descend(const NodePair& at, const PairFrame& pair, const Triangl
   const TriangleTreeNode* nodes_p = rows_are_a ? nodes_a : nodes_b;
   const TriangleTreeNode* nodes_q = rows_are_a ? nodes_b : nodes_a;
   const std::uint32_t in_q = rows_are_a ? in_b : in_a;
-  const float(&R)[3][4] = rows_are_a ? pair.R_ab : pair.R_ba;
+  const float* const(&R)[3] = rows_are_a ? X_ba.rows : X_ab.rows;
   const auto push = [&](std::uint32_t node_of_p, std::uint32_t node_of_q, std::uint32_t of_p, std::uint32_t of_q) {
     if (rows_are_a) {
       stack->push_back({node_of_p, node_of_q, static_cast<std::uint16_t>(of_p), static_cast<std::uint16_t>(of_q)});
@@ -384,36 +470,38 @@ HWY_INLINE bool descend(const NodePair& at, const PairFrame& pair, const Triangl
     if constexpr (kCount) counts->volume_tests += static_cast<std::uint64_t>(std::popcount(in_q));
     if (hits == 0) continue;
     if (!have_terms) {
-      make_cross_terms(R, pair.slack, p, q, &terms);
+      make_cross_terms(R, slack, p, q, &terms);
       have_terms = true;
     }
     hits &= overlap_across_edges(R, terms, p, row, q);
     if (hits == 0) continue;
-    const std::uint32_t leaf_hits = hits & node_q.leaf_mask;
-    std::uint32_t node_hits = hits & ~leaf_hits;
-    if ((node_p.leaf_mask >> row & 1U) != 0) {
-      for (std::uint32_t rest = leaf_hits; rest != 0; rest &= rest - 1) {
-        const std::uint32_t block_p = child_block(node_p, row);
-        const std::uint32_t block_q = child_block(node_q, static_cast<std::uint32_t>(std::countr_zero(rest)));
-        if (rows_are_a ? leaf(block_p, block_q) : leaf(block_q, block_p)) return true;
+    const auto child_of_p = row;
+    const bool p_is_leaf = (node_p.leaf_mask() >> child_of_p & 1U) != 0;
+    const std::uint32_t below_p = p_is_leaf ? child_block(node_p, child_of_p) : child_node(node_p, child_of_p);
+    const std::uint32_t all_p = p_is_leaf ? 0 : nodes_p[below_p].child_mask();
+    std::uint32_t leaves_of_q = 0;
+    for (; hits != 0; hits &= hits - 1) {
+      const auto child_of_q = static_cast<std::uint32_t>(std::countr_zero(hits));
+      const bool q_is_leaf = (node_q.leaf_mask() >> child_of_q & 1U) != 0;
+      if (p_is_leaf && q_is_leaf) {
+        const std::uint32_t block_q = child_block(node_q, child_of_q);
+        if (rows_are_a ? leaf(below_p, block_q) : leaf(block_q, below_p)) return true;
+      } else if (p_is_leaf) {
+        q_with_leaves |= 1U << child_of_q;
+        leaves_of_p[child_of_q] |= static_cast<std::uint16_t>(1U << child_of_p);
+      } else if (q_is_leaf) {
+        leaves_of_q |= 1U << child_of_q;
+      } else {
+        const std::uint32_t below_q = child_node(node_q, child_of_q);
+        push(below_p, below_q, all_p, nodes_q[below_q].child_mask());
       }
-      q_with_leaves |= node_hits;
-      for (; node_hits != 0; node_hits &= node_hits - 1)
-        leaves_of_p[std::countr_zero(node_hits)] |= static_cast<std::uint16_t>(1U << row);
-      continue;
     }
-    const std::uint32_t child_p = child_node(node_p, row);
-    const std::uint32_t all_p = nodes_p[child_p].child_mask;
-    if (leaf_hits != 0) push(child_p, rows_are_a ? at.b : at.a, all_p, leaf_hits);
-    for (; node_hits != 0; node_hits &= node_hits - 1) {
-      const std::uint32_t child_q = child_node(node_q, static_cast<std::uint32_t>(std::countr_zero(node_hits)));
-      push(child_p, child_q, all_p, nodes_q[child_q].child_mask);
-    }
+    if (leaves_of_q != 0) push(below_p, rows_are_a ? pair.b : pair.a, all_p, leaves_of_q);
   }
   for (; q_with_leaves != 0; q_with_leaves &= q_with_leaves - 1) {
     const auto i = static_cast<std::uint32_t>(std::countr_zero(q_with_leaves));
-    const std::uint32_t child_q = child_node(node_q, i);
-    push(rows_are_a ? at.a : at.b, child_q, leaves_of_p[i], nodes_q[child_q].child_mask);
+    const std::uint32_t below_q = child_node(node_q, i);
+    push(rows_are_a ? pair.a : pair.b, below_q, leaves_of_p[i], nodes_q[below_q].child_mask());
   }
   return false;
 }
@@ -423,35 +511,43 @@ HWY_INLINE bool descend(const NodePair& at, const PairFrame& pair, const Triangl
 template <bool kCount, class Leaf>
 HWY_INLINE bool for_overlapping_leaves(const TriangleTree& tree_a, const TriangleTree& tree_b, const Transform& X_AB,
                                        QueryScratch* scratch, QueryCounts* counts, const Leaf& leaf) {
-  // So many pairs are begun before the first is looked at, so that the processor need not guess what comes of one
-  // before it can go on with the next.
-  constexpr std::size_t kAtOnce = 4;
   const QueryFrame query = make_query_frame(tree_a, tree_b, X_AB);
   const TriangleTreeNode* nodes_a = tree_a.nodes().data();
   const TriangleTreeNode* nodes_b = tree_b.nodes().data();
   std::vector<NodePair>& stack = scratch->node_pairs();
   stack.clear();
-  stack.push_back({0, 0, nodes_a[0].child_mask, nodes_b[0].child_mask});
-  NodePair begun[kAtOnce];
-  PairFrame frames[kAtOnce];
+  stack.push_back(
+      {0, 0, static_cast<std::uint16_t>(nodes_a[0].child_mask()), static_cast<std::uint16_t>(nodes_b[0].child_mask())});
+  PairFrames frames;
   while (!stack.empty()) {
     const std::size_t count = std::min(kAtOnce, stack.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      begun[i] = stack[stack.size() - 1 - i];
-      const TriangleTreeNode& a = nodes_a[begun[i].a];
-      const TriangleTreeNode& b = nodes_b[begun[i].b];
-      make_pair_frame(query, a, b, &frames[i]);
-      begun[i].a_children &= static_cast<std::uint16_t>(reaching_children(a, frames[i].centre_b_a, frames[i].half_b_a));
-      begun[i].b_children &= static_cast<std::uint16_t>(reaching_children(b, frames[i].centre_a_b, frames[i].half_a_b));
+    NodePair begun[kAtOnce];
+    Nodes a;
+    Nodes b;
+    for (std::size_t i = 0; i < kAtOnce; ++i) {
+      begun[i] = stack[stack.size() - 1 - std::min(i, count - 1)];
+      a[i] = &nodes_a[begun[i].a];
+      b[i] = &nodes_b[begun[i].b];
     }
     stack.resize(stack.size() - count);
+    if (count < kAtOnce - 1) {
+      make_pair_frames(hn::CappedTag<float, 4>(), query, a, b, count, &frames);
+    } else {
+      make_pair_frames(Floats16(), query, a, b, kAtOnce, &frames);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      begun[i].a_children &=
+          static_cast<std::uint16_t>(children_that_meet(*a[i], frames.low_of_b + 4 * i, frames.high_of_b + 4 * i));
+      begun[i].b_children &=
+          static_cast<std::uint16_t>(children_that_meet(*b[i], frames.low_of_a + 4 * i, frames.high_of_a + 4 * i));
+    }
     for (std::size_t i = 0; i < count; ++i) {
       if constexpr (kCount) {
         ++counts->node_pairs;
         counts->volume_tests += 32;
       }
       if (begun[i].a_children == 0 || begun[i].b_children == 0) continue;
-      if (descend<kCount>(begun[i], frames[i], nodes_a, nodes_b, &stack, counts, leaf)) return true;
+      if (descend<kCount>(begun[i], frames, 4 * i, nodes_a, nodes_b, &stack, counts, leaf)) return true;
     }
   }
   return false;

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Matrix3f;
 
 constexpr int kBranching = 16;
-constexpr float kSteps = 255.0F;
+constexpr float kSteps = 253.0F;
 // Of a sum of three products of numbers below one, with room to spare.
 constexpr float kRounding = 8.0F * std::numeric_limits<float>::epsilon();
 
@@ -112,20 +112,24 @@ void fit(const Matrix3f& R_NM, const Corners& corners, std::span<const ChildRang
   const float pad = kRounding * (from_origin.high.cwiseAbs().maxCoeff() + std::numeric_limits<float>::min());
   Vector3f diagonal;
   for (int k = 0; k < 3; ++k) {
-    const auto row = static_cast<std::size_t>(k);
-    const float step =
-        std::max((from_origin.high[k] + 2.0F * pad) / kSteps * (1.0F + kRounding), std::numeric_limits<float>::min());
-    for (int c = 0; c < 3; ++c) node->frame[c][k] = R_NM(k, c);
-    node->frame[k][3] = 0.5F * step;
-    node->half_extent[k] = 0.5F * kSteps * step * (1.0F + kRounding);
+    const auto axis = static_cast<std::size_t>(k);
+    const float half_extent =
+        std::max(0.5F * (from_origin.high[k] + 2.0F * pad), 128.0F * std::numeric_limits<float>::min()) *
+        (1.0F + kRounding);
+    const float step = 2.0F * half_step(half_extent);
+    node->axes_x[k] = R_NM(k, 0);
+    node->axes_y[k] = R_NM(k, 1);
+    node->axes_z[k] = R_NM(k, 2);
+    node->steps_per_metre[k] = 1.0F / step;
+    node->half_extent[k] = half_extent;
     node->origin[k] = origin[k];
-    diagonal[k] = step * kSteps;
+    diagonal[k] = 2.0F * half_extent;
     for (std::size_t i = 0; i < children.size(); ++i) {
       const float low = std::floor((boxes[i].low[k] - pad) / step);
       const float high = std::ceil((boxes[i].high[k] + pad) / step);
       PRESCENE_DCHECK(high <= kSteps);
-      node->low[row][i] = static_cast<std::uint8_t>(std::clamp(low, 0.0F, kSteps));
-      node->high[row][i] = static_cast<std::uint8_t>(std::clamp(high, 0.0F, kSteps));
+      node->low[axis][i] = static_cast<std::uint8_t>(1.0F + std::clamp(low, 0.0F, kSteps));
+      node->high[axis][i] = static_cast<std::uint8_t>(1.0F + std::clamp(high, 0.0F, kSteps));
     }
   }
   node->diagonal = diagonal.norm();
@@ -222,10 +226,9 @@ TriangleTree TriangleTree::build(std::shared_ptr<const Mesh> mesh, const Triangl
         if (child.is_leaf()) leaf_mask |= 1U << c;
       }
       TriangleTreeNode node = make_node(corners, std::span(children).first(from.child_count), options.rotated_frames);
-      node.leaf_mask = static_cast<std::uint16_t>(leaf_mask);
-      node.child_mask = static_cast<std::uint16_t>((1U << from.child_count) - 1U);
-      node.first_child = first[0];
-      node.first_leaf = first[1];
+      node.children_word = TriangleTreeNode::kWordBit | from.child_count << 16U | leaf_mask;
+      node.first_child_word = TriangleTreeNode::kWordBit | first[0];
+      node.first_leaf_word = TriangleTreeNode::kWordBit | first[1];
       nodes[rank[i]] = node;
     }
   });

@@ -29,22 +29,43 @@ struct TriangleTreeOptions {
   friend bool operator==(const TriangleTreeOptions&, const TriangleTreeOptions&) = default;
 };
 
-/// One node: 192 bytes, three cache lines. Boxes of children are in the node's own frame N, whose origin is the low
-/// corner of the node's box: child i spans low[k][i] to high[k][i] steps along axis k.
+/// One node: 192 bytes, three cache lines. Boxes of children are in the node's own frame N, whose origin is a corner of
+/// the node's box: along axis k, child i spans from low[k][i] - 1 to high[k][i] - 1 steps, numbers from 0 to 253, so
+/// that 0 and 255 are left to say "below" and "above" all of them.
+///
+/// Vectors of three are loaded as four floats, so what shares their 16 bytes has kWordBit, which makes it a normal
+/// float: subnormal ones would slow the arithmetic that nobody looks at.
 struct alignas(64) TriangleTreeNode {
-  float frame[3][4];        ///< frame[c][k]: coordinate c, in the mesh's frame, of axis k; frame[k][3]: half a step, m.
-  float origin[3];          ///< Of N in the mesh's frame, m.
-  std::uint16_t leaf_mask;  ///< Bit i: child i is a leaf.
-  std::uint16_t child_mask;  ///< Bit i: there is a child i.
+  static constexpr std::uint32_t kWordBit = 1U << 30U;
+
+  float axes_x[3];  ///< Coordinate x, in the mesh's frame, of the three axes of N.
+  std::uint32_t first_child_word;
+  float axes_y[3];
+  std::uint32_t first_leaf_word;
+  float axes_z[3];
+  std::uint32_t children_word;  ///< leaf_mask() and, from bit 16 on, the number of children.
+  float origin[3];              ///< Of N in the mesh's frame, m.
+  float diagonal;               ///< Of the node's box, m.
+  float half_extent[3];         ///< Of the node's box: half of 253 steps, m.
+  std::uint32_t unused;
+  float steps_per_metre[3];
+  std::uint32_t unused_too;
   std::uint8_t low[3][16];
   std::uint8_t high[3][16];
-  std::uint32_t first_child;  ///< Node of the first child that is not a leaf; the others follow.
-  std::uint32_t first_leaf;   ///< Block of the first child that is a leaf; the others follow.
-  float half_extent[3];       ///< Of the node's box: half of 255 steps, m.
-  float diagonal;             ///< Of the node's box, m.
-  std::uint32_t unused[2];
+
+  /// Node of the first child that is not a leaf; the others follow.
+  std::uint32_t first_child() const { return first_child_word & ~kWordBit; }
+  /// Block of the first child that is a leaf; the others follow.
+  std::uint32_t first_leaf() const { return first_leaf_word & ~kWordBit; }
+  /// Bit i: child i is a leaf.
+  std::uint32_t leaf_mask() const { return children_word & 0xFFFFU; }
+  std::uint32_t child_count() const { return children_word >> 16U & 0x1FU; }
+  /// Bit i: there is a child i.
+  std::uint32_t child_mask() const { return (1U << child_count()) - 1U; }
 };
 static_assert(sizeof(TriangleTreeNode) == 192);
+/// Half a step along an axis, m, of a node of that half extent.
+inline float half_step(float half_extent) { return half_extent * (1.0F / 253.0F); }
 
 /// Up to four triangles of a leaf, corner by corner and coordinate by coordinate; a leaf with fewer repeats its last.
 struct alignas(16) TriangleBlock {
