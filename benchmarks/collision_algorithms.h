@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/hierarchy.h"
 #include "prescene/collision/mesh.h"
@@ -67,6 +68,8 @@ struct Algorithm {
 // Names that targets refer to.
 inline constexpr std::string_view kFcl = "FCL OBBRSS";
 inline constexpr std::string_view kDefaultTree = "default tree";
+inline constexpr std::string_view kBoxtree = "Boxtree";
+inline constexpr std::string_view kPlainBoxtree = "plain Boxtree";
 inline constexpr std::string_view kScalarDops = "scalar binary k-DOP tree";
 inline constexpr std::string_view kGimpact = "Bullet GImpact, first contact";
 inline constexpr std::string_view kOde = "ODE trimesh";
@@ -78,6 +81,7 @@ std::vector<Algorithm> peer_algorithms();
 std::vector<Algorithm> our_algorithms();
 /// The same with other settings, one changed at a time; begins with the default tree.
 std::vector<Algorithm> study_algorithms();
+std::string bvhlite_name(const collision::BvhLiteOptions& options);
 std::string simdop_name(const collision::SimdopOptions& options);
 std::string builder_name(collision::Builder builder);
 

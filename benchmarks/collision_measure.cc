@@ -4,12 +4,14 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <utility>
 
+#include "prescene/benchmarks/statistics.h"
 #include "prescene/core/check.h"
 #include "prescene/tests/support/brute_force.h"
 #include "prescene/tests/support/contact_configurations.h"
@@ -47,6 +49,7 @@ std::vector<Transform> make_configurations(ContactConfigurations& make, double s
 }
 
 /// Asks all for their answers, untimed; fills answers, distances and counts.
+/// Asks all for their answers, untimed; fills answers, distances and counts, and marks what is to be timed.
 void ask(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options, Cell* cell) {
   const auto stride = static_cast<std::size_t>(options.slow_stride);
   for (std::size_t k = 0; k < algorithms.size(); ++k) {
@@ -59,6 +62,8 @@ void ask(std::span<const Algorithm> algorithms, const Solvers& solvers, const Me
       if (algorithms[k].has_distance) timings.distances.push_back(solvers[k]->distance(X_AB));
       if (algorithms[k].has_counts) timings.counts.push_back(solvers[k]->count(X_AB));
     }
+    timings.repeated.assign(cell->configurations.size(), kNone);
+    timings.distance.assign(cell->configurations.size(), kNone);
   }
 }
 
@@ -88,49 +93,52 @@ void decide(const tests::MeshPair& pair, std::span<const Algorithm> algorithms, 
   }
 }
 
-void time_singles(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
-                  Cell* cell) {
-  for (std::size_t i = 0; i < cell->configurations.size(); ++i) {
-    const Transform& X_AB = cell->configurations[i];
-    std::vector<std::function<void()>> queries;
-    std::vector<std::pair<std::size_t, bool>> of;  // algorithm, whether the distance
-    for (std::size_t k = 0; k < algorithms.size(); ++k) {
-      PairSolver* solver = solvers[k].get();
-      if (!std::isnan(cell->timings[k].collide[i])) {
-        queries.emplace_back([solver, &X_AB] { solver->collide(X_AB); });
-        of.emplace_back(k, false);
-      }
-      if (algorithms[k].has_distance) {
-        queries.emplace_back([solver, &X_AB] { solver->distance(X_AB); });
-        of.emplace_back(k, true);
-      }
-    }
-    const std::vector<double> seconds = time_interleaved(queries, options);
-    for (std::size_t q = 0; q < queries.size(); ++q) {
-      Timings& timings = cell->timings[of[q].first];
-      if (of[q].second)
-        timings.distance.push_back(seconds[q]);
-      else
-        timings.collide[i] = seconds[q];
-    }
+void time_booleans(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
+                   Cell* cell) {
+  std::vector<Stream> streams(algorithms.size());
+  for (std::size_t k = 0; k < algorithms.size(); ++k) {
+    for (std::size_t i = 0; i < cell->configurations.size(); ++i)
+      if (!std::isnan(cell->timings[k].collide[i]))
+        streams[k].queries.emplace_back(
+            [solver = solvers[k].get(), X_AB = &cell->configurations[i]] { solver->collide(*X_AB); });
+  }
+  const std::vector<std::vector<double>> seconds = time_streams(streams, options.rounds);
+  for (std::size_t k = 0; k < algorithms.size(); ++k) {
+    std::size_t next = 0;
+    for (double& value : cell->timings[k].collide)
+      if (!std::isnan(value)) value = seconds[k][next++];
   }
 }
 
-void time_in_turn(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
-                  Cell* cell) {
-  std::vector<std::function<void()>> passes;
+void time_distances(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
+                    Cell* cell) {
+  std::vector<Stream> streams;
   std::vector<std::size_t> of;
   for (std::size_t k = 0; k < algorithms.size(); ++k) {
-    cell->timings[k].in_turn = kNone;
-    if (algorithms[k].slow) continue;
-    passes.emplace_back([solver = solvers[k].get(), cell] {
-      for (const Transform& X_AB : cell->configurations) solver->collide(X_AB);
-    });
+    if (!algorithms[k].has_distance) continue;
     of.push_back(k);
+    streams.emplace_back();
+    for (const Transform& X_AB : cell->configurations)
+      streams.back().queries.emplace_back([solver = solvers[k].get(), &X_AB] { solver->distance(X_AB); });
   }
-  const std::vector<double> seconds = time_interleaved(passes, options);
-  for (std::size_t p = 0; p < passes.size(); ++p)
-    cell->timings[of[p]].in_turn = seconds[p] / static_cast<double>(cell->configurations.size());
+  const std::vector<std::vector<double>> seconds = time_streams(streams, options.rounds);
+  for (std::size_t s = 0; s < of.size(); ++s) cell->timings[of[s]].distance = seconds[s];
+}
+
+/// Of the default tree and what it is compared with foremost.
+void time_again_and_again(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
+                          Cell* cell) {
+  for (std::size_t i = 0; i < cell->configurations.size(); ++i) {
+    std::vector<std::function<void()>> queries;
+    std::vector<std::size_t> of;
+    for (std::size_t k = 0; k < algorithms.size(); ++k) {
+      if (algorithms[k].name != kDefaultTree && algorithms[k].name != kFcl) continue;
+      of.push_back(k);
+      queries.emplace_back([solver = solvers[k].get(), X_AB = &cell->configurations[i]] { solver->collide(*X_AB); });
+    }
+    const std::vector<double> seconds = time_repeated(queries, options);
+    for (std::size_t q = 0; q < of.size(); ++q) cell->timings[of[q]].repeated[i] = seconds[q];
+  }
 }
 
 void use_targets(std::int64_t allowed) {
@@ -144,42 +152,42 @@ void time_targets(std::span<const Algorithm> algorithms, const Solvers& solvers,
                                    [](const Algorithm& algorithm) { return algorithm.name == kDefaultTree; });
   if (chosen == algorithms.end()) return;
   PairSolver* solver = solvers[static_cast<std::size_t>(chosen - algorithms.begin())].get();
-  std::vector<std::function<void()>> passes;
+  std::vector<Stream> streams;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    cell->targets.push_back({hwy::TargetName(target), 0.0});
-    passes.emplace_back([solver, cell, target] {
-      use_targets(target);
-      for (const Transform& X_AB : cell->configurations) solver->collide(X_AB);
-    });
+    cell->targets.push_back({hwy::TargetName(target), {}});
+    Stream stream{[target] { use_targets(target); }, {}};
+    for (const Transform& X_AB : cell->configurations)
+      stream.queries.emplace_back([solver, &X_AB] { solver->collide(X_AB); });
+    streams.push_back(std::move(stream));
   }
-  const std::vector<double> seconds = time_interleaved(passes, options);
+  const std::vector<std::vector<double>> seconds = time_streams(streams, options.rounds);
   use_targets(0);
-  for (std::size_t i = 0; i < seconds.size(); ++i)
-    cell->targets[i].in_turn = seconds[i] / static_cast<double>(cell->configurations.size());
+  for (std::size_t i = 0; i < seconds.size(); ++i) cell->targets[i].collide = seconds[i];
 }
 
 void time_batches(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
                   ContactConfigurations& make, Cell* cell) {
-  const std::size_t count = cell->configurations.size();
-  for (std::size_t i = 0; i < std::min(count, static_cast<std::size_t>(options.batches)); ++i) {
-    // Spread over the cell, so that both methods and both sides of a contact have their share.
-    const auto batches = static_cast<std::size_t>(options.batches);
-    const std::array<Transform, 16> batch =
-        make.near(cell->configurations[i * (count - 1) / std::max<std::size_t>(1, batches - 1)]);
+  const std::size_t count = cell->configurations.size(), wanted = static_cast<std::size_t>(options.batches);
+  std::vector<std::array<Transform, 16>> batches;
+  // Spread over the cell, so that both methods and both sides of a contact have their share.
+  for (std::size_t i = 0; i < wanted; ++i)
+    batches.push_back(make.near(cell->configurations[i * (count - 1) / (wanted - 1)]));
+  for (std::size_t k = 0; k < algorithms.size(); ++k) {
+    if (!algorithms[k].has_batches) continue;
+    PairSolver* solver = solvers[k].get();
     std::array<bool, 16> answers = {};
-    for (std::size_t k = 0; k < algorithms.size(); ++k) {
-      if (!algorithms[k].has_batches) continue;
-      PairSolver* solver = solvers[k].get();
+    std::vector<Stream> streams(2);
+    for (const std::array<Transform, 16>& batch : batches) {
       solver->collide_batch(batch, answers);
-      for (std::size_t j = 0; j < batch.size(); ++j) PRESCENE_CHECK(answers[j] == solver->collide(batch[j]));
-      const std::vector<std::function<void()>> queries = {[&] { solver->collide_batch(batch, answers); },
-                                                          [&] {
-                                                            for (const Transform& X_AB : batch) solver->collide(X_AB);
-                                                          }};
-      const std::vector<double> seconds = time_interleaved(queries, options);
-      cell->timings[k].batch.push_back(seconds[0]);
-      cell->timings[k].batch_single.push_back(seconds[1]);
+      for (std::size_t i = 0; i < batch.size(); ++i) PRESCENE_CHECK(answers[i] == solver->collide(batch[i]));
+      streams[0].queries.emplace_back([solver, &batch, &answers] { solver->collide_batch(batch, answers); });
+      streams[1].queries.emplace_back([solver, &batch] {
+        for (const Transform& X_AB : batch) solver->collide(X_AB);
+      });
     }
+    const std::vector<std::vector<double>> seconds = time_streams(streams, options.rounds);
+    cell->timings[k].batch = seconds[0];
+    cell->timings[k].batch_single = seconds[1];
   }
 }
 
@@ -200,7 +208,26 @@ void note_costs(const tests::MeshPair& pair, std::span<const Algorithm> algorith
 
 std::vector<double> all_shares() { return {0.0, 0.01, 0.05, 0.1, 0.3, -0.01, -0.1}; }
 
-std::vector<double> time_interleaved(std::span<const std::function<void()>> queries, const MeasureOptions& options) {
+std::vector<std::vector<double>> time_streams(std::span<const Stream> streams, int rounds) {
+  const std::function<void()> nothing = [] {};
+  std::vector<double> clock;
+  for (int i = 0; i < 101; ++i) clock.push_back(time_block(nothing, 1));
+  const double clock_takes = median(std::move(clock));
+  std::vector<std::vector<double>> best;
+  for (const Stream& stream : streams)
+    best.emplace_back(stream.queries.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t round = 0; round < static_cast<std::size_t>(rounds); ++round) {
+    for (std::size_t turn = 0; turn < streams.size(); ++turn) {
+      const std::size_t s = (turn + round) % streams.size();
+      streams[s].before();
+      for (std::size_t q = 0; q < streams[s].queries.size(); ++q)
+        best[s][q] = std::min(best[s][q], std::max(1e-9, time_block(streams[s].queries[q], 1) - clock_takes));
+    }
+  }
+  return best;
+}
+
+std::vector<double> time_repeated(std::span<const std::function<void()>> queries, const MeasureOptions& options) {
   std::vector<int> repeats;
   for (const std::function<void()>& query : queries) {
     query();
@@ -208,9 +235,10 @@ std::vector<double> time_interleaved(std::span<const std::function<void()>> quer
     repeats.push_back(std::clamp(static_cast<int>(std::ceil(options.block / once)), 1, 1000));
   }
   std::vector<double> best(queries.size(), std::numeric_limits<double>::infinity());
-  for (int round = 0; round < options.rounds; ++round) {
+  for (std::size_t round = 0; round < static_cast<std::size_t>(options.rounds); ++round) {
     for (std::size_t turn = 0; turn < queries.size(); ++turn) {
-      const std::size_t q = (turn + static_cast<std::size_t>(round)) % queries.size();
+      const std::size_t q = (turn + round) % queries.size();
+      queries[q]();
       best[q] = std::min(best[q], time_block(queries[q], repeats[q]));
     }
   }
@@ -249,8 +277,9 @@ void measure_pair(const tests::MeshPair& pair, std::span<const Algorithm> algori
     if (cell.configurations.empty()) continue;
     ask(algorithms, solvers, options, &cell);
     decide(pair, algorithms, &cell, measurements);
-    time_singles(algorithms, solvers, options, &cell);
-    time_in_turn(algorithms, solvers, options, &cell);
+    time_booleans(algorithms, solvers, options, &cell);
+    time_distances(algorithms, solvers, options, &cell);
+    time_again_and_again(algorithms, solvers, options, &cell);
     time_targets(algorithms, solvers, options, &cell);
     time_batches(algorithms, solvers, options, make, &cell);
     measurements->cells.push_back(std::move(cell));

@@ -15,33 +15,44 @@ namespace prescene::benchmarks {
 
 struct MeasureOptions {
   int configurations = 32;  ///< A cell; half by the sphere method, half by the grid method.
-  int batches = 4;          ///< A cell, of 16 near configurations each.
-  int rounds = 5;
-  double block = 4e-6;  ///< s: a query is repeated so often in each round that it takes at least this long.
+  int batches = 6;          ///< A cell, of 16 near configurations each.
+  int rounds = 7;
+  double block = 4e-6;  ///< s: a query that is repeated goes on for at least this long in each round.
   int slow_stride = 4;  ///< Slow algorithms are measured on every so many configurations.
   std::uint64_t seed = 2007;
 };
 
-/// Seconds a call of each of `queries`: the smallest of the rounds. In each round every query has its turn, in rotating
-/// order, so that all see the same state of the machine. Caches are warm.
-std::vector<double> time_interleaved(std::span<const std::function<void()>> queries, const MeasureOptions& options);
+/// Queries that are asked one after another, as in use: on the same meshes, each of them another.
+struct Stream {
+  std::function<void()> before = [] {};  ///< Not timed.
+  std::vector<std::function<void()>> queries;
+};
+
+/// Seconds each query takes, stream by stream: each is clocked by itself, less what the clock takes; the smallest of
+/// the rounds. In each round every stream has its turn, in rotating order, so that all see the same state of the
+/// machine.
+std::vector<std::vector<double>> time_streams(std::span<const Stream> streams, int rounds);
+
+/// Seconds a call of each of `queries` when it is asked again and again, so that the processor has learnt it by heart;
+/// otherwise likewise.
+std::vector<double> time_repeated(std::span<const std::function<void()>> queries, const MeasureOptions& options);
 
 /// Of one algorithm in one cell; an entry a configuration, NaN where it was not measured.
 struct Timings {
-  std::vector<double> collide;       ///< s
+  std::vector<double> collide;       ///< s, in a stream.
+  std::vector<double> repeated;      ///< s, the same again and again.
   std::vector<bool> answers;         ///< Of collide; where measured.
-  std::vector<double> distance;      ///< s; empty without distances.
-  std::vector<double> distances;     ///< m
+  std::vector<double> distance;      ///< s; NaN for all without distances.
+  std::vector<double> distances;     ///< m; empty without distances.
   std::vector<WorkCounts> counts;    ///< Empty without counts.
-  double in_turn = 0.0;              ///< s a query while one configuration comes after another; NaN if slow.
   std::vector<double> batch;         ///< s for all 16 of a batch, an entry a batch; empty without batches.
   std::vector<double> batch_single;  ///< s for the same 16 one by one.
 };
 
 /// The default tree with fewer instructions than the machine has.
 struct TargetTiming {
-  std::string target;    ///< As Highway calls it; the best one first.
-  double in_turn = 0.0;  ///< s a query.
+  std::string target;           ///< As Highway calls it; the best one first.
+  std::vector<double> collide;  ///< s, an entry a configuration.
 };
 
 /// A pair of meshes at one distance.

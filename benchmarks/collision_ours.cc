@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "prescene/benchmarks/collision_algorithms.h"
+#include "prescene/collision/dops/boxtree.h"
+#include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/dop_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/triangle_queries.h"
@@ -13,9 +15,15 @@
 namespace prescene::benchmarks {
 namespace {
 
+using collision::Boxtree;
+using collision::BoxtreeOptions;
 using collision::Builder;
+using collision::BvhLiteOptions;
+using collision::BvhLiteScratch;
+using collision::BvhLiteTree;
 using collision::DopTree;
 using collision::DopTreeOptions;
+using collision::PlainBoxtree;
 using collision::PlanePrecision;
 using collision::QueryCounts;
 using collision::QueryScratch;
@@ -55,7 +63,7 @@ class TreeSolver : public PairSolver {
 
  private:
   bool ask(const Transform& X_AB, QueryCounts* counts) {
-    if constexpr (std::is_same_v<Tree, DopTree>)
+    if constexpr (std::is_same_v<Tree, DopTree> || std::is_same_v<Tree, Boxtree> || std::is_same_v<Tree, PlainBoxtree>)
       return collision::collide(a_, b_, X_AB, counts);
     else
       return collision::collide(a_, b_, X_AB, scratch_, counts);
@@ -71,7 +79,7 @@ class TreeSolver : public PairSolver {
   }
 
   Tree a_, b_;
-  QueryScratch scratch_;
+  std::conditional_t<std::is_same_v<Tree, BvhLiteTree>, BvhLiteScratch, QueryScratch> scratch_;
 };
 
 template <class Tree, class Options>
@@ -104,6 +112,11 @@ std::string name_of(SimdopTraversal traversal) {
 
 }  // namespace
 
+std::string bvhlite_name(const BvhLiteOptions& options) {
+  return "BVHLite k=" + std::to_string(options.k) + " n=" + std::to_string(options.branching) + " " +
+         std::to_string(options.bits) + " bit, " + std::to_string(options.leaf_items) + " a leaf";
+}
+
 std::string simdop_name(const SimdopOptions& options) {
   return "SIMDop k=" + std::to_string(options.k) + " n=" + std::to_string(options.branching) + " " +
          name_of(options.traversal) + (options.precision == PlanePrecision::kHalf ? " 16 bit" : " 32 bit") + ", " +
@@ -119,6 +132,11 @@ std::vector<Algorithm> our_algorithms() {
   algorithms.push_back(triangle_tree(kDefaultTree, {}));
   algorithms.push_back(triangle_tree("default tree, frames not rotated", {.rotated_frames = false}));
   algorithms.push_back(algorithm_of<SimdopTree>("SIMDop", SimdopOptions{}));
+  algorithms.push_back(algorithm_of<BvhLiteTree>("BVHLite", BvhLiteOptions{}));
+  algorithms.push_back(algorithm_of<Boxtree>(std::string(kBoxtree), BoxtreeOptions{}));
+  algorithms.back().slow = true;
+  algorithms.push_back(algorithm_of<PlainBoxtree>(std::string(kPlainBoxtree), BoxtreeOptions{}.builder));
+  algorithms.back().slow = true;
   algorithms.push_back(algorithm_of<DopTree>(std::string(kScalarDops), DopTreeOptions{}));
   return algorithms;
 }
@@ -150,6 +168,17 @@ std::vector<Algorithm> study_algorithms() {
   add_simdop({.precision = PlanePrecision::kSingle});
   add_simdop({.traversal = SimdopTraversal::kOneVersusOne});
   add_simdop({.branching = 4, .traversal = SimdopTraversal::kFourVersusFour});
+  for (const BvhLiteOptions& options :
+       {BvhLiteOptions{}, BvhLiteOptions{.bits = 4}, BvhLiteOptions{.bits = 8},
+        BvhLiteOptions{.bits = 4, .leaf_items = 4}, BvhLiteOptions{.bits = 4, .leaf_items = 8}, BvhLiteOptions{.k = 26},
+        BvhLiteOptions{.k = 26, .branching = 16}})
+    algorithms.push_back(algorithm_of<BvhLiteTree>(bvhlite_name(options), options));
+  algorithms.push_back(algorithm_of<Boxtree>(std::string(kBoxtree), BoxtreeOptions{}));
+  algorithms.back().slow = true;
+  algorithms.push_back(algorithm_of<PlainBoxtree>(std::string(kPlainBoxtree), BoxtreeOptions{}.builder));
+  algorithms.back().slow = true;
+  algorithms.push_back(algorithm_of<Boxtree>("Boxtree, 4 a leaf", BoxtreeOptions{.leaf_items = 4}));
+  algorithms.back().slow = true;
   algorithms.push_back(algorithm_of<DopTree>(std::string(kScalarDops), DopTreeOptions{}));
   algorithms.push_back(algorithm_of<DopTree>("scalar binary k-DOP tree, surface area heuristic",
                                              DopTreeOptions{.builder = Builder::kSurfaceAreaHeuristic}));

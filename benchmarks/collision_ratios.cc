@@ -47,6 +47,18 @@ class RatioOfCells {
 
 }  // namespace
 
+std::vector<double> Timings::*seconds_of(Query query) {
+  switch (query) {
+    case Query::kCollide:
+      return &Timings::collide;
+    case Query::kCollideRepeated:
+      return &Timings::repeated;
+    case Query::kDistance:
+      return &Timings::distance;
+  }
+  return nullptr;
+}
+
 std::optional<Ratio> speed_ratio(const Measurements& measurements, std::string_view name, std::string_view baseline,
                                  Query query, std::span<const double> shares) {
   const std::optional<std::size_t> fast = index_of(measurements, name), slow = index_of(measurements, baseline);
@@ -55,18 +67,12 @@ std::optional<Ratio> speed_ratio(const Measurements& measurements, std::string_v
   for (const Cell& cell : measurements.cells) {
     if (!contains(shares, cell.share)) continue;
     const Timings &of_fast = cell.timings[*fast], &of_slow = cell.timings[*slow];
-    if (query == Query::kCollideInTurn) {
-      ratio.add(cell, {of_slow.in_turn}, {of_fast.in_turn}, {true});
-      continue;
-    }
     std::vector<bool> right(cell.configurations.size(), true);
     for (std::size_t i = 0; i < right.size(); ++i)
       right[i] = query == Query::kDistance ||
                  (of_fast.answers[i] == cell.collides[i] && of_slow.answers[i] == cell.collides[i]);
-    if (query == Query::kCollide)
-      ratio.add(cell, of_slow.collide, of_fast.collide, right);
-    else
-      ratio.add(cell, of_slow.distance, of_fast.distance, right);
+    const std::vector<double> Timings::*seconds = seconds_of(query);
+    ratio.add(cell, of_slow.*seconds, of_fast.*seconds, right);
   }
   return ratio.joined();
 }

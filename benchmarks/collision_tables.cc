@@ -107,24 +107,13 @@ Table ratio_table(const Measurements& measurements) {
 
 namespace {
 
-/// Medians of a cell, or the one value; nothing where it was not measured.
-std::optional<double> typical_seconds(const Timings& timings, Query query) {
-  if (query == Query::kCollideInTurn) {
-    if (std::isnan(timings.in_turn)) return std::nullopt;
-    return timings.in_turn;
-  }
-  const std::vector<double> seconds = measured(query == Query::kCollide ? timings.collide : timings.distance);
-  if (seconds.empty()) return std::nullopt;
-  return median(seconds);
-}
-
 /// Microseconds, geometric mean over pairs; NaN for none.
 double typical_microseconds(const Measurements& measurements, std::size_t algorithm, Query query, double share) {
   std::vector<double> each;
   for (const Cell& cell : measurements.cells) {
     if (cell.share != share) continue;
-    if (const std::optional<double> seconds = typical_seconds(cell.timings[algorithm], query))
-      each.push_back(1e6 * *seconds);
+    const std::vector<double> seconds = measured(cell.timings[algorithm].*seconds_of(query));
+    if (!seconds.empty()) each.push_back(1e6 * median(seconds));
   }
   return each.empty() ? kNone : geometric_mean(each);
 }
@@ -137,7 +126,7 @@ Table summary_table(const Measurements& measurements) {
   for (const double share : shares) table.columns.push_back(share_text(share));
   for (std::size_t k = 0; k < measurements.algorithms.size(); ++k) {
     for (const auto& [name, query] :
-         {std::pair("boolean", Query::kCollide), std::pair("boolean, in turn", Query::kCollideInTurn),
+         {std::pair("boolean", Query::kCollide), std::pair("boolean, repeated", Query::kCollideRepeated),
           std::pair("distance", Query::kDistance)}) {
       std::vector<Figure> row = {measurements.algorithms[k], std::string(name)};
       bool any = false;
@@ -162,7 +151,7 @@ Table target_table(const Measurements& measurements) {
     for (const double share : shares) {
       std::vector<double> each;
       for (const Cell& cell : measurements.cells)
-        if (cell.share == share) each.push_back(1e6 * cell.targets[t].in_turn);
+        if (cell.share == share) each.push_back(1e6 * median(cell.targets[t].collide));
       row.emplace_back(geometric_mean(each));
     }
     table.rows.push_back(std::move(row));

@@ -15,7 +15,7 @@ namespace prescene::benchmarks {
 Table query_table(const Measurements& measurements);
 /// A row an algorithm and distance: geometric means over the pairs of the median times, in microseconds.
 Table summary_table(const Measurements& measurements);
-/// A row an instruction set: the default tree's boolean queries in turn, in microseconds.
+/// A row an instruction set: the default tree's boolean queries, medians in microseconds.
 Table target_table(const Measurements& measurements);
 /// The summary, and how many times faster than FCL the default tree is for each pair.
 Plot summary_plot(const Measurements& measurements);
@@ -29,8 +29,9 @@ Table wrong_answer_table(const Measurements& measurements);
 /// A row an algorithm: how many answers were wrong, which way.
 Table wrong_answer_counts(const Measurements& measurements);
 
-/// In turn: one configuration after another, all together.
-enum class Query { kCollide, kCollideInTurn, kDistance };
+/// kCollideRepeated: the same query again and again.
+enum class Query { kCollide, kCollideRepeated, kDistance };
+std::vector<double> Timings::*seconds_of(Query query);
 
 /// How many times faster `name` is than `baseline`: per pair and distance the geometric mean over the configurations
 /// that both answer rightly, then over pairs and `shares`. Nothing when there is no such configuration.

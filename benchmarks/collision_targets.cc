@@ -21,9 +21,6 @@ using collision::Builder;
 
 constexpr std::array<double, 3> kNearShares = {0.0, 0.01, 0.05};
 constexpr std::array<double, 2> kDistanceShares = {0.0, 0.01};
-// Small meshes have partly filled nodes: memory is told for those that need it.
-constexpr std::uint32_t kLeastTriangles = 10000;
-
 void set_reached(const std::optional<Ratio>& ratio, Target* target) {
   if (!ratio) {
     target->why = "not measured in this run";
@@ -81,8 +78,9 @@ void add_query_targets(const Measurements& measurements, Report* report) {
                            "GImpact, no margin, first contact, one-sided triangles" + near, boolean(kGimpact)));
   report->add(ratio_target("boolean vs scalar binary k-DOP tree", 10.0, 20.0, "ours, k = 32, longest axis" + near,
                            boolean(kScalarDops)));
-  report->add(ratio_target("boolean vs FCL, configurations in turn", std::nullopt, std::nullopt, "FCL, OBBRSS" + near,
-                           speed_ratio(measurements, kDefaultTree, kFcl, Query::kCollideInTurn, kNearShares)));
+  report->add(ratio_target("boolean vs FCL, the same query again and again", std::nullopt, std::nullopt,
+                           "FCL, OBBRSS" + near,
+                           speed_ratio(measurements, kDefaultTree, kFcl, Query::kCollideRepeated, kNearShares)));
   report->add(ratio_target("boolean vs ODE", std::nullopt, std::nullopt, "ODE's trimesh" + near, boolean(kOde)));
   report->add(
       ratio_target("boolean vs Embree", std::nullopt, std::nullopt, "rtcCollide with refit" + near, boolean(kEmbree)));
@@ -98,6 +96,9 @@ void add_study_targets(const Measurements& study, Report* report) {
   report->add(ratio_target("half-float nodes vs 32 bit: time", 1.0, 1.0 / 0.9,
                            simdop_name(single) + ", at 0, 1 % and 5 %",
                            speed_ratio(study, simdop_name(half), simdop_name(single), Query::kCollide, kNearShares)));
+  report->add(ratio_target("Boxtree of 16-byte nodes vs plain Boxtree", std::nullopt, std::nullopt,
+                           "the same tree of heap objects, at 0, 1 % and 5 %; the seed says 0.9",
+                           speed_ratio(study, kBoxtree, kPlainBoxtree, Query::kCollide, kNearShares)));
   for (const bool simdop : {true, false}) {
     const auto name = [simdop](Builder builder) {
       collision::SimdopOptions options;
@@ -125,22 +126,6 @@ void add_study_targets(const Measurements& study, Report* report) {
           speed_ratio(study, name(gas), name(Builder::kSurfaceAreaHeuristic), Query::kCollide, kNearShares)));
     }
   }
-}
-
-void add_memory_targets(const Measurements& measurements, Report* report) {
-  Target target;
-  target.work = "default tree, nodes and triangle references";
-  target.better = Better::kLower;
-  target.must = at_most(24.0);
-  target.aim = at_most(16.0);
-  target.unit = "bytes a triangle";
-  target.reached = bytes_a_triangle(measurements, kDefaultTree, kLeastTriangles);
-  target.baseline = "all measured meshes of 10,000 triangles and more";
-  target.n = static_cast<std::int64_t>(std::count_if(
-      measurements.costs.begin(), measurements.costs.end(),
-      [](const MeshCost& cost) { return cost.algorithm == kDefaultTree && cost.triangles >= kLeastTriangles; }));
-  if (!target.reached) target.why = "no such mesh was measured";
-  report->add(target);
 }
 
 }  // namespace prescene::benchmarks

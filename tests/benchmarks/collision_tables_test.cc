@@ -26,7 +26,7 @@ Cell cell(const char* pair, double share, std::vector<double> ours, std::vector<
     Timings& timings = made.timings[k];
     timings.collide = k == 0 ? ours : fcl;
     timings.answers.assign(ours.size(), true);
-    timings.in_turn = k == 0 ? 1e-6 : 5e-6;
+    timings.repeated.assign(ours.size(), k == 0 ? 1e-6 : 5e-6);
   }
   return made;
 }
@@ -50,7 +50,7 @@ TEST(SpeedRatio, IsAGeometricMeanOfGeometricMeans) {
   EXPECT_NEAR(ratio->value, 8.0, 1e-12);
   EXPECT_EQ(ratio->n, 4);
   EXPECT_EQ(ratio->pairs, 2);
-  EXPECT_NEAR(speed_ratio(measurements, kDefaultTree, kFcl, Query::kCollideInTurn, kShares)->value, 5.0, 1e-12);
+  EXPECT_NEAR(speed_ratio(measurements, kDefaultTree, kFcl, Query::kCollideRepeated, kShares)->value, 5.0, 1e-12);
   EXPECT_FALSE(speed_ratio(measurements, kDefaultTree, kOde, Query::kCollide, kShares));
   EXPECT_FALSE(speed_ratio(measurements, kDefaultTree, kFcl, Query::kDistance, kShares));
 }
