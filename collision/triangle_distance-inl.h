@@ -160,25 +160,32 @@ struct LaneDistance {
   LaneVerdict<D> verdict;
 };
 
+// Of the lanes that are near, whatever their distance. Long enough to be worth a call: one copy serves all callers.
+template <class D>
+HWY_NOINLINE LaneDistance<D> measure_lanes(D d, const Corners<D>& a, const Corners<D>& b, hn::Vec<D> extent,
+                                           hn::Mask<D> near) {
+  // 2^e <= extent < 2^(e + 1) becomes 1 to 2. Exponents of denormal extents are all taken as -127.
+  const hn::RebindToSigned<D> di;
+  const auto exponent = hn::And(hn::BitCast(di, extent), hn::Set(di, 0x7F800000));
+  const auto down = hn::BitCast(d, hn::Sub(hn::Set(di, 254 << 23), exponent));
+  const auto square = squared_distance(d, scaled(d, a, down), scaled(d, b, down));
+  const auto up = hn::IfThenElse(hn::Eq(exponent, hn::Zero(di)), hn::Set(di, 1 << 22), exponent);
+  const auto distance = hn::Mul(hn::Sqrt(square), hn::BitCast(d, up));
+  const LaneVerdict<D> verdict = test_lanes(d, a, b, near);
+  const auto infinity = hn::Set(d, std::numeric_limits<float>::infinity());
+  return {hn::IfThenElse(near, hn::IfThenZeroElse(hn::Or(verdict.hit, verdict.unsure), distance), infinity), verdict};
+}
+
 /// Zero for hits and lanes that the verdict is unsure of. Lanes that are not active, and those whose boxes are at least
 /// `limit` apart along an axis, get infinity. Distances keep their relative precision for triangles of any size: each
 /// pair is scaled by a power of two.
 template <class D>
 HWY_INLINE LaneDistance<D> distance_lanes(D d, const Corners<D>& a, const Corners<D>& b, hn::Vec<D> limit,
                                           hn::Mask<D> active) {
-  const auto infinity = hn::Set(d, std::numeric_limits<float>::infinity());
   const BoxPair<D> boxes = box_pair(d, a, b);
   const auto near = hn::And(active, hn::Lt(boxes.gap, limit));
-  if (hn::AllFalse(d, near)) return {infinity, {hn::FirstN(d, 0), hn::FirstN(d, 0)}};
-  // 2^e <= extent < 2^(e + 1) becomes 1 to 2. Exponents of denormal extents are all taken as -127.
-  const hn::RebindToSigned<D> di;
-  const auto exponent = hn::And(hn::BitCast(di, boxes.extent), hn::Set(di, 0x7F800000));
-  const auto down = hn::BitCast(d, hn::Sub(hn::Set(di, 254 << 23), exponent));
-  const auto square = squared_distance(d, scaled(d, a, down), scaled(d, b, down));
-  const auto up = hn::IfThenElse(hn::Eq(exponent, hn::Zero(di)), hn::Set(di, 1 << 22), exponent);
-  const auto distance = hn::Mul(hn::Sqrt(square), hn::BitCast(d, up));
-  const LaneVerdict<D> verdict = test_lanes(d, a, b, near);
-  return {hn::IfThenElse(near, hn::IfThenZeroElse(hn::Or(verdict.hit, verdict.unsure), distance), infinity), verdict};
+  if (!hn::AllFalse(d, near)) return measure_lanes(d, a, b, boxes.extent, near);
+  return {hn::Set(d, std::numeric_limits<float>::infinity()), {hn::FirstN(d, 0), hn::FirstN(d, 0)}};
 }
 
 /// Writes the distances of 16 pairs: zero for hits and for pairs of which the verdict is unsure, infinity for those
