@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// A body that turns and moves steadily from one pose to another: what continuous queries take for a motion.
+//
+//   PRESCENE_TRY(const ScrewMotion motion, ScrewMotion::make(X_AB_start, X_AB_end));
+#pragma once
+
+#include <Eigen/Core>
+
+#include "prescene/collision/transform.h"
+#include "prescene/core/status.h"
+#include "prescene/geometry/pose.h"
+
+namespace prescene::collision {
+
+/// X_AB(t) = exp(t twist) X_AB(0) for t in [0, 1]: turns about one axis in A by at most half a turn, and moves along
+/// it. Its inverse, the motion of A in B, is one as well.
+class ScrewMotion {
+ public:
+  /// Fails with kInvalidInput as to_transform does. Of two turns by pi, one is taken.
+  static core::Result<ScrewMotion> make(const geometry::Pose& X_AB_start, const geometry::Pose& X_AB_end);
+
+  /// t is not limited to [0, 1].
+  geometry::Pose pose(double t) const;
+  /// Place at t of the point of B that is at p_start at t = 0, in A, m.
+  Eigen::Vector3d place(const Eigen::Vector3d& p_start, double t) const;
+  /// Length of the second derivative of place(p_start, t) by t, m; constant in t. Between two times the point is off
+  /// the straight line between its places there, at the same time, by at most an eighth of it times the square of their
+  /// difference.
+  double bend(const Eigen::Vector3d& p_start) const { return spin_.cross(velocity(p_start)).norm(); }
+  /// Length of the first derivative, m; constant in t.
+  double speed(const Eigen::Vector3d& p_start) const { return velocity(p_start).norm(); }
+
+  const geometry::Pose& start() const { return start_; }
+  /// Rotation vector from start to end in A, radians.
+  const Eigen::Vector3d& spin() const { return spin_; }
+  /// Velocity at t = 0 of the point of B at A's origin, m.
+  const Eigen::Vector3d& drift() const { return drift_; }
+
+ private:
+  ScrewMotion() = default;
+  Eigen::Vector3d velocity(const Eigen::Vector3d& p_start) const { return spin_.cross(p_start) + drift_; }
+
+  geometry::Pose start_;
+  Eigen::Vector3d spin_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d drift_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace prescene::collision
