@@ -55,6 +55,14 @@ class TreeSolver : public PairSolver {
 
   bool collide(const Transform& X_AB) override { return ask(X_AB, nullptr); }
 
+  void collide_batch(std::span<const Transform> X_AB, std::span<bool> answers) override {
+    if constexpr (std::is_same_v<Tree, TriangleTree>) {
+      collision::collide(a_, b_, X_AB, answers, scratch_);
+    } else {
+      PairSolver::collide_batch(X_AB, answers);
+    }
+  }
+
   WorkCounts count(const Transform& X_AB) override {
     QueryCounts counts;
     ask(X_AB, &counts);
@@ -95,7 +103,9 @@ Algorithm algorithm_of(std::string name, const Options& options) {
 }
 
 Algorithm triangle_tree(std::string_view name, const TriangleTreeOptions& options) {
-  return algorithm_of<TriangleTree>(std::string(name), options);
+  Algorithm algorithm = algorithm_of<TriangleTree>(std::string(name), options);
+  algorithm.has_batches = true;
+  return algorithm;
 }
 
 std::string name_of(SimdopTraversal traversal) {

@@ -28,15 +28,15 @@ HWY_INLINE bool for_intersecting_blocks(const TriangleTree& a, const TriangleTre
   const TriangleBlock* blocks_b = b.blocks().data();
   std::uint64_t exact_tests = 0;
   std::uint64_t block_pairs = 0;
-  const auto leaf = [&](std::uint32_t block_a, std::uint32_t block_b) HWY_ATTR {
+  const auto leaf = [&](const LeafPair& leaves) HWY_ATTR {
     TriangleBlock placed_b;
-    place_block(X_AB, blocks_b[block_b], &placed_b);
-    const std::uint32_t hits = intersecting(blocks_a[block_a], placed_b, &exact_tests);
+    place_block(X_AB, blocks_b[leaves.block_b], &placed_b);
+    const std::uint32_t hits = intersecting(blocks_a[leaves.block_a], placed_b, &exact_tests);
     ++block_pairs;
-    return hits != 0 && found(block_a, block_b, hits);
+    return hits != 0 && found(leaves.block_a, leaves.block_b, hits);
   };
-  if (counts == nullptr) return for_overlapping_leaves<false>(a, b, X_AB, scratch, counts, leaf);
-  const bool ended = for_overlapping_leaves<true>(a, b, X_AB, scratch, counts, leaf);
+  if (counts == nullptr) return for_overlapping_leaves<false>(a, b, X_AB, roots(a, b), scratch, counts, leaf);
+  const bool ended = for_overlapping_leaves<true>(a, b, X_AB, roots(a, b), scratch, counts, leaf);
   counts->triangle_tests += 16 * block_pairs;
   counts->exact_tests += exact_tests;
   return ended;

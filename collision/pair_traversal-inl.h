@@ -29,6 +29,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Bytes16 = hn::CappedTag<std::uint8_t, 16>;
 using Ints16 = hn::CappedTag<std::int32_t, 16>;
 using Floats16 = hn::CappedTag<float, 16>;
+using OneBlock = hn::CappedTag<float, 4>;
 using V16 = hn::Vec<Floats16>;
 
 /// Bits of a mask of at most 16 lanes.
@@ -157,7 +158,7 @@ HWY_INLINE void make_pair_frames(D, const QueryFrame& query, const Nodes& a, con
 /// Four floats of each node, from the first on for which a vector has room.
 template <class D, class Field>
 HWY_INLINE hn::Vec<D> load_of_each(D d, const Nodes& nodes, std::size_t first, const Field& field) {
-  const hn::CappedTag<float, 4> d4;
+  const OneBlock d4;
   if constexpr (hn::MaxLanes(d) == 16) {
     const hn::CappedTag<float, 8> d8;
     return hn::Combine(d, hn::Combine(d8, hn::LoadU(d4, field(*nodes[3])), hn::LoadU(d4, field(*nodes[2]))),
@@ -425,12 +426,19 @@ HWY_INLINE std::uint32_t child_block(const TriangleTreeNode& node, std::uint32_t
   return node.first_leaf() + rank_below(node.leaf_mask(), i);
 }
 
-/// The children of two nodes against each other: what overlaps is pushed, or is a pair of leaves. Returns whether a
-/// leaf ended it. `at` is the place of the pair in `frames`.
-template <bool kCount, class Leaf>
+/// Two leaves whose boxes overlap: their blocks, and which children they are of the nodes of their pair.
+struct LeafPair {
+  std::uint32_t block_a;
+  std::uint32_t block_b;
+  std::uint32_t child_a;
+  std::uint32_t child_b;
+};
+
+/// The children of two nodes against each other: push(NodePair) for what overlaps and has children, leaf(LeafPair) for
+/// leaves. Returns whether `leaf` did, which ends it. `at` is the place of the pair in `frames`.
+template <bool kCount, class Push, class Leaf>
 HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::size_t at, const TriangleTreeNode* nodes_a,
-                        const TriangleTreeNode* nodes_b, std::vector<NodePair>* stack, QueryCounts* counts,
-                        const Leaf& leaf) {
+                        const TriangleTreeNode* nodes_b, QueryCounts* counts, const Push& push, const Leaf& leaf) {
   const TriangleTreeNode& a = nodes_a[pair.a];
   const TriangleTreeNode& b = nodes_b[pair.b];
   const float slack = frames.slack[at];
@@ -453,12 +461,10 @@ HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::siz
   const TriangleTreeNode* nodes_q = rows_are_a ? nodes_b : nodes_a;
   const std::uint32_t in_q = rows_are_a ? in_b : in_a;
   const float* const(&R)[3] = rows_are_a ? X_ba.rows : X_ab.rows;
-  const auto push = [&](std::uint32_t node_of_p, std::uint32_t node_of_q, std::uint32_t of_p, std::uint32_t of_q) {
-    if (rows_are_a) {
-      stack->push_back({node_of_p, node_of_q, static_cast<std::uint16_t>(of_p), static_cast<std::uint16_t>(of_q)});
-    } else {
-      stack->push_back({node_of_q, node_of_p, static_cast<std::uint16_t>(of_q), static_cast<std::uint16_t>(of_p)});
-    }
+  const auto push_rows = [&](std::uint32_t below_p, std::uint32_t below_q, std::uint32_t of_p, std::uint32_t of_q) {
+    const auto some_p = static_cast<std::uint16_t>(of_p);
+    const auto some_q = static_cast<std::uint16_t>(of_q);
+    push(rows_are_a ? NodePair{below_p, below_q, some_p, some_q} : NodePair{below_q, below_p, some_q, some_p});
   };
   CrossTerms terms;
   bool have_terms = false;
@@ -475,7 +481,7 @@ HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::siz
     }
     hits &= overlap_across_edges(R, terms, p, row, q);
     if (hits == 0) continue;
-    const auto child_of_p = row;
+    const std::uint32_t child_of_p = row;
     const bool p_is_leaf = (node_p.leaf_mask() >> child_of_p & 1U) != 0;
     const std::uint32_t below_p = p_is_leaf ? child_block(node_p, child_of_p) : child_node(node_p, child_of_p);
     const std::uint32_t all_p = p_is_leaf ? 0 : nodes_p[below_p].child_mask();
@@ -485,7 +491,9 @@ HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::siz
       const bool q_is_leaf = (node_q.leaf_mask() >> child_of_q & 1U) != 0;
       if (p_is_leaf && q_is_leaf) {
         const std::uint32_t block_q = child_block(node_q, child_of_q);
-        if (rows_are_a ? leaf(below_p, block_q) : leaf(block_q, below_p)) return true;
+        if (leaf(rows_are_a ? LeafPair{below_p, block_q, child_of_p, child_of_q}
+                            : LeafPair{block_q, below_p, child_of_q, child_of_p}))
+          return true;
       } else if (p_is_leaf) {
         q_with_leaves |= 1U << child_of_q;
         leaves_of_p[child_of_q] |= static_cast<std::uint16_t>(1U << child_of_p);
@@ -493,31 +501,32 @@ HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::siz
         leaves_of_q |= 1U << child_of_q;
       } else {
         const std::uint32_t below_q = child_node(node_q, child_of_q);
-        push(below_p, below_q, all_p, nodes_q[below_q].child_mask());
+        push_rows(below_p, below_q, all_p, nodes_q[below_q].child_mask());
       }
     }
-    if (leaves_of_q != 0) push(below_p, rows_are_a ? pair.b : pair.a, all_p, leaves_of_q);
+    if (leaves_of_q != 0) push_rows(below_p, rows_are_a ? pair.b : pair.a, all_p, leaves_of_q);
   }
   for (; q_with_leaves != 0; q_with_leaves &= q_with_leaves - 1) {
     const auto i = static_cast<std::uint32_t>(std::countr_zero(q_with_leaves));
     const std::uint32_t below_q = child_node(node_q, i);
-    push(rows_are_a ? pair.a : pair.b, below_q, leaves_of_p[i], nodes_q[below_q].child_mask());
+    push_rows(rows_are_a ? pair.a : pair.b, below_q, leaves_of_p[i], nodes_q[below_q].child_mask());
   }
   return false;
 }
 
-/// Calls leaf(block of a, block of b) for pairs of leaves whose boxes overlap, until it returns true (then so does
+/// Calls leaf(LeafPair) for pairs of leaves below `first` whose boxes overlap, until it returns true (then so does
 /// this).
 template <bool kCount, class Leaf>
 HWY_INLINE bool for_overlapping_leaves(const TriangleTree& tree_a, const TriangleTree& tree_b, const Transform& X_AB,
-                                       QueryScratch* scratch, QueryCounts* counts, const Leaf& leaf) {
+                                       const NodePair& first, QueryScratch* scratch, QueryCounts* counts,
+                                       const Leaf& leaf) {
   const QueryFrame query = make_query_frame(tree_a, tree_b, X_AB);
   const TriangleTreeNode* nodes_a = tree_a.nodes().data();
   const TriangleTreeNode* nodes_b = tree_b.nodes().data();
   std::vector<NodePair>& stack = scratch->node_pairs();
   stack.clear();
-  stack.push_back(
-      {0, 0, static_cast<std::uint16_t>(nodes_a[0].child_mask()), static_cast<std::uint16_t>(nodes_b[0].child_mask())});
+  stack.push_back(first);
+  const auto push = [&stack](const NodePair& pair) { stack.push_back(pair); };
   PairFrames frames;
   while (!stack.empty()) {
     const std::size_t count = std::min(kAtOnce, stack.size());
@@ -531,7 +540,7 @@ HWY_INLINE bool for_overlapping_leaves(const TriangleTree& tree_a, const Triangl
     }
     stack.resize(stack.size() - count);
     if (count < kAtOnce - 1) {
-      make_pair_frames(hn::CappedTag<float, 4>(), query, a, b, count, &frames);
+      make_pair_frames(OneBlock(), query, a, b, count, &frames);
     } else {
       make_pair_frames(Floats16(), query, a, b, kAtOnce, &frames);
     }
@@ -547,10 +556,16 @@ HWY_INLINE bool for_overlapping_leaves(const TriangleTree& tree_a, const Triangl
         counts->volume_tests += 32;
       }
       if (begun[i].a_children == 0 || begun[i].b_children == 0) continue;
-      if (descend<kCount>(begun[i], frames, 4 * i, nodes_a, nodes_b, &stack, counts, leaf)) return true;
+      if (descend<kCount>(begun[i], frames, 4 * i, nodes_a, nodes_b, counts, push, leaf)) return true;
     }
   }
   return false;
+}
+
+/// All children of the two roots.
+inline NodePair roots(const TriangleTree& a, const TriangleTree& b) {
+  return {0, 0, static_cast<std::uint16_t>(a.nodes()[0].child_mask()),
+          static_cast<std::uint16_t>(b.nodes()[0].child_mask())};
 }
 
 }  // namespace prescene::collision::HWY_NAMESPACE

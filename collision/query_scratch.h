@@ -23,13 +23,21 @@ struct NodePair {
   std::uint16_t b_children;
 };
 
+/// The same for those of several configurations whose bits are set.
+struct SharedNodePair {
+  NodePair pair;
+  std::uint32_t configurations;
+};
+
 /// Memory that a query works in. One a thread; after the first queries nothing is allocated any more.
 class QueryScratch {
  public:
   std::vector<NodePair>& node_pairs() { return node_pairs_; }
+  std::vector<SharedNodePair>& shared_node_pairs() { return shared_node_pairs_; }
 
  private:
   std::vector<NodePair> node_pairs_;
+  std::vector<SharedNodePair> shared_node_pairs_;
 };
 
 }  // namespace prescene::collision

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <vector>
 
@@ -85,19 +86,58 @@ TEST(TriangleQueries, FindWhatBruteForceFinds) {
   EXPECT_LT(intersecting, configurations);
 }
 
+/// A configuration that moves no point within `reach` of the origin further than about `distance`.
+Transform nudged(const Transform& X_AB, double distance, double reach) {
+  geometry::Pose X;
+  Eigen::Matrix3d R;
+  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = static_cast<double>(X_AB.rotation[static_cast<std::size_t>(i)]);
+  X.rotation = geometry::Quaterniond(R).normalized() * geometry::exp_rotation(*tests::vectors(distance / reach));
+  X.translation = Eigen::Map<const Vector3f>(X_AB.translation.data()).cast<double>() + *tests::vectors(distance);
+  const auto made = to_transform(X);
+  RC_ASSERT(made.ok());
+  return *made;
+}
+
+TEST(TriangleQueries, AnswerBatchesLikeSingleQueries) {
+  int touching = 0;
+  int configurations = 0;
+  EXPECT_TRUE(rc::check([&] {
+    const TriangleTree a = tree_of(*tests::closed_meshes());
+    const TriangleTree b = tree_of(*tests::closed_meshes());
+    QueryScratch scratch;
+    const Transform X_AB = touching_pose(a.mesh(), b.mesh());
+    const double size = static_cast<double>(std::max(a.mesh().size(), b.mesh().size()));
+    const double distance = size * *rc::gen::element(0.0, 0.001, 0.01, 0.3);
+    std::vector<Transform> batch(*rc::gen::inRange<std::size_t>(0, 40));
+    for (Transform& X : batch) X = nudged(X_AB, distance, size);
+    std::array<bool, 40> answers{};
+    collide(a, b, batch, std::span(answers).first(batch.size()), scratch);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      RC_ASSERT(answers[i] == collide(a, b, batch[i], scratch));
+      touching += answers[i] ? 1 : 0;
+    }
+    configurations += static_cast<int>(batch.size());
+  }));
+  EXPECT_GT(touching, configurations / 10);
+  EXPECT_LT(touching, configurations);
+}
+
 TEST(TriangleQueries, DoNotAllocateOnceWarm) {
   if (!tests::can_count_allocations()) GTEST_SKIP() << "allocations cannot be counted in this build";
   const TriangleTree a = tree_of(geometry::make_mesh(geometry::Sphere{0.1}, 64));
   const TriangleTree b = tree_of(geometry::make_mesh(geometry::Cylinder{0.05, 0.2}, 64));
   QueryScratch scratch;
   std::vector<TrianglePair> pairs;
+  std::array<bool, 20> answers{};
   const auto X_AB = to_transform(geometry::Pose::from_translation({0.12, 0.01, 0.02}));
   ASSERT_TRUE(X_AB.ok());
+  const std::vector<Transform> batch(answers.size(), *X_AB);
   for (const bool warm : {false, true}) {
     const std::uint64_t before = tests::allocation_count();
     pairs.clear();
     EXPECT_TRUE(collide(a, b, *X_AB, scratch));
     EXPECT_TRUE(first_pair(a, b, *X_AB, scratch).has_value());
+    collide(a, b, batch, answers, scratch);
     EXPECT_TRUE(all_pairs(a, b, *X_AB, 100000, &pairs, scratch));
     EXPECT_TRUE(!warm || tests::allocation_count() == before);
   }
