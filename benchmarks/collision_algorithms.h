@@ -83,6 +83,7 @@ std::vector<Algorithm> our_algorithms();
 std::vector<Algorithm> study_algorithms();
 std::string bvhlite_name(const collision::BvhLiteOptions& options);
 std::string simdop_name(const collision::SimdopOptions& options);
-std::string builder_name(collision::Builder builder);
+/// Of the default tree with that builder.
+std::string default_tree_name(collision::Builder builder);
 
 }  // namespace prescene::benchmarks

@@ -16,6 +16,7 @@
 
 #include "prescene/benchmarks/collision_algorithms.h"
 #include "prescene/benchmarks/collision_measure.h"
+#include "prescene/benchmarks/collision_plots.h"
 #include "prescene/benchmarks/collision_tables.h"
 #include "prescene/benchmarks/collision_targets.h"
 #include "prescene/benchmarks/report.h"
@@ -164,8 +165,9 @@ int run(const Arguments& arguments) {
     table.name = "study_" + table.name;
     report.add(std::move(table));
   }
-  report.add(summary_plot(measurements));
-  report.add(ratio_plot(measurements));
+  for (Plot& plot : query_plots(measurements)) report.add(std::move(plot));
+  if (!study.cells.empty())
+    for (Plot& plot : study_plots(study)) report.add(std::move(plot));
   const core::Status status = report.write(arguments.out);
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.message().c_str());
   return status.ok() ? 0 : 1;

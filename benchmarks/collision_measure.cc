@@ -220,6 +220,7 @@ std::vector<std::vector<double>> time_streams(std::span<const Stream> streams, i
     for (std::size_t turn = 0; turn < streams.size(); ++turn) {
       const std::size_t s = (turn + round) % streams.size();
       streams[s].before();
+      for (const std::function<void()>& query : streams[s].queries) query();
       for (std::size_t q = 0; q < streams[s].queries.size(); ++q)
         best[s][q] = std::min(best[s][q], std::max(1e-9, time_block(streams[s].queries[q], 1) - clock_takes));
     }

@@ -29,8 +29,8 @@ struct Stream {
 };
 
 /// Seconds each query takes, stream by stream: each is clocked by itself, less what the clock takes; the smallest of
-/// the rounds. In each round every stream has its turn, in rotating order, so that all see the same state of the
-/// machine.
+/// the rounds. In each round every stream has its turn, in rotating order, first once untimed: so all see the same
+/// state of the machine, and caches hold what a stream of queries on these meshes leaves there.
 std::vector<std::vector<double>> time_streams(std::span<const Stream> streams, int rounds);
 
 /// Seconds a call of each of `queries` when it is asked again and again, so that the processor has learnt it by heart;

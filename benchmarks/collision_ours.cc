@@ -133,7 +133,8 @@ std::string simdop_name(const SimdopOptions& options) {
          std::string(collision::to_string(options.builder));
 }
 
-std::string builder_name(Builder builder) {
+std::string default_tree_name(Builder builder) {
+  if (builder == TriangleTreeOptions{}.builder) return std::string(kDefaultTree);
   return std::string(kDefaultTree) + ", " + std::string(collision::to_string(builder));
 }
 
@@ -159,7 +160,7 @@ std::vector<Algorithm> study_algorithms() {
   };
   for (const Builder builder : collision::kAllBuilders) {
     if (builder != TriangleTreeOptions{}.builder)
-      algorithms.push_back(triangle_tree(builder_name(builder), {.builder = builder}));
+      algorithms.push_back(triangle_tree(default_tree_name(builder), {.builder = builder}));
     SimdopOptions options;
     options.builder = builder;
     add_simdop(options);

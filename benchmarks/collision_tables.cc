@@ -31,19 +31,6 @@ double mean_of(const std::vector<WorkCounts>& counts, double WorkCounts::*member
   return sum / static_cast<double>(counts.size());
 }
 
-/// In the order in which they come.
-std::vector<double> shares_of(const Measurements& measurements) {
-  std::vector<double> shares;
-  for (const Cell& cell : measurements.cells)
-    if (std::find(shares.begin(), shares.end(), cell.share) == shares.end()) shares.push_back(cell.share);
-  return shares;
-}
-
-std::string share_text(double share) {
-  if (share == 0.0) return "touching";
-  return (share < 0.0 ? "overlap " : "") + std::to_string(std::lround(100.0 * std::abs(share))) + " %";
-}
-
 std::string exact_text(float value) {
   std::array<char, 32> text;
   std::snprintf(text.data(), text.size(), "%.9g", static_cast<double>(value));
@@ -64,6 +51,18 @@ void add_rows(const Cell& cell, const std::string& algorithm, const char* query,
 }
 
 }  // namespace
+
+std::vector<double> shares_of(const Measurements& measurements) {
+  std::vector<double> shares;
+  for (const Cell& cell : measurements.cells)
+    if (std::find(shares.begin(), shares.end(), cell.share) == shares.end()) shares.push_back(cell.share);
+  return shares;
+}
+
+std::string share_text(double share) {
+  if (share == 0.0) return "touching";
+  return (share < 0.0 ? "overlap " : "") + std::to_string(std::lround(100.0 * std::abs(share))) + " %";
+}
 
 Table query_table(const Measurements& measurements) {
   Table table{"queries",
@@ -105,9 +104,6 @@ Table ratio_table(const Measurements& measurements) {
   return table;
 }
 
-namespace {
-
-/// Microseconds, geometric mean over pairs; NaN for none.
 double typical_microseconds(const Measurements& measurements, std::size_t algorithm, Query query, double share) {
   std::vector<double> each;
   for (const Cell& cell : measurements.cells) {
@@ -117,8 +113,6 @@ double typical_microseconds(const Measurements& measurements, std::size_t algori
   }
   return each.empty() ? kNone : geometric_mean(each);
 }
-
-}  // namespace
 
 Table summary_table(const Measurements& measurements) {
   const std::vector<double> shares = shares_of(measurements);
@@ -157,34 +151,6 @@ Table target_table(const Measurements& measurements) {
     table.rows.push_back(std::move(row));
   }
   return table;
-}
-
-Plot summary_plot(const Measurements& measurements) {
-  std::vector<double> shares = shares_of(measurements);
-  std::sort(shares.begin(), shares.end());
-  Plot plot{"times", "Boolean queries: median time, geometric mean over pairs", "microseconds", {}, {}};
-  for (const double share : shares) plot.x_labels.push_back(share_text(share));
-  for (std::size_t k = 0; k < measurements.algorithms.size(); ++k) {
-    Series series{measurements.algorithms[k], {}, !measurements.ours[k]};
-    for (const double share : shares)
-      series.values.push_back(typical_microseconds(measurements, k, Query::kCollide, share));
-    plot.series.push_back(std::move(series));
-  }
-  return plot;
-}
-
-Plot ratio_plot(const Measurements& measurements) {
-  Plot plot{"ratios", "Default tree: how many times faster than FCL", "ratio", {}, {}};
-  const Table table = ratio_table(measurements);
-  for (std::size_t column = 2; column < table.columns.size(); ++column)
-    plot.series.push_back({table.columns[column], {}, false});
-  for (const std::vector<Figure>& row : table.rows) {
-    if (std::get<std::string>(row[1]) != kDefaultTree) continue;
-    plot.x_labels.push_back(std::get<std::string>(row[0]));
-    for (std::size_t column = 2; column < row.size(); ++column)
-      plot.series[column - 2].values.push_back(std::get<double>(row[column]));
-  }
-  return plot;
 }
 
 Table cost_table(const Measurements& measurements) {

@@ -17,9 +17,6 @@ Table query_table(const Measurements& measurements);
 Table summary_table(const Measurements& measurements);
 /// A row an instruction set: the default tree's boolean queries, medians in microseconds.
 Table target_table(const Measurements& measurements);
-/// The summary, and how many times faster than FCL the default tree is for each pair.
-Plot summary_plot(const Measurements& measurements);
-Plot ratio_plot(const Measurements& measurements);
 /// A row a pair and algorithm: how many times faster than FCL in boolean queries, for each distance.
 Table ratio_table(const Measurements& measurements);
 /// A row a mesh and algorithm.
@@ -29,9 +26,16 @@ Table wrong_answer_table(const Measurements& measurements);
 /// A row an algorithm: how many answers were wrong, which way.
 Table wrong_answer_counts(const Measurements& measurements);
 
+/// Distances and overlaps, in the order in which they come.
+std::vector<double> shares_of(const Measurements& measurements);
+/// "touching", "5 %", "overlap 1 %".
+std::string share_text(double share);
+
 /// kCollideRepeated: the same query again and again.
 enum class Query { kCollide, kCollideRepeated, kDistance };
 std::vector<double> Timings::*seconds_of(Query query);
+/// Median time in microseconds, geometric mean over pairs; NaN where nothing was measured.
+double typical_microseconds(const Measurements& measurements, std::size_t algorithm, Query query, double share);
 
 /// How many times faster `name` is than `baseline`: per pair and distance the geometric mean over the configurations
 /// that both answer rightly, then over pairs and `shares`. Nothing when there is no such configuration.

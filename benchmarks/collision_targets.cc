@@ -101,11 +101,7 @@ void add_study_targets(const Measurements& study, Report* report) {
                            speed_ratio(study, kBoxtree, kPlainBoxtree, Query::kCollide, kNearShares)));
   for (const bool simdop : {true, false}) {
     const auto name = [simdop](Builder builder) {
-      collision::SimdopOptions options;
-      options.builder = builder;
-      return simdop                                                ? simdop_name(options)
-             : builder == collision::TriangleTreeOptions{}.builder ? std::string(kDefaultTree)
-                                                                   : builder_name(builder);
+      return simdop ? simdop_name({.builder = builder}) : default_tree_name(builder);
     };
     for (const Builder gas : {Builder::kNeuralGas, Builder::kWeightedNeuralGas}) {
       std::optional<Ratio> worst;
