@@ -12,27 +12,10 @@
 // After foreach_target.h, which includes this file once for each instruction set.
 #include <hwy/highway.h>
 
+#include "lane_sums-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace prescene::collision::HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-// Products and sums are rounded one by one, so that every instruction set looks at the same pairs.
-template <class V>
-HWY_INLINE V madd(V a, V b, V c) {
-  return hn::Add(hn::Mul(a, b), c);
-}
-template <class V>
-HWY_INLINE V dot3(V ax, V ay, V az, V bx, V by, V bz) {
-  return madd(az, bz, madd(ay, by, hn::Mul(ax, bx)));
-}
-
-template <class D>
-HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(d, mask, bytes);
-  return static_cast<std::uint32_t>(bytes[0]) | (static_cast<std::uint32_t>(bytes[1]) << 8U);
-}
 
 // Squares and products of three coordinates are off by a few roundings of their largest terms; thirty are allowed for.
 constexpr float kRounding = 32.0F * 6e-8F;

@@ -70,6 +70,9 @@ struct DescentStack {
   };
   std::vector<Entry> entries;
   PairBuffer buffer;
+
+  /// Each level leaves at most all pairs of children but one behind.
+  void reserve(const SphereTree& a, const SphereTree& b);
 };
 
 void find_critical_pairs(const SphereTree& a, const SphereTree& b, const Swelling& swelling, DescentStack* stack,
@@ -122,6 +125,8 @@ struct WrenchSums {
   double pairs = 0.0;       ///< Expected number of pairs that touch.
   SymmetricTensor bending;  ///< Of all but the kinks.
 };
+/// Covariance of the wrench (force, torque) for unit stiffness, the error being factor * z with z standard normal.
+geometry::Matrix6d wrench_covariance(const WrenchSums& sums, const geometry::Matrix6d& factor);
 /// Pairs further apart than `reach` standard deviations are left out.
 void sum_wrenches(const SphereTree& a, const SphereTree& b, const Swelling& swelling, float reach, DescentStack* stack,
                   WrenchSums* sums);
