@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <bit>
 #include <cstring>
 #include <fstream>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "prescene/core/random.h"
@@ -64,7 +67,8 @@ void expect_section(const TreeFile& file, std::size_t i, const std::vector<T>& e
   const auto section = file.section<T>(i);
   ASSERT_TRUE(section.ok()) << section.status().message();
   ASSERT_EQ(section->size(), expected.size());
-  EXPECT_EQ(std::memcmp(section->data(), expected.data(), expected.size() * sizeof(T)), 0);
+  const auto bytes = [](std::span<const T> values) { return std::as_bytes(values); };
+  EXPECT_TRUE(std::ranges::equal(bytes(section->span()), bytes(expected)));
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(section->data()) % kTreeFileAlignment, 0U);
 }
 

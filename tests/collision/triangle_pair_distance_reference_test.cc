@@ -14,7 +14,7 @@
 namespace prescene::collision {
 namespace {
 
-constexpr int kPairsOfAKind = 400;
+constexpr int kPairsOfAKind = 250;
 
 double extent(const Triangle& a, const Triangle& b) {
   Eigen::AlignedBox3d box;
