@@ -466,22 +466,31 @@ HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::siz
     const auto some_q = static_cast<std::uint16_t>(of_q);
     push(rows_are_a ? NodePair{below_p, below_q, some_p, some_q} : NodePair{below_q, below_p, some_q, some_p});
   };
+  // Each step is done for all rows before the next, so that the processor need not guess what comes of one.
+  std::uint32_t rows[16];
+  std::uint32_t hits_of[16];
+  std::uint32_t count = 0;
+  for (std::uint32_t rest = rows_are_a ? in_a : in_b; rest != 0; rest &= rest - 1) {
+    rows[count] = static_cast<std::uint32_t>(std::countr_zero(rest));
+    hits_of[count] = overlap_on_faces(p, rows[count], q) & in_q;
+    count += hits_of[count] != 0 ? 1 : 0;
+    if constexpr (kCount) counts->volume_tests += static_cast<std::uint64_t>(std::popcount(in_q));
+  }
+  if (count == 0) return false;
   CrossTerms terms;
-  bool have_terms = false;
+  make_cross_terms(R, slack, p, q, &terms);
+  std::uint32_t left = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t hits = hits_of[i] & overlap_across_edges(R, terms, p, rows[i], q);
+    rows[left] = rows[i];
+    hits_of[left] = hits;
+    left += hits != 0 ? 1 : 0;
+  }
   std::uint16_t leaves_of_p[16] = {};  // Leaves of p that overlap child i of q, which is a node.
   std::uint32_t q_with_leaves = 0;
-  for (std::uint32_t rows = rows_are_a ? in_a : in_b; rows != 0; rows &= rows - 1) {
-    const auto row = static_cast<std::uint32_t>(std::countr_zero(rows));
-    std::uint32_t hits = overlap_on_faces(p, row, q) & in_q;
-    if constexpr (kCount) counts->volume_tests += static_cast<std::uint64_t>(std::popcount(in_q));
-    if (hits == 0) continue;
-    if (!have_terms) {
-      make_cross_terms(R, slack, p, q, &terms);
-      have_terms = true;
-    }
-    hits &= overlap_across_edges(R, terms, p, row, q);
-    if (hits == 0) continue;
-    const std::uint32_t child_of_p = row;
+  for (std::uint32_t i = 0; i < left; ++i) {
+    std::uint32_t hits = hits_of[i];
+    const std::uint32_t child_of_p = rows[i];
     const bool p_is_leaf = (node_p.leaf_mask() >> child_of_p & 1U) != 0;
     const std::uint32_t below_p = p_is_leaf ? child_block(node_p, child_of_p) : child_node(node_p, child_of_p);
     const std::uint32_t all_p = p_is_leaf ? 0 : nodes_p[below_p].child_mask();
@@ -507,9 +516,9 @@ HWY_INLINE bool descend(const NodePair& pair, const PairFrames& frames, std::siz
     if (leaves_of_q != 0) push_rows(below_p, rows_are_a ? pair.b : pair.a, all_p, leaves_of_q);
   }
   for (; q_with_leaves != 0; q_with_leaves &= q_with_leaves - 1) {
-    const auto i = static_cast<std::uint32_t>(std::countr_zero(q_with_leaves));
-    const std::uint32_t below_q = child_node(node_q, i);
-    push_rows(rows_are_a ? pair.a : pair.b, below_q, leaves_of_p[i], nodes_q[below_q].child_mask());
+    const auto child_of_q = static_cast<std::uint32_t>(std::countr_zero(q_with_leaves));
+    const std::uint32_t below_q = child_node(node_q, child_of_q);
+    push_rows(rows_are_a ? pair.a : pair.b, below_q, leaves_of_p[child_of_q], nodes_q[below_q].child_mask());
   }
   return false;
 }
