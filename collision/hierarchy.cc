@@ -145,14 +145,18 @@ Cuts equal_cuts(std::uint32_t begin, std::uint32_t end, std::uint32_t parts) {
 
 Hierarchy build_hierarchy(std::span<const Item> items, const HierarchyOptions& options, core::ThreadPool& pool) {
   PRESCENE_CHECK(!items.empty());
+  return grow_hierarchy(*make_splitter(items, options, pool), static_cast<std::uint32_t>(items.size()), options, pool);
+}
+
+Hierarchy grow_hierarchy(Splitter& splitter, std::uint32_t count, const HierarchyOptions& options,
+                         core::ThreadPool& pool) {
   PRESCENE_CHECK(options.branching >= 2 && options.branching <= kMostChildren);
   PRESCENE_CHECK(options.leaf_items >= 1 && options.leaf_items <= 64);
-  const std::unique_ptr<Splitter> splitter = make_splitter(items, options, pool);
-  const Grower grower{*splitter, static_cast<std::uint32_t>(options.leaf_items),
+  const Grower grower{splitter, static_cast<std::uint32_t>(options.leaf_items),
                       static_cast<std::uint32_t>(options.branching)};
 
   Hierarchy tree;
-  tree.nodes.push_back({.begin = 0, .end = static_cast<std::uint32_t>(items.size())});
+  tree.nodes.push_back({.begin = 0, .end = count});
   const std::vector<Root> roots = grow_top(grower, tree.nodes, pool);
   std::vector<std::vector<Node>> subtrees(roots.size());
   pool.for_each_index(roots.size(), [&](std::size_t i) {
@@ -162,9 +166,9 @@ Hierarchy build_hierarchy(std::span<const Item> items, const HierarchyOptions& o
   });
   join(tree.nodes, roots, subtrees, pool);
 
-  tree.order.resize(items.size());
-  pool.for_blocks(items.size(), std::size_t{1} << 14U, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) tree.order[i] = splitter->item(i);
+  tree.order.resize(count);
+  pool.for_blocks(count, std::size_t{1} << 14U, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) tree.order[i] = splitter.item(i);
   });
   return tree;
 }

@@ -35,6 +35,10 @@ class Splitter {
   virtual std::uint32_t item(std::size_t i) const = 0;
 };
 
+/// As build_hierarchy, of `count` items.
+Hierarchy grow_hierarchy(Splitter& splitter, std::uint32_t count, const HierarchyOptions& options,
+                         core::ThreadPool& pool);
+
 /// What the builders that look at centres only keep of an item.
 struct Centre {
   std::array<float, 3> position = {};  ///< Divided by the largest coordinate of all.
@@ -58,6 +62,9 @@ std::uint32_t halve_at_median(std::span<Centre> centres, std::uint32_t begin, st
 
 std::unique_ptr<Splitter> surface_area_splitter(std::span<const Item> items, const HierarchyOptions& options,
                                                 core::ThreadPool& pool);
+/// The same over the triangles of a mesh, where each node is cut along its principal axes if its box is smaller there.
+std::unique_ptr<Splitter> turned_surface_area_splitter(const Mesh& mesh, const HierarchyOptions& options,
+                                                       core::ThreadPool& pool);
 /// Longest axis, extended longest axis, middle and median.
 std::unique_ptr<Splitter> axis_splitter(std::span<const Item> items, const HierarchyOptions& options);
 /// Neural gas, with and without weights.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hierarchy_splitter.h"
+#include "principal_axes.h"
 
 namespace prescene::collision {
 namespace {
@@ -128,7 +129,7 @@ void improve(Plane& best, const Bins& bins, int bin_count, int axis) {
   }
 }
 
-class SurfaceAreaSplitter final : public Splitter {
+class SurfaceAreaSplitter : public Splitter {
  public:
   SurfaceAreaSplitter(std::span<const Item> items, const HierarchyOptions& options, core::ThreadPool& pool)
       : pool_(pool),
@@ -149,7 +150,8 @@ class SurfaceAreaSplitter final : public Splitter {
         [](float a, float b) { return std::max(a, b); });
     // Products of lengths then neither overflow nor vanish.
     const int exponent = largest > 0.0F ? std::ilogb(largest) : 0;
-    const float scale = std::ldexp(1.0F, std::clamp(-exponent, -126, 126));
+    scale_ = std::ldexp(1.0F, std::clamp(-exponent, -126, 126));
+    const float scale = scale_;
     pool.for_blocks(items.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const Item& item = items[i];
@@ -183,6 +185,14 @@ class SurfaceAreaSplitter final : public Splitter {
     for (std::uint32_t i = 0; i < count; ++i) cuts.at[i] = parts[i].begin;
     cuts.at[count] = end;
     return cuts;
+  }
+
+ protected:
+  core::ThreadPool& pool() const { return pool_; }
+  /// Replaces the box of the item at place i.
+  void set_box(std::size_t i, const Vector3f& low, const Vector3f& high) {
+    records_[i].low.head<3>() = low.array() * scale_;
+    records_[i].high.head<3>() = high.array() * scale_;
   }
 
  private:
@@ -307,9 +317,98 @@ class SurfaceAreaSplitter final : public Splitter {
   std::uint32_t leaf_items_;
   std::vector<Record> records_;
   std::vector<Record> scratch_;
+  float scale_ = 1.0F;
+};
+
+/// A box in two frames: the mesh's and a turned one.
+struct TwoBoxes {
+  Box straight;
+  Box turned;
+
+  void add(const TwoBoxes& other) {
+    straight.add(other.straight);
+    turned.add(other.turned);
+  }
+};
+
+class TurnedSurfaceAreaSplitter final : public SurfaceAreaSplitter {
+ public:
+  TurnedSurfaceAreaSplitter(const Mesh& mesh, const std::vector<Item>& items, const HierarchyOptions& options,
+                            core::ThreadPool& threads)
+      : SurfaceAreaSplitter(items, options, threads), mesh_(mesh) {}
+
+  Cuts split(std::uint32_t begin, std::uint32_t end) override {
+    Eigen::Matrix3f R;
+    if (moments(begin, end).principal_axes(&R)) {
+      const TwoBoxes boxes = turn(begin, end, R);
+      if (!(boxes.turned.half_area() < boxes.straight.half_area())) turn(begin, end, Eigen::Matrix3f::Identity());
+    } else {
+      turn(begin, end, Eigen::Matrix3f::Identity());
+    }
+    return SurfaceAreaSplitter::split(begin, end);
+  }
+
+ private:
+  PointMoments moments(std::uint32_t begin, std::uint32_t end) {
+    const PointMoments none(mesh_.corners(item(begin))[0]);
+    const auto of_block = [&](std::size_t from, std::size_t to) {
+      PointMoments sums = none;
+      for (std::size_t i = from; i < to; ++i) {
+        for (const Vector3f& p : mesh_.corners(item(i))) sums.add(p);
+      }
+      return sums;
+    };
+    if (end - begin < kParallelItems) return of_block(begin, end);
+    return pool().reduce_blocks(
+        end - begin, kBlock, none,
+        [&](std::size_t from, std::size_t to) { return of_block(begin + from, begin + to); },
+        [](PointMoments a, const PointMoments& b) {
+          a.add(b);
+          return a;
+        });
+  }
+
+  // Gives the items their boxes in the frame whose axes are the rows of R; returns the boxes of all.
+  TwoBoxes turn(std::uint32_t begin, std::uint32_t end, const Eigen::Matrix3f& R) {
+    const auto of_block = [&](std::size_t from, std::size_t to) {
+      TwoBoxes all;
+      for (std::size_t i = from; i < to; ++i) {
+        const std::array<Vector3f, 3> corners = mesh_.corners(item(i));
+        Box straight;
+        for (const Vector3f& p : corners) {
+          const Array4f padded(p.x(), p.y(), p.z(), 0.0F);
+          straight.add(padded, padded);
+        }
+        const Vector3f a = R * corners[0];
+        const Vector3f b = R * corners[1];
+        const Vector3f c = R * corners[2];
+        const Vector3f low = a.cwiseMin(b).cwiseMin(c);
+        const Vector3f high = a.cwiseMax(b).cwiseMax(c);
+        set_box(i, low, high);
+        all.straight.add(straight);
+        all.turned.add(Array4f(low.x(), low.y(), low.z(), 0.0F), Array4f(high.x(), high.y(), high.z(), 0.0F));
+      }
+      return all;
+    };
+    if (end - begin < kParallelItems) return of_block(begin, end);
+    return pool().reduce_blocks(
+        end - begin, kBlock, TwoBoxes(),
+        [&](std::size_t from, std::size_t to) { return of_block(begin + from, begin + to); },
+        [](TwoBoxes a, const TwoBoxes& b) {
+          a.add(b);
+          return a;
+        });
+  }
+
+  const Mesh& mesh_;
 };
 
 }  // namespace
+
+std::unique_ptr<Splitter> turned_surface_area_splitter(const Mesh& mesh, const HierarchyOptions& options,
+                                                       core::ThreadPool& pool) {
+  return std::make_unique<TurnedSurfaceAreaSplitter>(mesh, triangle_items(mesh), options, pool);
+}
 
 std::unique_ptr<Splitter> surface_area_splitter(std::span<const Item> items, const HierarchyOptions& options,
                                                 core::ThreadPool& pool) {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/triangle_tree.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 
+#include "hierarchy_splitter.h"
 #include "prescene/core/check.h"
+#include "principal_axes.h"
 
 namespace prescene::collision {
 namespace {
@@ -53,37 +54,10 @@ float area(const Bounds& bounds) {
   return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
 
-/// Principal axes of the corners as rows, right-handed; nothing when they cannot be told.
 bool principal_axes(const Corners& corners, ChildRange range, Matrix3f* R_NM) {
-  const std::size_t begin = std::size_t{3} * range.begin;
-  const std::size_t end = std::size_t{3} * range.end;
-  const Vector3f reference = corners[begin];
-  Vector3f sum = Vector3f::Zero();
-  Matrix3f squares = Matrix3f::Zero();
-  for (std::size_t i = begin; i < end; ++i) {
-    const Vector3f d = corners[i] - reference;
-    sum += d;
-    squares += d * d.transpose();
-  }
-  const auto count = static_cast<float>(end - begin);
-  Matrix3f covariance = squares - sum * sum.transpose() / count;
-  const float scale = covariance.trace();
-  if (!(scale > std::numeric_limits<float>::min()) || !covariance.allFinite()) return false;
-  covariance /= scale;
-  Eigen::SelfAdjointEigenSolver<Matrix3f> solver;
-  solver.computeDirect(covariance);
-  *R_NM = solver.eigenvectors().transpose();
-  if (!R_NM->allFinite()) return false;
-  // Orthonormal to the last bits: the direct solver is not, for close eigenvalues.
-  const Vector3f x = R_NM->row(0).transpose().normalized();
-  Vector3f y = R_NM->row(1).transpose();
-  y = (y - x * x.dot(y));
-  if (!(y.norm() > 0.5F)) return false;
-  y.normalize();
-  R_NM->row(0) = x.transpose();
-  R_NM->row(1) = y.transpose();
-  R_NM->row(2) = x.cross(y).normalized().transpose();
-  return R_NM->allFinite();
+  PointMoments moments(corners[std::size_t{3} * range.begin]);
+  for (std::size_t i = std::size_t{3} * range.begin; i < std::size_t{3} * range.end; ++i) moments.add(corners[i]);
+  return moments.principal_axes(R_NM);
 }
 
 float cost_of(const Matrix3f& R_NM, const Vector3f& origin, const Corners& corners,
@@ -183,13 +157,19 @@ void ensure_root(Hierarchy* shape) {
   shape->nodes.insert(shape->nodes.begin(), root);
 }
 
+Hierarchy shape_of(const Mesh& mesh, const TriangleTreeOptions& options, core::ThreadPool& pool) {
+  const HierarchyOptions shape = {.builder = options.builder, .branching = kBranching, .leaf_items = 4};
+  if (!options.rotated_frames || options.builder != Builder::kSurfaceAreaHeuristic)
+    return build_hierarchy(triangle_items(mesh), shape, pool);
+  return grow_hierarchy(*turned_surface_area_splitter(mesh, shape, pool), mesh.triangle_count(), shape, pool);
+}
+
 }  // namespace
 
 TriangleTree TriangleTree::build(std::shared_ptr<const Mesh> mesh, const TriangleTreeOptions& options,
                                  core::ThreadPool& pool) {
   PRESCENE_CHECK(mesh != nullptr);
-  Hierarchy shape = build_hierarchy(triangle_items(*mesh),
-                                    {.builder = options.builder, .branching = kBranching, .leaf_items = 4}, pool);
+  Hierarchy shape = shape_of(*mesh, options, pool);
   ensure_root(&shape);
 
   constexpr std::size_t kTrianglesAtOnce = 4096;
