@@ -18,7 +18,7 @@ namespace prescene::collision {
 
 /// What a builder knows of an item.
 struct Item {
-  std::array<float, 3> low;     ///< Of its bounding box, m.
+  std::array<float, 3> low;  ///< Of its bounding box, m.
   std::array<float, 3> high;
   std::array<float, 3> centre;  ///< Centroid of the triangle, centre of the sphere.
   float weight = 1.0F;          ///< Importance for magnification control: area of the triangle, volume of the sphere.

@@ -360,8 +360,7 @@ class TurnedSurfaceAreaSplitter final : public SurfaceAreaSplitter {
     };
     if (end - begin < kParallelItems) return of_block(begin, end);
     return pool().reduce_blocks(
-        end - begin, kBlock, none,
-        [&](std::size_t from, std::size_t to) { return of_block(begin + from, begin + to); },
+        end - begin, kBlock, none, [&](std::size_t from, std::size_t to) { return of_block(begin + from, begin + to); },
         [](PointMoments a, const PointMoments& b) {
           a.add(b);
           return a;
