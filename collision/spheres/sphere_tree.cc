@@ -5,9 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <new>
-#include <numeric>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "prescene/core/check.h"
@@ -21,76 +19,22 @@ struct AlignedDelete {
   void operator()(float* values) const { ::operator delete[](values, std::align_val_t{kAlignment}); }
 };
 
-// How the spheres are grouped: node 0 is the root, the children of a node are consecutive and come after it.
-struct Hierarchy {
-  struct Node {
-    std::uint32_t begin = 0;  // Range of `order` below this node.
-    std::uint32_t end = 0;
-    std::uint32_t first_child = 0;
-    std::uint32_t child_count = 0;
-    bool is_leaf() const { return child_count == 0; }
-  };
-  std::vector<std::uint32_t> order;
-  std::vector<Node> nodes;
-};
-
 std::shared_ptr<float> aligned_floats(std::size_t count) {
   return {static_cast<float*>(::operator new[](count * sizeof(float), std::align_val_t{kAlignment})), AlignedDelete()};
 }
 
-// Cuts a range of spheres into `parts` of about equal numbers by halving along the longest axis of the centres.
-class Cutter {
- public:
-  explicit Cutter(std::span<const PackedSphere> spheres) : spheres_(spheres) {}
-
-  // Appends the ends of the parts of order[begin, end) to `ends`.
-  void cut(std::span<std::uint32_t> order, std::size_t begin, std::size_t end, std::size_t parts,
-           std::vector<std::size_t>& ends) const {
-    if (parts == 1) {
-      ends.push_back(end);
-      return;
-    }
-    Eigen::AlignedBox3f box;
-    for (std::size_t i = begin; i < end; ++i) box.extend(spheres_[order[i]].centre);
-    Eigen::Index axis = 0;
-    box.sizes().maxCoeff(&axis);
-    const std::size_t first_parts = parts / 2;
-    const std::size_t middle = begin + (end - begin) * first_parts / parts;
-    const auto before = [&](std::uint32_t a, std::uint32_t b) {
-      return std::pair(spheres_[a].centre[axis], a) < std::pair(spheres_[b].centre[axis], b);
-    };
-    const auto at = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(begin), at(middle), at(end), before);
-    cut(order, begin, middle, first_parts, ends);
-    cut(order, middle, end, parts - first_parts, ends);
+std::vector<Item> items_of(std::span<const PackedSphere> spheres) {
+  std::vector<Item> items;
+  items.reserve(spheres.size());
+  for (const PackedSphere& sphere : spheres) {
+    const Vector3f& c = sphere.centre;
+    const float r = sphere.radius;
+    items.push_back({.low = {c.x() - r, c.y() - r, c.z() - r},
+                     .high = {c.x() + r, c.y() + r, c.z() + r},
+                     .centre = {c.x(), c.y(), c.z()},
+                     .weight = r * r * r});
   }
-
- private:
-  std::span<const PackedSphere> spheres_;
-};
-
-Hierarchy group(std::span<const PackedSphere> spheres, std::size_t branching) {
-  Hierarchy shape;
-  shape.order.resize(spheres.size());
-  std::iota(shape.order.begin(), shape.order.end(), 0U);
-  shape.nodes.push_back({0, static_cast<std::uint32_t>(spheres.size()), 0, 0});
-  const Cutter cutter(spheres);
-  std::vector<std::size_t> ends;
-  for (std::size_t node = 0; node < shape.nodes.size(); ++node) {
-    const std::size_t begin = shape.nodes[node].begin;
-    const std::size_t end = shape.nodes[node].end;
-    if (end - begin <= branching) continue;
-    ends.clear();
-    cutter.cut(shape.order, begin, end, std::min(branching, (end - begin + branching - 1) / branching), ends);
-    shape.nodes[node].first_child = static_cast<std::uint32_t>(shape.nodes.size());
-    shape.nodes[node].child_count = static_cast<std::uint32_t>(ends.size());
-    std::size_t from = begin;
-    for (const std::size_t to : ends) {
-      shape.nodes.push_back({static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to), 0, 0});
-      from = to;
-    }
-  }
-  return shape;
+  return items;
 }
 
 std::vector<PackedSphere> in_order(const Array<PackedSphere>& spheres, std::span<const std::uint32_t> order) {
@@ -187,7 +131,9 @@ core::Result<std::shared_ptr<const SphereTree>> SphereTree::make(std::shared_ptr
   std::shared_ptr<SphereTree> tree(new SphereTree());
   tree->packing_ = packing;
   tree->options_ = options;
-  Hierarchy shape = group(packing->spheres().span(), branching);
+  Hierarchy shape = build_hierarchy(
+      items_of(packing->spheres().span()),
+      {.builder = options.builder, .branching = options.branching, .leaf_items = options.branching}, pool);
   const std::vector<PackedSphere> spheres = in_order(packing->spheres(), shape.order);
 
   std::vector<Node> nodes(shape.nodes.size());

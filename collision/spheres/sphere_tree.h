@@ -11,6 +11,7 @@
 #include <span>
 
 #include "prescene/collision/array.h"
+#include "prescene/collision/hierarchy.h"
 #include "prescene/collision/spheres/sphere_packing.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
@@ -19,6 +20,7 @@ namespace prescene::collision {
 
 struct SphereTreeOptions {
   int branching = 16;  ///< Most children of a node: 4, 8 or 16.
+  Builder builder = Builder::kWeightedNeuralGas;
 
   friend bool operator==(const SphereTreeOptions&, const SphereTreeOptions&) = default;
 };

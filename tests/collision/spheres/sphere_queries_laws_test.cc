@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <vector>
+
+#include "prescene/collision/spheres/sphere_queries.h"
+#include "prescene/geometry/primitives.h"
+#include "prescene/tests/support/generators.h"
+
+namespace prescene::collision {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::Pose;
+using Tree = std::shared_ptr<const SphereTree>;
+
+core::ThreadPool& pool() {
+  static core::ThreadPool threads(2);
+  return threads;
+}
+
+Tree packed(const geometry::Primitive& primitive) {
+  const auto mesh = *Mesh::make(geometry::make_mesh(primitive), "body");
+  return *SphereTree::make(pack_spheres(*mesh, {.max_spheres = 300}, pool())->packing, {}, pool());
+}
+
+// A bottle-like and a box-like body of about a decimetre.
+struct Bodies {
+  Tree a = packed(geometry::Capsule{0.03, 0.1});
+  Tree b = packed(geometry::BoxShape{{0.1, 0.07, 0.05}});
+};
+const Bodies& bodies() {
+  static const Bodies kept;
+  return kept;
+}
+
+Pose near_pose() { return *tests::poses(0.08); }
+
+constexpr double kRounding = 2e-6;  // m, of poses of a decimetre in single precision, with room.
+
+TEST(SphereQueriesLaw, SymmetricInTheBodies) {
+  EXPECT_TRUE(rc::check([] {
+    const auto& [a, b] = bodies();
+    SphereScratch scratch;
+    const Pose X_AB = near_pose();
+    const Transform there = *to_transform(X_AB);
+    const Transform back = *to_transform(X_AB.inverse());
+    const auto forth_distance = distance(*a, *b, there, scratch);
+    RC_ASSERT(std::abs(forth_distance->distance - distance(*b, *a, back, scratch)->distance) < kRounding);
+    if (std::abs(forth_distance->distance) > kRounding)
+      RC_ASSERT(overlap(*a, *b, there, scratch) == overlap(*b, *a, back, scratch));
+    RC_ASSERT(overlap(*a, *b, there, scratch) == (forth_distance->distance <= 0.0) ||
+              std::abs(forth_distance->distance) < kRounding);
+    const double volume = overlap_volume(*a, *b, there, scratch).volume;
+    RC_ASSERT(std::abs(volume - overlap_volume(*b, *a, back, scratch).volume) < 1e-3 * volume + 1e-10);
+    // Each body gets the opposite of what the other gets.
+    const Restitution on_a = restitution(*a, *b, there, {}, scratch);
+    const Restitution on_b = restitution(*b, *a, back, {.p_AP = X_AB.inverse().translation}, scratch);
+    const Eigen::Matrix3d R_AB = X_AB.rotation.toRotationMatrix();
+    const double scale = 1e-3 * std::sqrt(on_a.energy) + 1e-4;
+    RC_ASSERT((on_a.force + R_AB * on_b.force).norm() < scale);
+    RC_ASSERT((on_a.torque + R_AB * on_b.torque).norm() < scale);
+  }));
+}
+
+TEST(SphereQueriesLaw, InvariantUnderACommonMotion) {
+  EXPECT_TRUE(rc::check([] {
+    const auto& [a, b] = bodies();
+    SphereScratch scratch;
+    const Pose X_WA = *tests::poses(0.5);
+    const Pose X_AB = near_pose();
+    const Pose X_VW = *tests::poses(0.5);
+    const Transform here = *relative_transform(X_WA, X_WA * X_AB);
+    const Transform moved = *relative_transform(X_VW * X_WA, X_VW * X_WA * X_AB);
+    RC_ASSERT(std::abs(distance(*a, *b, here, scratch)->distance - distance(*a, *b, moved, scratch)->distance) <
+              kRounding);
+    const double volume = overlap_volume(*a, *b, here, scratch).volume;
+    RC_ASSERT(std::abs(volume - overlap_volume(*a, *b, moved, scratch).volume) < 1e-3 * volume + 1e-10);
+  }));
+}
+
+TEST(SphereQueriesLaw, DistanceChangesByAtMostTheWay) {
+  EXPECT_TRUE(rc::check([] {
+    const auto& [a, b] = bodies();
+    SphereScratch scratch;
+    Pose X_AB = near_pose();
+    const double before = distance(*a, *b, *to_transform(X_AB), scratch)->distance;
+    const Vector3d way = *tests::vectors(0.1);
+    X_AB.translation += way;
+    const double after = distance(*a, *b, *to_transform(X_AB), scratch)->distance;
+    RC_ASSERT(std::abs(after - before) <= way.norm() + kRounding);
+  }));
+}
+
+TEST(SphereQueriesLaw, SharedVolumeIsAtMostEitherVolume) {
+  EXPECT_TRUE(rc::check([] {
+    const auto& [a, b] = bodies();
+    SphereScratch scratch;
+    const double volume = overlap_volume(*a, *b, *to_transform(near_pose()), scratch).volume;
+    RC_ASSERT(volume >= 0.0);
+    RC_ASSERT(volume <= std::min(a->packing().volume(), b->packing().volume()) * (1.0 + 1e-5));
+  }));
+}
+
+TEST(SphereQueriesLaw, MoreSpheresShareMoreVolume) {
+  const auto mesh = *Mesh::make(geometry::make_mesh(geometry::Capsule{0.03, 0.1}), "body");
+  const auto all = pack_spheres(*mesh, {.max_spheres = 200}, pool())->packing;
+  const auto first = [&](std::ptrdiff_t count) {
+    return *SphereTree::make(*SpherePacking::make({all->spheres().begin(), all->spheres().begin() + count},
+                                                  {all->anchors().begin(), all->anchors().begin() + count}, "first"),
+                             {}, pool());
+  };
+  const Tree few = first(40);
+  const Tree many = first(200);
+  EXPECT_TRUE(rc::check([&] {
+    SphereScratch scratch;
+    const Transform X_AB = *to_transform(near_pose());
+    RC_ASSERT(overlap_volume(*few, *bodies().b, X_AB, scratch).volume <=
+              overlap_volume(*many, *bodies().b, X_AB, scratch).volume * (1.0 + 1e-6));
+    RC_ASSERT(distance(*few, *bodies().b, X_AB, scratch)->distance >=
+              distance(*many, *bodies().b, X_AB, scratch)->distance - 1e-9);
+  }));
+}
+
+TEST(SphereQueriesLaw, ForceAndTorqueAreTheGradientOfTheEnergy) {
+  EXPECT_TRUE(rc::check([] {
+    const auto& [a, b] = bodies();
+    SphereScratch scratch;
+    const Pose X_WB = near_pose();
+    // A stands at the world's origin, and its frame's origin is the point of the torque.
+    const Restitution push = restitution(*a, *b, *to_transform(X_WB), {.stiffness = 1e6}, scratch);
+    const double step = 2e-5;
+    const auto energy = [&](const Pose& X_WA) {
+      return restitution(*a, *b, *relative_transform(X_WA, X_WB), {.stiffness = 1e6}, scratch).energy;
+    };
+    const double scale = std::sqrt(1e6 * static_cast<double>(push.pairs) * push.energy) + 1.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3d unit = Vector3d::Unit(axis);
+      const double slope =
+          (energy(Pose::from_translation(step * unit)) - energy(Pose::from_translation(-step * unit))) / (2.0 * step);
+      RC_ASSERT(std::abs(push.force[axis] + slope) < 0.02 * scale);
+      Pose turned;
+      turned.rotation = geometry::Quaterniond(Eigen::AngleAxisd(step, unit));
+      Pose back;
+      back.rotation = turned.rotation.conjugate();
+      const double turn_slope = (energy(turned) - energy(back)) / (2.0 * step);
+      RC_ASSERT(std::abs(push.torque[axis] + turn_slope) < 0.02 * 0.1 * scale);
+    }
+  }));
+}
+
+}  // namespace
+}  // namespace prescene::collision
