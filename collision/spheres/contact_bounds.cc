@@ -26,9 +26,11 @@ double surely_touching(const CriticalPair& pair, const RelativeUncertainty& betw
   const double radii = pair.radii - remainder_at(between, pair.b);
   const Vector3d mean = pair.b - pair.a;
   const Eigen::Matrix3d covariance = between.covariance_at(pair.b);
-  const double whole = distance_probability(mean, covariance, radii) - kDistanceProbabilityError;
-  const double bound = distance_probability_bounds(mean, covariance, radii).lower;
-  return std::max(0.0, std::max(whole, bound) - RelativeUncertainty::kRemainderFails);
+  const ProbabilityBounds bounds = distance_probability_bounds(mean, covariance, radii);
+  double probability = bounds.lower;
+  if (bounds.upper - bounds.lower > 2.0 * kDistanceProbabilityError)
+    probability = std::max(probability, distance_probability(mean, covariance, radii) - kDistanceProbabilityError);
+  return std::max(0.0, probability - RelativeUncertainty::kRemainderFails);
 }
 
 /// Share of the errors along a pair's normal that let it touch: what ranks pairs that are not looked at further.
@@ -50,8 +52,10 @@ class HalfSpaces {
   double probability() const {
     double sum = 0.0;
     for (std::size_t i = 0; i < count_; ++i) sum += core::normal_cdf(-threshold_[i]);
-    if (sum < 1e-4) return sum;
     for (std::size_t i = 1; i < count_; ++i) {
+      // What is less than a thousandth of the sum is not worth the integral.
+      const double least = core::normal_cdf(-std::max(threshold_[i - 1], threshold_[i]));
+      if (least < 1e-3 * sum || sum < 1e-4) continue;
       constexpr double kError = 1e-6;  // of joint_upper_tail
       sum -= std::max(0.0, joint_upper_tail(threshold_[i - 1], threshold_[i], unit_[i - 1].dot(unit_[i])) - kError);
     }

@@ -19,6 +19,8 @@ namespace prescene::collision::HWY_NAMESPACE {
 /// Keeps the pairs with the least margins.
 class CriticalSink {
  public:
+  static constexpr bool kDeepestFirst = true;
+
   CriticalSink(const Swelling& s, CriticalPairs* critical) : s_(s), critical_(critical), limit_(s.region_radius) {}
 
   float deviations() const { return std::max(0.0F, limit_); }

@@ -16,7 +16,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::collision::HWY_NAMESPACE {
@@ -30,133 +30,248 @@ HWY_INLINE V pivot_square(D d, const Swelling& s, V x, V y, V z) {
   return dot3(ex, ey, ez, ex, ey, ez);
 }
 
-/// The children of a node of B in A's frame.
+using Lanes = hn::CappedTag<float, kPairLanes>;
+using IndexLanes = hn::RebindToUnsigned<Lanes>;
+using V = hn::Vec<Lanes>;
+
+/// All pairs of the children of two nodes of N lanes are met in order, child by child of A. A vector holds kRows of A's
+/// children, each with all of B's, or a part of B's with one of A's.
+template <std::size_t N>
+inline constexpr std::size_t kRows = hn::MaxLanes(Lanes()) > N ? hn::MaxLanes(Lanes()) / N : 1;
+/// Lanes of B's children in a vector.
+template <std::size_t N>
+inline constexpr std::size_t kStep = hn::MaxLanes(Lanes()) > N ? N : hn::MaxLanes(Lanes());
+
+/// The children of a node of B in A's frame, repeated for each row of a vector.
 struct SwollenChildren {
   HWY_ALIGN float x[16];
   HWY_ALIGN float y[16];
   HWY_ALIGN float z[16];
   HWY_ALIGN float radius[16];
-  HWY_ALIGN float reach[16];  ///< The radius and how far the error moves it.
+  HWY_ALIGN float reach[16];  ///< The radius and how far the error moves it; of unused lanes, below any radius.
 };
 
+HWY_ALIGN inline constexpr float kLaneNumbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
+/// N numbers, again and again.
 template <std::size_t N>
-HWY_INLINE void place(const float* lanes, const Swelling& s, float deviations, SwollenChildren* placed) {
-  const hn::CappedTag<float, N> d;
+HWY_INLINE V repeated(const float* numbers) {
+  const Lanes d;
+  if constexpr (kRows<N> == 1) return hn::Load(d, numbers);
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (kRows < N >> 1 && N == 4) return hn::LoadDup128(d, numbers);
+  if constexpr (kRows < N >> 1 && N == 8) {
+    const hn::Half<Lanes> half;
+    const auto part = hn::Load(half, numbers);
+    return hn::Combine(d, part, part);
+  }
+#endif
+}
+
+/// Of a row of numbers, `row` and the following ones of a vector, each for N lanes. `row` is a multiple of kRows.
+template <std::size_t N>
+HWY_INLINE V spread(const float* numbers, std::size_t row) {
+  const Lanes d;
+  if constexpr (kRows<N> == 1) {
+    return hn::Set(d, numbers[row]);
+  } else if constexpr (kRows<N> == 2) {
+    return hn::IfThenElse(hn::FirstN(d, N), hn::Set(d, numbers[row]), hn::Set(d, numbers[row + 1]));
+  } else {
+    const hn::RebindToSigned<Lanes> index;
+    return hn::TableLookupLanes(hn::LoadDup128(d, numbers + row),
+                                hn::IndicesFromVec(d, hn::ShiftRight<2>(hn::Iota(index, 0))));
+  }
+}
+
+template <std::size_t N>
+HWY_INLINE void place(const float* lanes, std::uint32_t count, const Swelling& s, float deviations,
+                      SwollenChildren* placed) {
+  const Lanes d;
   const auto moved = hn::Set(d, s.deviation * deviations + s.remainder);
   const auto moved_slope = hn::Set(d, s.deviation_slope * deviations + s.remainder_slope);
   const auto& r = s.X_AB.rotation;
   const auto& t = s.X_AB.translation;
-  for (std::size_t i = 0; i < N; i += hn::Lanes(d)) {
-    const auto x = hn::Load(d, lanes + i);
-    const auto y = hn::Load(d, lanes + N + i);
-    const auto z = hn::Load(d, lanes + 2 * N + i);
-    const auto radius = hn::Load(d, lanes + 3 * N + i);
+  for (std::size_t i = 0; i < N; i += kStep<N>) {
+    const V x = repeated<N>(lanes + i);
+    const V y = repeated<N>(lanes + N + i);
+    const V z = repeated<N>(lanes + 2 * N + i);
+    const V radius = repeated<N>(lanes + 3 * N + i);
     const auto row = [&](std::size_t k) HWY_ATTR {
       return hn::Add(dot3(hn::Set(d, r[3 * k]), hn::Set(d, r[3 * k + 1]), hn::Set(d, r[3 * k + 2]), x, y, z),
                      hn::Set(d, t[k]));
     };
-    const auto px = row(0);
-    const auto py = row(1);
-    const auto pz = row(2);
-    const auto reach = hn::Add(radius, madd(pivot_square(d, s, px, py, pz), moved_slope, moved));
+    const V px = row(0);
+    const V py = row(1);
+    const V pz = row(2);
+    const V swollen = hn::Add(radius, madd(pivot_square(d, s, px, py, pz), moved_slope, moved));
+    const auto used = hn::Lt(repeated<N>(kLaneNumbers + i), hn::Set(d, static_cast<float>(count)));
     hn::Store(px, d, placed->x + i);
     hn::Store(py, d, placed->y + i);
     hn::Store(pz, d, placed->z + i);
     hn::Store(radius, d, placed->radius + i);
-    hn::Store(reach, d, placed->reach + i);
+    hn::Store(hn::IfThenElse(used, swollen, hn::Set(d, -1e30F)), d, placed->reach + i);
   }
 }
 
+/// Some pairs of one of A's children, or of kRows of them, and B's children.
+struct MetPairs {
+  V ax, ay, az;
+  V x, y, z;
+  V radii;
+  V gap;  ///< Squared distance less the square of the reach.
+  hn::Mask<Lanes> meet;
+};
+
+/// Calls met(row of A, lane of B, pairs) where some pairs are within reach.
+template <std::size_t N, class Met>
+HWY_INLINE void for_met(const float* lanes_a, std::size_t stride_a, std::uint32_t count_a, const SwollenChildren& b,
+                        const Met& met) {
+  const Lanes d;
+  for (std::size_t i = 0; i < count_a; i += kRows<N>) {
+    MetPairs pairs;
+    pairs.ax = spread<N>(lanes_a, i);
+    pairs.ay = spread<N>(lanes_a + stride_a, i);
+    pairs.az = spread<N>(lanes_a + 2 * stride_a, i);
+    const V ar = spread<N>(lanes_a + 3 * stride_a, i);
+    for (std::size_t k = 0; k < N; k += kStep<N>) {
+      pairs.x = hn::Load(d, b.x + k);
+      pairs.y = hn::Load(d, b.y + k);
+      pairs.z = hn::Load(d, b.z + k);
+      const V dx = hn::Sub(pairs.x, pairs.ax);
+      const V dy = hn::Sub(pairs.y, pairs.ay);
+      const V dz = hn::Sub(pairs.z, pairs.az);
+      const V reach = hn::Add(hn::Load(d, b.reach + k), ar);
+      pairs.gap = hn::Sub(dot3(dx, dy, dz, dx, dy, dz), hn::Mul(reach, reach));
+      pairs.meet = hn::And(hn::Le(pairs.gap, hn::Zero(d)), hn::Ge(reach, hn::Zero(d)));
+      if (hn::AllFalse(d, pairs.meet)) continue;
+      pairs.radii = hn::Add(hn::Load(d, b.radius + k), ar);
+      met(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(k), pairs);
+    }
+  }
+}
+
+/// Pairs of nodes that are yet to be looked at.
+class NodePairs {
+ public:
+  explicit NodePairs(DescentStack* stack) : a_(stack->a.data()), b_(stack->b.data()), gap_(stack->gap.data()) {}
+
+  std::size_t size() const { return size_; }
+  void push(std::uint32_t a, std::uint32_t b) {
+    a_[size_] = a;
+    b_[size_] = b;
+    gap_[size_] = 0.0F;
+    ++size_;
+  }
+  std::pair<std::uint32_t, std::uint32_t> pop() {
+    --size_;
+    return {a_[size_], b_[size_]};
+  }
+  /// The pairs of children first_a + i and first_b + k of the lanes that meet.
+  template <std::size_t N>
+  HWY_INLINE void push_lanes(const MetPairs& pairs, std::uint32_t first_a, std::uint32_t first_b) {
+    const Lanes d;
+    const IndexLanes index;
+    const auto meet = hn::RebindMask(index, pairs.meet);
+    const auto lane = hn::Iota(index, 0);
+    auto a = hn::Set(index, first_a);
+    auto b = hn::Add(lane, hn::Set(index, first_b));
+    if constexpr (kRows < N >> 1) {
+      const auto row = hn::ShiftRight < N == 4 ? 2 : 3 > (lane);
+      a = hn::Add(a, row);
+      b = hn::Sub(b, hn::ShiftLeft < N == 4 ? 2 : 3 > (row));
+    }
+    hn::StoreU(hn::Compress(a, meet), index, a_ + size_);
+    hn::StoreU(hn::Compress(b, meet), index, b_ + size_);
+    hn::StoreU(hn::Compress(pairs.gap, pairs.meet), d, gap_ + size_);
+    size_ += hn::CountTrue(d, pairs.meet);
+  }
+  /// Brings the deepest of the pairs from `first` on to the top.
+  void deepest_on_top(std::size_t first) {
+    if (size_ <= first) return;
+    const auto deepest = static_cast<std::size_t>(std::min_element(gap_ + first, gap_ + size_) - gap_);
+    std::swap(a_[deepest], a_[size_ - 1]);
+    std::swap(b_[deepest], b_[size_ - 1]);
+  }
+
+ private:
+  std::uint32_t* a_;
+  std::uint32_t* b_;
+  float* gap_;
+  std::size_t size_ = 0;
+};
+
+/// Appends pairs of spheres.
+template <std::size_t N>
+HWY_INLINE void append(const MetPairs& pairs, PairBuffer* buffer) {
+  const Lanes d;
+  const std::size_t at = buffer->size;
+  // CompressStore would be many times slower on some processors than to compress and store.
+  const auto keep = [&](V v, PairBuffer::Numbers& numbers)
+                        HWY_ATTR { hn::StoreU(hn::Compress(v, pairs.meet), d, numbers.data() + at); };
+  keep(pairs.x, buffer->b[0]);
+  keep(pairs.y, buffer->b[1]);
+  keep(pairs.z, buffer->b[2]);
+  keep(pairs.radii, buffer->radii);
+  if constexpr (kRows<N> == 1) {  // the same in all lanes
+    hn::StoreU(pairs.ax, d, buffer->a[0].data() + at);
+    hn::StoreU(pairs.ay, d, buffer->a[1].data() + at);
+    hn::StoreU(pairs.az, d, buffer->a[2].data() + at);
+  } else {
+    keep(pairs.ax, buffer->a[0]);
+    keep(pairs.ay, buffer->a[1]);
+    keep(pairs.az, buffer->a[2]);
+  }
+  buffer->size += hn::CountTrue(d, pairs.meet);
+}
+
 /// Visits all pairs of spheres that the errors bring together. `sink` says how many standard deviations count
-/// (deviations(), which may shrink on the way), takes a full buffer (flush(buffer)), and may end the descent (ended()).
+/// (deviations(), which may shrink on the way), takes the pairs (flush(buffer)) when there are enough(), and may end
+/// the descent (ended()).
 template <std::size_t N, class Sink>
 HWY_INLINE void descend(const SphereTree& tree_a, const SphereTree& tree_b, const Swelling& s, DescentStack* stack,
                         Sink& sink) {
-  const hn::CappedTag<float, N> d;
   const SphereTree::Node* nodes_a = tree_a.nodes().data();
   const SphereTree::Node* nodes_b = tree_b.nodes().data();
-  const std::size_t stride_a = tree_a.branching();
+  const std::size_t stride_a = tree_a.branching();  // 4, 8 or 16: a multiple of kRows
   PairBuffer& buffer = stack->buffer;
   buffer.size = 0;
-  DescentStack::Entry* entries = stack->entries.data();
-  std::size_t size = 0;
-  entries[size++] = {0, 0};
+  NodePairs open(stack);
+  open.push(0, 0);
   SwollenChildren placed;
-  while (size > 0 && !sink.ended()) {
-    const DescentStack::Entry at = entries[--size];
-    const SphereTree::Node& a = nodes_a[at.a];
-    const SphereTree::Node& b = nodes_b[at.b];
-    const float* lanes_a = tree_a.lanes(at.a);
-    place<N>(tree_b.lanes(at.b), s, sink.deviations(), &placed);
-    const std::uint32_t used = (1U << b.count) - 1U;
-    const bool both_bottom = a.is_bottom() && b.is_bottom();
-    const std::size_t first = size;
-    float deepest = std::numeric_limits<float>::infinity();
-    std::size_t nearest = size;
-    std::uint32_t any = 0;
-    for (std::size_t i = 0; i < a.count; ++i) {
-      const auto ax = hn::Set(d, lanes_a[i]);
-      const auto ay = hn::Set(d, lanes_a[stride_a + i]);
-      const auto az = hn::Set(d, lanes_a[2 * stride_a + i]);
-      const auto ar = hn::Set(d, lanes_a[3 * stride_a + i]);
-      std::uint32_t hits = 0;
-      HWY_ALIGN float gaps[16];
-      for (std::size_t k = 0; k < N; k += hn::Lanes(d)) {
-        const auto x = hn::Load(d, placed.x + k);
-        const auto y = hn::Load(d, placed.y + k);
-        const auto z = hn::Load(d, placed.z + k);
-        const auto dx = hn::Sub(x, ax);
-        const auto dy = hn::Sub(y, ay);
-        const auto dz = hn::Sub(z, az);
-        const auto reach = hn::Add(hn::Load(d, placed.reach + k), ar);
-        const auto square = dot3(dx, dy, dz, dx, dy, dz);
-        const auto hit = hn::And(hn::Le(square, hn::Mul(reach, reach)), hn::Ge(reach, hn::Zero(d)));
-        if (!both_bottom) {
-          hn::Store(hn::Sub(square, hn::Mul(reach, reach)), d, gaps + k);
-          hits |= mask_bits(d, hit) << k;
-          continue;
-        }
-        const std::uint32_t bits = (mask_bits(d, hit) << k) & used;
-        if (bits == 0) continue;
-        // Unused lanes lie beyond all used ones, so that they are cut off by the count.
-        const auto most = static_cast<std::size_t>(std::popcount(bits));
-        // CompressStore would be many times slower on some processors than to compress and store.
-        hn::StoreU(hn::Compress(x, hit), d, buffer.b[0].data() + buffer.size);
-        hn::StoreU(hn::Compress(y, hit), d, buffer.b[1].data() + buffer.size);
-        hn::StoreU(hn::Compress(z, hit), d, buffer.b[2].data() + buffer.size);
-        hn::StoreU(hn::Compress(hn::Add(hn::Load(d, placed.radius + k), ar), hit), d,
-                   buffer.radii.data() + buffer.size);
-        hn::StoreU(ax, d, buffer.a[0].data() + buffer.size);
-        hn::StoreU(ay, d, buffer.a[1].data() + buffer.size);
-        hn::StoreU(az, d, buffer.a[2].data() + buffer.size);
-        buffer.size += most;
-      }
-      if (both_bottom) continue;
-      hits &= used;
-      any |= hits;
-      if (a.is_bottom()) continue;
-      if (b.is_bottom()) {
-        if (hits != 0) entries[size++] = {a.first + static_cast<std::uint32_t>(i), at.b};
-        continue;
-      }
-      for (; hits != 0; hits &= hits - 1) {
-        const auto k = static_cast<std::uint32_t>(std::countr_zero(hits));
-        if (gaps[k] < deepest) {
-          deepest = gaps[k];
-          nearest = size;
-        }
-        entries[size++] = {a.first + static_cast<std::uint32_t>(i), b.first + k};
-      }
-    }
-    if (both_bottom) {
+  while (open.size() > 0 && !sink.ended()) {
+    const auto [at_a, at_b] = open.pop();
+    const SphereTree::Node a = nodes_a[at_a];
+    const SphereTree::Node b = nodes_b[at_b];
+    place<N>(tree_b.lanes(at_b), b.count, s, sink.deviations(), &placed);
+    const float* lanes_a = tree_a.lanes(at_a);
+    if (a.is_bottom() && b.is_bottom()) {
+      for_met<N>(lanes_a, stride_a, a.count, placed,
+                 [&](std::uint32_t, std::uint32_t, const MetPairs& pairs) HWY_ATTR { append<N>(pairs, &buffer); });
       if (buffer.size >= sink.enough()) sink.flush(&buffer);
-      continue;
-    }
-    if (a.is_bottom()) {
-      for (; any != 0; any &= any - 1)
-        entries[size++] = {at.a, b.first + static_cast<std::uint32_t>(std::countr_zero(any))};
-    } else if (size > first) {
-      std::swap(entries[nearest < size ? nearest : first], entries[size - 1]);  // the deepest pair first
+    } else if (!a.is_bottom() && !b.is_bottom()) {
+      const std::size_t first = open.size();
+      for_met<N>(lanes_a, stride_a, a.count, placed,
+                 [&](std::uint32_t i, std::uint32_t k, const MetPairs& pairs)
+                     HWY_ATTR { open.push_lanes<N>(pairs, a.first + i, b.first + k); });
+      if (Sink::kDeepestFirst) open.deepest_on_top(first);
+    } else {
+      std::uint32_t met = 0;  // of the node that is not at the bottom
+      for_met<N>(lanes_a, stride_a, a.count, placed,
+                 [&](std::uint32_t i, std::uint32_t k, const MetPairs& pairs) HWY_ATTR {
+                   std::uint32_t bits = mask_bits(Lanes(), pairs.meet);
+                   for (std::uint32_t row = 0; row < kRows<N>; ++row, bits >>= kStep<N> % 16) {
+                     const std::uint32_t of_row = bits & ((1U << kStep<N>)-1U);
+                     met |= a.is_bottom() ? of_row << k : (of_row != 0 ? 1U << (i + row) : 0U);
+                   }
+                 });
+      for (; met != 0; met &= met - 1) {
+        const auto child = static_cast<std::uint32_t>(std::countr_zero(met));
+        if (a.is_bottom()) {
+          open.push(at_a, b.first + child);
+        } else {
+          open.push(a.first + child, at_b);
+        }
+      }
     }
   }
   if (!sink.ended()) sink.flush(&buffer);
@@ -173,9 +288,6 @@ HWY_INLINE void descend(const SphereTree& a, const SphereTree& b, const Swelling
       return descend<16>(a, b, s, stack, sink);
   }
 }
-
-using Lanes = hn::CappedTag<float, kPairLanes>;
-using V = hn::Vec<Lanes>;
 
 /// A vector of pairs.
 struct PairGeometry {

@@ -31,10 +31,13 @@ Swelling::Swelling(const RelativeUncertainty& between, const SphereTree& b) : X_
   }
 }
 
-void DescentStack::reserve(const SphereTree& a, const SphereTree& b) {
-  const std::size_t levels = static_cast<std::size_t>(a.depth()) + static_cast<std::size_t>(b.depth());
-  const std::size_t most = levels * a.branching() * b.branching() + 1;
-  if (entries.size() < most) entries.resize(most);
+void DescentStack::reserve(const SphereTree& tree_a, const SphereTree& tree_b) {
+  const std::size_t levels = static_cast<std::size_t>(tree_a.depth()) + static_cast<std::size_t>(tree_b.depth());
+  const std::size_t most = levels * tree_a.branching() * tree_b.branching() + 1 + kPairLanes;
+  if (a.size() >= most) return;
+  a.resize(most);
+  b.resize(most);
+  gap.resize(most);
 }
 
 }  // namespace prescene::collision

@@ -64,15 +64,13 @@ struct CriticalPairs {
 
 /// Memory of a descent.
 struct DescentStack {
-  struct Entry {
-    std::uint32_t a;
-    std::uint32_t b;
-  };
-  std::vector<Entry> entries;
+  std::vector<std::uint32_t> a;  ///< Pairs of nodes.
+  std::vector<std::uint32_t> b;
+  std::vector<float> gap;  ///< How deep they are.
   PairBuffer buffer;
 
   /// Each level leaves at most all pairs of children but one behind.
-  void reserve(const SphereTree& a, const SphereTree& b);
+  void reserve(const SphereTree& tree_a, const SphereTree& tree_b);
 };
 
 void find_critical_pairs(const SphereTree& a, const SphereTree& b, const Swelling& swelling, DescentStack* stack,

@@ -102,7 +102,13 @@ UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, con
   overlap.critical_pairs = static_cast<std::uint32_t>(memory.critical.pairs.size);
   overlap.complete = memory.critical.complete;
   if (memory.critical.pairs.size == 0) return overlap;
-  overlap.state = memory.critical.certain ? OverlapState::kCertain : OverlapState::kPossible;
+  if (memory.critical.certain) {
+    overlap.state = OverlapState::kCertain;
+    overlap.probability = 0.5 * (overlap.lower + overlap.upper);
+    overlap.probability_error = 0.5 * (overlap.upper - overlap.lower);
+    return overlap;
+  }
+  overlap.state = OverlapState::kPossible;
   set_lines(bounds.leader(), between, memory.points, &memory.lines);
   intersect_lines(memory.critical, swelling, memory.lines, !memory.critical.complete, &memory.intervals);
   estimate(memory.intervals, &overlap);

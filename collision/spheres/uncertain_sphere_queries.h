@@ -30,9 +30,10 @@ enum class OverlapState {
 
 struct UncertainOverlap {
   OverlapState state = OverlapState::kNone;
-  double probability = 0.0;        ///< Best estimate that some pair of spheres touches; within the bounds.
-  double probability_error = 0.0;  ///< Two standard errors of the estimate, from its sampling alone.
-  double lower = 0.0;              ///< Bounds that hold without exception, also for rotations that are not small.
+  double probability = 0.0;  ///< Best estimate that some pair of spheres touches; within the bounds.
+  double probability_error =
+      0.0;             ///< Two standard errors of the estimate's sampling; half the bounds' gap when certain.
+  double lower = 0.0;  ///< Bounds that hold without exception, also for rotations that are not small.
   double upper = 1.0;
   std::uint32_t critical_pairs = 0;  ///< Pairs that estimate and bounds rest on.
   /// Whether these are all pairs that touch for some error in the region. Otherwise they are those that the shortest

@@ -19,6 +19,8 @@ namespace prescene::collision::HWY_NAMESPACE {
 /// Adds up WrenchSums, a vector a number.
 class WrenchSink {
  public:
+  static constexpr bool kDeepestFirst = false;
+
   WrenchSink(const Swelling& s, float reach) : s_(s), reach_(reach) {
     for (auto& lanes : sums_) std::fill(std::begin(lanes), std::end(lanes), 0.0F);
     for (auto& lanes : local_) std::fill(std::begin(lanes), std::end(lanes), 0.0F);
@@ -66,7 +68,7 @@ class WrenchSink {
     hn::Store(hn::Add(hn::Load(d, sum), value), d, sum);
   }
 
-  HWY_INLINE void add(const PairGeometry& g, hn::Mask<Lanes> used) {
+  HWY_INLINE void add(const PairGeometry& g, hn::Mask<Lanes> there) {
     const Lanes d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0F);
@@ -79,6 +81,9 @@ class WrenchSink {
     const V sigma = hn::Max(g.deviation, hn::Set(d, 1e-20F));
     const V gap = hn::Sub(distance, g.radii);
     const V margin = hn::Max(hn::Min(hn::Div(gap, sigma), hn::Set(d, 12.0F)), hn::Set(d, -12.0F));
+    // The descent took the largest deviation in any direction; along n it is often less.
+    const auto used = hn::And(there, hn::Lt(margin, hn::Set(d, reach_)));
+    if (hn::AllFalse(d, used)) return;
     // Density and tail of the normal distribution [Abramowitz and Stegun 1964, 26.2.17]: within 1e-7.
     const V density =
         hn::Mul(hn::Set(d, 0.3989422804F), hn::Exp(d, hn::Mul(hn::Set(d, -0.5F), hn::Mul(margin, margin))));
