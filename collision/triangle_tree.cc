@@ -214,15 +214,21 @@ TriangleTree TriangleTree::build(std::shared_ptr<const Mesh> mesh, const Triangl
   });
 
   TriangleTree tree;
-  float squared_radius = 0.0F;
-  for (const Vector3f& p : corners) squared_radius = std::max(squared_radius, p.squaredNorm());
-  tree.radius_ = std::sqrt(squared_radius);
+  tree.radius_ = radius_of(*mesh);
   tree.mesh_ = std::move(mesh);
   tree.options_ = options;
   tree.nodes_ = Array<TriangleTreeNode>(std::move(nodes));
   tree.blocks_ = Array<TriangleBlock>(std::move(blocks));
   tree.references_ = Array<TriangleReferences>(std::move(references));
   return tree;
+}
+
+float TriangleTree::radius_of(const Mesh& mesh) {
+  float radius = 0.0F;
+  for (const TriangleIndices& triangle : mesh.triangles()) {
+    for (const std::uint32_t index : triangle) radius = std::max(radius, mesh.vertices()[index].stableNorm());
+  }
+  return radius;
 }
 
 TriangleTreeMemory TriangleTree::memory() const { return {nodes_.bytes(), references_.bytes(), blocks_.bytes()}; }

@@ -12,12 +12,16 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "prescene/collision/array.h"
 #include "prescene/collision/hierarchy.h"
 #include "prescene/collision/mesh.h"
 #include "prescene/core/parallel.h"
+#include "prescene/core/status.h"
 
 namespace prescene::collision {
 
@@ -82,6 +86,8 @@ struct TriangleTreeMemory {
   std::size_t triangle_bytes = 0;  ///< The copy of the triangles.
 };
 
+class TreeFile;
+
 class TriangleTree {
  public:
   /// The same for any number of threads of `pool`.
@@ -99,7 +105,23 @@ class TriangleTree {
   float radius() const { return radius_; }
   TriangleTreeMemory memory() const;
 
+  /// Keeps the tree in a file (tree_file.h) that belongs to this mesh and these options. Fails as
+  /// TreeFileWriter::write.
+  core::Status save(const std::filesystem::path& path) const;
+  /// The tree that save() wrote for this mesh and these options, mapped into memory: the same bits. Fails as
+  /// TreeFile::open, and with kDataLoss when what is in it cannot be a tree over the mesh.
+  static core::Result<TriangleTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                         const TriangleTreeOptions& options);
+  /// The same in memory.
+  std::vector<std::uint8_t> bytes() const;
+  static core::Result<TriangleTree> from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                               const TriangleTreeOptions& options);
+
  private:
+  static float radius_of(const Mesh& mesh);
+  static core::Result<TriangleTree> from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                              const TriangleTreeOptions& options);
+
   std::shared_ptr<const Mesh> mesh_;
   TriangleTreeOptions options_;
   Array<TriangleTreeNode> nodes_;
