@@ -12,19 +12,9 @@
 namespace prescene::collision {
 namespace {
 
-constexpr std::uint32_t kCountMask = 0x7F;
-
 double half_area(const BoxtreeBox& box) {
   const auto extent = [&](std::size_t i) { return static_cast<double>(box.high[i]) - static_cast<double>(box.low[i]); };
   return extent(0) * extent(1) + extent(1) * extent(2) + extent(2) * extent(0);
-}
-
-// The ends of the two children after a share of the box's width has been cut off.
-float low_child_high(const BoxtreeBox& box, std::size_t axis, std::uint16_t cut) {
-  return box.high[axis] - from_half(cut) * (box.high[axis] - box.low[axis]);
-}
-float high_child_low(const BoxtreeBox& box, std::size_t axis, std::uint16_t cut) {
-  return box.low[axis] + from_half(cut) * (box.high[axis] - box.low[axis]);
 }
 
 // The largest half by which `wanted` or less of the width is cut off, and for which `contains` holds.
@@ -36,18 +26,23 @@ std::uint16_t cut_share(double wanted, double width, const Contains& contains) {
   return cut;
 }
 
-std::uint16_t low_cut(const BoxtreeBox& box, const BoxtreeCut& exact) {
-  const std::size_t i = exact.axis;
-  return cut_share(static_cast<double>(box.high[i]) - static_cast<double>(exact.low_child_high),
-                   static_cast<double>(box.high[i] - box.low[i]),
-                   [&](std::uint16_t cut) { return low_child_high(box, i, cut) >= exact.low_child_high; });
+// Cuts along one axis, as Boxtree::cut_off takes them.
+std::array<std::uint16_t, 4> along(std::size_t axis, std::uint16_t cut) {
+  std::array<std::uint16_t, 4> cuts = {};
+  cuts[axis] = cut;
+  return cuts;
 }
 
-std::uint16_t high_cut(const BoxtreeBox& box, const BoxtreeCut& exact) {
-  const std::size_t i = exact.axis;
-  return cut_share(static_cast<double>(exact.high_child_low) - static_cast<double>(box.low[i]),
-                   static_cast<double>(box.high[i] - box.low[i]),
-                   [&](std::uint16_t cut) { return high_child_low(box, i, cut) <= exact.high_child_low; });
+// What is to be cut off the upper end so that `high` stays inside, and off the lower end for `low`.
+std::uint16_t upper_cut(const BoxtreeBox& box, std::size_t axis, float high) {
+  return cut_share(static_cast<double>(box.high[axis]) - static_cast<double>(high),
+                   static_cast<double>(box.high[axis] - box.low[axis]),
+                   [&](std::uint16_t cut) { return Boxtree::cut_off(box, {}, along(axis, cut)).high[axis] >= high; });
+}
+std::uint16_t lower_cut(const BoxtreeBox& box, std::size_t axis, float low) {
+  return cut_share(static_cast<double>(low) - static_cast<double>(box.low[axis]),
+                   static_cast<double>(box.high[axis] - box.low[axis]),
+                   [&](std::uint16_t cut) { return Boxtree::cut_off(box, along(axis, cut), {}).low[axis] <= low; });
 }
 
 class Packer {
@@ -57,29 +52,45 @@ class Packer {
     nodes.reserve(shape.nodes.size() / 2);
   }
 
-  Boxtree::Child add(std::uint32_t number, const BoxtreeBox& box) {
+  Boxtree::Child add(std::uint32_t number, BoxtreeBox box) {
     const Hierarchy::Node& from = shape_.nodes[number];
     if (from.is_leaf()) return {one_a_leaf_ ? shape_.order[from.begin] : from.begin, from.end - from.begin};
-    const auto index = static_cast<std::uint32_t>(nodes.size());
+    const auto first = static_cast<std::uint32_t>(nodes.size());
+    if (is_loose(exact_[number], box)) box = trim(exact_[number], box);
+    const std::size_t index = nodes.size();
     nodes.emplace_back();
     const BoxtreeSplit split = split_of(from, exact_, box);
     Boxtree::Node node;
-    node.cut = {low_cut(box, split.cut), high_cut(box, split.cut)};
-    const BoxtreeCut cut = {split.cut.axis, low_child_high(box, split.cut.axis, node.cut[0]),
-                            high_child_low(box, split.cut.axis, node.cut[1])};
-    node.header = static_cast<std::uint32_t>(split.cut.axis);
+    const std::size_t axis = split.cut.axis;
+    node.header = static_cast<std::uint32_t>(axis);
+    node.cut = {upper_cut(box, axis, split.cut.low_child_high), lower_cut(box, axis, split.cut.high_child_low)};
+    const std::array<BoxtreeBox, 2> boxes = {Boxtree::cut_off(box, {}, along(axis, node.cut[0])),
+                                             Boxtree::cut_off(box, along(axis, node.cut[1]), {})};
     for (std::size_t i = 0; i < 2; ++i) {
-      const Boxtree::Child child = add(split.child[i], cut_off(box, cut, i));
+      const Boxtree::Child child = add(split.child[i], boxes[i]);
       node.child[i] = child.index;
       node.header |= child.triangles << (2 + 7 * i);
     }
     nodes[index] = node;
-    return {index, 0};
+    return {first, 0};
   }
 
   std::vector<Boxtree::Node> nodes;
 
  private:
+  // Adds a node that trims the box; returns what is left.
+  BoxtreeBox trim(const BoxtreeBox& exact, const BoxtreeBox& box) {
+    std::array<std::uint16_t, 4> low = {};
+    std::array<std::uint16_t, 4> high = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = lower_cut(box, axis, exact.low[axis]);
+      high[axis] = upper_cut(box, axis, exact.high[axis]);
+    }
+    const auto two = [&](std::size_t i) { return low[i] | static_cast<std::uint32_t>(high[i]) << 16U; };
+    nodes.push_back({.child = {two(0), two(1)}, .cut = {low[2], high[2]}, .header = Boxtree::kTrims});
+    return Boxtree::cut_off(box, low, high);
+  }
+
   const Hierarchy& shape_;
   std::vector<BoxtreeBox> exact_;
   bool one_a_leaf_;
@@ -92,7 +103,7 @@ std::vector<BoxtreeBox> exact_boxes(const Hierarchy& shape, const std::vector<It
   for (std::size_t i = shape.nodes.size(); i-- > 0;) {
     const Hierarchy::Node& node = shape.nodes[i];
     bool first = true;
-    const auto add = [&](const std::array<float, 3>& low, const std::array<float, 3>& high) {
+    const auto add = [&](const auto& low, const auto& high) {
       for (std::size_t c = 0; c < 3; ++c) {
         boxes[i].low[c] = first ? low[c] : std::min(boxes[i].low[c], low[c]);
         boxes[i].high[c] = first ? high[c] : std::max(boxes[i].high[c], high[c]);
@@ -105,6 +116,11 @@ std::vector<BoxtreeBox> exact_boxes(const Hierarchy& shape, const std::vector<It
       add(items[shape.order[k]].low, items[shape.order[k]].high);
   }
   return boxes;
+}
+
+bool is_loose(const BoxtreeBox& exact, const BoxtreeBox& box) {
+  constexpr double kLoose = 0.6;  // Of the area: looser ones save less memory than they cost time.
+  return half_area(exact) < kLoose * half_area(box);
 }
 
 BoxtreeSplit split_of(const Hierarchy::Node& node, const std::vector<BoxtreeBox>& exact, const BoxtreeBox& box) {
@@ -138,17 +154,6 @@ Boxtree Boxtree::build(std::shared_ptr<const Mesh> mesh, const BoxtreeOptions& o
   tree.nodes_ = Array<Node>(std::move(packer.nodes));
   if (options.leaf_items > 1) tree.order_ = Array<std::uint32_t>(std::move(shape.order));
   return tree;
-}
-
-std::array<Boxtree::Child, 2> Boxtree::children(const Child& node) const {
-  const Node& from = nodes_[node.index];
-  return {Child{from.child[0], from.header >> 2U & kCountMask}, Child{from.child[1], from.header >> 9U & kCountMask}};
-}
-
-BoxtreeCut Boxtree::cut(const Child& node, const BoxtreeBox& box) const {
-  const Node& from = nodes_[node.index];
-  const std::size_t axis = from.header & 3U;
-  return {axis, low_child_high(box, axis, from.cut[0]), high_child_low(box, axis, from.cut[1])};
 }
 
 }  // namespace prescene::collision

@@ -35,17 +35,31 @@ std::array<Boxtree::Child, 2> children_of(const Boxtree& tree, const Boxtree::Ch
 std::array<PlainBoxtree::Child, 2> children_of(const PlainBoxtree& /*tree*/, PlainBoxtree::Child node) {
   return {node->children[0].get(), node->children[1].get()};
 }
-BoxtreeCut cut_of(const Boxtree& tree, const Boxtree::Child& node, const BoxtreeBox& box) {
-  return tree.cut(node, box);
+void trim(const Boxtree& tree, Boxtree::Child& child, BoxtreeBox& box) { tree.trim(child, box); }
+void trim(const PlainBoxtree& /*tree*/, PlainBoxtree::Child child, BoxtreeBox& box) {
+  if (child->trimmed != nullptr) box = *child->trimmed;
 }
-BoxtreeCut cut_of(const PlainBoxtree& /*tree*/, PlainBoxtree::Child node, const BoxtreeBox& /*box*/) {
-  return node->cut;
+std::array<BoxtreeBox, 2> halves_of(const Boxtree& tree, const Boxtree::Child& node, const BoxtreeBox& box) {
+  return tree.halves(node, box);
 }
+std::array<BoxtreeBox, 2> halves_of(const PlainBoxtree& /*tree*/, PlainBoxtree::Child node, const BoxtreeBox& box) {
+  const BoxtreeCut cut = node->cut;
+  std::array<BoxtreeBox, 2> parts = {box, box};
+  for (std::size_t i = 0; i < 4; ++i) {
+    parts[0].high[i] = i == cut.axis ? cut.low_child_high : box.high[i];
+    parts[1].low[i] = i == cut.axis ? cut.high_child_low : box.low[i];
+  }
+  return parts;
+}
+
+// Four numbers that are handled as a vector.
+using Four = std::array<float, 4>;
 
 // Where B's boxes are in A's frame, and what rounding may add to the tests, m.
 struct BoxtreeFrame {
-  std::array<std::array<float, 3>, 3> R = {};
-  std::array<float, 3> t = {};
+  alignas(16) std::array<Four, 3> columns = {};  // Of R_AB.
+  alignas(16) std::array<Four, 3> rows = {};
+  alignas(16) Four t = {};
   float slack = 0.0F;        ///< Along A's axes.
   float other_slack = 0.0F;  ///< Along B's: also because they are perpendicular only up to rounding.
 
@@ -61,8 +75,9 @@ struct BoxtreeFrame {
       reach_b += std::max(std::abs(static_cast<double>(b.low[i])), std::abs(static_cast<double>(b.high[i])));
       shift += std::abs(static_cast<double>(t[i]));
       for (std::size_t k = 0; k < 3; ++k) {
-        R[i][k] = X_AB.rotation[3 * i + k];
-        largest = std::max(largest, std::abs(static_cast<double>(R[i][k])));
+        rows[i][k] = X_AB.rotation[3 * i + k];
+        columns[k][i] = rows[i][k];
+        largest = std::max(largest, std::abs(static_cast<double>(rows[i][k])));
         double product = i == k ? -1.0 : 0.0;
         for (std::size_t n = 0; n < 3; ++n)
           product += static_cast<double>(X_AB.rotation[3 * n + i]) * static_cast<double>(X_AB.rotation[3 * n + k]);
@@ -90,7 +105,7 @@ class BoxtreeQuery {
       : a_(a), b_(b), frame_(a.box(), b.box(), X_AB), counts_(counts), batch_(a.mesh(), b.mesh(), X_AB, counts) {}
 
   bool run() {
-    const SideA a{a_.root(), a_.box()};
+    const SideA a = side_a(a_.root(), a_.box());
     const SideB b = seen_from_a(b_.root(), b_.box());
     return (!disjoint(a, b) && visit(a, b)) || batch_.flush();
   }
@@ -101,48 +116,62 @@ class BoxtreeQuery {
   struct SideA {
     Child child;
     BoxtreeBox box;
+    alignas(16) Four centre;
+    alignas(16) Four half;
   };
   struct SideB {
     Child child;
     BoxtreeBox box;
-    std::array<float, 3> half;      // In B's frame.
-    std::array<float, 3> centre_A;  // In A's.
-    std::array<float, 3> half_A;    // Of the box around it along A's axes.
+    alignas(16) Four half;      // In B's frame.
+    alignas(16) Four centre_A;  // In A's.
+    alignas(16) Four half_A;    // Of the box around it along A's axes.
   };
 
-  HWY_INLINE SideB seen_from_a(const Child& child, const BoxtreeBox& box) const {
-    SideB side{child, box, {}, frame_.t, {frame_.slack, frame_.slack, frame_.slack}};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const float centre = 0.5F * box.low[k] + 0.5F * box.high[k];
-      side.half[k] = 0.5F * box.high[k] - 0.5F * box.low[k];
-      for (std::size_t i = 0; i < 3; ++i) {
-        side.centre_A[i] += frame_.R[i][k] * centre;
-        side.half_A[i] += std::abs(frame_.R[i][k]) * side.half[k];
-      }
+  HWY_INLINE SideA side_a(Child child, BoxtreeBox box) const {
+    trim(a_, child, box);
+    SideA side{child, box, {}, {}};
+    for (std::size_t i = 0; i < 4; ++i) {
+      side.centre[i] = 0.5F * box.low[i] + 0.5F * box.high[i];
+      side.half[i] = 0.5F * box.high[i] - 0.5F * box.low[i];
     }
     return side;
   }
 
-  // By the axes of both boxes.
+  HWY_INLINE SideB seen_from_a(Child child, BoxtreeBox box) const {
+    trim(b_, child, box);
+    SideB side{child, box, {}, {}, {}};
+    alignas(16) Four centre;
+    for (std::size_t i = 0; i < 4; ++i) {
+      centre[i] = 0.5F * box.low[i] + 0.5F * box.high[i];
+      side.half[i] = 0.5F * box.high[i] - 0.5F * box.low[i];
+    }
+    const auto& R = frame_.columns;
+    for (std::size_t i = 0; i < 4; ++i) {
+      side.centre_A[i] = frame_.t[i] + R[0][i] * centre[0] + R[1][i] * centre[1] + R[2][i] * centre[2];
+      side.half_A[i] = frame_.slack + std::abs(R[0][i]) * side.half[0] + std::abs(R[1][i]) * side.half[1] +
+                       std::abs(R[2][i]) * side.half[2];
+    }
+    return side;
+  }
+
+  // By the axes of both boxes; without a branch an axis, which nobody could predict.
   HWY_INLINE bool disjoint(const SideA& a, const SideB& b) const {
     if (counts_ != nullptr) ++counts_->volume_tests;
-    std::array<float, 3> apart;
-    std::array<float, 3> half;
-    for (std::size_t i = 0; i < 3; ++i) {
-      half[i] = 0.5F * a.box.high[i] - 0.5F * a.box.low[i];
-      apart[i] = b.centre_A[i] - (0.5F * a.box.low[i] + 0.5F * a.box.high[i]);
-      if (std::abs(apart[i]) > half[i] + b.half_A[i]) return true;
+    alignas(16) Four apart;
+    int separated = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      apart[i] = b.centre_A[i] - a.centre[i];
+      separated |= static_cast<int>(std::abs(apart[i]) > a.half[i] + b.half_A[i]);
     }
-    for (std::size_t k = 0; k < 3; ++k) {
-      float along = 0.0F;
-      float reach = b.half[k] + frame_.other_slack;
-      for (std::size_t i = 0; i < 3; ++i) {
-        along += frame_.R[i][k] * apart[i];
-        reach += std::abs(frame_.R[i][k]) * half[i];
-      }
-      if (std::abs(along) > reach) return true;
+    if (separated != 0) return true;
+    const auto& R = frame_.rows;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const float along = R[0][k] * apart[0] + R[1][k] * apart[1] + R[2][k] * apart[2];
+      const float reach = frame_.other_slack + b.half[k] + std::abs(R[0][k]) * a.half[0] +
+                          std::abs(R[1][k]) * a.half[1] + std::abs(R[2][k]) * a.half[2];
+      separated |= static_cast<int>(std::abs(along) > reach);
     }
-    return false;
+    return separated != 0;
   }
 
   // Trees are at most some 60 levels deep.
@@ -156,10 +185,9 @@ class BoxtreeQuery {
       return std::any_of(parts.begin(), parts.end(),
                          [&](const SideA& part) HWY_ATTR { return !disjoint(part, b) && visit(part, b); });
     }
-    const auto cut = cut_of(b_, b.child, b.box);
+    const auto boxes = halves_of(b_, b.child, b.box);
     const auto children = children_of(b_, b.child);
-    const std::array<SideB, 2> parts_b = {seen_from_a(children[0], cut_off(b.box, cut, 0)),
-                                          seen_from_a(children[1], cut_off(b.box, cut, 1))};
+    const std::array<SideB, 2> parts_b = {seen_from_a(children[0], boxes[0]), seen_from_a(children[1], boxes[1])};
     if (leaf_a) {
       for (const SideB& part : parts_b) {
         if (!disjoint(a, part) && visit(a, part)) return true;
@@ -175,9 +203,9 @@ class BoxtreeQuery {
   }
 
   HWY_INLINE std::array<SideA, 2> parts_of_a(const SideA& a) const {
-    const auto cut = cut_of(a_, a.child, a.box);
+    const auto boxes = halves_of(a_, a.child, a.box);
     const auto children = children_of(a_, a.child);
-    return {SideA{children[0], cut_off(a.box, cut, 0)}, SideA{children[1], cut_off(a.box, cut, 1)}};
+    return {side_a(children[0], boxes[0]), side_a(children[1], boxes[1])};
   }
 
   HWY_INLINE bool add_leaves(const Child& a, const Child& b) {

@@ -87,7 +87,8 @@ class BvhLiteQuery {
         k_(static_cast<std::size_t>(a.options().k)),
         unpacking_a_(a.options().bits),
         unpacking_b_(b.options().bits),
-        steps_(Realignment(DopDirections::of(a.options().k), a.space(), b.space(), X_AB), a.options().k),
+        steps_(DopDirections::of(a.options().k),
+               Realignment(DopDirections::of(a.options().k), a.space(), b.space(), X_AB)),
         batch_(a.mesh(), b.mesh(), X_AB, counts) {}
 
   bool run() {

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
 #include "prescene/core/parallel.h"
+#include "prescene/core/status.h"
 
 namespace prescene::collision {
 
@@ -50,6 +52,10 @@ class BvhLiteTree {
 
   /// Options out of range, and trees of 2^30 nodes, are our bug (checked).
   static BvhLiteTree build(std::shared_ptr<const Mesh> mesh, const BvhLiteOptions& options, core::ThreadPool& pool);
+  /// To and from a file (tree_file.h); TreeFile::open says how reading may fail. Bad contents are kDataLoss.
+  core::Status save(const std::filesystem::path& path) const;
+  static core::Result<BvhLiteTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                        const BvhLiteOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const BvhLiteOptions& options() const { return options_; }

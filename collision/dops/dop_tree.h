@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 
@@ -18,6 +19,7 @@
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
 #include "prescene/core/parallel.h"
+#include "prescene/core/status.h"
 
 namespace prescene::collision {
 
@@ -39,6 +41,10 @@ class DopTree {
 
   /// Options out of range are our bug (checked).
   static DopTree build(std::shared_ptr<const Mesh> mesh, const DopTreeOptions& options, core::ThreadPool& pool);
+  /// To and from a file (tree_file.h); TreeFile::open says how reading may fail. Bad contents are kDataLoss.
+  core::Status save(const std::filesystem::path& path) const;
+  static core::Result<DopTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                    const DopTreeOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const DopTreeOptions& options() const { return options_; }

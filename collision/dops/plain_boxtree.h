@@ -16,6 +16,7 @@ struct PlainBoxtree::Node {
 
   BoxtreeCut cut;
   std::array<std::unique_ptr<Node>, 2> children;  ///< Low and high; null in leaves.
+  std::unique_ptr<BoxtreeBox> trimmed;            ///< In place of what the parent's cut gives; mostly null.
   std::uint32_t triangle = 0;                     ///< Of a leaf.
 };
 
@@ -29,6 +30,8 @@ struct BoxtreeSplit {
 std::vector<BoxtreeBox> exact_boxes(const Hierarchy& shape, const std::vector<Item>& items);
 /// The axis and the order of the two children that make their boxes' areas smallest.
 BoxtreeSplit split_of(const Hierarchy::Node& node, const std::vector<BoxtreeBox>& exact, const BoxtreeBox& box);
+/// Whether a node whose exact box is the first one, in the second, is worth trimming.
+bool is_loose(const BoxtreeBox& exact, const BoxtreeBox& box);
 /// A child's box.
 inline BoxtreeBox cut_off(const BoxtreeBox& box, const BoxtreeCut& cut, std::size_t child) {
   BoxtreeBox part = box;

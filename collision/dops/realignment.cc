@@ -2,7 +2,6 @@
 #include "prescene/collision/dops/realignment.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -15,9 +14,12 @@ namespace {
 constexpr double kUnit = 0x1p-24;        // Unit roundoff of single precision.
 constexpr double kUnderflow = 0x1p-140;  // Far above what sums of a few products can lose to it.
 constexpr double kHuge = 1e35;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::uint32_t kHalfInfinity = 0x7C00;
 
 double to_double(float x) { return static_cast<double>(x); }
+
+float constant_of(double bound) { return bound > -kHuge ? static_cast<float>(std::min(bound, kHuge)) : -kInfinity; }
 
 using Planes = std::array<double, 2 * kMostDopAxes>;
 
@@ -97,14 +99,6 @@ float round_up(double value) {
   return std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
 
-float from_half(std::uint16_t value) {
-  const std::uint32_t sign = (value & 0x8000U) << 16U;
-  const std::uint32_t magnitude = value & 0x7FFFU;
-  // Single precision with the half's exponent, brought to its bias by a product, which treats subnormal halves alike.
-  const float wide = std::bit_cast<float>(magnitude << 13U) * 0x1p112F;
-  return std::bit_cast<float>(std::bit_cast<std::uint32_t>(wide) | sign);
-}
-
 std::uint16_t round_up_to_half(double value) {
   PRESCENE_CHECK(std::abs(value) <= 65504.0);
   // Halves of one sign are ordered as their bits. The largest one towards zero, then outward where that is not enough.
@@ -137,23 +131,32 @@ Realignment::Realignment(const DopDirections& dop_directions, const DopSpace& sp
   const double placing = 2.0 * (8.0 * kUnit * largest + kUnderflow);
   const double scale_a = to_double(space_a.inverse_length);
   const double ratio = scale_a / to_double(space_b.inverse_length);
-  for (std::size_t p = 0; p < static_cast<std::size_t>(dop_directions.k()); ++p) {
-    const DopAxis d = dop_directions.direction(p);
+  const std::span<const DopAxis> axes = dop_directions.axes();
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const DopAxis& d = axes[i];
     DopAxis against{};  // -d, in B's frame.
     for (std::size_t col = 0; col < 3; ++col)
       against[col] = -(d[0] * to_double(r[col]) + d[1] * to_double(r[3 + col]) + d[2] * to_double(r[6 + col]));
     const DopCone cone = dop_directions.cone(against);
     const double constant = scale_a * (d[0] * between[0] + d[1] * between[1] + d[2] * between[2]);
-    double sum = 1.0 + std::abs(constant);  // Of the sizes of all terms: planes are at most 1.
-    for (std::size_t n = 0; n < 3; ++n) sum += cone.weights[n] * ratio;
-    const double bound = constant - scale_a * placing - 16.0 * kUnit * sum;
+    double weight = 0.0;
+    for (std::size_t n = 0; n < 3; ++n) weight += cone.weights[n] * ratio;
+    const double slack =
+        scale_a * placing + 32.0 * kUnit * (1.0 + std::abs(constant) + weight);  // Planes are at most 1.
+    Direction& upper = directions[i];
+    Direction& lower = directions[axes.size() + i];
     // Where sizes differ so much that single precision overflows, the opposite direction decides, or none.
-    const bool usable = bound > -kHuge && sum - std::abs(constant) < kHuge;
-    Direction& direction = directions[p];
-    direction.constant = usable ? static_cast<float>(std::min(bound, kHuge)) : -std::numeric_limits<float>::infinity();
+    upper.constant = weight < kHuge ? constant_of(constant - slack) : -kInfinity;
+    lower.constant = weight < kHuge ? constant_of(-constant - slack) : -kInfinity;
     for (std::size_t n = 0; n < 3; ++n) {
-      direction.weights[n] = usable ? static_cast<float>(cone.weights[n] * ratio) : 0.0F;
-      direction.planes[n] = cone.directions[n];
+      upper.planes[n] = cone.directions[n];
+      lower.planes[n] = static_cast<std::uint8_t>(dop_directions.opposite(cone.directions[n]));
+      const auto sum = static_cast<float>(std::clamp(against[n] * ratio, -kHuge, kHuge));
+      upper.against[n] = upper.constant > -kInfinity ? sum : 0.0F;
+      lower.against[n] = lower.constant > -kInfinity ? -sum : 0.0F;
+      const auto w = static_cast<float>(std::min(cone.weights[n] * ratio, kHuge));
+      upper.weights[n] = upper.constant > -kInfinity ? w : 0.0F;
+      lower.weights[n] = lower.constant > -kInfinity ? w : 0.0F;
     }
   }
 }

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -41,18 +42,27 @@ std::vector<float> fit_planes(const DopDirections& directions, const DopSpace& s
 /// Rounded up, also to half precision. Finite input.
 float round_up(double value);
 std::uint16_t round_up_to_half(double value);
-float from_half(std::uint16_t value);
+/// Of a half that is not negative: single precision with the half's exponent, brought to its bias by a product, which
+/// treats subnormal halves alike.
+inline float from_positive_half(std::uint16_t value) {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(value) << 13U) * 0x1p112F;
+}
+inline float from_half(std::uint16_t value) {
+  const float magnitude = from_positive_half(value & 0x7FFFU);
+  return (value & 0x8000U) != 0 ? -magnitude : magnitude;
+}
 
 struct Realignment {
   struct Direction {
     std::array<float, 3> weights;
+    std::array<float, 3> against;  ///< Sum of the three planes' normals with these weights.
     float constant;
     std::array<std::uint8_t, 3> planes;
   };
   std::array<Direction, 2 * kMostDopAxes> directions;  ///< The first k are used.
 
   /// `constant` makes room for all rounding: of B's vertices when they are put into A's frame (transform.h), of the
-  /// weights, and of the sum, with or without fused operations.
+  /// weights, and of the sum, with or without fused operations, also when it is moved by SIMDop's shifts.
   Realignment(const DopDirections& dop_directions, const DopSpace& space_a, const DopSpace& space_b,
               const Transform& X_AB);
 };

@@ -6,6 +6,7 @@
 #define HWY_TARGET_INCLUDE "simdop_collide.cc"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, which includes this file once for each instruction set.
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "pair_batch-inl.h"
@@ -33,7 +34,8 @@ class SimdopQuery {
         b_(b),
         stack_(scratch->node_pairs()),
         counts_(counts),
-        steps_(Realignment(DopDirections::of(a.options().k), a.space(), b.space(), X_AB), a.options().k),
+        steps_(DopDirections::of(a.options().k),
+               Realignment(DopDirections::of(a.options().k), a.space(), b.space(), X_AB)),
         planes_a_(planes_of(a, Plane{})),
         planes_b_(planes_of(b, Plane{})),
         batch_(a.mesh(), b.mesh(), X_AB, counts) {}
@@ -59,21 +61,33 @@ class SimdopQuery {
  private:
   HWY_INLINE void push(std::uint32_t a, std::uint32_t a_children, std::uint32_t b, std::uint32_t b_children) {
     stack_.push_back({a, b, static_cast<std::uint16_t>(a_children), static_cast<std::uint16_t>(b_children)});
+    hwy::Prefetch(planes_a_ + a * kBranching * steps_.count);
+    hwy::Prefetch(planes_b_ + b * kBranching * steps_.count);
   }
 
   HWY_INLINE void find_overlaps(const NodePair& pair, Overlaps& overlaps) const {
     const std::size_t size = kBranching * steps_.count;
     const Plane* planes_a = planes_a_ + pair.a * size;
     const Plane* planes_b = planes_b_ + pair.b * size;
+    const float* constant = steps_.constant.data();
+    HWY_ALIGN std::array<float, SimdopSteps::kMost> shifted;
+    if constexpr (sizeof(Plane) == 2) {
+      shift_constants(steps_, a_.nodes()[pair.a], b_.nodes()[pair.b], shifted.data());
+      constant = shifted.data();
+    }
     if constexpr (kTraversal == SimdopTraversal::kOneVersusOne) {
-      one_versus_one<kBranching>(steps_, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
+      one_versus_one<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
     } else if (std::has_single_bit(pair.b_children)) {
       const auto child_b = static_cast<std::size_t>(std::countr_zero(pair.b_children));
-      all_versus_one<kBranching>(steps_, planes_a, pair.a_children, planes_b, child_b, overlaps);
+      all_versus_one<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, child_b, overlaps);
     } else if constexpr (kTraversal == SimdopTraversal::kOneVersusAll) {
-      one_versus_all<kBranching>(steps_, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
+      if (!std::has_single_bit(pair.a_children)) {
+        all_versus_each<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
+        return;
+      }
+      one_versus_all<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
     } else {
-      four_versus_four(steps_, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
+      four_versus_four(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
     }
   }
 

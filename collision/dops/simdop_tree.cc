@@ -2,6 +2,7 @@
 #include "prescene/collision/dops/simdop_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -61,6 +62,29 @@ Layout lay_out(const Hierarchy& shape) {
   return layout;
 }
 
+// The middle of a node's volume along the coordinate axes, which are the first three.
+void choose_shifts(const SimdopOptions& options, const std::vector<float>& fitted, Layout& layout) {
+  const auto k = static_cast<std::size_t>(options.k);
+  for (std::size_t i = 0; i < layout.nodes.size(); ++i) {
+    const float* planes = &fitted[layout.shape_nodes[i] * k];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float middle = 0.5F * (planes[axis] - planes[k / 2 + axis]);
+      const float steps = std::clamp(std::round(middle / SimdopTree::kShift), -127.0F, 127.0F);
+      layout.nodes[i].shift[axis] = static_cast<std::int8_t>(steps);
+    }
+  }
+}
+
+// Of the point that a node's planes are relative to, along each direction.
+std::array<double, 2 * kMostDopAxes> shift_along(const DopDirections& directions, const SimdopTree::Node& node) {
+  std::array<double, 2 * kMostDopAxes> along = {};
+  for (std::size_t p = 0; p < static_cast<std::size_t>(directions.k()); ++p) {
+    const DopAxis d = directions.direction(p);
+    for (std::size_t c = 0; c < 3; ++c) along[p] += d[c] * static_cast<double>(SimdopTree::kShift) * node.shift[c];
+  }
+  return along;
+}
+
 template <class Plane, class Round>
 Array<Plane> arrange(const SimdopOptions& options, const Hierarchy& shape, const Layout& layout,
                      const std::vector<float>& fitted, core::ThreadPool& pool, const Round& round) {
@@ -72,12 +96,13 @@ Array<Plane> arrange(const SimdopOptions& options, const Hierarchy& shape, const
   pool.for_blocks(layout.nodes.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Hierarchy::Node& node = shape.nodes[layout.shape_nodes[i]];
+      const auto shift = shift_along(DopDirections::of(options.k), layout.nodes[i]);
       Plane* to = &planes[i * branching * k];
       for (std::size_t c = 0; c < node.child_count; ++c) {
         const float* from = &fitted[(node.first_child + c) * k];
         for (std::size_t p = 0; p < k; ++p) {
           const std::size_t direction = p % 2 == 0 ? p / 2 : k / 2 + p / 2;
-          to[by_child ? c * k + p : p * branching + c] = round(from[direction]);
+          to[by_child ? c * k + p : p * branching + c] = round(static_cast<double>(from[direction]) - shift[direction]);
         }
       }
     }
@@ -100,10 +125,13 @@ SimdopTree SimdopTree::build(std::shared_ptr<const Mesh> mesh, const SimdopOptio
   const std::vector<float> fitted = fit_planes(directions, tree.space_, *mesh, shape, pool);
   Layout layout = lay_out(shape);
   if (options.precision == PlanePrecision::kHalf) {
+    choose_shifts(options, fitted, layout);
+    // With room for the rounding of the difference.
     tree.half_planes_ = arrange<std::uint16_t>(options, shape, layout, fitted, pool,
-                                               [](float x) { return round_up_to_half(static_cast<double>(x)); });
+                                               [](double x) { return round_up_to_half(x + 1e-15); });
   } else {
-    tree.single_planes_ = arrange<float>(options, shape, layout, fitted, pool, [](float x) { return x; });
+    tree.single_planes_ =
+        arrange<float>(options, shape, layout, fitted, pool, [](double x) { return static_cast<float>(x); });
   }
   tree.mesh_ = std::move(mesh);
   tree.nodes_ = Array<Node>(std::move(layout.nodes));

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 
 #include "prescene/collision/array.h"
@@ -21,6 +22,7 @@
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
 #include "prescene/core/parallel.h"
+#include "prescene/core/status.h"
 
 namespace prescene::collision {
 
@@ -53,10 +55,19 @@ class SimdopTree {
     std::uint32_t first_leaf = 0;
     std::uint16_t children = 0;  ///< A bit a lane in use.
     std::uint16_t leaves = 0;    ///< Those that are leaves.
+    /// In half precision, which is finest about zero, planes are relative to this point: in units of kShift of the
+    /// space's length from its centre.
+    std::array<std::int8_t, 3> shift = {0, 0, 0};
   };
+  static_assert(sizeof(Node) == 16);
+  static constexpr float kShift = 1.0F / 256.0F;
 
   /// Options out of range are our bug (checked).
   static SimdopTree build(std::shared_ptr<const Mesh> mesh, const SimdopOptions& options, core::ThreadPool& pool);
+  /// To and from a file (tree_file.h); TreeFile::open says how reading may fail. Bad contents are kDataLoss.
+  core::Status save(const std::filesystem::path& path) const;
+  static core::Result<SimdopTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                       const SimdopOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const SimdopOptions& options() const { return options_; }
