@@ -3,13 +3,16 @@
 #include "prescene/collision/triangle_queries.h"
 
 #include <gmock/gmock.h>
+#include <hwy/highway.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <limits>
 #include <vector>
 
 #include "prescene/collision/exact_triangles.h"
+#include "prescene/collision/triangle_pair_distance.h"
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/generators.h"
 
@@ -84,6 +87,90 @@ TEST(TriangleQueries, FindWhatBruteForceFinds) {
   std::printf("%d configurations compared with brute force, %d of them in contact\n", configurations, intersecting);
   EXPECT_GT(intersecting, configurations / 10);
   EXPECT_LT(intersecting, configurations);
+}
+
+/// Smallest distance of the triangles, m, by trying all.
+double brute_force_distance(const Mesh& a, const Mesh& b, const Transform& X_AB) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t k = 0; k < b.triangle_count(); ++k) {
+    Triangle placed = b.corners(k);
+    for (Vector3f& p : placed) p = X_AB * p;
+    for (std::uint32_t i = 0; i < a.triangle_count(); ++i)
+      least = std::min(least, triangle_pair_distance(a.corners(i), placed).distance);
+  }
+  return least;
+}
+
+// What is rounded differently may answer differently only where the surfaces are within that rounding of each other.
+void assert_same_but_for_rounding(bool one, bool other, const TriangleTree& a, const TriangleTree& b,
+                                  const Transform& X_AB) {
+  if (one == other) return;
+  const double size = static_cast<double>(a.radius() + b.radius());
+  RC_ASSERT(brute_force_distance(a.mesh(), b.mesh(), X_AB) < 1e-5 * size);
+}
+
+TEST(TriangleQueries, AreSymmetricInTheBodies) {
+  EXPECT_TRUE(rc::check([] {
+    const TriangleTree a = tree_of(*tests::closed_meshes());
+    const TriangleTree b = tree_of(*tests::closed_meshes());
+    QueryScratch scratch;
+    const Transform X_AB = touching_pose(a.mesh(), b.mesh());
+    assert_same_but_for_rounding(collide(a, b, X_AB, scratch), collide(b, a, inverse(X_AB), scratch), a, b, X_AB);
+  }));
+}
+
+TEST(TriangleQueries, DoNotSeeACommonRigidMotion) {
+  EXPECT_TRUE(rc::check([] {
+    const geometry::TriangleMesh mesh_a = *tests::closed_meshes();
+    const geometry::TriangleMesh mesh_b = *tests::closed_meshes();
+    const geometry::Pose X_MA = *tests::poses(0.1);
+    const geometry::Pose X_MB = *tests::poses(0.1);
+    const TriangleTree a = tree_of(mesh_a);
+    const TriangleTree b = tree_of(mesh_b);
+    QueryScratch scratch;
+    const Transform X_AB = touching_pose(a.mesh(), b.mesh());
+    geometry::Pose pose;
+    Eigen::Matrix3d R;
+    for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = static_cast<double>(X_AB.rotation[static_cast<std::size_t>(i)]);
+    pose.rotation = geometry::Quaterniond(R).normalized();
+    pose.translation = Eigen::Map<const Vector3f>(X_AB.translation.data()).cast<double>();
+    // The same bodies, each described in another frame of its own.
+    const TriangleTree moved_a = tree_of(geometry::transformed(mesh_a, X_MA));
+    const TriangleTree moved_b = tree_of(geometry::transformed(mesh_b, X_MB));
+    const auto moved_X = to_transform(X_MA * pose * X_MB.inverse());
+    RC_ASSERT(moved_X.ok());
+    assert_same_but_for_rounding(collide(a, b, X_AB, scratch), collide(moved_a, moved_b, *moved_X, scratch), a, b,
+                                 X_AB);
+  }));
+}
+
+TEST(TriangleQueries, AnswerAlikeForEveryTreeAndInstructionSet) {
+  EXPECT_TRUE(rc::check([] {
+    core::ThreadPool pool(1);
+    const auto mesh_a = to_mesh(*tests::closed_meshes());
+    const auto mesh_b = to_mesh(*tests::closed_meshes());
+    const Transform X_AB = touching_pose(*mesh_a, *mesh_b);
+    QueryScratch scratch;
+    const TriangleTree a = TriangleTree::build(mesh_a, {}, pool);
+    const bool expected = collide(a, TriangleTree::build(mesh_b, {}, pool), X_AB, scratch);
+    for (const Builder builder : kAllBuilders) {
+      for (const bool rotated : {false, true}) {
+        const TriangleTree b = TriangleTree::build(mesh_b, {builder, rotated}, pool);
+        RC_ASSERT(collide(a, b, X_AB, scratch) == expected);
+        const std::array<Transform, 3> batch = {X_AB, X_AB, X_AB};
+        std::array<bool, 3> answers{};
+        for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+          hwy::SetSupportedTargetsForTest(target);
+          hwy::GetChosenTarget().DeInit();
+          RC_ASSERT(collide(a, b, X_AB, scratch) == expected);
+          collide(a, b, batch, answers, scratch);
+          RC_ASSERT(answers[0] == expected && answers[2] == expected);
+        }
+        hwy::SetSupportedTargetsForTest(0);
+        hwy::GetChosenTarget().DeInit();
+      }
+    }
+  }));
 }
 
 /// A configuration that moves no point within `reach` of the origin further than about `distance`.
