@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <iomanip>
 #include <numeric>
+#include <sstream>
 #include <tuple>
 
 #include "prescene/core/check.h"
@@ -62,6 +64,17 @@ OpenEdges open_edges(const Mesh& mesh) {
   }
   std::sort(open.edges.begin(), open.edges.end(), starts_before);
   return open;
+}
+
+core::Status check_closed(const Mesh& mesh, const OpenEdges& open) {
+  if (open.edges.empty()) return core::ok_status();
+  const Vector3f place = 0.5F * (mesh.vertices()[open.edges[0].from] + mesh.vertices()[open.edges[0].to]);
+  std::ostringstream text;
+  text << std::setprecision(4) << "mesh '" << mesh.name()
+       << "': it is open, or its triangles are of mixed orientation: " << open.edges.size() << " open edges, one at ("
+       << place.x() << ", " << place.y() << ", " << place.z()
+       << ") m; mend it, or have its holes covered by pack_spheres with close_holes";
+  return core::invalid_input(text.str());
 }
 
 ClosedMesh close_holes(const Mesh& mesh, const OpenEdges& open) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "prescene/collision/mesh.h"
+#include "prescene/core/status.h"
 
 namespace prescene::collision {
 
@@ -19,6 +20,8 @@ struct OpenEdges {
   std::vector<Edge> edges;  ///< Sorted; an edge that misses two triangles stands twice.
 };
 OpenEdges open_edges(const Mesh& mesh);
+/// kInvalidInput, with the mesh's name, the number of open edges and a place on one, when there are any.
+core::Status check_closed(const Mesh& mesh, const OpenEdges& open);
 
 /// A mesh with its holes covered: each closed loop of open edges by triangles from its middle.
 struct ClosedMesh {

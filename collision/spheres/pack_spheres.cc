@@ -60,13 +60,7 @@ double enclosed_volume(const ClosedMesh& mesh) {
 core::Result<ClosedMesh> closed(const Mesh& mesh, bool close, PackingReport& report) {
   const OpenEdges open = open_edges(mesh);
   report.open_edges = static_cast<int>(open.edges.size());
-  if (!open.edges.empty() && !close) {
-    const Vector3d from = mesh.vertices()[open.edges[0].from].cast<double>();
-    const Vector3d to = mesh.vertices()[open.edges[0].to].cast<double>();
-    return refuse(mesh, "it is open, or its triangles are of mixed orientation: " + std::to_string(open.edges.size()) +
-                            " open edges, one at " + text_of(0.5 * (from + to)) +
-                            "; mend it, or set close_holes to have the holes covered");
-  }
+  if (!close) PRESCENE_RETURN_IF_ERROR(check_closed(mesh, open));
   ClosedMesh result = close_holes(mesh, open);
   report.closed_holes = result.holes;
   report.body_volume = enclosed_volume(result);
