@@ -6,10 +6,12 @@
 #include <gmock/gmock.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +41,7 @@ struct Compared {
   int by_brute_force = 0;
   int fcl_differs = 0;
   int wrong = 0;           ///< Answers of the tree that brute force refutes.
+  int batch_differs = 0;   ///< Configurations that a batch answers otherwise than a single query.
   int targets_differ = 0;  ///< Configurations that instruction sets answer differently.
 };
 
@@ -71,6 +74,26 @@ std::vector<bool> answers(const TriangleTree& a, const TriangleTree& b, const st
   return collides;
 }
 
+/// The same sixteen at a time: those around one touching pose come after each other.
+std::vector<bool> answers_of_batches(const TriangleTree& a, const TriangleTree& b,
+                                     const std::vector<Transform>& configurations) {
+  QueryScratch scratch;
+  std::vector<bool> collides;
+  for (std::size_t begin = 0; begin < configurations.size(); begin += 16) {
+    const std::size_t count = std::min<std::size_t>(16, configurations.size() - begin);
+    std::array<bool, 16> touching = {};
+    collide(a, b, std::span(configurations).subspan(begin, count), std::span(touching).first(count), scratch);
+    collides.insert(collides.end(), touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  return collides;
+}
+
+int differences(const std::vector<bool>& a, const std::vector<bool>& b) {
+  int count = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) count += a[i] != b[i] ? 1 : 0;
+  return count;
+}
+
 Compared compare(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b) {
   core::ThreadPool pool(1);
   const TriangleTree tree_a = TriangleTree::build(a, {}, pool), tree_b = TriangleTree::build(b, {}, pool);
@@ -91,8 +114,8 @@ Compared compare(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<con
   compared.configurations = static_cast<int>(configurations.size());
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     use_targets(target);
-    const std::vector<bool> again = answers(tree_a, tree_b, configurations);
-    for (std::size_t i = 0; i < again.size(); ++i) compared.targets_differ += again[i] != by_tree[i] ? 1 : 0;
+    compared.targets_differ += differences(answers(tree_a, tree_b, configurations), by_tree);
+    compared.batch_differs += differences(answers_of_batches(tree_a, tree_b, configurations), by_tree);
   }
   use_targets(0);
   return compared;
@@ -107,6 +130,7 @@ void expect_same_answers(const std::shared_ptr<const Mesh>& a, const std::shared
       compared.by_brute_force, compared.colliding, compared.fcl_differs);
   EXPECT_EQ(compared.wrong, 0);
   EXPECT_EQ(compared.targets_differ, 0);
+  EXPECT_EQ(compared.batch_differs, 0);
   EXPECT_EQ(compared.configurations, kScattered + kTouching * kAround);
   // Both answers are frequent.
   EXPECT_GT(compared.colliding, compared.configurations / 10);
