@@ -118,6 +118,21 @@ Table without_turns(Table table) {
   return table;
 }
 
+/// A million triangles, with cold caches.
+Measurements measure_cold() {
+  MeasureOptions options;
+  options.configurations = 12;
+  options.rounds = 3;
+  options.cold = true;
+  std::vector<Algorithm> algorithms = our_algorithms();
+  for (Algorithm& peer : peer_algorithms()) algorithms.push_back(std::move(peer));
+  std::erase_if(algorithms, [](const Algorithm& algorithm) { return algorithm.slow; });
+  const std::vector<tests::MeshPair> pair = {
+      {"bumpy_sphere / knot, 1M", tests::collision_mesh(tests::make_bumpy_sphere(0.1, 1'000'000), "bumpy_sphere_1M"),
+       tests::collision_mesh(tests::make_knot(0.1, 1'000'000), "knot_1M")}};
+  return measure(pair, algorithms, {0.0, 0.01, 0.05}, options);
+}
+
 void show(const char* title, const Table& table) { std::printf("%s\n%s\n", title, text_of(table).c_str()); }
 
 int run(const Arguments& arguments) {
@@ -143,16 +158,19 @@ int run(const Arguments& arguments) {
   const Measurements measurements = measure(pairs, chosen_algorithms(arguments), shares, options);
   add_query_targets(measurements, &report);
   add_memory_targets(measurements, &report);
-  Measurements study;
+  Measurements study, cold;
   if (arguments.only.empty()) {
     study = measure_study(pairs, arguments);
     add_study_targets(study, &report);
+    if (!arguments.quick) cold = measure_cold();
+    add_cold_targets(cold, &report);
   }
 
   std::puts(report.text().c_str());
   show("Median times in microseconds, geometric means over pairs", summary_table(measurements));
   if (!study.cells.empty())
     show("Other settings, likewise over pairs of 20,000 to 150,000 triangles", without_turns(summary_table(study)));
+  if (!cold.cells.empty()) show("Two meshes of a million triangles, caches cold", without_turns(summary_table(cold)));
   show("Default tree by instruction set: median times in microseconds", target_table(measurements));
   show("Answers against the exact reference", wrong_answer_counts(measurements));
   if (arguments.out.empty()) return 0;
@@ -163,6 +181,10 @@ int run(const Arguments& arguments) {
     report.add(std::move(table));
   for (Table table : {summary_table(study), wrong_answer_counts(study), query_table(study), cost_table(study)}) {
     table.name = "study_" + table.name;
+    report.add(std::move(table));
+  }
+  for (Table table : {summary_table(cold), query_table(cold), cost_table(cold)}) {
+    table.name = "cold_" + table.name;
     report.add(std::move(table));
   }
   for (Plot& plot : query_plots(measurements)) report.add(std::move(plot));

@@ -18,6 +18,8 @@ struct MeasureOptions {
   int batches = 6;          ///< A cell, of 16 near configurations each.
   int rounds = 7;
   double block = 4e-6;  ///< s: a query that is repeated goes on for at least this long in each round.
+  /// Boolean queries only, each after something else has filled the caches.
+  bool cold = false;
   int slow_stride = 4;  ///< Slow algorithms are measured on every so many configurations.
   std::uint64_t seed = 2007;
 };
@@ -30,8 +32,9 @@ struct Stream {
 
 /// Seconds each query takes, stream by stream: each is clocked by itself, less what the clock takes; the smallest of
 /// the rounds. In each round every stream has its turn, in rotating order, first once untimed: so all see the same
-/// state of the machine, and caches hold what a stream of queries on these meshes leaves there.
-std::vector<std::vector<double>> time_streams(std::span<const Stream> streams, int rounds);
+/// state of the machine, and caches hold what a stream of queries on these meshes leaves there. `cold`: instead the
+/// caches are filled with other things before each query.
+std::vector<std::vector<double>> time_streams(std::span<const Stream> streams, int rounds, bool cold = false);
 
 /// Seconds a call of each of `queries` when it is asked again and again, so that the processor has learnt it by heart;
 /// otherwise likewise.

@@ -90,6 +90,17 @@ void add_query_targets(const Measurements& measurements, Report* report) {
                            speed_ratio(measurements, kDefaultTree, kFcl, Query::kDistance, kDistanceShares)));
 }
 
+void add_cold_targets(const Measurements& cold, Report* report) {
+  const auto boolean = [&](std::string_view baseline) {
+    return speed_ratio(cold, kDefaultTree, baseline, Query::kCollide, kNearShares);
+  };
+  const std::string near = ", two meshes of a million triangles, at 0, 1 % and 5 %";
+  report->add(
+      ratio_target("cold caches: boolean vs FCL", std::nullopt, std::nullopt, "FCL, OBBRSS" + near, boolean(kFcl)));
+  report->add(ratio_target("cold caches: boolean vs scalar binary k-DOP tree", std::nullopt, std::nullopt,
+                           "ours, k = 32, longest axis" + near, boolean(kScalarDops)));
+}
+
 void add_study_targets(const Measurements& study, Report* report) {
   const collision::SimdopOptions half{.precision = collision::PlanePrecision::kHalf};
   const collision::SimdopOptions single{.precision = collision::PlanePrecision::kSingle};

@@ -13,6 +13,8 @@ void add_build_targets(Report* report);
 void add_query_targets(const Measurements& measurements, Report* report);
 /// Settings of our trees against each other.
 void add_study_targets(const Measurements& study, Report* report);
+/// Queries whose trees are in no cache.
+void add_cold_targets(const Measurements& cold, Report* report);
 /// Bytes of trees.
 void add_memory_targets(const Measurements& measurements, Report* report);
 
