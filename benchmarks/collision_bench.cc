@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compares our collision trees with other libraries and with their targets.
 //
-//   bench_collision [--quick] [--only=NAME[,NAME]...] [--benchmark_out=PATH]
+//   bench_collision [--quick] [--part=PART[,PART]...] [--only=NAME[,NAME]...] [--benchmark_out=PATH]
 //
-// --quick takes about a minute; --only measures just the algorithms whose name contains one of the NAMEs, and FCL, and
-// leaves out the study of settings.
+// --quick takes about a minute. --part: of queries, study (settings of our trees), cold (trees in no cache; not if
+// quick) and spheres. --only measures just the queries of algorithms whose name contains one of the NAMEs, and of FCL.
+#include <hwy/targets.h>
 #include <sched.h>
 
-#include <hwy/targets.h>
 #include <algorithm>
 #include <cstdio>
 #include <string>
@@ -28,26 +28,42 @@ namespace {
 
 struct Arguments {
   bool quick = false;
+  std::vector<std::string> parts;  ///< All if empty.
   std::vector<std::string> only;
   std::string out;
+
+  bool wants(std::string_view part) const {
+    return parts.empty() || std::find(parts.begin(), parts.end(), part) != parts.end();
+  }
 };
+
+std::vector<std::string> split(std::string_view names) {
+  std::vector<std::string> words;
+  while (!names.empty()) {
+    const std::size_t comma = std::min(names.find(','), names.size());
+    words.emplace_back(names.substr(0, comma));
+    names.remove_prefix(std::min(comma + 1, names.size()));
+  }
+  return words;
+}
 
 bool parse(int count, char** words, Arguments* arguments) {
   for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
+    const std::string_view word = words[i], value = word.substr(std::min(word.find('=') + 1, word.size()));
     if (word == "--quick") {
       arguments->quick = true;
     } else if (word.starts_with("--benchmark_out=")) {
-      arguments->out = word.substr(word.find('=') + 1);
+      arguments->out = value;
+    } else if (word.starts_with("--part=")) {
+      arguments->parts = split(value);
     } else if (word.starts_with("--only=")) {
-      std::string_view names = word.substr(word.find('=') + 1);
-      while (!names.empty()) {
-        const std::size_t comma = std::min(names.find(','), names.size());
-        arguments->only.emplace_back(names.substr(0, comma));
-        names.remove_prefix(std::min(comma + 1, names.size()));
-      }
+      arguments->only = split(value);
+      arguments->parts = {"queries"};
     } else {
-      std::fprintf(stderr, "usage: %s [--quick] [--only=NAME[,NAME]...] [--benchmark_out=PATH]\n", words[0]);
+      std::fprintf(stderr,
+                   "usage: %s [--quick] [--part=PART[,PART]...] [--only=NAME[,NAME]...] [--benchmark_out=PATH]\n"
+                   "parts: queries, study, cold, spheres\n",
+                   words[0]);
       return false;
     }
   }
@@ -113,7 +129,7 @@ Measurements measure_study(const std::vector<tests::MeshPair>& pairs, const Argu
 }
 
 /// Only the queries by themselves.
-Table without_turns(Table table) {
+Table without_repeats(Table table) {
   std::erase_if(table.rows, [](const std::vector<Figure>& row) { return row[1] != Figure("boolean"); });
   return table;
 }
@@ -133,18 +149,25 @@ Measurements measure_cold() {
   return measure(pair, algorithms, {0.0, 0.01, 0.05}, options);
 }
 
-void show(const char* title, const Table& table) { std::printf("%s\n%s\n", title, text_of(table).c_str()); }
+void show(const char* title, const Table& table) {
+  if (table.rows.empty()) return;
+  std::printf("%s\n%s\n", title, text_of(table).c_str());
+}
 
-int run(const Arguments& arguments) {
-  Report report("collision", simd_target());
+/// What was measured; without cells where it was not wanted.
+struct Results {
+  Measurements queries, study, cold;
+};
+
+Results measure_all(const Arguments& arguments, Report* report) {
   std::vector<tests::MeshPair> pairs = tests::recorded_mesh_pairs();
-  if (pairs.empty()) report.note(tests::missing_data_message("meshes") + " Only shapes made here are measured.");
+  if (pairs.empty()) report->note(tests::missing_data_message("meshes") + " Only shapes made here are measured.");
   for (tests::MeshPair& pair : tests::made_mesh_pairs()) pairs.push_back(std::move(pair));
-  report.note(
+  report->note(
       "Queries are clocked one by one in streams of different poses, the smallest of some rounds, on one processor.");
 
   // Uses all processors, so before the rest is bound to one.
-  add_build_targets(&report);
+  if (arguments.wants("queries")) add_build_targets(report);
   stay_on_one_processor();
 
   MeasureOptions options;
@@ -155,41 +178,59 @@ int run(const Arguments& arguments) {
     options.rounds = 5;
     shares = {0.0, 0.01, 0.05, -0.01};
   }
-  const Measurements measurements = measure(pairs, chosen_algorithms(arguments), shares, options);
-  add_query_targets(measurements, &report);
-  add_memory_targets(measurements, &report);
-  Measurements study, cold;
-  if (arguments.only.empty()) {
-    study = measure_study(pairs, arguments);
-    add_study_targets(study, &report);
-    if (!arguments.quick) cold = measure_cold();
-    add_cold_targets(cold, &report);
+  Results results;
+  if (arguments.wants("queries")) {
+    results.queries = measure(pairs, chosen_algorithms(arguments), shares, options);
+    add_query_targets(results.queries, report);
+    add_memory_targets(results.queries, report);
   }
+  if (arguments.wants("study")) {
+    results.study = measure_study(pairs, arguments);
+    add_study_targets(results.study, report);
+  }
+  if (arguments.wants("cold") && !arguments.quick) {
+    results.cold = measure_cold();
+    add_cold_targets(results.cold, report);
+  }
+  if (arguments.wants("spheres")) add_sphere_targets(arguments.quick, report);
+  return results;
+}
 
+void print(const Report& report, const Results& results) {
   std::puts(report.text().c_str());
-  show("Median times in microseconds, geometric means over pairs", summary_table(measurements));
-  if (!study.cells.empty())
-    show("Other settings, likewise over pairs of 20,000 to 150,000 triangles", without_turns(summary_table(study)));
-  if (!cold.cells.empty()) show("Two meshes of a million triangles, caches cold", without_turns(summary_table(cold)));
-  show("Default tree by instruction set: median times in microseconds", target_table(measurements));
-  show("Answers against the exact reference", wrong_answer_counts(measurements));
-  if (arguments.out.empty()) return 0;
+  show("Median times in microseconds, geometric means over pairs", summary_table(results.queries));
+  show("Other settings, likewise over pairs of 20,000 to 150,000 triangles",
+       without_repeats(summary_table(results.study)));
+  show("Two meshes of a million triangles, caches cold", without_repeats(summary_table(results.cold)));
+  show("Default tree by instruction set: median times in microseconds", target_table(results.queries));
+  show("Answers against the exact reference", wrong_answer_counts(results.queries));
+}
 
-  for (Table table : {summary_table(measurements), wrong_answer_counts(measurements), target_table(measurements),
-                      ratio_table(measurements), query_table(measurements), cost_table(measurements),
-                      wrong_answer_table(measurements)})
-    report.add(std::move(table));
-  for (Table table : {summary_table(study), wrong_answer_counts(study), query_table(study), cost_table(study)}) {
-    table.name = "study_" + table.name;
-    report.add(std::move(table));
+void add_raw_figures(const Results& results, Report* report) {
+  const auto add = [&](const std::string& prefix, Table table) {
+    table.name = prefix + table.name;
+    report->add(std::move(table));
+  };
+  for (const auto& [prefix, measurements] :
+       {std::pair("", &results.queries), std::pair("study_", &results.study), std::pair("cold_", &results.cold)}) {
+    add(prefix, summary_table(*measurements));
+    add(prefix, query_table(*measurements));
+    add(prefix, cost_table(*measurements));
+    add(prefix, wrong_answer_counts(*measurements));
+    add(prefix, wrong_answer_table(*measurements));
   }
-  for (Table table : {summary_table(cold), query_table(cold), cost_table(cold)}) {
-    table.name = "cold_" + table.name;
-    report.add(std::move(table));
-  }
-  for (Plot& plot : query_plots(measurements)) report.add(std::move(plot));
-  if (!study.cells.empty())
-    for (Plot& plot : study_plots(study)) report.add(std::move(plot));
+  report->add(target_table(results.queries));
+  report->add(ratio_table(results.queries));
+  for (Plot& plot : query_plots(results.queries)) report->add(std::move(plot));
+  for (Plot& plot : study_plots(results.study)) report->add(std::move(plot));
+}
+
+int run(const Arguments& arguments) {
+  Report report("collision", simd_target());
+  const Results results = measure_all(arguments, &report);
+  print(report, results);
+  if (arguments.out.empty()) return 0;
+  add_raw_figures(results, &report);
   const core::Status status = report.write(arguments.out);
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.message().c_str());
   return status.ok() ? 0 : 1;

@@ -15,6 +15,8 @@ void add_query_targets(const Measurements& measurements, Report* report);
 void add_study_targets(const Measurements& study, Report* report);
 /// Queries whose trees are in no cache.
 void add_cold_targets(const Measurements& cold, Report* report);
+/// Inner sphere trees: vector instructions against plain C++, uncertain poses against certain ones.
+void add_sphere_targets(bool quick, Report* report);
 /// Bytes of trees.
 void add_memory_targets(const Measurements& measurements, Report* report);
 
