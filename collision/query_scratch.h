@@ -29,15 +29,29 @@ struct SharedNodePair {
   std::uint32_t configurations;
 };
 
+/// A node or a leaf that is to be tested against rays.
+struct RayStep {
+  static constexpr std::uint32_t kLeafBit = 1U << 31U;
+
+  float near;                ///< Where the first of them comes to its box, m.
+  std::uint32_t below_word;  ///< The node, or, with kLeafBit, the leaf's block.
+  std::uint32_t rays;        ///< Which of a packet.
+
+  bool is_leaf() const { return (below_word & kLeafBit) != 0; }
+  std::uint32_t below() const { return below_word & ~kLeafBit; }
+};
+
 /// Memory that a query works in. One a thread; after the first queries nothing is allocated any more.
 class QueryScratch {
  public:
   std::vector<NodePair>& node_pairs() { return node_pairs_; }
   std::vector<SharedNodePair>& shared_node_pairs() { return shared_node_pairs_; }
+  std::vector<RayStep>& ray_steps() { return ray_steps_; }
 
  private:
   std::vector<NodePair> node_pairs_;
   std::vector<SharedNodePair> shared_node_pairs_;
+  std::vector<RayStep> ray_steps_;
 };
 
 }  // namespace prescene::collision
