@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "prescene/core/hash.h"
 
@@ -17,8 +18,7 @@ core::Status refuse(std::string_view name, const std::string& what) {
   return core::invalid_input("sphere packing '" + std::string(name) + "': " + what);
 }
 
-core::Status check(const std::vector<PackedSphere>& spheres, const std::vector<SurfaceAnchor>& anchors,
-                   std::string_view name) {
+core::Status check(const Array<PackedSphere>& spheres, const Array<SurfaceAnchor>& anchors, std::string_view name) {
   if (spheres.empty()) return refuse(name, "it has no spheres; give at least one");
   if (spheres.size() > kMostSpheres)
     return refuse(name, "it has " + std::to_string(spheres.size()) + " spheres; at most 2^30 are allowed");
@@ -44,18 +44,24 @@ core::Status check(const std::vector<PackedSphere>& spheres, const std::vector<S
 core::Result<std::shared_ptr<const SpherePacking>> SpherePacking::make(std::vector<PackedSphere> spheres,
                                                                        std::vector<SurfaceAnchor> anchors,
                                                                        std::string_view name) {
+  return make(Array<PackedSphere>(std::move(spheres)), Array<SurfaceAnchor>(std::move(anchors)), name);
+}
+
+core::Result<std::shared_ptr<const SpherePacking>> SpherePacking::make(Array<PackedSphere> spheres,
+                                                                       Array<SurfaceAnchor> anchors,
+                                                                       std::string_view name) {
   PRESCENE_RETURN_IF_ERROR(check(spheres, anchors, name));
   std::shared_ptr<SpherePacking> packing(new SpherePacking());
   packing->name_ = name;
   core::Hasher hasher;
   hasher.value(spheres.size());
-  hasher.bytes(spheres.data(), spheres.size() * sizeof(PackedSphere));
-  hasher.bytes(anchors.data(), anchors.size() * sizeof(SurfaceAnchor));
+  hasher.bytes(spheres.data(), spheres.bytes());
+  hasher.bytes(anchors.data(), anchors.bytes());
   packing->content_hash_ = hasher.digest();
   for (const PackedSphere& sphere : spheres)
     packing->volume_ += 4.0 / 3.0 * std::numbers::pi * std::pow(static_cast<double>(sphere.radius), 3);
-  packing->spheres_ = Array<PackedSphere>(std::move(spheres));
-  packing->anchors_ = Array<SurfaceAnchor>(std::move(anchors));
+  packing->spheres_ = std::move(spheres);
+  packing->anchors_ = std::move(anchors);
   return std::shared_ptr<const SpherePacking>(std::move(packing));
 }
 

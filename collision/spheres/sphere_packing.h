@@ -42,6 +42,10 @@ class SpherePacking {
                                                                  std::vector<SurfaceAnchor> anchors,
                                                                  std::string_view name);
 
+  /// The same from values that somebody else keeps, such as a mapped file.
+  static core::Result<std::shared_ptr<const SpherePacking>> make(Array<PackedSphere> spheres,
+                                                                 Array<SurfaceAnchor> anchors, std::string_view name);
+
   std::uint32_t size() const { return static_cast<std::uint32_t>(spheres_.size()); }
   const Array<PackedSphere>& spheres() const { return spheres_; }
   const Array<SurfaceAnchor>& anchors() const { return anchors_; }

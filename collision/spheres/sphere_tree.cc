@@ -6,6 +6,7 @@
 #include <limits>
 #include <new>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "prescene/core/check.h"
@@ -43,7 +44,7 @@ std::vector<PackedSphere> in_order(const Array<PackedSphere>& spheres, std::span
   return result;
 }
 
-int depth_of(const std::vector<SphereTree::Node>& nodes) {
+int depth_of(std::span<const SphereTree::Node> nodes) {
   std::vector<int> depths(nodes.size(), 1);
   int deepest = 1;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -52,6 +53,50 @@ int depth_of(const std::vector<SphereTree::Node>& nodes) {
     for (std::uint32_t k = 0; k < nodes[i].count; ++k) depths[nodes[i].first + k] = depths[i] + 1;
   }
   return deepest;
+}
+
+core::Status check(const SphereTreeOptions& options, const std::string& name) {
+  if (options.branching == 4 || options.branching == 8 || options.branching == 16) return core::ok_status();
+  return core::invalid_input("sphere tree of '" + name + "': a branching of " + std::to_string(options.branching) +
+                             "; choose 4, 8 or 16");
+}
+
+// Each node and each sphere is the child of one node.
+core::Status check(const SphereTree::Parts& parts, std::uint32_t spheres, std::size_t branching,
+                   const std::string& name) {
+  const auto damaged = [&](const std::string& what) {
+    return core::data_loss("sphere tree of '" + name + "': " + what + "; build it anew");
+  };
+  const std::size_t count = parts.nodes.size();
+  if (count == 0 || parts.lanes.size() != count * 4 * branching || parts.order.size() != spheres)
+    return damaged("its parts are of different sizes");
+  std::vector<bool> node_below(count, false);
+  std::vector<bool> place_below(spheres, false);
+  node_below[0] = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SphereTree::Node& node = parts.nodes[i];
+    std::vector<bool>& below = node.is_bottom() ? place_below : node_below;
+    if (node.count == 0 || node.count > branching || node.bottom > 1 || !node_below[i] ||
+        std::size_t{node.first} + node.count > below.size() || (!node.is_bottom() && node.first <= i))
+      return damaged("node " + std::to_string(i) + " is out of range");
+    for (std::size_t k = node.first; k < std::size_t{node.first} + node.count; ++k) {
+      if (below[k]) return damaged("node " + std::to_string(i) + " has a child of another node");
+      below[k] = true;
+    }
+  }
+  std::vector<bool> placed(spheres, false);
+  for (const std::uint32_t sphere : parts.order) {
+    if (sphere >= spheres || placed[sphere]) return damaged("its order is not one of the spheres");
+    placed[sphere] = true;
+  }
+  if (std::find(node_below.begin(), node_below.end(), false) != node_below.end() ||
+      std::find(place_below.begin(), place_below.end(), false) != place_below.end())
+    return damaged("a node or sphere is missing");
+  const auto finite = [](float x) { return std::abs(x) <= SphereTree::kUnusedCentre; };
+  if (!std::all_of(parts.lanes.begin(), parts.lanes.end(), finite) || !parts.root.centre.allFinite() ||
+      !finite(parts.root.radius))
+    return damaged("a bounding sphere is not finite");
+  return core::ok_status();
 }
 
 void set_lane(float* lanes, std::size_t branching, std::size_t lane, const PackedSphere& sphere) {
@@ -119,22 +164,35 @@ PackedSphere bounding_sphere(std::span<const PackedSphere> spheres) {
   return sphere_about(best.cast<float>(), spheres);
 }
 
+core::Result<std::shared_ptr<const SphereTree>> SphereTree::restore(std::shared_ptr<const SpherePacking> packing,
+                                                                    const SphereTreeOptions& options, Parts parts) {
+  PRESCENE_CHECK(packing != nullptr);
+  PRESCENE_RETURN_IF_ERROR(check(options, packing->name()));
+  PRESCENE_RETURN_IF_ERROR(check(parts, packing->size(), static_cast<std::size_t>(options.branching), packing->name()));
+  std::shared_ptr<SphereTree> tree(new SphereTree());
+  tree->packing_ = std::move(packing);
+  tree->options_ = options;
+  tree->depth_ = depth_of(parts.nodes.span());
+  tree->nodes_ = std::move(parts.nodes);
+  tree->lanes_ = std::move(parts.lanes);
+  tree->order_ = std::move(parts.order);
+  tree->root_ = parts.root;
+  return std::shared_ptr<const SphereTree>(std::move(tree));
+}
+
 core::Result<std::shared_ptr<const SphereTree>> SphereTree::make(std::shared_ptr<const SpherePacking> packing,
                                                                  const SphereTreeOptions& options,
                                                                  core::ThreadPool& pool) {
   PRESCENE_CHECK(packing != nullptr);
-  if (options.branching != 4 && options.branching != 8 && options.branching != 16) {
-    return core::invalid_input("sphere tree of '" + packing->name() + "': a branching of " +
-                               std::to_string(options.branching) + "; choose 4, 8 or 16");
-  }
+  PRESCENE_RETURN_IF_ERROR(check(options, packing->name()));
   const auto branching = static_cast<std::size_t>(options.branching);
   std::shared_ptr<SphereTree> tree(new SphereTree());
-  tree->packing_ = packing;
+  tree->packing_ = std::move(packing);
   tree->options_ = options;
   Hierarchy shape = build_hierarchy(
-      items_of(packing->spheres().span()),
+      items_of(tree->packing_->spheres().span()),
       {.builder = options.builder, .branching = options.branching, .leaf_items = options.branching}, pool);
-  const std::vector<PackedSphere> spheres = in_order(packing->spheres(), shape.order);
+  const std::vector<PackedSphere> spheres = in_order(tree->packing_->spheres(), shape.order);
 
   std::vector<Node> nodes(shape.nodes.size());
   const std::size_t floats_a_node = 4 * branching;

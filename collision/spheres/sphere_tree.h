@@ -48,6 +48,20 @@ class SphereTree {
   static core::Result<std::shared_ptr<const SphereTree>> make(std::shared_ptr<const SpherePacking> packing,
                                                               const SphereTreeOptions& options, core::ThreadPool& pool);
 
+  /// What a tree is made of besides its packing and options.
+  struct Parts {
+    Array<Node> nodes;
+    Array<float> lanes;
+    Array<std::uint32_t> order;
+    PackedSphere root;
+  };
+  Parts parts() const { return {nodes_, lanes_, order_, root_}; }
+  /// A tree from parts that were kept. Fails with kDataLoss when they don't make a tree over the packing: a count, an
+  /// index or a number is out of range, or a node or sphere is below two nodes or none. That the bounding spheres bound
+  /// is not looked at.
+  static core::Result<std::shared_ptr<const SphereTree>> restore(std::shared_ptr<const SpherePacking> packing,
+                                                                 const SphereTreeOptions& options, Parts parts);
+
   const SpherePacking& packing() const { return *packing_; }
   const std::shared_ptr<const SpherePacking>& shared_packing() const { return packing_; }
   std::size_t branching() const { return static_cast<std::size_t>(options_.branching); }
