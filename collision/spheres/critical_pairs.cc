@@ -107,7 +107,6 @@ HWY_EXPORT(find_critical_lanes);
 
 void find_critical_pairs(const SphereTree& a, const SphereTree& b, const Swelling& swelling, DescentStack* stack,
                          CriticalPairs* critical) {
-  stack->reserve(a, b);
   HWY_DYNAMIC_DISPATCH(find_critical_lanes)(a, b, swelling, stack, critical);
 }
 

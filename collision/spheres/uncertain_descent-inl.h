@@ -43,12 +43,14 @@ template <std::size_t N>
 inline constexpr std::size_t kStep = hn::MaxLanes(Lanes()) > N ? N : hn::MaxLanes(Lanes());
 
 /// The children of a node of B in A's frame, repeated for each row of a vector.
+template <std::size_t N>
 struct SwollenChildren {
-  HWY_ALIGN float x[16];
-  HWY_ALIGN float y[16];
-  HWY_ALIGN float z[16];
-  HWY_ALIGN float radius[16];
-  HWY_ALIGN float reach[16];  ///< The radius and how far the error moves it; of unused lanes, below any radius.
+  static constexpr std::size_t kVectors = N / kStep<N>;
+  V x[kVectors];
+  V y[kVectors];
+  V z[kVectors];
+  V radius[kVectors];
+  V reach[kVectors];  ///< The radius and how far the error moves it; of unused lanes, below any radius.
 };
 
 HWY_ALIGN inline constexpr float kLaneNumbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -84,33 +86,32 @@ HWY_INLINE V spread(const float* numbers, std::size_t row) {
 }
 
 template <std::size_t N>
-HWY_INLINE void place(const float* lanes, std::uint32_t count, const Swelling& s, float deviations,
-                      SwollenChildren* placed) {
+HWY_INLINE SwollenChildren<N> place(const float* lanes, std::uint32_t count, const Swelling& s, float deviations) {
   const Lanes d;
-  const auto moved = hn::Set(d, s.deviation * deviations + s.remainder);
-  const auto moved_slope = hn::Set(d, s.deviation_slope * deviations + s.remainder_slope);
+  const V moved = hn::Set(d, s.deviation * deviations + s.remainder);
+  const V moved_slope = hn::Set(d, s.deviation_slope * deviations + s.remainder_slope);
   const auto& r = s.X_AB.rotation;
   const auto& t = s.X_AB.translation;
-  for (std::size_t i = 0; i < N; i += kStep<N>) {
+  SwollenChildren<N> placed;
+  for (std::size_t v = 0; v < SwollenChildren<N>::kVectors; ++v) {
+    const std::size_t i = v * kStep<N>;
     const V x = repeated<N>(lanes + i);
     const V y = repeated<N>(lanes + N + i);
     const V z = repeated<N>(lanes + 2 * N + i);
-    const V radius = repeated<N>(lanes + 3 * N + i);
     const auto row = [&](std::size_t k) HWY_ATTR {
       return hn::Add(dot3(hn::Set(d, r[3 * k]), hn::Set(d, r[3 * k + 1]), hn::Set(d, r[3 * k + 2]), x, y, z),
                      hn::Set(d, t[k]));
     };
-    const V px = row(0);
-    const V py = row(1);
-    const V pz = row(2);
-    const V swollen = hn::Add(radius, madd(pivot_square(d, s, px, py, pz), moved_slope, moved));
+    placed.x[v] = row(0);
+    placed.y[v] = row(1);
+    placed.z[v] = row(2);
+    placed.radius[v] = repeated<N>(lanes + 3 * N + i);
+    const V square = pivot_square(d, s, placed.x[v], placed.y[v], placed.z[v]);
+    const V swollen = hn::Add(placed.radius[v], madd(square, moved_slope, moved));
     const auto used = hn::Lt(repeated<N>(kLaneNumbers + i), hn::Set(d, static_cast<float>(count)));
-    hn::Store(px, d, placed->x + i);
-    hn::Store(py, d, placed->y + i);
-    hn::Store(pz, d, placed->z + i);
-    hn::Store(radius, d, placed->radius + i);
-    hn::Store(hn::IfThenElse(used, swollen, hn::Set(d, -1e30F)), d, placed->reach + i);
+    placed.reach[v] = hn::IfThenElse(used, swollen, hn::Set(d, -1e30F));
   }
+  return placed;
 }
 
 /// Some pairs of one of A's children, or of kRows of them, and B's children.
@@ -124,7 +125,7 @@ struct MetPairs {
 
 /// Calls met(row of A, lane of B, pairs) where some pairs are within reach.
 template <std::size_t N, class Met>
-HWY_INLINE void for_met(const float* lanes_a, std::size_t stride_a, std::uint32_t count_a, const SwollenChildren& b,
+HWY_INLINE void for_met(const float* lanes_a, std::size_t stride_a, std::uint32_t count_a, const SwollenChildren<N>& b,
                         const Met& met) {
   const Lanes d;
   for (std::size_t i = 0; i < count_a; i += kRows<N>) {
@@ -133,41 +134,44 @@ HWY_INLINE void for_met(const float* lanes_a, std::size_t stride_a, std::uint32_
     pairs.ay = spread<N>(lanes_a + stride_a, i);
     pairs.az = spread<N>(lanes_a + 2 * stride_a, i);
     const V ar = spread<N>(lanes_a + 3 * stride_a, i);
-    for (std::size_t k = 0; k < N; k += kStep<N>) {
-      pairs.x = hn::Load(d, b.x + k);
-      pairs.y = hn::Load(d, b.y + k);
-      pairs.z = hn::Load(d, b.z + k);
+    for (std::size_t v = 0; v < SwollenChildren<N>::kVectors; ++v) {
+      pairs.x = b.x[v];
+      pairs.y = b.y[v];
+      pairs.z = b.z[v];
       const V dx = hn::Sub(pairs.x, pairs.ax);
       const V dy = hn::Sub(pairs.y, pairs.ay);
       const V dz = hn::Sub(pairs.z, pairs.az);
-      const V reach = hn::Add(hn::Load(d, b.reach + k), ar);
+      const V reach = hn::Add(b.reach[v], ar);
       pairs.gap = hn::Sub(dot3(dx, dy, dz, dx, dy, dz), hn::Mul(reach, reach));
       pairs.meet = hn::And(hn::Le(pairs.gap, hn::Zero(d)), hn::Ge(reach, hn::Zero(d)));
       if (hn::AllFalse(d, pairs.meet)) continue;
-      pairs.radii = hn::Add(hn::Load(d, b.radius + k), ar);
-      met(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(k), pairs);
+      pairs.radii = hn::Add(b.radius[v], ar);
+      met(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(v * kStep<N>), pairs);
     }
   }
 }
 
-/// Pairs of nodes that are yet to be looked at.
+/// Pairs of nodes that are yet to be looked at, with room for what one pair of nodes can add.
 class NodePairs {
  public:
-  explicit NodePairs(DescentStack* stack) : a_(stack->a.data()), b_(stack->b.data()), gap_(stack->gap.data()) {}
+  explicit NodePairs(DescentStack::Pairs* memory) : memory_(memory) { make_room(); }
 
   std::size_t size() const { return size_; }
+  void clear() { size_ = 0; }
+  std::uint32_t a(std::size_t i) const { return a_[i]; }
+  std::uint32_t b(std::size_t i) const { return b_[i]; }
+  void pop() { --size_; }
+  HWY_INLINE void make_room() {
+    if (size_ + kRoom > memory_->a.size() || size_ == 0) grow();
+  }
   void push(std::uint32_t a, std::uint32_t b) {
     a_[size_] = a;
     b_[size_] = b;
     gap_[size_] = 0.0F;
     ++size_;
   }
-  std::pair<std::uint32_t, std::uint32_t> pop() {
-    --size_;
-    return {a_[size_], b_[size_]};
-  }
   /// The pairs of children first_a + i and first_b + k of the lanes that meet.
-  template <std::size_t N>
+  template <std::size_t N, bool kGaps>
   HWY_INLINE void push_lanes(const MetPairs& pairs, std::uint32_t first_a, std::uint32_t first_b) {
     const Lanes d;
     const IndexLanes index;
@@ -175,14 +179,17 @@ class NodePairs {
     const auto lane = hn::Iota(index, 0);
     auto a = hn::Set(index, first_a);
     auto b = hn::Add(lane, hn::Set(index, first_b));
-    if constexpr (kRows < N >> 1) {
-      const auto row = hn::ShiftRight < N == 4 ? 2 : 3 > (lane);
+    if constexpr (kRows<N> == 1) {
+      hn::StoreU(a, index, a_ + size_);
+    } else {
+      constexpr int kShift = std::countr_zero(N);
+      const auto row = hn::ShiftRight<kShift>(lane);
       a = hn::Add(a, row);
-      b = hn::Sub(b, hn::ShiftLeft < N == 4 ? 2 : 3 > (row));
+      b = hn::Sub(b, hn::ShiftLeft<kShift>(row));
+      hn::StoreU(hn::Compress(a, meet), index, a_ + size_);
     }
-    hn::StoreU(hn::Compress(a, meet), index, a_ + size_);
     hn::StoreU(hn::Compress(b, meet), index, b_ + size_);
-    hn::StoreU(hn::Compress(pairs.gap, pairs.meet), d, gap_ + size_);
+    if constexpr (kGaps) hn::StoreU(hn::Compress(pairs.gap, pairs.meet), d, gap_ + size_);
     size_ += hn::CountTrue(d, pairs.meet);
   }
   /// Brings the deepest of the pairs from `first` on to the top.
@@ -194,9 +201,19 @@ class NodePairs {
   }
 
  private:
-  std::uint32_t* a_;
-  std::uint32_t* b_;
-  float* gap_;
+  static constexpr std::size_t kRoom = SphereTree::kMostBranching * SphereTree::kMostBranching + kPairLanes;
+
+  void grow() {
+    memory_->reserve(size_ + kRoom);
+    a_ = memory_->a.data();
+    b_ = memory_->b.data();
+    gap_ = memory_->gap.data();
+  }
+
+  DescentStack::Pairs* memory_;
+  std::uint32_t* a_ = nullptr;
+  std::uint32_t* b_ = nullptr;
+  float* gap_ = nullptr;
   std::size_t size_ = 0;
 };
 
@@ -224,54 +241,74 @@ HWY_INLINE void append(const MetPairs& pairs, PairBuffer* buffer) {
   buffer->size += hn::CountTrue(d, pairs.meet);
 }
 
+/// Meets the children of two nodes: pairs of spheres go to the buffer, pairs of nodes to `next`.
+template <std::size_t N, class Sink>
+HWY_INLINE void meet_children(const SphereTree& tree_a, const SphereTree& tree_b, std::uint32_t at_a,
+                              std::uint32_t at_b, const Swelling& s, Sink& sink, PairBuffer* buffer, NodePairs* next) {
+  const SphereTree::Node a = tree_a.nodes().data()[at_a];
+  const SphereTree::Node b = tree_b.nodes().data()[at_b];
+  const std::size_t stride_a = tree_a.branching();  // 4, 8 or 16: a multiple of kRows
+  const float* lanes_a = tree_a.lanes(at_a);
+  const SwollenChildren<N> placed = place<N>(tree_b.lanes(at_b), b.count, s, sink.deviations());
+  if (a.is_bottom() && b.is_bottom()) {
+    for_met<N>(lanes_a, stride_a, a.count, placed,
+               [&](std::uint32_t, std::uint32_t, const MetPairs& pairs) HWY_ATTR { append<N>(pairs, buffer); });
+    if (buffer->size >= sink.enough()) sink.flush(buffer);
+    return;
+  }
+  next->make_room();
+  if (!a.is_bottom() && !b.is_bottom()) {
+    const std::size_t first = next->size();
+    for_met<N>(lanes_a, stride_a, a.count, placed,
+               [&](std::uint32_t i, std::uint32_t k, const MetPairs& pairs)
+                   HWY_ATTR { next->push_lanes<N, Sink::kDeepestFirst>(pairs, a.first + i, b.first + k); });
+    if constexpr (Sink::kDeepestFirst) next->deepest_on_top(first);
+    return;
+  }
+  std::uint32_t met = 0;  // of the node that is not at the bottom
+  for_met<N>(lanes_a, stride_a, a.count, placed, [&](std::uint32_t i, std::uint32_t k, const MetPairs& pairs) HWY_ATTR {
+    std::uint32_t bits = mask_bits(Lanes(), pairs.meet);
+    for (std::uint32_t row = 0; row < kRows<N>; ++row, bits >>= kStep<N> % 16) {
+      const std::uint32_t of_row = bits & ((1U << kStep<N>)-1U);
+      met |= a.is_bottom() ? of_row << k : (of_row != 0 ? 1U << (i + row) : 0U);
+    }
+  });
+  for (; met != 0; met &= met - 1) {
+    const auto child = static_cast<std::uint32_t>(std::countr_zero(met));
+    if (a.is_bottom()) {
+      next->push(at_a, b.first + child);
+    } else {
+      next->push(a.first + child, at_b);
+    }
+  }
+}
+
 /// Visits all pairs of spheres that the errors bring together. `sink` says how many standard deviations count
 /// (deviations(), which may shrink on the way), takes the pairs (flush(buffer)) when there are enough(), and may end
-/// the descent (ended()).
+/// the descent (ended()). With kDeepestFirst that helps; without, a level is done at a time: what a pair of nodes needs
+/// then never waits for the pair before.
 template <std::size_t N, class Sink>
-HWY_INLINE void descend(const SphereTree& tree_a, const SphereTree& tree_b, const Swelling& s, DescentStack* stack,
-                        Sink& sink) {
-  const SphereTree::Node* nodes_a = tree_a.nodes().data();
-  const SphereTree::Node* nodes_b = tree_b.nodes().data();
-  const std::size_t stride_a = tree_a.branching();  // 4, 8 or 16: a multiple of kRows
+HWY_INLINE void descend(const SphereTree& a, const SphereTree& b, const Swelling& s, DescentStack* stack, Sink& sink) {
   PairBuffer& buffer = stack->buffer;
   buffer.size = 0;
-  NodePairs open(stack);
+  NodePairs open(&stack->open);
   open.push(0, 0);
-  SwollenChildren placed;
-  while (open.size() > 0 && !sink.ended()) {
-    const auto [at_a, at_b] = open.pop();
-    const SphereTree::Node a = nodes_a[at_a];
-    const SphereTree::Node b = nodes_b[at_b];
-    place<N>(tree_b.lanes(at_b), b.count, s, sink.deviations(), &placed);
-    const float* lanes_a = tree_a.lanes(at_a);
-    if (a.is_bottom() && b.is_bottom()) {
-      for_met<N>(lanes_a, stride_a, a.count, placed,
-                 [&](std::uint32_t, std::uint32_t, const MetPairs& pairs) HWY_ATTR { append<N>(pairs, &buffer); });
-      if (buffer.size >= sink.enough()) sink.flush(&buffer);
-    } else if (!a.is_bottom() && !b.is_bottom()) {
-      const std::size_t first = open.size();
-      for_met<N>(lanes_a, stride_a, a.count, placed,
-                 [&](std::uint32_t i, std::uint32_t k, const MetPairs& pairs)
-                     HWY_ATTR { open.push_lanes<N>(pairs, a.first + i, b.first + k); });
-      if (Sink::kDeepestFirst) open.deepest_on_top(first);
-    } else {
-      std::uint32_t met = 0;  // of the node that is not at the bottom
-      for_met<N>(lanes_a, stride_a, a.count, placed,
-                 [&](std::uint32_t i, std::uint32_t k, const MetPairs& pairs) HWY_ATTR {
-                   std::uint32_t bits = mask_bits(Lanes(), pairs.meet);
-                   for (std::uint32_t row = 0; row < kRows<N>; ++row, bits >>= kStep<N> % 16) {
-                     const std::uint32_t of_row = bits & ((1U << kStep<N>)-1U);
-                     met |= a.is_bottom() ? of_row << k : (of_row != 0 ? 1U << (i + row) : 0U);
-                   }
-                 });
-      for (; met != 0; met &= met - 1) {
-        const auto child = static_cast<std::uint32_t>(std::countr_zero(met));
-        if (a.is_bottom()) {
-          open.push(at_a, b.first + child);
-        } else {
-          open.push(a.first + child, at_b);
-        }
-      }
+  if constexpr (Sink::kDeepestFirst) {
+    while (open.size() > 0 && !sink.ended()) {
+      const std::size_t top = open.size() - 1;
+      const std::uint32_t at_a = open.a(top);
+      const std::uint32_t at_b = open.b(top);
+      open.pop();
+      meet_children<N>(a, b, at_a, at_b, s, sink, &buffer, &open);
+    }
+  } else {
+    NodePairs below(&stack->below);
+    NodePairs* level = &open;
+    NodePairs* next = &below;
+    for (; level->size() > 0; std::swap(level, next)) {
+      next->clear();
+      for (std::size_t i = 0; i < level->size(); ++i)
+        meet_children<N>(a, b, level->a(i), level->b(i), s, sink, &buffer, next);
     }
   }
   if (!sink.ended()) sink.flush(&buffer);

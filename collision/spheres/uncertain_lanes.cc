@@ -25,19 +25,22 @@ Swelling::Swelling(const RelativeUncertainty& between, const SphereTree& b) : X_
   deviation_slope = up(slope);
   region_radius = up(between.region_radius());
   ball_radius = up(between.ball_radius());
+  least_trace = static_cast<float>(between.covariance_at(between.pivot()).trace());
+  const Eigen::Matrix3d rotation = between.covariance().topLeftCorner<3, 3>();
+  const Eigen::Matrix3d growing = rotation.trace() * Eigen::Matrix3d::Identity() - rotation;
+  for (int i = 0; i < 9; ++i) trace_growth[static_cast<std::size_t>(i)] = static_cast<float>(growing(i / 3, i % 3));
   std::size_t index = 0;
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j <= i; ++j) factor[index++] = static_cast<float>(between.factor()(i, j));
   }
 }
 
-void DescentStack::reserve(const SphereTree& tree_a, const SphereTree& tree_b) {
-  const std::size_t levels = static_cast<std::size_t>(tree_a.depth()) + static_cast<std::size_t>(tree_b.depth());
-  const std::size_t most = levels * tree_a.branching() * tree_b.branching() + 1 + kPairLanes;
-  if (a.size() >= most) return;
-  a.resize(most);
-  b.resize(most);
-  gap.resize(most);
+void DescentStack::Pairs::reserve(std::size_t size) {
+  if (a.size() >= size) return;
+  const std::size_t enough = size + size / 2;
+  a.resize(enough);
+  b.resize(enough);
+  gap.resize(enough);
 }
 
 }  // namespace prescene::collision

@@ -31,7 +31,9 @@ struct Swelling {
   float remainder_slope;
   float region_radius;  ///< Of RelativeUncertainty, as ball_radius.
   float ball_radius;
-  std::array<float, 21> factor;  ///< Rows of the lower triangle of RelativeUncertainty::factor().
+  float least_trace;                  ///< Of covariance_at(pivot), m^2.
+  std::array<float, 9> trace_growth;  ///< Times the offset from the pivot, twice: what the trace is more elsewhere.
+  std::array<float, 21> factor;       ///< Rows of the lower triangle of RelativeUncertainty::factor().
 };
 
 /// Pairs of spheres, one array a number: the centre in A, B's centre in A, and the sum of the radii, m.
@@ -64,13 +66,16 @@ struct CriticalPairs {
 
 /// Memory of a descent.
 struct DescentStack {
-  std::vector<std::uint32_t> a;  ///< Pairs of nodes.
-  std::vector<std::uint32_t> b;
-  std::vector<float> gap;  ///< How deep they are.
+  struct Pairs {
+    std::vector<std::uint32_t> a;  ///< Nodes.
+    std::vector<std::uint32_t> b;
+    std::vector<float> gap;  ///< How deep they are.
+    /// Grows by at least half.
+    void reserve(std::size_t size);
+  };
+  Pairs open;
+  Pairs below;  ///< The level below.
   PairBuffer buffer;
-
-  /// Each level leaves at most all pairs of children but one behind.
-  void reserve(const SphereTree& tree_a, const SphereTree& tree_b);
 };
 
 void find_critical_pairs(const SphereTree& a, const SphereTree& b, const Swelling& swelling, DescentStack* stack,

@@ -363,6 +363,7 @@ TEST(UncertainSphereQueries, DoNotAllocateOnceWarm) {
   const auto b = tree_of(setting.b, 16);
   UncertainScratch scratch;
   uncertain_overlap(*a, *b, *between, scratch);
+  uncertain_wrench(*a, *b, *between, kStiffness, scratch);
   const auto before = tests::allocation_count();
   uncertain_overlap(*a, *b, *between, scratch);
   uncertain_wrench(*a, *b, *between, kStiffness, scratch);
