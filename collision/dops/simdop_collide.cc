@@ -69,25 +69,40 @@ class SimdopQuery {
     const std::size_t size = kBranching * steps_.count;
     const Plane* planes_a = planes_a_ + pair.a * size;
     const Plane* planes_b = planes_b_ + pair.b * size;
-    const float* constant = steps_.constant.data();
-    HWY_ALIGN std::array<float, SimdopSteps::kMost> shifted;
     if constexpr (sizeof(Plane) == 2) {
-      shift_constants(steps_, a_.nodes()[pair.a], b_.nodes()[pair.b], shifted.data());
-      constant = shifted.data();
-    }
-    if constexpr (kTraversal == SimdopTraversal::kOneVersusOne) {
-      one_versus_one<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
-    } else if (std::has_single_bit(pair.b_children)) {
-      const auto child_b = static_cast<std::size_t>(std::countr_zero(pair.b_children));
-      all_versus_one<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, child_b, overlaps);
-    } else if constexpr (kTraversal == SimdopTraversal::kOneVersusAll) {
-      if (!std::has_single_bit(pair.a_children)) {
-        all_versus_each<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
-        return;
+      HWY_ALIGN std::array<float, SimdopSteps::kMost> constant;
+      shift_constants(steps_, a_.nodes()[pair.a], b_.nodes()[pair.b], constant.data());
+      // Rows that are shorter than a vector are unpacked together, longer ones when they are needed.
+      if constexpr (kBranching < 16 && kTraversal != SimdopTraversal::kOneVersusOne) {
+        HWY_ALIGN std::array<float, SimdopSteps::kMost * kBranching> single_a;
+        HWY_ALIGN std::array<float, SimdopSteps::kMost * kBranching> single_b;
+        unpack_planes(planes_a, size, single_a.data());
+        unpack_planes(planes_b, size, single_b.data());
+        find_overlaps(pair, constant.data(), single_a.data(), single_b.data(), overlaps);
+      } else {
+        find_overlaps(pair, constant.data(), planes_a, planes_b, overlaps);
       }
-      one_versus_all<kBranching>(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
     } else {
-      four_versus_four(steps_, constant, planes_a, pair.a_children, planes_b, pair.b_children, overlaps);
+      find_overlaps(pair, steps_.constant.data(), planes_a, planes_b, overlaps);
+    }
+  }
+
+  template <class Stored>
+  HWY_INLINE void find_overlaps(const NodePair& pair, const float* constant, const Stored* planes_a,
+                                const Stored* planes_b, Overlaps& overlaps) const {
+    const std::uint32_t wanted_a = pair.a_children;
+    const std::uint32_t wanted_b = pair.b_children;
+    if constexpr (kTraversal == SimdopTraversal::kOneVersusOne) {
+      one_versus_one<kBranching>(steps_, constant, planes_a, wanted_a, planes_b, wanted_b, overlaps);
+    } else if (std::has_single_bit(wanted_b)) {
+      const auto child_b = static_cast<std::size_t>(std::countr_zero(wanted_b));
+      all_versus_one<kBranching>(steps_, constant, planes_a, wanted_a, planes_b, child_b, overlaps);
+    } else if constexpr (kTraversal == SimdopTraversal::kFourVersusFour) {
+      four_versus_four(steps_, constant, planes_a, wanted_a, planes_b, wanted_b, overlaps);
+    } else if (std::has_single_bit(wanted_a)) {
+      one_versus_all<kBranching>(steps_, constant, planes_a, wanted_a, planes_b, wanted_b, overlaps);
+    } else {
+      all_versus_each<kBranching>(steps_, constant, planes_a, wanted_a, planes_b, wanted_b, overlaps);
     }
   }
 

@@ -2,7 +2,7 @@
 // SIMDop: trees of k-DOPs with up to 16 children a node, whose volumes lie in the order in which vector units test them
 // [Tan et al. 2019]. Wrapped: a node's volume is tight about its triangles.
 //
-//   const SimdopTree cup = SimdopTree::build(mesh, {.k = 26, .branching = 16}, pool);
+//   const SimdopTree cup = SimdopTree::build(mesh, {}, pool);
 //   QueryScratch scratch;
 //   bool touching = collide(cup, table, X_CT, scratch);
 //
@@ -37,8 +37,8 @@ enum class PlanePrecision { kSingle, kHalf };
 
 struct SimdopOptions {
   int k = 26;          ///< One of kDopSizes.
-  int branching = 16;  ///< 2, 4, 8 or 16.
-  int leaf_items = 1;  ///< Most triangles of a leaf.
+  int branching = 4;   ///< 2, 4, 8 or 16.
+  int leaf_items = 2;  ///< Most triangles of a leaf.
   Builder builder = Builder::kSurfaceAreaHeuristic;
   PlanePrecision precision = PlanePrecision::kHalf;
   SimdopTraversal traversal = SimdopTraversal::kOneVersusAll;

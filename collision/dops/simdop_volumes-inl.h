@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/triangle_pairs-inl.h"
@@ -41,6 +40,12 @@ HWY_INLINE hn::Vec<D> broadcast_plane(D d, const std::uint16_t* plane) {
   const hn::Rebind<hwy::float16_t, D> halves;
   const hn::Rebind<std::uint16_t, D> words;
   return hn::PromoteTo(d, hn::BitCast(halves, hn::Set(words, *plane)));
+}
+
+/// `count` planes in single precision; both arrays go on for a vector.
+HWY_INLINE void unpack_planes(const std::uint16_t* planes, std::size_t count, float* single) {
+  const PairTag d;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) hn::Store(load_planes(d, planes + i), d, single + i);
 }
 
 HWY_INLINE float scalar_plane(const float* plane) { return *plane; }
@@ -81,27 +86,17 @@ using Overlaps = std::array<std::uint32_t, 16>;
 
 // Lane l of a row of four: number l modulo 4, or number l / 4 of it, beginning with l = first.
 #if HWY_TARGET == HWY_SCALAR
-template <class Plane>
-HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const Plane* row, std::size_t first) {
-  return hn::Set(d, scalar_plane(row + first % 4));
+HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const float* row, std::size_t first) {
+  return hn::Set(d, row[first % 4]);
 }
-template <class Plane>
-HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const Plane* row, std::size_t first) {
-  return hn::Set(d, scalar_plane(row + first / 4));
+HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const float* row, std::size_t first) {
+  return hn::Set(d, row[first / 4]);
 }
 #else
 HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const float* row, std::size_t /*first*/) {
   return hn::LoadDup128(d, row);
 }
-HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const std::uint16_t* row, std::size_t /*first*/) {
-  const hn::Rebind<hwy::float16_t, PairTag> halves;
-  const hn::Repartition<std::uint64_t, decltype(halves)> fours;
-  std::uint64_t four = 0;
-  std::memcpy(&four, row, sizeof(four));
-  return hn::PromoteTo(d, hn::BitCast(halves, hn::Set(fours, four)));
-}
-template <class Plane>
-HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const Plane* row, std::size_t first) {
+HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const float* row, std::size_t first) {
   const auto lanes = hn::Iota(hn::RebindToSigned<PairTag>(), static_cast<std::int32_t>(first));
   return hn::TableLookupLanes(all_of_four(d, row, first), hn::IndicesFromVec(d, hn::ShiftRight<2>(lanes)));
 }
@@ -224,21 +219,19 @@ HWY_INLINE void all_versus_one(const SimdopSteps& steps, const float* constant, 
 }
 
 /// As realigned_lanes, for all of four volumes.
-template <class Plane>
 HWY_INLINE hn::Vec<PairTag> realigned_fours(PairTag d, const SimdopSteps& steps, const float* constant, std::size_t s,
-                                            const Plane* planes_b, std::size_t first) {
+                                            const float* planes_b, std::size_t first) {
   auto bound = hn::Set(d, constant[s]);
   for (std::size_t n = 0; n < 3; ++n) {
-    const Plane* row = planes_b + 4 * static_cast<std::size_t>(steps.planes[n][s]);
+    const float* row = planes_b + 4 * static_cast<std::size_t>(steps.planes[n][s]);
     bound = hn::NegMulAdd(hn::Set(d, steps.weights[n][s]), all_of_four(d, row, first), bound);
   }
   return bound;
 }
 
 /// All 16 pairs of the children of two nodes.
-template <class Plane>
-HWY_INLINE void four_versus_four(const SimdopSteps& steps, const float* constant, const Plane* planes_a,
-                                 std::uint32_t wanted_a, const Plane* planes_b, std::uint32_t wanted_b,
+HWY_INLINE void four_versus_four(const SimdopSteps& steps, const float* constant, const float* planes_a,
+                                 std::uint32_t wanted_a, const float* planes_b, std::uint32_t wanted_b,
                                  Overlaps& overlaps) {
   const PairTag d;
   std::uint32_t wanted = 0;
