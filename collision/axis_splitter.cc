@@ -127,7 +127,8 @@ std::vector<Centre> centres_of(std::span<const Item> items) {
 
 std::array<std::size_t, 3> CentreBox::axes_by_length() const {
   std::array<std::size_t, 3> axes = {0, 1, 2};
-  std::stable_sort(axes.begin(), axes.end(), [&](std::size_t a, std::size_t b) { return extent(a) > extent(b); });
+  std::sort(axes.begin(), axes.end(),
+            [&](std::size_t a, std::size_t b) { return extent(a) != extent(b) ? extent(a) > extent(b) : a < b; });
   return axes;
 }
 
