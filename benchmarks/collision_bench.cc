@@ -161,7 +161,10 @@ struct Results {
 
 Results measure_all(const Arguments& arguments, Report* report) {
   std::vector<tests::MeshPair> pairs = tests::recorded_mesh_pairs();
-  if (pairs.empty()) report->note(tests::missing_data_message("meshes") + " Only shapes made here are measured.");
+  if (pairs.empty()) {
+    report->note(tests::missing_data_message("meshes"));
+    report->note("So only shapes made here are measured.");
+  }
   for (tests::MeshPair& pair : tests::made_mesh_pairs()) pairs.push_back(std::move(pair));
   report->note(
       "Queries are clocked one by one in streams of different poses, the smallest of some rounds, on one processor.");
@@ -218,6 +221,7 @@ void add_raw_figures(const Results& results, Report* report) {
     add(prefix, cost_table(*measurements));
     add(prefix, wrong_answer_counts(*measurements));
     add(prefix, wrong_answer_table(*measurements));
+    add(prefix, distance_difference_table(*measurements));
   }
   report->add(target_table(results.queries));
   report->add(ratio_table(results.queries));

@@ -95,6 +95,28 @@ void decide(const tests::MeshPair& pair, std::span<const Algorithm> algorithms, 
   }
 }
 
+/// Lists the distances that are not those of brute force, where there are such.
+void decide_distances(const tests::MeshPair& pair, std::span<const Algorithm> algorithms, Cell* cell,
+                      Measurements* measurements) {
+  const double tolerance = 1e-6 * static_cast<double>(std::min(pair.a->size(), pair.b->size()));
+  for (std::size_t i = 0; i < cell->configurations.size(); ++i) {
+    double low = std::numeric_limits<double>::infinity(), high = 0.0;
+    for (const Timings& timings : cell->timings) {
+      if (timings.distances.empty()) continue;
+      low = std::min(low, std::max(0.0, timings.distances[i]));
+      high = std::max(high, timings.distances[i]);
+    }
+    if (high - low <= tolerance) continue;
+    const double exact = tests::distance_by_brute_force(*pair.a, *pair.b, cell->configurations[i], high + tolerance);
+    for (std::size_t k = 0; k < algorithms.size(); ++k) {
+      const Timings& timings = cell->timings[k];
+      if (!timings.distances.empty() && std::abs(std::max(0.0, timings.distances[i]) - exact) > tolerance)
+        measurements->distance_differences.push_back(
+            {cell->pair, cell->share, algorithms[k].name, timings.distances[i], exact});
+    }
+  }
+}
+
 void time_booleans(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options,
                    Cell* cell) {
   std::vector<Stream> streams(algorithms.size());
@@ -284,6 +306,7 @@ void measure_pair(const tests::MeshPair& pair, std::span<const Algorithm> algori
     if (cell.configurations.empty()) continue;
     ask(algorithms, solvers, options, &cell);
     decide(pair, algorithms, &cell, measurements);
+    decide_distances(pair, algorithms, &cell, measurements);
     time_booleans(algorithms, solvers, options, &cell);
     if (!options.cold) {
       time_distances(algorithms, solvers, options, &cell);

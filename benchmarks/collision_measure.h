@@ -88,6 +88,15 @@ struct WrongAnswer {
   collision::Transform X_AB;
 };
 
+/// Distances of one configuration on which algorithms differ by more than 1e-6 of the size.
+struct DistanceDifference {
+  std::string pair;
+  double share = 0.0;
+  std::string algorithm;
+  double distance = 0.0;  ///< m
+  double exact = 0.0;     ///< By brute force, m.
+};
+
 struct Measurements {
   std::vector<std::string> algorithms;
   std::vector<std::string> differs;
@@ -95,6 +104,7 @@ struct Measurements {
   std::vector<Cell> cells;
   std::vector<MeshCost> costs;
   std::vector<WrongAnswer> wrong;
+  std::vector<DistanceDifference> distance_differences;
 };
 
 /// Distances and overlaps of the cells of a full run.

@@ -88,7 +88,8 @@ Table ratio_table(const Measurements& measurements) {
   for (const Cell& cell : measurements.cells)
     if (pairs.empty() || pairs.back() != cell.pair) pairs.push_back(cell.pair);
   for (const std::string& pair : pairs) {
-    Measurements of_pair = {measurements.algorithms, measurements.differs, measurements.ours, {}, {}, {}};
+    Measurements of_pair;
+    of_pair.algorithms = measurements.algorithms;
     for (const Cell& cell : measurements.cells)
       if (cell.pair == pair) of_pair.cells.push_back(cell);
     for (const std::string& algorithm : measurements.algorithms) {
@@ -175,8 +176,17 @@ Table wrong_answer_table(const Measurements& measurements) {
   return table;
 }
 
+Table distance_difference_table(const Measurements& measurements) {
+  Table table{"distance_differences", {"pair", "distance", "algorithm", "answer_um", "exact_um"}, {}};
+  for (const DistanceDifference& difference : measurements.distance_differences)
+    table.rows.push_back(
+        {difference.pair, difference.share, difference.algorithm, 1e6 * difference.distance, 1e6 * difference.exact});
+  return table;
+}
+
 Table wrong_answer_counts(const Measurements& measurements) {
-  Table table{"answers", {"algorithm", "answers", "wrongly_colliding", "wrongly_apart", "differs"}, {}};
+  Table table{
+      "answers", {"algorithm", "answers", "wrongly_colliding", "wrongly_apart", "wrong_distances", "differs"}, {}};
   for (std::size_t k = 0; k < measurements.algorithms.size(); ++k) {
     std::int64_t asked = 0;
     for (const Cell& cell : measurements.cells)
@@ -184,7 +194,10 @@ Table wrong_answer_counts(const Measurements& measurements) {
     std::int64_t colliding = 0, apart = 0;
     for (const WrongAnswer& wrong : measurements.wrong)
       if (wrong.algorithm == measurements.algorithms[k]) ++(wrong.answer ? colliding : apart);
-    table.rows.push_back({measurements.algorithms[k], asked, colliding, apart, measurements.differs[k]});
+    const std::int64_t distances = std::count_if(
+        measurements.distance_differences.begin(), measurements.distance_differences.end(),
+        [&](const DistanceDifference& difference) { return difference.algorithm == measurements.algorithms[k]; });
+    table.rows.push_back({measurements.algorithms[k], asked, colliding, apart, distances, measurements.differs[k]});
   }
   return table;
 }

@@ -23,6 +23,8 @@ Table ratio_table(const Measurements& measurements);
 Table cost_table(const Measurements& measurements);
 /// A row an answer that is not the exact reference's.
 Table wrong_answer_table(const Measurements& measurements);
+/// A row a distance that differs from brute force by more than 1e-6 of the size.
+Table distance_difference_table(const Measurements& measurements);
 /// A row an algorithm: how many answers were wrong, which way.
 Table wrong_answer_counts(const Measurements& measurements);
 
