@@ -59,9 +59,10 @@ void add_half_floats(const CollisionMesh& mesh, Report* report) {
   };
   report->add(memory_target("half-float nodes vs 32 bit: memory", 50.0, std::nullopt,
                             percent(half.plane_bytes(), single.plane_bytes()), "%",
-                            "planes of SIMDop, k = 26, n = 16"));
+                            "planes of " + simdop_name({.precision = PlanePrecision::kSingle})));
   report->add(memory_target("half-float tree vs 32 bit: memory with references", std::nullopt, std::nullopt,
-                            percent(half.bytes(), single.bytes()), "%", "all of SIMDop, k = 26, n = 16"));
+                            percent(half.bytes(), single.bytes()), "%",
+                            "all of " + simdop_name({.precision = PlanePrecision::kSingle})));
 }
 
 void add_bvhlite(const CollisionMesh& mesh, Report* report) {

@@ -171,12 +171,14 @@ std::vector<Algorithm> study_algorithms() {
     options.k = k;
     add_simdop(options);
   }
-  for (const int branching : {2, 4, 8}) {
+  for (const int branching : {2, 4, 8, 16}) {
     SimdopOptions options;
+    if (branching == options.branching) continue;
     options.branching = branching;
     add_simdop(options);
   }
   add_simdop({.precision = PlanePrecision::kSingle});
+  add_simdop({.branching = 16, .precision = PlanePrecision::kSingle});
   add_simdop({.traversal = SimdopTraversal::kOneVersusOne});
   add_simdop({.branching = 4, .traversal = SimdopTraversal::kFourVersusFour});
   for (const BvhLiteOptions& options :

@@ -68,7 +68,7 @@ std::vector<Plot> query_plots(const Measurements& measurements) {
 }
 
 std::vector<Plot> study_plots(const Measurements& study) {
-  Plot by_k{"k", "SIMDop, n = 16: median time over k", "microseconds", {}, {}};
+  Plot by_k{"k", "SIMDop: median time over k", "microseconds", {}, {}};
   std::vector<std::string> names;
   for (const int k : collision::kDopSizes) {
     by_k.x_labels.push_back("k = " + std::to_string(k));
@@ -76,7 +76,7 @@ std::vector<Plot> study_plots(const Measurements& study) {
   }
   by_k = study_plot(study, std::move(by_k), names, "", false);
 
-  Plot by_branching{"branching", "SIMDop, k = 26: median time over children a node", "microseconds", {}, {}};
+  Plot by_branching{"branching", "SIMDop: median time over children a node", "microseconds", {}, {}};
   names.clear();
   for (const int branching : {2, 4, 8, 16}) {
     by_branching.x_labels.push_back("n = " + std::to_string(branching));
