@@ -12,10 +12,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kRound = 48;     // Entries worked on together; fixed, for the order of insertion hangs on it.
-constexpr double kRoundShare = 0.75;   // An entry of a round has at least this share of the largest bound.
-constexpr double kAcceptShare = 0.75;  // A sphere is taken when its radius is this share of what may be left.
-constexpr double kClimbShare = 0.8;    // A prototype sets out where the cell's half diagonal is below this share.
+constexpr std::size_t kRound = 48;    // Entries worked on together; fixed, for the order of insertion hangs on it.
+constexpr double kRoundShare = 0.6;   // An entry of a round has at least this share of the largest bound.
+constexpr double kAcceptShare = 0.6;  // A sphere is taken when its radius is this share of what may be left.
+constexpr double kClimbShare = 1.0;   // A prototype sets out where the cell's half diagonal is below this share.
 // A prototype gives up this share of what it moves downhill, so that among equal places it ends in a corner or beside
 // another sphere, and not in the middle of a plate or a rod where it would leave two gaps.
 constexpr double kSlope = 0.05;

@@ -32,8 +32,8 @@ struct Bodies {
   Tree b = packed(geometry::BoxShape{{0.1, 0.07, 0.05}});
 };
 const Bodies& bodies() {
-  static const Bodies kept;
-  return kept;
+  static const Bodies kBodies;
+  return kBodies;
 }
 
 Pose near_pose() { return *tests::poses(0.08); }
@@ -126,7 +126,8 @@ TEST(SphereQueriesLaw, MoreSpheresShareMoreVolume) {
 
 TEST(SphereQueriesLaw, ForceAndTorqueAreTheGradientOfTheEnergy) {
   EXPECT_TRUE(rc::check([] {
-    const auto& [a, b] = bodies();
+    const Tree& a = bodies().a;
+    const Tree& b = bodies().b;
     SphereScratch scratch;
     const Pose X_WB = near_pose();
     // A stands at the world's origin, and its frame's origin is the point of the torque.
