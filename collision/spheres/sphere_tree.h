@@ -20,8 +20,8 @@ namespace prescene::collision {
 
 struct SphereTreeOptions {
   int branching = 16;  ///< Most children of a node: 4, 8 or 16.
-  /// Neural gas without weights answers a few per cent to a half faster than with the spheres' volumes as weights, which
-  /// draw the children to the large spheres [Weller and Zachmann 2011].
+  /// Neural gas without weights answers a few per cent to a half faster than with the spheres' volumes as weights,
+  /// which draw the children to the large spheres [Weller and Zachmann 2011].
   Builder builder = Builder::kNeuralGas;
 
   friend bool operator==(const SphereTreeOptions&, const SphereTreeOptions&) = default;

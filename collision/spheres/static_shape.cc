@@ -152,4 +152,9 @@ std::optional<Nearest> TriangleSurface::nearest(const Vector3d& p_BQ, double bel
   return if_below({inside ? -distance : distance, direction(out, direction(facing, Vector3d::UnitZ()))}, below);
 }
 
+bool TriangleSurface::is_within(const Vector3d& p_BQ, double below) const {
+  if (below <= 0.0) return nearest(p_BQ, below).has_value();
+  return search_->is_within(p_BQ, below * below) || (side_ == SurfaceSide::kSolid && search_->winding(p_BQ) > 0);
+}
+
 }  // namespace prescene::collision

@@ -40,6 +40,8 @@ class StaticShape {
 
   /// Of a point in the shape's frame B, m, where its distance is less than `below`. No allocation.
   virtual std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const = 0;
+  /// Whether nearest() would answer.
+  virtual bool is_within(const Eigen::Vector3d& p_BQ, double below) const { return nearest(p_BQ, below).has_value(); }
 };
 
 /// All points with normal . p <= offset.
@@ -83,6 +85,7 @@ class TriangleSurface final : public StaticShape {
   /// Fails with kInvalidInput, naming the mesh and a place, when it shall be solid and is open.
   static core::Result<TriangleSurface> make(std::shared_ptr<const Mesh> mesh, SurfaceSide side);
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
+  bool is_within(const Eigen::Vector3d& p_BQ, double below) const override;
 
  private:
   TriangleSurface() = default;

@@ -36,7 +36,7 @@ bool for_overlapping(const SphereTree& a, const StaticShape& b, const Placement&
                      const Found& found) {
   std::vector<std::uint32_t>& stack = scratch.nodes_a;
   stack.clear();
-  if (!b.nearest(placement.to_shape(a.root().centre), static_cast<double>(a.root().radius) + placement.slack))
+  if (!b.is_within(placement.to_shape(a.root().centre), static_cast<double>(a.root().radius) + placement.slack))
     return false;
   stack.push_back(0);
   while (!stack.empty()) {
@@ -45,15 +45,14 @@ bool for_overlapping(const SphereTree& a, const StaticShape& b, const Placement&
     const SphereTree::Node& node = a.nodes()[index];
     for (std::uint32_t k = 0; k < node.count; ++k) {
       const PackedSphere child = lane(a, index, k);
+      const Vector3d centre = placement.to_shape(child.centre);
       const auto radius = static_cast<double>(child.radius);
-      const double below = node.is_bottom() ? std::nextafter(radius, 2.0 * radius) : radius + placement.slack;
-      const auto nearest = b.nearest(placement.to_shape(child.centre), below);
-      if (!nearest) continue;
       if (!node.is_bottom()) {
-        stack.push_back(node.first + k);
-      } else if (found(child, *nearest, node.first + k)) {
-        return true;
+        if (b.is_within(centre, radius + placement.slack)) stack.push_back(node.first + k);
+        continue;
       }
+      const auto nearest = b.nearest(centre, std::nextafter(radius, 2.0 * radius));
+      if (nearest && found(child, *nearest, node.first + k)) return true;
     }
   }
   return false;

@@ -132,6 +132,11 @@ SurfaceSearch::Nearest SurfaceSearch::nearest(const Vector3d& q, double bound) c
   return best;
 }
 
+bool SurfaceSearch::is_within(const Vector3d& q, double bound) const {
+  return descend([&](const Box& box) { return squared_distance(box, q) < bound; },
+                 [&](const Corners& t) { return (nearest_on_triangle(q, t.a, t.b, t.c) - q).squaredNorm() < bound; });
+}
+
 int SurfaceSearch::winding(const Vector3d& q) const {
   // Signed crossings of the ray from q along +z.
   int winding = 0;
@@ -146,11 +151,12 @@ int SurfaceSearch::winding(const Vector3d& q) const {
         const Vector3d b = t.b - q;
         const Vector3d c = t.c - q;
         const bool left = left_of(a, b);
-        if (left_of(b, c) != left || left_of(c, a) != left) return;
+        if (left_of(b, c) != left || left_of(c, a) != left) return false;
         // The plane's height above q has the sign of the volume that q spans with the triangle.
         const double volume = a.dot((b - a).cross(c - a));
         const bool above = left ? volume > 0.0 : volume < 0.0;
         if (above) winding += left ? 1 : -1;
+        return false;
       });
   return winding;
 }

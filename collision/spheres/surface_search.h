@@ -34,17 +34,8 @@ class SurfaceSearch {
   const Eigen::AlignedBox3d& box() const { return root_box_; }
   /// The nearest place whose squared distance is less than `bound`; no triangle when there is none. No allocation.
   Nearest nearest(const Eigen::Vector3d& q, double bound = std::numeric_limits<double>::infinity()) const;
-  /// Calls visit(triangle, point, squared_distance) with the nearest place of each triangle nearer than the square root
-  /// of `bound`.
-  template <class Visit>
-  void visit_near(const Eigen::Vector3d& q, double bound, const Visit& visit) const {
-    descend([&](const Box& box) { return squared_distance(box, q) < bound; },
-            [&](const Corners& t) {
-              const Eigen::Vector3d point = nearest_on_triangle(q, t.a, t.b, t.c);
-              const double squared = (point - q).squaredNorm();
-              if (squared < bound) visit(t.triangle, point, squared);
-            });
-  }
+  /// Whether the squared distance is less than `bound`; cheaper than nearest().
+  bool is_within(const Eigen::Vector3d& q, double bound) const;
   /// How often a closed, oriented surface winds around q: 1 inside of one solid, 2 where two overlap, 0 outside. The
   /// signs of shared edges agree between their triangles, so that no crossing is missed or counted twice.
   int winding(const Eigen::Vector3d& q) const;
@@ -76,22 +67,26 @@ class SurfaceSearch {
              std::size_t end);
   bool is_leaf(std::size_t node) const { return node >= first_leaf_; }
 
+  // Calls leaf(triangle) for those below boxes that enter(box) lets in, until it returns true; then returns true.
   template <class Enter, class Leaf>
-  void descend(const Enter& enter, const Leaf& leaf) const {
+  bool descend(const Enter& enter, const Leaf& leaf) const {
     std::array<std::uint32_t, kMaxDepth> stack;
     std::size_t size = 0;
     stack[size++] = 1;
     while (size > 0) {
       const std::uint32_t node = stack[--size];
       if (!enter(boxes_[node])) continue;
-      if (is_leaf(node)) {
-        const std::size_t i = node - first_leaf_;
-        for (std::uint32_t k = leaf_begin_[i]; k < leaf_begin_[i + 1]; ++k) leaf(corners_[k]);
-      } else {
+      if (!is_leaf(node)) {
         stack[size++] = 2 * node + 1;
         stack[size++] = 2 * node;
+        continue;
+      }
+      const std::size_t i = node - first_leaf_;
+      for (std::uint32_t k = leaf_begin_[i]; k < leaf_begin_[i + 1]; ++k) {
+        if (leaf(corners_[k])) return true;
       }
     }
+    return false;
   }
 
   std::vector<Box> boxes_;  // Index 1 is the root, 2n and 2n + 1 are the children of n.

@@ -34,6 +34,7 @@ void check_laws(const StaticShape& shape, const Vector3d& p, const Vector3d& way
   const auto limited = shape.nearest(p, here->distance + 1e-3);
   RC_ASSERT(limited.has_value() && std::abs(limited->distance - here->distance) < 1e-9);
   RC_ASSERT(!shape.nearest(p, here->distance).has_value());
+  RC_ASSERT(shape.is_within(p, here->distance + 1e-9) && !shape.is_within(p, here->distance - 1e-9));
 }
 
 TEST(PrimitiveShape, DistancesObeyTheirLaws) {
