@@ -41,17 +41,26 @@ struct RayStep {
   std::uint32_t below() const { return below_word & ~kLeafBit; }
 };
 
+/// Two parts of bodies that move, which do not touch before a time.
+struct MovingPair {
+  float time;
+  bool are_leaves;  ///< Then the pair is two blocks.
+  NodePair pair;
+};
+
 /// Memory that a query works in. One a thread; after the first queries nothing is allocated any more.
 class QueryScratch {
  public:
   std::vector<NodePair>& node_pairs() { return node_pairs_; }
   std::vector<SharedNodePair>& shared_node_pairs() { return shared_node_pairs_; }
   std::vector<RayStep>& ray_steps() { return ray_steps_; }
+  std::vector<MovingPair>& moving_pairs() { return moving_pairs_; }
 
  private:
   std::vector<NodePair> node_pairs_;
   std::vector<SharedNodePair> shared_node_pairs_;
   std::vector<RayStep> ray_steps_;
+  std::vector<MovingPair> moving_pairs_;
 };
 
 }  // namespace prescene::collision

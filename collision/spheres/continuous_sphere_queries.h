@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "prescene/collision/spheres/screw_motion.h"
+#include "prescene/collision/screw_motion.h"
 #include "prescene/collision/spheres/sphere_tree.h"
 #include "prescene/collision/transform.h"
 

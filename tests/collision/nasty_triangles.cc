@@ -21,7 +21,7 @@ Triangle plain_triangle(core::RandomStream& random, double scale = 1.0, const Ve
   return t;
 }
 
-TrianglePair plain_pair(core::RandomStream& random) { return {plain_triangle(random), plain_triangle(random)}; }
+NastyPair plain_pair(core::RandomStream& random) { return {plain_triangle(random), plain_triangle(random)}; }
 
 double power_of_ten(core::RandomStream& random, double low, double high) {
   return std::pow(10.0, random.uniform(low, high));
@@ -34,8 +34,8 @@ Vector3f inner_point(const Triangle& t, core::RandomStream& random) {
   return (a + u * (t[1].cast<double>() - a) + v * (t[2].cast<double>() - a)).cast<float>();
 }
 
-TrianglePair grid_pair(core::RandomStream& random) {
-  TrianglePair pair;
+NastyPair grid_pair(core::RandomStream& random) {
+  NastyPair pair;
   for (Triangle* t : {&pair.a, &pair.b}) {
     for (Vector3f& p : *t) {
       for (int i = 0; i < 3; ++i) p[i] = static_cast<float>(random.uniform_below(3));
@@ -45,13 +45,13 @@ TrianglePair grid_pair(core::RandomStream& random) {
 }
 
 // Moves all of b so that one of its points, rounded, comes to lie on a point of a.
-void bring(TrianglePair& pair, const Vector3f& from, const Vector3f& to) {
+void bring(NastyPair& pair, const Vector3f& from, const Vector3f& to) {
   const Vector3f shift = to - from;
   for (Vector3f& p : pair.b) p += shift;
 }
 
-TrianglePair touching_pair(core::RandomStream& random) {
-  TrianglePair pair = plain_pair(random);
+NastyPair touching_pair(core::RandomStream& random) {
+  NastyPair pair = plain_pair(random);
   bring(pair, pair.b[0], inner_point(pair.a, random));
   if (random.uniform_below(2) == 0) {  // The rest of b on one side: it touches or just does not.
     const Vector3f normal = (pair.a[1] - pair.a[0]).cross(pair.a[2] - pair.a[0]);
@@ -63,16 +63,16 @@ TrianglePair touching_pair(core::RandomStream& random) {
   return pair;
 }
 
-TrianglePair edge_pair(core::RandomStream& random) {
-  TrianglePair pair = plain_pair(random);
+NastyPair edge_pair(core::RandomStream& random) {
+  NastyPair pair = plain_pair(random);
   const auto s = static_cast<float>(random.uniform());
   const auto t = static_cast<float>(random.uniform());
   bring(pair, pair.b[0] + s * (pair.b[1] - pair.b[0]), pair.a[0] + t * (pair.a[1] - pair.a[0]));
   return pair;
 }
 
-TrianglePair almost_touching_pair(core::RandomStream& random) {
-  TrianglePair pair = random.uniform_below(2) == 0 ? touching_pair(random) : edge_pair(random);
+NastyPair almost_touching_pair(core::RandomStream& random) {
+  NastyPair pair = random.uniform_below(2) == 0 ? touching_pair(random) : edge_pair(random);
   const double size = power_of_ten(random, -9.0, -4.0);  // A statement for each draw fixes their order.
   const Vector3d shift = size * cube_point(random);
   for (Vector3f& p : pair.b) p += shift.cast<float>();
@@ -87,15 +87,15 @@ void make_needle(Triangle& t, core::RandomStream& random) {
   t[2] = (a + along * (b - a) + width * cube_point(random)).cast<float>();
 }
 
-TrianglePair needle_pair(core::RandomStream& random) {
-  TrianglePair pair = random.uniform_below(2) == 0 ? touching_pair(random) : plain_pair(random);
+NastyPair needle_pair(core::RandomStream& random) {
+  NastyPair pair = random.uniform_below(2) == 0 ? touching_pair(random) : plain_pair(random);
   make_needle(pair.a, random);
   if (random.uniform_below(2) == 0) make_needle(pair.b, random);
   return pair;
 }
 
-TrianglePair neighbours(std::size_t shared, core::RandomStream& random) {
-  TrianglePair pair = plain_pair(random);
+NastyPair neighbours(std::size_t shared, core::RandomStream& random) {
+  NastyPair pair = plain_pair(random);
   const std::size_t turn = random.uniform_below(3);
   for (std::size_t i = 0; i < shared; ++i) pair.b[(i + turn) % 3] = pair.a[i];
   // Often bent over almost flat, or just off.
@@ -104,8 +104,8 @@ TrianglePair neighbours(std::size_t shared, core::RandomStream& random) {
   return pair;
 }
 
-TrianglePair coplanar_pair(core::RandomStream& random) {
-  TrianglePair pair = random.uniform_below(2) == 0 ? grid_pair(random) : plain_pair(random);
+NastyPair coplanar_pair(core::RandomStream& random) {
+  NastyPair pair = random.uniform_below(2) == 0 ? grid_pair(random) : plain_pair(random);
   if (random.uniform_below(2) == 0) {
     const auto axis = static_cast<int>(random.uniform_below(3));
     const auto height = static_cast<float>(random.uniform());
@@ -121,8 +121,8 @@ TrianglePair coplanar_pair(core::RandomStream& random) {
   return pair;
 }
 
-TrianglePair mixed_pair(core::RandomStream& random) {
-  TrianglePair pair = plain_pair(random);
+NastyPair mixed_pair(core::RandomStream& random) {
+  NastyPair pair = plain_pair(random);
   const double scale = power_of_ten(random, -30.0, 0.0);
   const bool at_origin = random.uniform_below(2) == 0;
   const Vector3d centre = at_origin ? Vector3d::Zero() : Vector3d(inner_point(pair.a, random).cast<double>());
@@ -131,8 +131,8 @@ TrianglePair mixed_pair(core::RandomStream& random) {
   return pair;
 }
 
-TrianglePair degenerate_pair(core::RandomStream& random) {
-  TrianglePair pair = random.uniform_below(2) == 0 ? touching_pair(random) : grid_pair(random);
+NastyPair degenerate_pair(core::RandomStream& random) {
+  NastyPair pair = random.uniform_below(2) == 0 ? touching_pair(random) : grid_pair(random);
   const auto flatten = [&random](Triangle& t) {
     switch (random.uniform_below(4)) {
       case 0:
@@ -154,27 +154,27 @@ TrianglePair degenerate_pair(core::RandomStream& random) {
   return pair;
 }
 
-void scale_pair(TrianglePair& pair, const Vector3f& factors) {
+void scale_pair(NastyPair& pair, const Vector3f& factors) {
   for (Triangle* t : {&pair.a, &pair.b}) {
     for (Vector3f& p : *t) p = p.cwiseProduct(factors);
   }
 }
 
-TrianglePair denormal_pair(core::RandomStream& random) {
-  TrianglePair pair = random.uniform_below(2) == 0 ? grid_pair(random) : plain_pair(random);
+NastyPair denormal_pair(core::RandomStream& random) {
+  NastyPair pair = random.uniform_below(2) == 0 ? grid_pair(random) : plain_pair(random);
   scale_pair(pair, Vector3f::Constant(static_cast<float>(power_of_ten(random, -44.0, -38.0))));
   return pair;
 }
 
-TrianglePair far_pair(core::RandomStream& random) {
+NastyPair far_pair(core::RandomStream& random) {
   const double distance = power_of_ten(random, 0.0, 8.0);
   const Vector3d centre = distance * cube_point(random);
   const double size = power_of_ten(random, -3.0, 0.0);
   return {plain_triangle(random, size, centre), plain_triangle(random, size, centre)};
 }
 
-TrianglePair huge_pair(core::RandomStream& random) {
-  TrianglePair pair{plain_triangle(random, 1e9), plain_triangle(random, 1e9)};
+NastyPair huge_pair(core::RandomStream& random) {
+  NastyPair pair{plain_triangle(random, 1e9), plain_triangle(random, 1e9)};
   if (random.uniform_below(2) == 0) {
     const double size = power_of_ten(random, -9.0, 9.0);
     const Vector3f centre = inner_point(pair.a, random);
@@ -183,15 +183,15 @@ TrianglePair huge_pair(core::RandomStream& random) {
   return pair;
 }
 
-TrianglePair scaled_grid_pair(core::RandomStream& random) {
-  TrianglePair pair = grid_pair(random);
+NastyPair scaled_grid_pair(core::RandomStream& random) {
+  NastyPair pair = grid_pair(random);
   Vector3f factors;
   for (int i = 0; i < 3; ++i) factors[i] = std::ldexp(1.0F, static_cast<int>(random.uniform_below(150)) - 122);
   scale_pair(pair, factors);
   return pair;
 }
 
-TrianglePair make(Nastiness nastiness, core::RandomStream& random) {
+NastyPair make(Nastiness nastiness, core::RandomStream& random) {
   switch (nastiness) {
     case Nastiness::kPlain:
       return plain_pair(random);
@@ -236,8 +236,8 @@ std::string_view to_string(Nastiness nastiness) {
   return kNames[static_cast<std::size_t>(nastiness)];
 }
 
-TrianglePair nasty_pair(Nastiness nastiness, core::RandomStream& random) {
-  TrianglePair pair = make(nastiness, random);
+NastyPair nasty_pair(Nastiness nastiness, core::RandomStream& random) {
+  NastyPair pair = make(nastiness, random);
   for (Triangle* t : {&pair.a, &pair.b}) {
     random.shuffle(std::span<Vector3f>(*t));
     for (Vector3f& p : *t) p = p.cwiseMin(kLargestCoordinate).cwiseMax(-kLargestCoordinate);

@@ -35,10 +35,10 @@ inline constexpr std::array<Nastiness, 15> kAllNastiness = {
     Nastiness::kFar,      Nastiness::kHuge,       Nastiness::kGridScaled};
 std::string_view to_string(Nastiness nastiness);
 
-struct TrianglePair {
+struct NastyPair {
   Triangle a;
   Triangle b;
 };
-TrianglePair nasty_pair(Nastiness nastiness, core::RandomStream& random);
+NastyPair nasty_pair(Nastiness nastiness, core::RandomStream& random);
 
 }  // namespace prescene::collision

@@ -16,7 +16,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/generators.h"
-#include "triangle_lanes.h"
+#include "target_test.h"
 
 namespace prescene::collision {
 namespace {

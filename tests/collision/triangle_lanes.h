@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Batches of nasty triangles in the layouts of the kernels, and tests that run once for each instruction set.
+// Batches of nasty triangles in the layouts of the kernels.
 #pragma once
-
-#include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <array>
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "nasty_triangles.h"
 #include "prescene/collision/triangle_pairs.h"
+#include "target_test.h"
 
 namespace prescene::collision {
 
@@ -22,7 +18,7 @@ inline TriangleCoordinates coordinates(const Triangle& t) {
 inline bool bit(std::uint32_t bits, std::size_t i) { return (bits >> i & 1U) != 0; }
 
 struct LaneBatch {
-  std::array<TrianglePair, 16> pairs;
+  std::array<NastyPair, 16> pairs;
   alignas(64) std::array<float, 144> a;
   alignas(64) std::array<float, 144> b;
   alignas(64) std::array<float, 36> four_a;  ///< The first four of a.
@@ -43,27 +39,6 @@ inline LaneBatch nasty_batch(Nastiness nastiness, core::RandomStream& random) {
     }
   }
   return batch;
-}
-
-inline void use_target(std::int64_t target) {
-  hwy::SetSupportedTargetsForTest(target);
-  hwy::GetChosenTarget().DeInit();
-}
-
-/// Runs with HWY_DYNAMIC_DISPATCH going to the target that is the parameter.
-class TargetTest : public testing::TestWithParam<std::int64_t> {
- protected:
-  void SetUp() override { use_target(GetParam()); }
-  void TearDown() override { use_target(0); }
-};
-
-inline std::vector<std::int64_t> all_targets() {
-  hwy::SetSupportedTargetsForTest(0);
-  return hwy::SupportedAndGeneratedTargets();
-}
-
-inline std::string target_name(const testing::TestParamInfo<std::int64_t>& target) {
-  return hwy::TargetName(target.param);
 }
 
 }  // namespace prescene::collision

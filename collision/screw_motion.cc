@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/collision/spheres/screw_motion.h"
+#include "prescene/collision/screw_motion.h"
 
 #include <cmath>
 
