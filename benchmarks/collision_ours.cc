@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "prescene/benchmarks/collision_algorithms.h"
+#include "prescene/collision/distance_queries.h"
 #include "prescene/collision/dops/boxtree.h"
 #include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/dop_tree.h"
@@ -63,6 +64,14 @@ class TreeSolver : public PairSolver {
     }
   }
 
+  double distance(const Transform& X_AB) override {
+    if constexpr (std::is_same_v<Tree, TriangleTree>) {
+      return collision::distance(a_, b_, X_AB, {}, scratch_)->distance;
+    } else {
+      return PairSolver::distance(X_AB);
+    }
+  }
+
   WorkCounts count(const Transform& X_AB) override {
     QueryCounts counts;
     ask(X_AB, &counts);
@@ -105,6 +114,7 @@ Algorithm algorithm_of(std::string name, const Options& options) {
 Algorithm triangle_tree(std::string_view name, const TriangleTreeOptions& options) {
   Algorithm algorithm = algorithm_of<TriangleTree>(std::string(name), options);
   algorithm.has_batches = true;
+  algorithm.has_distance = name == kDefaultTree;
   return algorithm;
 }
 

@@ -48,6 +48,13 @@ struct MovingPair {
   NodePair pair;
 };
 
+/// Two nodes, or two leaves' blocks (then without children), that wait for being looked at; see distance_descent-inl.h.
+struct NearPair {
+  NodePair pair;
+  float key;           ///< Grows with the distance that they have at least.
+  std::uint32_t next;  ///< In a list.
+};
+
 /// Memory that a query works in. One a thread; after the first queries nothing is allocated any more.
 class QueryScratch {
  public:
@@ -55,12 +62,14 @@ class QueryScratch {
   std::vector<SharedNodePair>& shared_node_pairs() { return shared_node_pairs_; }
   std::vector<RayStep>& ray_steps() { return ray_steps_; }
   std::vector<MovingPair>& moving_pairs() { return moving_pairs_; }
+  std::vector<NearPair>& near_pairs() { return near_pairs_; }
 
  private:
   std::vector<NodePair> node_pairs_;
   std::vector<SharedNodePair> shared_node_pairs_;
   std::vector<RayStep> ray_steps_;
   std::vector<MovingPair> moving_pairs_;
+  std::vector<NearPair> near_pairs_;
 };
 
 }  // namespace prescene::collision

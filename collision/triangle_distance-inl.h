@@ -57,9 +57,9 @@ HWY_INLINE hn::Vec<D> clamped(D d, hn::Vec<D> value) {
   return hn::Min(hn::Max(value, hn::Zero(d)), hn::Set(d, 1.0F));
 }
 
-/// Squared, of the segments from p along u and from q along v; r = q - p.
+/// From the segment from p along u to that from q along v; r = q - p.
 template <class D>
-HWY_INLINE hn::Vec<D> edge_to_edge(D d, const Vectors<D>& r, const Vectors<D>& u, hn::Vec<D> inverse_uu,
+HWY_INLINE Vectors<D> edge_to_edge(D d, const Vectors<D>& r, const Vectors<D>& u, hn::Vec<D> inverse_uu,
                                    const Vectors<D>& v, hn::Vec<D> inverse_vv) {
   const Vectors<D> n = cross(d, u, v);
   auto s = clamped(d, hn::Mul(dot(d, cross(d, r, v), n), inverse_or_zero(d, dot(d, n, n))));
@@ -67,8 +67,7 @@ HWY_INLINE hn::Vec<D> edge_to_edge(D d, const Vectors<D>& r, const Vectors<D>& u
   const auto t = clamped(d, hn::Neg(hn::Mul(dot(d, from_q, v), inverse_vv)));
   const Vectors<D> to_q = along(d, r, t, v);
   s = clamped(d, hn::Mul(dot(d, to_q, u), inverse_uu));
-  const Vectors<D> rest = back_along(d, to_q, s, u);
-  return dot(d, rest, rest);
+  return back_along(d, to_q, s, u);
 }
 
 /// A face with a corner, the edges u and v from it, and what all points share.
@@ -86,9 +85,15 @@ HWY_INLINE Face<D> make_face(D d, const Vectors<D>& u, const Vectors<D>& v) {
   return {u, v, n, inverse_or_zero(d, dot(d, n, n))};
 }
 
-/// Squared, of the point w (from the face's corner) where it is above or below the face, infinite elsewhere.
+/// From the face to the point w (from the face's corner), where it is above or below the face.
 template <class D>
-HWY_INLINE hn::Vec<D> point_to_face(D d, const Vectors<D>& w, const Face<D>& face) {
+struct FaceDistance {
+  Vectors<D> rest;
+  hn::Mask<D> inside;
+};
+
+template <class D>
+HWY_INLINE FaceDistance<D> face_to_point(D d, const Vectors<D>& w, const Face<D>& face) {
   auto s = hn::Mul(dot(d, cross(d, w, face.v), face.n), face.inverse_nn);
   auto t = hn::Mul(dot(d, cross(d, face.u, w), face.n), face.inverse_nn);
   Vectors<D> rest = back_along(d, back_along(d, w, s, face.u), t, face.v);
@@ -99,8 +104,21 @@ HWY_INLINE hn::Vec<D> point_to_face(D d, const Vectors<D>& w, const Face<D>& fac
   rest = back_along(d, back_along(d, rest, ds, face.u), dt, face.v);
   const auto inside = hn::And(hn::Ge(hn::Min(s, t), hn::Zero(d)),
                               hn::And(hn::Le(hn::Add(s, t), hn::Set(d, 1.0F)), hn::Gt(face.inverse_nn, hn::Zero(d))));
-  return hn::IfThenElse(inside, dot(d, rest, rest), hn::Set(d, std::numeric_limits<float>::infinity()));
+  return {rest, inside};
 }
+
+/// The shortest of vectors from a to b, squared, and if wanted itself.
+template <class D, bool kBetween>
+struct Shortest {
+  hn::Vec<D> squared;
+  Vectors<D> between;
+
+  HWY_INLINE void keep(D d, const Vectors<D>& v) { keep(d, v, dot(d, v, v)); }
+  HWY_INLINE void keep(D d, const Vectors<D>& v, hn::Vec<D> square) {
+    if constexpr (kBetween) between = select(d, hn::Lt(square, squared), v, between);
+    squared = hn::Min(squared, square);
+  }
+};
 
 template <class D>
 HWY_INLINE Corners<D> scaled(D, const Corners<D>& c, hn::Vec<D> factor) {
@@ -110,22 +128,26 @@ HWY_INLINE Corners<D> scaled(D, const Corners<D>& c, hn::Vec<D> factor) {
   return {times(c[0]), times(c[1]), times(c[2])};
 }
 
-template <class D>
-HWY_INLINE hn::Vec<D> squared_distance(D d, const Corners<D>& a, const Corners<D>& b) {
+template <bool kBetween, class D>
+HWY_INLINE Shortest<D, kBetween> shortest(D d, const Corners<D>& a, const Corners<D>& b) {
   const Corners<D> u = {difference(d, a[1], a[0]), difference(d, a[2], a[1]), difference(d, a[0], a[2])};
   const Corners<D> v = {difference(d, b[1], b[0]), difference(d, b[2], b[1]), difference(d, b[0], b[2])};
   const Face<D> face_a = make_face(d, u[0], difference(d, a[2], a[0]));
   const Face<D> face_b = make_face(d, v[0], difference(d, b[2], b[0]));
-  auto best = hn::Set(d, std::numeric_limits<float>::infinity());
+  const auto infinity = hn::Set(d, std::numeric_limits<float>::infinity());
+  Shortest<D, kBetween> best{infinity, {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
   const std::array<hn::Vec<D>, 3> inverse_vv = {inverse_or_zero(d, dot(d, v[0], v[0])),
                                                 inverse_or_zero(d, dot(d, v[1], v[1])),
                                                 inverse_or_zero(d, dot(d, v[2], v[2]))};
   for (std::size_t i = 0; i < 3; ++i) {
     const auto inverse_uu = inverse_or_zero(d, dot(d, u[i], u[i]));
     for (std::size_t k = 0; k < 3; ++k)
-      best = hn::Min(best, edge_to_edge(d, difference(d, b[k], a[i]), u[i], inverse_uu, v[k], inverse_vv[k]));
-    best = hn::Min(best, point_to_face(d, difference(d, a[i], b[0]), face_b));
-    best = hn::Min(best, point_to_face(d, difference(d, b[i], a[0]), face_a));
+      best.keep(d, edge_to_edge(d, difference(d, b[k], a[i]), u[i], inverse_uu, v[k], inverse_vv[k]));
+    const FaceDistance<D> to_a = face_to_point(d, difference(d, a[i], b[0]), face_b);
+    const Vectors<D> from_a = {hn::Neg(to_a.rest.x), hn::Neg(to_a.rest.y), hn::Neg(to_a.rest.z)};
+    best.keep(d, from_a, hn::IfThenElse(to_a.inside, dot(d, from_a, from_a), infinity));
+    const FaceDistance<D> to_b = face_to_point(d, difference(d, b[i], a[0]), face_a);
+    best.keep(d, to_b.rest, hn::IfThenElse(to_b.inside, dot(d, to_b.rest, to_b.rest), infinity));
   }
   return best;
 }
@@ -158,47 +180,58 @@ template <class D>
 struct LaneDistance {
   hn::Vec<D> distance;
   LaneVerdict<D> verdict;
+  Vectors<D> between;  ///< From a to b, as long as the distance, where asked for and not zero.
 };
 
 // Of the lanes that are near, whatever their distance. Long enough to be worth a call: one copy serves all callers.
-template <class D>
+template <bool kBetween, class D>
 HWY_NOINLINE LaneDistance<D> measure_lanes(D d, const Corners<D>& a, const Corners<D>& b, hn::Vec<D> extent,
                                            hn::Mask<D> near) {
   // 2^e <= extent < 2^(e + 1) becomes 1 to 2. Exponents of denormal extents are all taken as -127.
   const hn::RebindToSigned<D> di;
   const auto exponent = hn::And(hn::BitCast(di, extent), hn::Set(di, 0x7F800000));
   const auto down = hn::BitCast(d, hn::Sub(hn::Set(di, 254 << 23), exponent));
-  const auto square = squared_distance(d, scaled(d, a, down), scaled(d, b, down));
-  const auto up = hn::IfThenElse(hn::Eq(exponent, hn::Zero(di)), hn::Set(di, 1 << 22), exponent);
-  const auto distance = hn::Mul(hn::Sqrt(square), hn::BitCast(d, up));
+  const auto found = shortest<kBetween>(d, scaled(d, a, down), scaled(d, b, down));
+  const auto up = hn::BitCast(d, hn::IfThenElse(hn::Eq(exponent, hn::Zero(di)), hn::Set(di, 1 << 22), exponent));
+  const auto distance = hn::Mul(hn::Sqrt(found.squared), up);
+  Vectors<D> between = found.between;
+  if constexpr (kBetween) between = {hn::Mul(between.x, up), hn::Mul(between.y, up), hn::Mul(between.z, up)};
   const LaneVerdict<D> verdict = test_lanes(d, a, b, near);
   const auto infinity = hn::Set(d, std::numeric_limits<float>::infinity());
-  return {hn::IfThenElse(near, hn::IfThenZeroElse(hn::Or(verdict.hit, verdict.unsure), distance), infinity), verdict};
+  return {hn::IfThenElse(near, hn::IfThenZeroElse(hn::Or(verdict.hit, verdict.unsure), distance), infinity), verdict,
+          between};
 }
 
 /// Zero for hits and lanes that the verdict is unsure of. Lanes that are not active, and those whose boxes are at least
 /// `limit` apart along an axis, get infinity. Distances keep their relative precision for triangles of any size: each
 /// pair is scaled by a power of two.
-template <class D>
+template <bool kBetween = false, class D>
 HWY_INLINE LaneDistance<D> distance_lanes(D d, const Corners<D>& a, const Corners<D>& b, hn::Vec<D> limit,
                                           hn::Mask<D> active) {
   const BoxPair<D> boxes = box_pair(d, a, b);
   const auto near = hn::And(active, hn::Lt(boxes.gap, limit));
-  if (!hn::AllFalse(d, near)) return measure_lanes(d, a, b, boxes.extent, near);
-  return {hn::Set(d, std::numeric_limits<float>::infinity()), {hn::FirstN(d, 0), hn::FirstN(d, 0)}};
+  if (!hn::AllFalse(d, near)) return measure_lanes<kBetween>(d, a, b, boxes.extent, near);
+  return {hn::Set(d, std::numeric_limits<float>::infinity()),
+          {hn::FirstN(d, 0), hn::FirstN(d, 0)},
+          {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
 }
 
 /// Writes the distances of 16 pairs: zero for hits and for pairs of which the verdict is unsure, infinity for those
 /// that are not active or whose distance is `limit` or more (up to a rounding; not all such pairs are found).
-template <class LoadA, class LoadB>
+template <bool kBetween = false, class LoadA, class LoadB>
 HWY_INLINE PairVerdict distance_of_16(const LoadA& load_a, const LoadB& load_b, float limit, float* distances,
-                                      std::uint32_t active) {
+                                      std::uint32_t active, float (*between)[16] = nullptr) {
   const PairTag d;
   PairVerdict verdict;
   for (std::size_t first = 0; first < 16; first += hn::Lanes(d)) {
-    const LaneDistance<PairTag> lanes =
-        distance_lanes(d, load_a(d, first), load_b(d, first), hn::Set(d, limit), mask_of_bits(d, active >> first));
+    const LaneDistance<PairTag> lanes = distance_lanes<kBetween>(d, load_a(d, first), load_b(d, first),
+                                                                 hn::Set(d, limit), mask_of_bits(d, active >> first));
     hn::StoreU(lanes.distance, d, distances + first);
+    if constexpr (kBetween) {
+      hn::StoreU(lanes.between.x, d, between[0] + first);
+      hn::StoreU(lanes.between.y, d, between[1] + first);
+      hn::StoreU(lanes.between.z, d, between[2] + first);
+    }
     verdict.hit |= bits_of_mask(d, lanes.verdict.hit) << first;
     verdict.unsure |= bits_of_mask(d, lanes.verdict.unsure) << first;
   }

@@ -119,15 +119,18 @@ void keep_crossing(const Corners<double>& edges, const Corners<double>& face, Ca
 }  // namespace
 
 TriangleDistance triangle_pair_distance(const Triangle& a, const Triangle& b) {
+  if (!triangles_intersect(a, b)) return disjoint_pair_distance(a, b);
   const Corners<double> corners_a = widened(a);
   const Corners<double> corners_b = widened(b);
   Candidate<double> best = nearest_features(corners_a, corners_b);
-  if (triangles_intersect(a, b)) {
-    keep_crossing(corners_a, corners_b, best);
-    keep_crossing(corners_b, corners_a, best);
-    const Vector<double> common = best.p_A + 0.5 * best.between;
-    return {0.0, common, common};
-  }
+  keep_crossing(corners_a, corners_b, best);
+  keep_crossing(corners_b, corners_a, best);
+  const Vector<double> common = best.p_A + 0.5 * best.between;
+  return {0.0, common, common};
+}
+
+TriangleDistance disjoint_pair_distance(const Triangle& a, const Triangle& b) {
+  const Candidate<double> best = nearest_features(widened(a), widened(b));
   const double distance = std::max(std::sqrt(best.squared), std::numeric_limits<double>::min());
   return {distance, best.p_A, best.p_A + best.between};
 }

@@ -22,6 +22,9 @@ struct TriangleDistance {
 /// most 1e-13 of the size of the box about both triangles, for needles too.
 TriangleDistance triangle_pair_distance(const Triangle& a, const Triangle& b);
 
+/// The same for triangles that are known not to intersect.
+TriangleDistance disjoint_pair_distance(const Triangle& a, const Triangle& b);
+
 /// The kernel's distance in plain C++; zero for a pair that intersects or may do so.
 float single_triangle_pair_distance(const TriangleCoordinates& a, const TriangleCoordinates& b);
 
