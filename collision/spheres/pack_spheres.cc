@@ -144,8 +144,10 @@ core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& op
   const bool edges = options.edge_fidelity > 0.0;
   grow_to(edges ? (most + 1) / 2 : most);
   if (voids.spheres().empty()) {
-    return refuse(mesh, "no sphere with a radius of " + std::to_string(smallest) +
-                            " m fits into it; it has no thickness, or smallest_radius is too large");
+    return refuse(mesh,
+                  "no sphere with a radius of " + std::to_string(smallest) +
+                      " m fits into it; it has no thickness, lies too far from its origin for single precision, or "
+                      "smallest_radius is too large");
   }
   if (edges) {
     PRESCENE_RETURN_IF_ERROR(place_edges(mesh, body, surface, options, smallest, voids, report, pool));

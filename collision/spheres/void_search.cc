@@ -41,6 +41,12 @@ Vector3d shortest_combination(std::span<const Vector3d> vectors) {
   return shortest;
 }
 
+// Far from the origin centres can only lie on the coarse grid of single precision; smaller spheres than that are in vain.
+double resolution(const Eigen::AlignedBox3d& box) {
+  const double farthest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  return 2.0 * farthest * static_cast<double>(std::numeric_limits<float>::epsilon());
+}
+
 }  // namespace
 
 bool VoidSearch::Before::operator()(const Entry& a, const Entry& b) const {
@@ -48,7 +54,7 @@ bool VoidSearch::Before::operator()(const Entry& a, const Entry& b) const {
 }
 
 VoidSearch::VoidSearch(const SurfaceSearch& surface, double smallest, core::ThreadPool& pool)
-    : surface_(surface), smallest_(smallest), pool_(pool) {
+    : surface_(surface), smallest_(std::max(smallest, resolution(surface.box()))), pool_(pool) {
   Cell root;
   root.centre = surface.box().center();
   root.half = 0.5 * surface.box().sizes().maxCoeff() * (1.0 + 1e-9);

@@ -20,7 +20,8 @@ namespace prescene::collision {
 
 class VoidSearch {
  public:
-  /// Spheres with a radius below `smallest` are not looked for. `surface` outlives the search.
+  /// Spheres with a radius below `smallest`, or too small for single precision so far from the origin, are not looked
+  /// for. `surface` outlives the search.
   VoidSearch(const SurfaceSearch& surface, double smallest, core::ThreadPool& pool);
 
   /// Inserts at least one and at most `most` (>= 1) of the largest spheres that fit, or none, and says so, when all

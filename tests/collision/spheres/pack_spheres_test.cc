@@ -195,6 +195,28 @@ TEST(PackSpheres, RefusesBadOptions) {
   EXPECT_THAT(message({.max_spheres = 20, .smallest_radius = 1e-3, .edge_fidelity = 1e-4}), HasSubstr("it is thinner"));
 }
 
+TEST(PackSpheres, EndsForTinyHugeAndFarBodies) {
+  core::ThreadPool pool(2);
+  for (const double scale : {1e-38, 1e-30, 1e-10, 1e8}) {
+    geometry::TriangleMesh box = geometry::scaled(geometry::make_mesh(geometry::BoxShape{{1.0, 2.0, 3.0}}), scale);
+    const auto packed = pack_spheres(*to_mesh(box), {.max_spheres = 50, .edge_fidelity = 0.01 * scale}, pool);
+    ASSERT_TRUE(packed.ok()) << packed.status().message();
+    EXPECT_NEAR(packed->report.body_volume, 6.0 * std::pow(scale, 3), 1e-5 * std::pow(scale, 3));
+    EXPECT_GT(packed->report.share(), 0.5);
+  }
+  // Ten thousand times its size away, single precision still has room for some spheres; a million times, for none.
+  for (const double away : {1e4, 1e6}) {
+    geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{1.0, 2.0, 3.0}});
+    for (Vector3d& v : box.vertices) v.x() += away;
+    const auto packed = pack_spheres(*to_mesh(box), {.max_spheres = 50}, pool);
+    if (packed.ok()) {
+      expect_apart(*packed->packing);
+    } else {
+      EXPECT_THAT(packed.status().message(), HasSubstr("too far from its origin"));
+    }
+  }
+}
+
 // How much further the body reaches in a direction than its packing does, at most over many directions.
 double largest_lack(const Mesh& mesh, const SpherePacking& packing) {
   core::RandomStream stream(1, core::Purpose::kTest);
