@@ -70,7 +70,7 @@ float cost_of(const Matrix3f& R_NM, const Vector3f& origin, const Corners& corne
 /// Sets the frame and the children's boxes.
 void fit(const Matrix3f& R_NM, const Corners& corners, std::span<const ChildRange> children, TriangleTreeNode* node) {
   // The low corner is rounded when it is put into the mesh's frame, so boxes are measured from what it became.
-  const Vector3f reference = corners[std::size_t{3} * children[0].begin];
+  const Vector3f& reference = corners[std::size_t{3} * children[0].begin];
   Bounds all;
   for (const ChildRange& child : children) all.add(bounds_in(R_NM, reference, corners, child));
   const float scale = reference.cwiseAbs().maxCoeff() + (all.high - all.low).norm();
@@ -115,7 +115,7 @@ TriangleTreeNode make_node(const Corners& corners, std::span<const ChildRange> c
   Matrix3f principal;
   const ChildRange all{children.front().begin, children.back().end};
   if (rotated_frames && principal_axes(corners, all, &principal)) {
-    const Vector3f origin = corners[std::size_t{3} * all.begin];
+    const Vector3f& origin = corners[std::size_t{3} * all.begin];
     if (cost_of(principal, origin, corners, children) < cost_of(R_NM, origin, corners, children)) R_NM = principal;
   }
   fit(R_NM, corners, children, &node);

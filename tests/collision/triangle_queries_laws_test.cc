@@ -84,7 +84,7 @@ TEST(TriangleQueries, FindWhatBruteForceFinds) {
       intersecting += expected.empty() ? 0 : 1;
     }
   }));
-  std::printf("%d configurations compared with brute force, %d of them in contact\n", configurations, intersecting);
+  std::printf("compared: drawn pairs: %d configurations with brute force; %d collide\n", configurations, intersecting);
   EXPECT_GT(intersecting, configurations / 10);
   EXPECT_LT(intersecting, configurations);
 }
