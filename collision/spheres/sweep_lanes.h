@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdint>
 
-#include "prescene/collision/spheres/continuous_sphere_queries.h"
 #include "prescene/collision/screw_motion.h"
+#include "prescene/collision/spheres/continuous_sphere_queries.h"
 #include "prescene/collision/spheres/sphere_tree.h"
 
 namespace prescene::collision {

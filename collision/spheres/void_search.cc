@@ -41,7 +41,8 @@ Vector3d shortest_combination(std::span<const Vector3d> vectors) {
   return shortest;
 }
 
-// Far from the origin centres can only lie on the coarse grid of single precision; smaller spheres than that are in vain.
+// Far from the origin centres can only lie on the coarse grid of single precision; smaller spheres than that are in
+// vain.
 double resolution(const Eigen::AlignedBox3d& box) {
   const double farthest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
   return 2.0 * farthest * static_cast<double>(std::numeric_limits<float>::epsilon());
