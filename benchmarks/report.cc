@@ -83,8 +83,8 @@ std::string goal_text(const std::optional<Goal>& goal, Better better) {
 std::string mark_of(const Target& target) {
   if (!target.reached || (!target.must && !target.aim)) return "-";
   if (target.aim && meets(target, *target.aim)) return "aim";
-  if (!target.must || meets(target, *target.must)) return "must";
-  return "MISSED";
+  if (!target.must) return "-";
+  return meets(target, *target.must) ? "must" : "MISSED";
 }
 
 Json json_of(const Target& target) {

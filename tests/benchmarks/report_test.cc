@@ -45,6 +45,14 @@ TEST(Report, MarksWhatWasReached) {
   }
 }
 
+TEST(Report, AnAimAloneIsNotMissed) {
+  Target target = ratio(30.0);
+  target.must.reset();
+  Report report("some", "scalar");
+  report.add(target);
+  EXPECT_THAT(report.text(), Not(HasSubstr("MISSED")));
+}
+
 TEST(Report, GoalsBelowAndWithin) {
   Target target = ratio(16.0);
   target.better = Better::kLower;
