@@ -123,7 +123,8 @@ class NearestSearch {
       if (distances[i] == 0.0F || (!found_ && distances[i] >= certain_ && distances[i] < best_)) {
         if (counts_ != nullptr && (verdict.hit >> i & 1U) == 0) ++counts_->exact_tests;
         const TriangleDistance d = triangle_pair_distance(triangle_a(batch_.pair(i)), triangle_b(batch_.pair(i)));
-        if (keep_known(d, &batch_.pair(i))) return true;
+        const BlockPair pair = batch_.pair(i);
+        if (keep_known(d, &pair)) return true;
       }
     }
     std::uint32_t nearest = 16;
@@ -150,7 +151,7 @@ class NearestSearch {
     if (pairs == 0) return;
     TriangleBlock placed_b;
     place_block(X_AB_, b, &placed_b);
-    batch_.add({block_a, block_b, 0}, pairs, a, placed_b);
+    batch_.add(block_a, block_b, pairs, a, placed_b);
   }
 
   /// Straight down to what looks nearest, for a first distance. Returns whether that ends the search.
@@ -166,12 +167,7 @@ class NearestSearch {
   }
 
   void descend() {
-    // The second dive knows a direction from the first.
-    constexpr int kDives = 2;
-    for (int i = 0; i < kDives && !seeded_; ++i)
-      if (dive()) return;
-    // Pairs that wait are measured before another pair of nodes is looked at if there are so many.
-    constexpr std::uint32_t kWorthwhile = 8;
+    if (!seeded_ && dive()) return;
     NearQueue queue(reach_, &scratch_->near_pairs());
     const auto push = [&queue](const NodePair& pair, float key) HWY_ATTR { queue.push(pair, key); };
     NodePair pair = roots(a_, b_);
@@ -182,7 +178,6 @@ class NearestSearch {
         if (batch_.count() >= PairBatch::kFull && measure()) return;
         continue;
       }
-      if (batch_.count() >= kWorthwhile && measure()) return;
       if (place_near_pair(frame_, pair, a_.nodes().data(), b_.nodes().data(), reach_, &children_, counts_))
         for_near_children(children_, reach_, push);
     }

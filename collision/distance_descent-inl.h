@@ -324,7 +324,7 @@ HWY_INLINE void for_near_children(const NearChildren& children, float limit, con
   }
 }
 
-/// Pairs that wait, nearest first up to a sixteenth of the square of the distance at the start: as good as a heap, and
+/// Pairs that wait, nearest first up to a 32nd of the square of the distance at the start: as good as a heap, and
 /// several times cheaper. Those that overlap come first of all.
 class NearQueue {
  public:
@@ -365,7 +365,7 @@ class NearQueue {
   }
 
  private:
-  static constexpr std::size_t kLists = 16;
+  static constexpr std::size_t kLists = 32;
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
   std::size_t list_of(float key) const {

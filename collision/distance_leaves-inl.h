@@ -56,23 +56,12 @@ HWY_INLINE float largest_of_four(const float* four) {
   return hn::GetLane(hn::MaxOfLanes(d, largest));
 }
 
-/// Of pair 4 i + k, from pair `first` on: number i of four.
-HWY_INLINE hn::Vec<PairTag> each_of_four(PairTag d, const float* four, std::size_t first) {
+/// Those of four that `lanes`, from 0 to 3, say.
+HWY_INLINE hn::Vec<PairTag> pick_of_four(PairTag d, const float* four, hn::Vec<hn::RebindToSigned<PairTag>> lanes) {
 #if HWY_TARGET == HWY_SCALAR
-  return hn::Set(d, four[first / 4]);
+  return hn::Set(d, four[hn::GetLane(lanes)]);
 #else
-  const auto lanes = hn::Iota(hn::RebindToSigned<PairTag>(), static_cast<std::int32_t>(first));
-  return hn::TableLookupLanes(hn::LoadDup128(d, four), hn::IndicesFromVec(d, hn::ShiftRight<2>(lanes)));
-#endif
-}
-
-/// Number k of four.
-HWY_INLINE hn::Vec<PairTag> all_of_four(PairTag d, const float* four, std::size_t first) {
-#if HWY_TARGET == HWY_SCALAR
-  return hn::Set(d, four[first % 4]);
-#else
-  static_cast<void>(first);
-  return hn::LoadDup128(d, four);
+  return hn::TableLookupLanes(hn::LoadDup128(d, four), hn::IndicesFromVec(d, lanes));
 #endif
 }
 
@@ -95,13 +84,17 @@ HWY_INLINE std::uint32_t near_triangles(const DistanceFrame& frame, const Triang
     const float in_units = apart * frame.scale;
     if (apart > 0.0F && in_units * in_units > limit) return 0;
   }
+  const hn::RebindToSigned<PairTag> di;
   for (std::size_t first = 0; first < 16; first += hn::Lanes(d)) {
+    const auto pair = hn::Iota(di, static_cast<std::int32_t>(first));
+    const auto lanes_a = hn::ShiftRight<2>(pair);
+    const auto lanes_b = hn::And(pair, hn::Set(di, 3));
     auto square = hn::Zero(d);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto low_a = each_of_four(d, spans_a[axis].low, first);
-      const auto high_a = each_of_four(d, spans_a[axis].high, first);
-      const auto low_b = all_of_four(d, spans_b[axis].low, first);
-      const auto high_b = all_of_four(d, spans_b[axis].high, first);
+      const auto low_a = pick_of_four(d, spans_a[axis].low, lanes_a);
+      const auto high_a = pick_of_four(d, spans_a[axis].high, lanes_a);
+      const auto low_b = pick_of_four(d, spans_b[axis].low, lanes_b);
+      const auto high_b = pick_of_four(d, spans_b[axis].high, lanes_b);
       const auto apart = hn::Sub(hn::Max(hn::Sub(low_b, high_a), hn::Sub(low_a, high_b)), hn::Set(d, slack));
       const auto in_units = hn::Mul(hn::Max(apart, hn::Zero(d)), hn::Set(d, frame.scale));
       square = hn::MulAdd(in_units, in_units, square);
@@ -125,19 +118,31 @@ class PairBatch {
 
   std::uint32_t count() const { return count_; }
   /// Of the first kFull.
-  const BlockPair& pair(std::uint32_t i) const { return pairs_[i]; }
+  BlockPair pair(std::uint32_t i) const {
+    return {static_cast<std::uint32_t>(blocks_a_[i]), static_cast<std::uint32_t>(blocks_b_[i]),
+            static_cast<std::uint32_t>(pairs_[i])};
+  }
 
   /// `pairs`: bits of pairs 4 i + k of the two blocks. Only while count() is less than kFull.
-  HWY_INLINE void add(const BlockPair& blocks, std::uint32_t pairs, const TriangleBlock& a, const TriangleBlock& b) {
-    for (; pairs != 0; pairs &= pairs - 1) {
-      const auto pair = static_cast<std::uint32_t>(std::countr_zero(pairs));
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          a_[3 * corner + axis][count_] = a.corners[corner][axis][pair / 4];
-          b_[3 * corner + axis][count_] = b.corners[corner][axis][pair % 4];
-        }
+  HWY_INLINE void add(std::uint32_t block_a, std::uint32_t block_b, std::uint32_t pairs, const TriangleBlock& a,
+                      const TriangleBlock& b) {
+    const PairTag d;
+    const hn::RebindToSigned<PairTag> di;
+    for (std::size_t first = 0; first < 16; first += hn::Lanes(d)) {
+      const auto wanted = mask_of_bits(d, pairs >> first);
+      if (hn::AllFalse(d, wanted)) continue;
+      // Those that are wanted come first; what comes after them is overwritten by the next.
+      const auto pair = hn::Compress(hn::Iota(di, static_cast<std::int32_t>(first)), hn::RebindMask(di, wanted));
+      const auto lanes_a = hn::ShiftRight<2>(pair);
+      const auto lanes_b = hn::And(pair, hn::Set(di, 3));
+      for (std::size_t row = 0; row < 9; ++row) {
+        hn::StoreU(pick_of_four(d, a.corners[row / 3][row % 3], lanes_a), d, a_[row] + count_);
+        hn::StoreU(pick_of_four(d, b.corners[row / 3][row % 3], lanes_b), d, b_[row] + count_);
       }
-      pairs_[count_++] = {blocks.block_a, blocks.block_b, pair};
+      hn::StoreU(hn::Set(di, static_cast<std::int32_t>(block_a)), di, blocks_a_ + count_);
+      hn::StoreU(hn::Set(di, static_cast<std::int32_t>(block_b)), di, blocks_b_ + count_);
+      hn::StoreU(pair, di, pairs_ + count_);
+      count_ += static_cast<std::uint32_t>(hn::CountTrue(d, wanted));
     }
   }
 
@@ -159,7 +164,8 @@ class PairBatch {
       std::memcpy(a_[row], a_[row] + kFull, kFull * sizeof(float));
       std::memcpy(b_[row], b_[row] + kFull, kFull * sizeof(float));
     }
-    std::copy(pairs_ + kFull, pairs_ + count_, pairs_);
+    for (std::int32_t* ids : {blocks_a_, blocks_b_, pairs_})
+      std::memcpy(ids, ids + kFull, kFull * sizeof(std::int32_t));
     count_ -= kFull;
   }
 
@@ -169,7 +175,9 @@ class PairBatch {
   std::uint32_t count_ = 0;
   HWY_ALIGN float a_[9][kRoom];
   HWY_ALIGN float b_[9][kRoom];
-  BlockPair pairs_[kRoom];
+  std::int32_t blocks_a_[kRoom];
+  std::int32_t blocks_b_[kRoom];
+  std::int32_t pairs_[kRoom];
 };
 
 }  // namespace prescene::collision::HWY_NAMESPACE
