@@ -6,8 +6,10 @@
 #include <string>
 #include <utility>
 
+#include "prescene/collision/spheres/continuous_sphere_queries.h"
 #include "prescene/collision/spheres/static_shape.h"
 #include "surface_search.h"
+#include "swept_sphere.h"
 
 namespace prescene::collision {
 namespace {
@@ -42,8 +44,6 @@ core::Status check(const HeightField::Grid& grid, std::string_view name) {
   }
   return core::ok_status();
 }
-
-double beyond(double x, double low, double high) { return std::max({low - x, x - high, 0.0}); }
 
 }  // namespace
 
@@ -110,18 +110,15 @@ std::optional<double> HeightField::height(double x, double y) const {
   return corner + t * (left - corner) + s * (opposite - left);
 }
 
-// From the box about a square of cells.
-double HeightField::squared_distance(std::size_t level, int column, int row, const Vector3d& p) const {
+// About the surface over a square of cells.
+Eigen::AlignedBox3d HeightField::box(std::size_t level, int column, int row) const {
   const Level& cells = levels_[level];
   const Range& range = cells.ranges[static_cast<std::size_t>(row) * static_cast<std::size_t>(cells.columns) +
                                     static_cast<std::size_t>(column)];
   const double size = std::exp2(static_cast<double>(level));
-  const double dx = beyond(p.x(), column * size * grid_.spacing_x,
-                           std::min((column + 1) * size, grid_.columns - 1.0) * grid_.spacing_x);
-  const double dy =
-      beyond(p.y(), row * size * grid_.spacing_y, std::min((row + 1) * size, grid_.rows - 1.0) * grid_.spacing_y);
-  const double dz = beyond(p.z(), static_cast<double>(range.low), static_cast<double>(range.high));
-  return dx * dx + dy * dy + dz * dz;
+  return {Vector3d(column * size * grid_.spacing_x, row * size * grid_.spacing_y, static_cast<double>(range.low)),
+          Vector3d(std::min((column + 1) * size, grid_.columns - 1.0) * grid_.spacing_x,
+                   std::min((row + 1) * size, grid_.rows - 1.0) * grid_.spacing_y, static_cast<double>(range.high))};
 }
 
 // Of the vertical sides, or nothing where p lies above them.
@@ -167,7 +164,7 @@ std::optional<StaticShape::Nearest> HeightField::nearest(const Vector3d& p_BQ, d
   };
   std::array<Square, 128> stack;  // Three wait on each of at most 28 levels.
   std::size_t size = 0;
-  stack[size++] = {levels_.size() - 1, 0, 0, squared_distance(levels_.size() - 1, 0, 0, p_BQ)};
+  stack[size++] = {levels_.size() - 1, 0, 0, box(levels_.size() - 1, 0, 0).squaredExteriorDistance(p_BQ)};
   while (size > 0) {
     const Square square = stack[--size];
     if (square.squared >= bound) continue;
@@ -182,7 +179,7 @@ std::optional<StaticShape::Nearest> HeightField::nearest(const Vector3d& p_BQ, d
     const std::size_t before = size;
     for (int r = 2 * square.row; r < std::min(2 * square.row + 2, fine.rows); ++r) {
       for (int c = 2 * square.column; c < std::min(2 * square.column + 2, fine.columns); ++c) {
-        const double squared = squared_distance(square.level - 1, c, r, p_BQ);
+        const double squared = box(square.level - 1, c, r).squaredExteriorDistance(p_BQ);
         if (squared < bound) stack[size++] = {square.level - 1, c, r, squared};
       }
     }
@@ -196,6 +193,71 @@ std::optional<StaticShape::Nearest> HeightField::nearest(const Vector3d& p_BQ, d
   }
   if (!nearest || nearest->distance >= below) return std::nullopt;
   return nearest;
+}
+
+double HeightField::first_of_sides(const Vector3d& from, const Vector3d& to, double radius) const {
+  const Vector3d move = to - from;
+  const Eigen::Vector2d end((grid_.columns - 1) * grid_.spacing_x, (grid_.rows - 1) * grid_.spacing_y);
+  double first = SweptSphere::kNever;
+  for (int axis = 0; axis < 2; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      const double at = sign < 0.0 ? 0.0 : end[axis];
+      const double gap = sign * (from[axis] - at) - radius;
+      const double gap_at_end = sign * (to[axis] - at) - radius;
+      if (!(gap > 0.0 && gap_at_end <= 0.0)) continue;
+      const double t = gap / (gap - gap_at_end);
+      Vector3d p = from + t * move;
+      p[axis] = at;
+      const std::optional<double> ground = height(p.x(), p.y());
+      if (ground && p.z() <= *ground) first = std::min(first, t);
+    }
+  }
+  // The edges between them.
+  for (const auto& [column, row] : {std::pair(0, 0), std::pair(grid_.columns - 1, 0), std::pair(0, grid_.rows - 1),
+                                    std::pair(grid_.columns - 1, grid_.rows - 1)}) {
+    const Vector3d corner = point(column, row);
+    const auto across = [&](const Vector3d& p) { return Vector3d(p.x() - corner.x(), p.y() - corner.y(), 0.0); };
+    const auto t = swept_spheres_contact(across(from), across(to), radius);
+    if (t && from.z() + *t * move.z() <= corner.z()) first = std::min(first, *t);
+  }
+  return first;
+}
+
+std::optional<double> HeightField::swept_sphere_contact(const Vector3d& from, const Vector3d& to, double radius) const {
+  if (nearest(from, std::nextafter(radius, 2.0 * radius))) return 0.0;
+  const SweptSphere sphere(from, to, radius);
+  double first = first_of_sides(from, to, radius);
+  struct Square {
+    std::size_t level;
+    int column;
+    int row;
+    double time;
+  };
+  std::array<Square, 128> stack;  // As in nearest().
+  std::size_t size = 0;
+  stack[size++] = {levels_.size() - 1, 0, 0, sphere.enters(box(levels_.size() - 1, 0, 0))};
+  while (size > 0) {
+    const Square square = stack[--size];
+    if (square.time >= first) continue;
+    if (square.level == 0) {
+      const Vector3d corner = point(square.column, square.row);
+      const Vector3d opposite = point(square.column + 1, square.row + 1);
+      first = std::min({first, sphere.meets_triangle(corner, point(square.column + 1, square.row), opposite),
+                        sphere.meets_triangle(corner, opposite, point(square.column, square.row + 1))});
+      continue;
+    }
+    const Level& fine = levels_[square.level - 1];
+    const std::size_t before = size;
+    for (int r = 2 * square.row; r < std::min(2 * square.row + 2, fine.rows); ++r) {
+      for (int c = 2 * square.column; c < std::min(2 * square.column + 2, fine.columns); ++c) {
+        const double time = sphere.enters(box(square.level - 1, c, r));
+        if (time < first) stack[size++] = {square.level - 1, c, r, time};
+      }
+    }
+    std::sort(stack.begin() + static_cast<std::ptrdiff_t>(before), stack.begin() + static_cast<std::ptrdiff_t>(size),
+              [](const Square& a, const Square& b) { return a.time > b.time; });
+  }
+  return first <= 1.0 ? std::optional(first) : std::nullopt;
 }
 
 }  // namespace prescene::collision

@@ -108,6 +108,14 @@ std::optional<Nearest> HalfSpace::nearest(const Vector3d& p_BQ, double below) co
   return if_below({normal_.dot(p_BQ) - offset_, normal_}, below);
 }
 
+std::optional<double> HalfSpace::swept_sphere_contact(const Vector3d& from, const Vector3d& to, double radius) const {
+  const double gap = normal_.dot(from) - offset_ - radius;
+  const double gap_at_end = normal_.dot(to) - offset_ - radius;
+  if (gap <= 0.0) return 0.0;
+  if (gap_at_end > 0.0) return std::nullopt;
+  return gap / (gap - gap_at_end);
+}
+
 core::Result<PrimitiveShape> PrimitiveShape::make(const geometry::Primitive& primitive) {
   const Vector3d lengths = std::visit(
       [](const auto& shape) -> Vector3d {
@@ -126,7 +134,34 @@ core::Result<PrimitiveShape> PrimitiveShape::make(const geometry::Primitive& pri
 }
 
 std::optional<Nearest> PrimitiveShape::nearest(const Vector3d& p_BQ, double below) const {
-  return if_below(std::visit([&](const auto& shape) { return nearest_of(shape, p_BQ); }, primitive_), below);
+  return if_below(nearest(p_BQ), below);
+}
+
+Nearest PrimitiveShape::nearest(const Vector3d& p_BQ) const {
+  return std::visit([&](const auto& shape) { return nearest_of(shape, p_BQ); }, primitive_);
+}
+
+std::optional<double> PrimitiveShape::swept_sphere_contact(const Vector3d& from, const Vector3d& to,
+                                                           double radius) const {
+  // All primitives are convex: the plane across the normal has the shape behind it, so that the sphere does not touch
+  // before it touches that plane. As the distance is a convex function of the time, this is Newton's method from the
+  // left. Where the sphere grazes, it halves the way that is left with each step.
+  constexpr int kMostSteps = 100;
+  const Vector3d move = to - from;
+  const double rounding = 1e-15 * (from.norm() + to.norm() + radius);
+  double t = 0.0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Nearest at = nearest(from + t * move);
+    const double gap = at.distance - radius;
+    if (gap <= (step == 0 ? 0.0 : rounding)) break;
+    const double approach = -at.normal.dot(move);
+    if (approach <= 0.0) return std::nullopt;
+    const double next = t + gap / approach;
+    if (next > 1.0) return std::nullopt;
+    if (next <= t) break;
+    t = next;
+  }
+  return t;
 }
 
 core::Result<TriangleSurface> TriangleSurface::make(std::shared_ptr<const Mesh> mesh, SurfaceSide side) {
@@ -150,6 +185,13 @@ std::optional<Nearest> TriangleSurface::nearest(const Vector3d& p_BQ, double bel
   const Vector3d facing = (corners[1] - corners[0]).cast<double>().cross((corners[2] - corners[0]).cast<double>());
   const Vector3d out = inside ? Vector3d(found.point - p_BQ) : Vector3d(p_BQ - found.point);
   return if_below({inside ? -distance : distance, direction(out, direction(facing, Vector3d::UnitZ()))}, below);
+}
+
+std::optional<double> TriangleSurface::swept_sphere_contact(const Vector3d& from, const Vector3d& to,
+                                                            double radius) const {
+  if (side_ == SurfaceSide::kSolid && search_->winding(from) > 0) return 0.0;
+  const double t = search_->first_contact(SweptSphere(from, to, radius));
+  return t <= 1.0 ? std::optional(t) : std::nullopt;
 }
 
 bool TriangleSurface::is_within(const Vector3d& p_BQ, double below) const {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -42,6 +43,10 @@ class StaticShape {
   virtual std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const = 0;
   /// Whether nearest() would answer.
   virtual bool is_within(const Eigen::Vector3d& p_BQ, double below) const { return nearest(p_BQ, below).has_value(); }
+  /// First t in [0, 1] at which a sphere touches the shape while its centre moves straight from `from` to `to` (m, in
+  /// B): 0 when it does at the start. Off by rounding in double precision, also for motions that graze. No allocation.
+  virtual std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                                     double radius) const = 0;
 };
 
 /// All points with normal . p <= offset.
@@ -51,6 +56,8 @@ class HalfSpace final : public StaticShape {
   /// the normal is zero or a number is not finite.
   static core::Result<HalfSpace> make(const Eigen::Vector3d& normal, double offset);
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
+  std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                             double radius) const override;
   const Eigen::Vector3d& normal() const { return normal_; }
   double offset() const { return offset_; }
 
@@ -67,9 +74,12 @@ class PrimitiveShape final : public StaticShape {
   /// Fails with kInvalidInput when a length is not positive and finite.
   static core::Result<PrimitiveShape> make(const geometry::Primitive& primitive);
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
+  std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                             double radius) const override;
 
  private:
   explicit PrimitiveShape(const geometry::Primitive& primitive) : primitive_(primitive) {}
+  Nearest nearest(const Eigen::Vector3d& p_BQ) const;
 
   geometry::Primitive primitive_;
 };
@@ -86,6 +96,8 @@ class TriangleSurface final : public StaticShape {
   static core::Result<TriangleSurface> make(std::shared_ptr<const Mesh> mesh, SurfaceSide side);
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
   bool is_within(const Eigen::Vector3d& p_BQ, double below) const override;
+  std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                             double radius) const override;
 
  private:
   TriangleSurface() = default;
@@ -111,6 +123,8 @@ class HeightField final : public StaticShape {
   /// spacing not positive.
   static core::Result<HeightField> make(Grid grid, std::string_view name);
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
+  std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                             double radius) const override;
   /// Of the surface above a point of the ground, m; nothing outside of the grid.
   std::optional<double> height(double x, double y) const;
 
@@ -129,7 +143,8 @@ class HeightField final : public StaticShape {
   HeightField() = default;
   Eigen::Vector3d point(int column, int row) const;
   std::optional<Nearest> nearest_of_sides(const Eigen::Vector3d& p_BQ) const;
-  double squared_distance(std::size_t level, int column, int row, const Eigen::Vector3d& p) const;
+  double first_of_sides(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius) const;
+  Eigen::AlignedBox3d box(std::size_t level, int column, int row) const;
 
   Grid grid_;
   std::vector<Level> levels_;  // The first is of the cells, the last is one square.

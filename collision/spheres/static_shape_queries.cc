@@ -4,35 +4,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "shape_placement.h"
 #include "sphere_pairs.h"
 
 namespace prescene::collision {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-// X_AB in double precision.
-struct Placement {
-  Matrix3d R_AB;
-  Vector3d p_AB;
-  double slack = 0.0;  // Lengths of a rotation that was rounded, m.
-
-  Placement(const SphereTree& a, const Transform& X_AB) {
-    for (int row = 0; row < 3; ++row) {
-      for (int col = 0; col < 3; ++col)
-        R_AB(row, col) = static_cast<double>(X_AB.rotation[static_cast<std::size_t>(3 * row + col)]);
-      p_AB[row] = static_cast<double>(X_AB.translation[static_cast<std::size_t>(row)]);
-    }
-    slack = 4.0 * static_cast<double>(std::numeric_limits<float>::epsilon()) *
-            (static_cast<double>(a.root().centre.norm() + a.root().radius) + p_AB.norm());
-  }
-  Vector3d to_shape(const Vector3f& p_A) const { return R_AB.transpose() * (p_A.cast<double>() - p_AB); }
-};
 
 // Calls found(sphere, nearest, place) for each sphere that overlaps until it returns true; then returns true.
 template <class Found>
-bool for_overlapping(const SphereTree& a, const StaticShape& b, const Placement& placement, SphereScratch& scratch,
+bool for_overlapping(const SphereTree& a, const StaticShape& b, const ShapePlacement& placement, SphereScratch& scratch,
                      const Found& found) {
   std::vector<std::uint32_t>& stack = scratch.nodes_a;
   stack.clear();
@@ -66,14 +48,26 @@ double cap_volume(double radius, double height) {
 }  // namespace
 
 bool overlap(const SphereTree& a, const StaticShape& b, const Transform& X_AB, SphereScratch& scratch) {
-  return for_overlapping(a, b, Placement(a, X_AB), scratch,
+  return for_overlapping(a, b, ShapePlacement(a, X_AB), scratch,
                          [](const PackedSphere&, const StaticShape::Nearest&, std::uint32_t) { return true; });
+}
+
+SphereOverlap overlap_volume(const SphereTree& a, const StaticShape& b, const Transform& X_AB, SphereScratch& scratch) {
+  SphereOverlap overlap;
+  for_overlapping(a, b, ShapePlacement(a, X_AB), scratch,
+                  [&](const PackedSphere& sphere, const StaticShape::Nearest& nearest, std::uint32_t) {
+                    const auto radius = static_cast<double>(sphere.radius);
+                    overlap.volume += cap_volume(radius, radius - nearest.distance);
+                    ++overlap.pairs;
+                    return false;
+                  });
+  return overlap;
 }
 
 bool contacts(const SphereTree& a, const StaticShape& b, const Transform& X_AB, std::size_t limit,
               std::vector<ShapeContact>& contacts, SphereScratch& scratch) {
   const std::size_t most = contacts.size() + limit;
-  const Placement placement(a, X_AB);
+  const ShapePlacement placement(a, X_AB);
   const auto found = [&](const PackedSphere& sphere, const StaticShape::Nearest& nearest, std::uint32_t place) {
     if (contacts.size() == most) return true;
     const auto radius = static_cast<double>(sphere.radius);
@@ -93,7 +87,7 @@ bool contacts(const SphereTree& a, const StaticShape& b, const Transform& X_AB, 
 
 Restitution restitution(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
                         const RestitutionOptions& options, SphereScratch& scratch) {
-  const Placement placement(a, X_AB);
+  const ShapePlacement placement(a, X_AB);
   Restitution sum;
   for_overlapping(a, b, placement, scratch,
                   [&](const PackedSphere& sphere, const StaticShape::Nearest& nearest, std::uint32_t) {
@@ -113,7 +107,7 @@ Restitution restitution(const SphereTree& a, const StaticShape& b, const Transfo
 
 std::optional<ShapeDistance> distance(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
                                       SphereScratch& scratch, double below) {
-  const Placement placement(a, X_AB);
+  const ShapePlacement placement(a, X_AB);
   std::optional<ShapeDistance> best;
   std::vector<SphereScratch::NodePair>& stack = scratch.pairs;
   stack.clear();

@@ -28,6 +28,15 @@ struct ShapeDistance {
 std::optional<ShapeDistance> distance(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
                                       SphereScratch& scratch, double below = std::numeric_limits<double>::infinity());
 
+/// The sum, over the spheres that overlap, of the volume of the sphere's part behind the plane that touches the surface
+/// at the place nearest to its centre, m^3; `pairs` counts these spheres. For a half-space that is the volume that the
+/// packing shares with it. For a convex solid (a primitive) it is at least that volume, as the solid lies behind each
+/// of these planes, and more than it where spheres are large against the solid's curvature or reach over its edges: at
+/// most the volume of the spheres whose centres are outside, and of those inside that are not wholly in it. For other
+/// solids it may be more or less, by as much. A sheet has no inside: of it, this is the volume that spheres reach
+/// through it.
+SphereOverlap overlap_volume(const SphereTree& a, const StaticShape& b, const Transform& X_AB, SphereScratch& scratch);
+
 /// A sphere that overlaps the shape. In A's frame.
 struct ShapeContact {
   Vector3f position;  ///< In the middle of the overlap, m.

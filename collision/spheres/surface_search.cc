@@ -137,6 +137,33 @@ bool SurfaceSearch::is_within(const Vector3d& q, double bound) const {
                  [&](const Corners& t) { return (nearest_on_triangle(q, t.a, t.b, t.c) - q).squaredNorm() < bound; });
 }
 
+double SurfaceSearch::first_contact(const SweptSphere& sphere) const {
+  struct Entry {
+    std::uint32_t node;
+    double time;
+  };
+  double first = SweptSphere::kNever;
+  std::array<Entry, kMaxDepth> stack;
+  std::size_t size = 0;
+  stack[size++] = {1, sphere.enters(aligned(boxes_[1]))};
+  while (size > 0) {
+    const Entry entry = stack[--size];
+    if (entry.time >= first) continue;
+    if (is_leaf(entry.node)) {
+      const std::size_t i = entry.node - first_leaf_;
+      for (std::uint32_t k = leaf_begin_[i]; k < leaf_begin_[i + 1]; ++k)
+        first = std::min(first, sphere.meets_triangle(corners_[k].a, corners_[k].b, corners_[k].c));
+      continue;
+    }
+    Entry near{2 * entry.node, sphere.enters(aligned(boxes_[2 * entry.node]))};
+    Entry far{2 * entry.node + 1, sphere.enters(aligned(boxes_[2 * entry.node + 1]))};
+    if (far.time < near.time) std::swap(near, far);
+    if (far.time < first) stack[size++] = far;
+    if (near.time < first) stack[size++] = near;
+  }
+  return first;
+}
+
 int SurfaceSearch::winding(const Vector3d& q) const {
   // Signed crossings of the ray from q along +z.
   int winding = 0;

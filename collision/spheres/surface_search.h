@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "prescene/collision/mesh.h"
+#include "swept_sphere.h"
 
 namespace prescene::collision {
 
@@ -36,6 +37,8 @@ class SurfaceSearch {
   Nearest nearest(const Eigen::Vector3d& q, double bound = std::numeric_limits<double>::infinity()) const;
   /// Whether the squared distance is less than `bound`; cheaper than nearest().
   bool is_within(const Eigen::Vector3d& q, double bound) const;
+  /// When the sphere first touches a triangle; SweptSphere::kNever when it does not. No allocation.
+  double first_contact(const SweptSphere& sphere) const;
   /// How often a closed, oriented surface winds around q: 1 inside of one solid, 2 where two overlap, 0 outside. The
   /// signs of shared edges agree between their triangles, so that no crossing is missed or counted twice.
   int winding(const Eigen::Vector3d& q) const;
@@ -54,6 +57,12 @@ class SurfaceSearch {
   static constexpr std::size_t kLeafSize = 4;
   static constexpr std::size_t kMaxDepth = 40;
 
+  static Eigen::AlignedBox3d aligned(const Box& box) {
+    const auto corner = [](const std::array<float, 3>& p) {
+      return Eigen::Vector3d(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+    };
+    return {corner(box.low), corner(box.high)};
+  }
   static double squared_distance(const Box& box, const Eigen::Vector3d& q) {
     double sum = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -9,6 +9,8 @@
 #include <set>
 #include <vector>
 
+#include "every_shape.h"
+#include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/generators.h"
 
@@ -27,22 +29,6 @@ core::ThreadPool& pool() {
 Tree packed(const geometry::Primitive& primitive, const PackingOptions& options) {
   const auto packing = pack_spheres(**Mesh::make(geometry::make_mesh(primitive), "body"), options, pool());
   return *SphereTree::make(packing->packing, {}, pool());
-}
-
-std::vector<std::unique_ptr<StaticShape>> shapes() {
-  std::vector<std::unique_ptr<StaticShape>> all;
-  all.push_back(std::make_unique<HalfSpace>(*HalfSpace::make({0.1, 0.2, 1}, 0.01)));
-  all.push_back(std::make_unique<PrimitiveShape>(*PrimitiveShape::make(geometry::Cone{0.05, 0.1})));
-  all.push_back(std::make_unique<PrimitiveShape>(*PrimitiveShape::make(geometry::BoxShape{{0.1, 0.05, 0.08}})));
-  geometry::TriangleMesh bin = geometry::make_open_bin({0.1, 0.1, 0.05}, 0.004);
-  all.push_back(
-      std::make_unique<TriangleSurface>(*TriangleSurface::make(*Mesh::make(bin, "bin"), SurfaceSide::kSolid)));
-  bin.triangles.pop_back();
-  all.push_back(std::make_unique<TriangleSurface>(*TriangleSurface::make(*Mesh::make(bin, "bin"), SurfaceSide::kBoth)));
-  HeightField::Grid grid{6, 5, 0.05, 0.06, {}};
-  for (int i = 0; i < 30; ++i) grid.heights.push_back(0.01F * static_cast<float>(i % 4));
-  all.push_back(std::make_unique<HeightField>(*HeightField::make(std::move(grid), "field")));
-  return all;
 }
 
 // Asks each sphere on its own.
@@ -78,12 +64,16 @@ void expect_agreement(const SphereTree& tree, const StaticShape& shape, const Po
   const Restitution push = restitution(tree, shape, transform, {.stiffness = 100.0, .p_AP = p_AP}, scratch);
   RC_ASSERT((push.force - force).norm() < 1e-4 * force.norm() + 1e-3);
   RC_ASSERT((push.torque - torque).norm() < 1e-4 * force.norm() + 1e-3);
+  const SphereOverlap shared = overlap_volume(tree, shape, transform, scratch);
+  double volume = 0.0;
+  for (const ShapeContact& contact : all) volume += static_cast<double>(contact.volume);
+  RC_ASSERT(shared.pairs == all.size() && std::abs(shared.volume - volume) <= 1e-6 * volume);
 }
 
 TEST(StaticShapeQueries, AgreeWithEachSphereOnItsOwn) {
   const Tree tree = packed(geometry::Capsule{0.02, 0.06}, {.max_spheres = 150});
   SphereScratch scratch;
-  for (const std::unique_ptr<StaticShape>& shape : shapes())
+  for (const std::unique_ptr<StaticShape>& shape : every_shape())
     EXPECT_TRUE(rc::check([&] { expect_agreement(*tree, *shape, *tests::poses(0.1), scratch); }));
 }
 
@@ -99,6 +89,48 @@ TEST(StaticShapeQueries, VolumeBehindAHalfSpaceIsExact) {
   EXPECT_NEAR(found[0].volume, 2.0 / 3.0 * std::numbers::pi * std::pow(radius, 3), 1e-8);
   EXPECT_NEAR(found[0].depth, radius, 1e-6);
   EXPECT_NEAR(found[0].position.z(), centre.z() - 0.5 * radius, 1e-6);
+}
+
+// Against points drawn in the spheres.
+TEST(StaticShapeQueries, VolumeIsThatOfTheHalfSpaceAndAtLeastThatOfAConvexSolid) {
+  const Tree tree = packed(geometry::Capsule{0.02, 0.06}, {.max_spheres = 60});
+  SphereScratch scratch;
+  core::RandomStream stream(12, core::Purpose::kTest);
+  const auto drawn = [&](const StaticShape& shape, const Pose& X_AB) {
+    constexpr int kDraws = 1000;
+    double volume = 0.0;
+    for (const PackedSphere& sphere : tree->packing().spheres()) {
+      const auto radius = static_cast<double>(sphere.radius);
+      const Vector3d centre = X_AB.inverse() * sphere.centre.cast<double>();
+      int inside = 0;
+      for (int i = 0; i < kDraws;) {
+        const Vector3d q(stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-1, 1));
+        if (q.squaredNorm() > 1.0) continue;
+        ++i;
+        inside += shape.is_within(centre + radius * q, 0.0) ? 1 : 0;
+      }
+      volume += 4.0 / 3.0 * std::numbers::pi * std::pow(radius, 3) * inside / kDraws;
+    }
+    return volume;
+  };
+  const auto half_space = *HalfSpace::make({0.1, -0.2, 1}, 0.005);
+  const auto box = *PrimitiveShape::make(geometry::BoxShape{{0.2, 0.2, 0.2}});
+  const auto ball = *PrimitiveShape::make(geometry::Sphere{0.05});
+  for (int i = 0; i < 10; ++i) {
+    Pose X_AB;
+    X_AB.rotation = geometry::exp_rotation({stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-1, 1)});
+    X_AB.translation = {stream.uniform(-0.02, 0.02), stream.uniform(-0.02, 0.02), stream.uniform(-0.02, 0.02)};
+    const auto volume = [&](const StaticShape& shape) {
+      return overlap_volume(*tree, shape, *to_transform(X_AB), scratch).volume;
+    };
+    EXPECT_NEAR(volume(half_space), drawn(half_space, X_AB), 0.02 * tree->packing().volume());
+    X_AB.translation += X_AB.rotation * Vector3d(0.0, 0.0, 0.1);
+    EXPECT_NEAR(volume(box), drawn(box, X_AB), 0.02 * tree->packing().volume());  // reaches over no edge
+    X_AB.translation -= X_AB.rotation * Vector3d(0.0, 0.0, 0.05);
+    const double of_ball = drawn(ball, X_AB);
+    EXPECT_GE(volume(ball), of_ball - 0.01 * tree->packing().volume());
+    EXPECT_LE(volume(ball), 1.5 * of_ball + 0.01 * tree->packing().volume());
+  }
 }
 
 // A box that leans on its edge: the half-space's force turns it back or over.
@@ -128,12 +160,13 @@ TEST(StaticShapeQueries, PackedBoxTipsAtItsAngle) {
 TEST(StaticShapeQueries, DoNotAllocateOnceWarm) {
   if (!tests::can_count_allocations()) GTEST_SKIP() << "allocations can't be counted in this build";
   const Tree tree = packed(geometry::Capsule{0.02, 0.06}, {.max_spheres = 150});
-  const auto all = shapes();
+  const auto all = every_shape();
   SphereScratch scratch;
   std::vector<ShapeContact> found;
   const auto ask = [&] {
     for (const std::unique_ptr<StaticShape>& shape : all) {
       overlap(*tree, *shape, Transform(), scratch);
+      overlap_volume(*tree, *shape, Transform(), scratch);
       distance(*tree, *shape, Transform(), scratch);
       restitution(*tree, *shape, Transform(), {}, scratch);
       found.clear();

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/collision/spheres/continuous_shape_queries.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "prescene/core/check.h"
+#include "shape_placement.h"
+#include "sphere_pairs.h"
+
+namespace prescene::collision {
+namespace {
+
+using Eigen::Vector3d;
+
+struct Earliest {
+  double time = 1.0;
+  bool found = false;
+  std::uint32_t place = 0;  // In the tree's order.
+
+  void offer(double t, std::uint32_t of_place) {
+    if (t > time || (found && t == time && of_place > place)) return;
+    *this = {t, true, of_place};
+  }
+};
+
+float rounded_down(double x) { return std::nextafter(static_cast<float>(x), -std::numeric_limits<float>::infinity()); }
+
+// Looks at all spheres that may touch before motion.earliest, near ones first. A motion knows when, at the earliest,
+// the sphere about a node's spheres touches, and offers the times of the packing's spheres.
+template <class Motion>
+void sweep(const SphereTree& a, SweepScratch& scratch, Motion& motion) {
+  std::vector<SweepScratch::Entry>& stack = scratch.entries();
+  stack.clear();
+  if (const auto time = motion.reaches(a.root())) stack.push_back({0, 0, rounded_down(*time)});
+  while (!stack.empty()) {
+    const SweepScratch::Entry entry = stack.back();
+    stack.pop_back();
+    if (static_cast<double>(entry.time) > motion.earliest.time) continue;
+    const SphereTree::Node& node = a.nodes()[entry.a];
+    const std::size_t before = stack.size();
+    for (std::uint32_t k = 0; k < node.count; ++k) {
+      const PackedSphere child = lane(a, entry.a, k);
+      if (node.is_bottom()) {
+        motion.meet(child, node.first + k);
+      } else if (const auto time = motion.reaches(child); time && *time <= motion.earliest.time) {
+        stack.push_back({node.first + k, 0, rounded_down(*time)});
+      }
+    }
+    std::sort(stack.begin() + static_cast<std::ptrdiff_t>(before), stack.end(),
+              [](const auto& x, const auto& y) { return x.time > y.time; });
+  }
+}
+
+class StraightMotion {
+ public:
+  StraightMotion(const SphereTree& a, const StaticShape& b, const Transform& start, const Transform& end)
+      : b_(b), start_(a, start), end_(a, end) {}
+
+  std::optional<double> reaches(const PackedSphere& bounding) const {
+    const double slack = std::max(start_.slack, end_.slack);
+    return touches(bounding, static_cast<double>(bounding.radius) + slack);
+  }
+  void meet(const PackedSphere& sphere, std::uint32_t place) {
+    if (const auto time = touches(sphere, static_cast<double>(sphere.radius))) earliest.offer(*time, place);
+  }
+  Vector3d centre(const Vector3f& c, double t) const {
+    const Vector3d from = start_.to_shape(c);
+    return from + t * (end_.to_shape(c) - from);
+  }
+  Vector3d to_body(const Vector3d& v, double t) const {
+    const Vector3d turned = (1.0 - t) * (start_.R_AB * v) + t * (end_.R_AB * v);
+    const double length = turned.norm();
+    return length > 0.0 ? Vector3d(turned / length) : v;
+  }
+
+  Earliest earliest;
+
+ private:
+  std::optional<double> touches(const PackedSphere& sphere, double radius) const {
+    return b_.swept_sphere_contact(start_.to_shape(sphere.centre), end_.to_shape(sphere.centre), radius);
+  }
+
+  const StaticShape& b_;
+  ShapePlacement start_;
+  ShapePlacement end_;
+};
+
+// Within a piece [begin, end] of a screw. Going back along B's screw, A's points move in B as they do in A but for the
+// pose at the start.
+class TurningMotion {
+ public:
+  TurningMotion(const StaticShape& b, const ScrewMotion& motion, double tolerance)
+      : b_(b), motion_(motion), X_BA_(motion.start().inverse()), tolerance_(tolerance) {}
+
+  void set_piece(double begin, double end) {
+    begin_ = begin;
+    end_ = end;
+    earliest.time = end;
+  }
+
+  std::optional<double> reaches(const PackedSphere& bounding) const {
+    const auto radius = static_cast<double>(bounding.radius);
+    const double length = end_ - begin_;
+    const double bend = motion_.bend(bounding.centre.cast<double>()) + motion_.spin().squaredNorm() * radius;
+    const auto share = b_.swept_sphere_contact(centre(bounding.centre, begin_), centre(bounding.centre, end_),
+                                               (radius + 0.125 * bend * length * length) * (1.0 + 1e-12));
+    if (!share) return std::nullopt;
+    return begin_ + *share * length;
+  }
+
+  void meet(const PackedSphere& sphere, std::uint32_t place) {
+    const auto radius = static_cast<double>(sphere.radius);
+    const Vector3d c = sphere.centre.cast<double>();
+    const double speed = motion_.speed(c);
+    const double bend = motion_.bend(c);
+    // On chords of this length the sphere is off by half the tolerance at most.
+    const double chord = bend > 0.0 ? std::sqrt(4.0 * tolerance_ / bend) : 2.0;
+    double t = begin_;
+    while (true) {
+      const Vector3d from = centre(sphere.centre, t);
+      const auto near = b_.nearest(from, radius + speed * (earliest.time - t) + tolerance_);
+      if (!near) return;
+      const double gap = near->distance - radius;
+      if (gap <= 0.0) return earliest.offer(t, place);
+      if (t >= earliest.time || speed <= 0.0) return;
+      // It takes that long to close the gap, however the sphere moves.
+      const double free = gap / speed;
+      if (free > chord) {
+        t += free;
+        if (t > earliest.time) return;
+        continue;
+      }
+      const double next = std::min(t + chord, end_);
+      const double off = 0.125 * bend * (next - t) * (next - t);
+      if (const auto share = b_.swept_sphere_contact(from, centre(sphere.centre, next), radius + off))
+        return earliest.offer(t + *share * (next - t), place);
+      if (next >= earliest.time) return;
+      t = next;
+    }
+  }
+
+  Vector3d centre(const Vector3f& c, double t) const { return X_BA_ * motion_.place(c.cast<double>(), -t); }
+  Vector3d to_body(const Vector3d& v, double t) const { return motion_.pose(t).rotation * v; }
+
+  Earliest earliest;
+
+ private:
+  const StaticShape& b_;
+  const ScrewMotion& motion_;
+  geometry::Pose X_BA_;
+  double tolerance_;
+  double begin_ = 0.0;
+  double end_ = 1.0;
+};
+
+template <class Motion>
+ShapeImpact impact_of(const SphereTree& a, const StaticShape& b, const Motion& motion) {
+  ShapeImpact impact;
+  impact.time = motion.earliest.time;
+  impact.sphere = a.order()[motion.earliest.place];
+  const PackedSphere& sphere = a.packing().spheres()[impact.sphere];
+  const auto nearest = b.nearest(motion.centre(sphere.centre, impact.time), std::numeric_limits<double>::infinity());
+  PRESCENE_CHECK(nearest.has_value());
+  impact.normal = -motion.to_body(nearest->normal, impact.time);
+  impact.point = sphere.centre.cast<double>() + static_cast<double>(sphere.radius) * impact.normal;
+  return impact;
+}
+
+// The motion is cut so that spheres leave their chords by at most this share of the body's radius: less cuts more often
+// and prunes better.
+constexpr double kMostOff = 0.02;
+constexpr double kMostPieces = 256.0;
+
+int pieces_of(const SphereTree& a, const ScrewMotion& motion) {
+  const auto radius = static_cast<double>(a.root().radius);
+  const double bend = motion.bend(a.root().centre.cast<double>()) + motion.spin().squaredNorm() * radius;
+  return static_cast<int>(std::clamp(std::ceil(std::sqrt(0.125 * bend / (kMostOff * radius))), 1.0, kMostPieces));
+}
+
+}  // namespace
+
+std::optional<ShapeImpact> time_of_impact(const SphereTree& a, const StaticShape& b, const Transform& X_AB_start,
+                                          const Transform& X_AB_end, SweepScratch& scratch) {
+  StraightMotion motion(a, b, X_AB_start, X_AB_end);
+  sweep(a, scratch, motion);
+  if (!motion.earliest.found) return std::nullopt;
+  return impact_of(a, b, motion);
+}
+
+std::optional<ShapeImpact> time_of_impact(const SphereTree& a, const StaticShape& b, const ScrewMotion& motion,
+                                          const ImpactOptions& options, SweepScratch& scratch) {
+  PRESCENE_CHECK(options.tolerance >= 1e-9);
+  TurningMotion turning(b, motion, options.tolerance);
+  const int count = pieces_of(a, motion);
+  for (int i = 0; i < count && !turning.earliest.found; ++i) {
+    turning.set_piece(static_cast<double>(i) / count, i + 1 == count ? 1.0 : static_cast<double>(i + 1) / count);
+    sweep(a, scratch, turning);
+  }
+  if (!turning.earliest.found) return std::nullopt;
+  return impact_of(a, b, turning);
+}
+
+}  // namespace prescene::collision
