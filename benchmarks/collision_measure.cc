@@ -50,7 +50,6 @@ std::vector<Transform> make_configurations(ContactConfigurations& make, double s
   return configurations;
 }
 
-/// Asks all for their answers, untimed; fills answers, distances and counts.
 /// Asks all for their answers, untimed; fills answers, distances and counts, and marks what is to be timed.
 void ask(std::span<const Algorithm> algorithms, const Solvers& solvers, const MeasureOptions& options, Cell* cell) {
   const auto stride = static_cast<std::size_t>(options.slow_stride);

@@ -93,7 +93,7 @@ TreePair trees_of(const PackedPair& pair, int branching) {
 
 /// Times of the same queries asked in two ways.
 struct Compared {
-  std::string query;
+  std::string work;
   std::string slow_name, fast_name;
   std::vector<double> slow, fast;  ///< s
 
@@ -156,15 +156,20 @@ collision::RelativeUncertainty uncertain(const Pose& X_AB, double angle, double 
   return *between;
 }
 
-/// Overlap against both certain overlaps, and force; deviations of `share` of the size and 2 degrees a percent.
-std::array<Compared, 3> uncertain_to_certain(const std::vector<PackedPair>& pairs, double share, int rounds) {
+/// Overlap against both certain overlaps, and force; deviations of `share` of the size and 2 degrees a percent. The
+/// same follow for the poses alone whose means don't overlap, where no plain query can stop early.
+std::array<Compared, 6> uncertain_to_certain(const std::vector<PackedPair>& pairs, double share, int rounds) {
   std::array<char, 64> text;
   std::snprintf(text.data(), text.size(), ", deviations %.2g degrees and %.2g %% of the size", 200.0 * share,
                 100.0 * share);
   const std::string deviations = text.data();
-  std::array<Compared, 3> compared = {{{"overlap" + deviations, "uncertain", "boolean", {}, {}},
-                                       {"overlap" + deviations, "uncertain", "overlap volume", {}, {}},
-                                       {"force" + deviations, "uncertain", "restitution", {}, {}}}};
+  std::array<Compared, 6> compared;
+  for (std::size_t i = 0; i < compared.size(); ++i) {
+    const std::string where = i < 3 ? deviations : ", apart" + deviations;
+    compared[i].slow_name = i % 3 == 2 ? "uncertain wrench" : "uncertain overlap";
+    compared[i].fast_name = std::array{"boolean", "overlap volume", "restitution"}[i % 3];
+    compared[i].work = compared[i].slow_name + " vs " + compared[i].fast_name + where;
+  }
   SphereScratch scratch;
   collision::UncertainScratch uncertain_scratch;
   for (const PackedPair& pair : pairs) {
@@ -173,17 +178,21 @@ std::array<Compared, 3> uncertain_to_certain(const std::vector<PackedPair>& pair
     std::vector<collision::RelativeUncertainty> between;
     for (const Pose& X_AB : pair.poses)
       between.push_back(uncertain(X_AB, 200.0 * share * M_PI / 180.0, share * pair.size));
-    Queries overlap, boolean, volume, wrench, force;
-    for (const collision::RelativeUncertainty& one : between) {
-      overlap.emplace_back([&] { collision::uncertain_overlap(a, b, one, uncertain_scratch); });
-      boolean.emplace_back([&] { collision::overlap(a, b, one.X_AB(), scratch); });
-      volume.emplace_back([&] { collision::overlap_volume(a, b, one.X_AB(), scratch); });
-      wrench.emplace_back([&] { collision::uncertain_wrench(a, b, one, 1.0, uncertain_scratch); });
-      force.emplace_back([&] { collision::restitution(a, b, one.X_AB(), {}, scratch); });
+    for (const bool apart : {false, true}) {
+      Queries overlap, boolean, volume, wrench, force;
+      for (const collision::RelativeUncertainty& one : between) {
+        if (apart && collision::overlap(a, b, one.X_AB(), scratch)) continue;
+        overlap.emplace_back([&] { collision::uncertain_overlap(a, b, one, uncertain_scratch); });
+        boolean.emplace_back([&] { collision::overlap(a, b, one.X_AB(), scratch); });
+        volume.emplace_back([&] { collision::overlap_volume(a, b, one.X_AB(), scratch); });
+        wrench.emplace_back([&] { collision::uncertain_wrench(a, b, one, 1.0, uncertain_scratch); });
+        force.emplace_back([&] { collision::restitution(a, b, one.X_AB(), {}, scratch); });
+      }
+      const std::size_t first = apart ? 3 : 0;
+      compared[first].measure(overlap, boolean, rounds);
+      compared[first + 1].measure(overlap, volume, rounds);
+      compared[first + 2].measure(wrench, force, rounds);
     }
-    compared[0].measure(overlap, boolean, rounds);
-    compared[1].measure(overlap, volume, rounds);
-    compared[2].measure(wrench, force, rounds);
   }
   return compared;
 }
@@ -191,7 +200,7 @@ std::array<Compared, 3> uncertain_to_certain(const std::vector<PackedPair>& pair
 Target sphere_target(const Compared& compared, std::optional<double> must, std::optional<double> aim, Better better,
                      const std::string& where) {
   Target target;
-  target.work = "spheres, " + compared.query;
+  target.work = "spheres, " + compared.work;
   target.better = better;
   const auto goal = [&](double value) { return better == Better::kHigher ? at_least(value) : at_most(value); };
   if (must) target.must = goal(*must);
@@ -205,7 +214,7 @@ Target sphere_target(const Compared& compared, std::optional<double> must, std::
 
 std::vector<Figure> row_of(const Compared& compared) {
   const Summary slow = summarize(compared.slow), fast = summarize(compared.fast);
-  return {compared.query,     compared.slow_name, 1e6 * slow.median, 1e6 * slow.mean,
+  return {compared.work,      compared.slow_name, 1e6 * slow.median, 1e6 * slow.mean,
           compared.fast_name, 1e6 * fast.median,  1e6 * fast.mean,   static_cast<std::int64_t>(slow.n)};
 }
 
@@ -229,9 +238,10 @@ void add_sphere_targets(bool quick, Report* report) {
     }
   }
   for (const double share : {0.001, 0.01}) {
-    for (const Compared& compared : uncertain_to_certain(pairs, share, rounds)) {
-      // Against the queries that ask the same; the shared volume is told beside them.
-      const bool same = compared.fast_name != "overlap volume";
+    const std::array<Compared, 6> all = uncertain_to_certain(pairs, share, rounds);
+    for (const Compared& compared : all) {
+      // Against the queries that ask the same, over all poses; the others are told beside them.
+      const bool same = &compared == &all[0] || &compared == &all[2];
       report->add(sphere_target(compared, same ? std::optional(2.0) : std::nullopt,
                                 same ? std::optional(1.3) : std::nullopt, Better::kLower, where));
       table.rows.push_back(row_of(compared));
