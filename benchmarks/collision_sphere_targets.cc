@@ -156,18 +156,19 @@ collision::RelativeUncertainty uncertain(const Pose& X_AB, double angle, double 
   return *between;
 }
 
-/// Overlap against both certain overlaps, and force; deviations of `share` of the size and 2 degrees a percent. The
-/// same follow for the poses alone whose means don't overlap, where no plain query can stop early.
-std::array<Compared, 6> uncertain_to_certain(const std::vector<PackedPair>& pairs, double share, int rounds) {
+/// State and overlap against certain overlaps, and force; deviations of `share` of the size and 2 degrees a percent.
+/// The same follow for the poses alone whose means don't overlap, where no plain query can stop early.
+std::array<Compared, 8> uncertain_to_certain(const std::vector<PackedPair>& pairs, double share, int rounds) {
   std::array<char, 64> text;
   std::snprintf(text.data(), text.size(), ", deviations %.2g degrees and %.2g %% of the size", 200.0 * share,
                 100.0 * share);
   const std::string deviations = text.data();
-  std::array<Compared, 6> compared;
+  std::array<Compared, 8> compared;
   for (std::size_t i = 0; i < compared.size(); ++i) {
-    const std::string where = i < 3 ? deviations : ", apart" + deviations;
-    compared[i].slow_name = i % 3 == 2 ? "uncertain wrench" : "uncertain overlap";
-    compared[i].fast_name = std::array{"boolean", "overlap volume", "restitution"}[i % 3];
+    const std::string where = i < 4 ? deviations : ", apart" + deviations;
+    compared[i].slow_name =
+        std::array{"uncertain state", "uncertain overlap", "uncertain overlap", "uncertain wrench"}[i % 4];
+    compared[i].fast_name = std::array{"boolean", "boolean", "overlap volume", "restitution"}[i % 4];
     compared[i].work = compared[i].slow_name + " vs " + compared[i].fast_name + where;
   }
   SphereScratch scratch;
@@ -179,19 +180,21 @@ std::array<Compared, 6> uncertain_to_certain(const std::vector<PackedPair>& pair
     for (const Pose& X_AB : pair.poses)
       between.push_back(uncertain(X_AB, 200.0 * share * M_PI / 180.0, share * pair.size));
     for (const bool apart : {false, true}) {
-      Queries overlap, boolean, volume, wrench, force;
+      Queries state, overlap, boolean, volume, wrench, force;
       for (const collision::RelativeUncertainty& one : between) {
         if (apart && collision::overlap(a, b, one.X_AB(), scratch)) continue;
+        state.emplace_back([&] { collision::overlap_state(a, b, one, uncertain_scratch); });
         overlap.emplace_back([&] { collision::uncertain_overlap(a, b, one, uncertain_scratch); });
         boolean.emplace_back([&] { collision::overlap(a, b, one.X_AB(), scratch); });
         volume.emplace_back([&] { collision::overlap_volume(a, b, one.X_AB(), scratch); });
         wrench.emplace_back([&] { collision::uncertain_wrench(a, b, one, 1.0, uncertain_scratch); });
         force.emplace_back([&] { collision::restitution(a, b, one.X_AB(), {}, scratch); });
       }
-      const std::size_t first = apart ? 3 : 0;
-      compared[first].measure(overlap, boolean, rounds);
-      compared[first + 1].measure(overlap, volume, rounds);
-      compared[first + 2].measure(wrench, force, rounds);
+      const std::size_t first = apart ? 4 : 0;
+      compared[first].measure(state, boolean, rounds);
+      compared[first + 1].measure(overlap, boolean, rounds);
+      compared[first + 2].measure(overlap, volume, rounds);
+      compared[first + 3].measure(wrench, force, rounds);
     }
   }
   return compared;
@@ -238,10 +241,10 @@ void add_sphere_targets(bool quick, Report* report) {
     }
   }
   for (const double share : {0.001, 0.01}) {
-    const std::array<Compared, 6> all = uncertain_to_certain(pairs, share, rounds);
+    const std::array<Compared, 8> all = uncertain_to_certain(pairs, share, rounds);
     for (const Compared& compared : all) {
       // Against the queries that ask the same, over all poses; the others are told beside them.
-      const bool same = &compared == &all[0] || &compared == &all[2];
+      const bool same = compared.fast_name != "overlap volume" && &compared < &all[4];
       report->add(sphere_target(compared, same ? std::optional(2.0) : std::nullopt,
                                 same ? std::optional(1.3) : std::nullopt, Better::kLower, where));
       table.rows.push_back(row_of(compared));

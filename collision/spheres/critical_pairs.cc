@@ -23,22 +23,18 @@ class CriticalSink {
 
   CriticalSink(const Swelling& s, CriticalPairs* critical) : s_(s), critical_(critical), limit_(s.region_radius) {}
 
-  float deviations() const { return std::max(0.0F, limit_); }
+  Growth growth(bool) const { return growth_by(s_, std::max(0.0F, limit_)); }
   bool ended() const { return ended_; }
   std::size_t enough() const { return 32; }
 
   void flush(PairBuffer* buffer) {
     const Lanes d;
     for (std::size_t i = 0; i < buffer->size && !ended_; i += hn::Lanes(d)) {
-      const PairGeometry g = geometry_of(*buffer, s_, i);
-      const V missed = madd(g.pivot_square, hn::Set(d, s_.remainder_slope), hn::Set(d, s_.remainder));
-      const V gap = hn::Sub(hn::Sub(g.distance, g.radii), missed);
-      const V bound = madd(g.pivot_square, hn::Set(d, s_.deviation_slope), hn::Set(d, s_.deviation));
-      const V sure = hn::Sub(hn::Sub(hn::Sub(g.radii, g.distance), missed), hn::Mul(bound, hn::Set(d, s_.ball_radius)));
+      const PairMargins margin = margins_of(geometry_of(*buffer, s_, i), s_);
       HWY_ALIGN float margins[kPairLanes];
       HWY_ALIGN float sures[kPairLanes];
-      hn::Store(hn::Div(gap, hn::Max(g.deviation, hn::Set(d, 1e-30F))), d, margins);
-      hn::Store(sure, d, sures);
+      hn::Store(margin.deviations, d, margins);
+      hn::Store(margin.sure, d, sures);
       const std::size_t count = std::min(hn::Lanes(d), buffer->size - i);
       for (std::size_t k = 0; k < count && !ended_; ++k) {
         if (margins[k] >= limit_ && sures[k] < 0.0F) continue;

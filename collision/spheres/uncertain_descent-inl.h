@@ -85,11 +85,22 @@ HWY_INLINE V spread(const float* numbers, std::size_t row) {
   }
 }
 
+/// By how much the radius of a sphere is larger, its centre at a squared distance w from the pivot: constant + slope w,
+/// m.
+struct Growth {
+  float constant;
+  float slope;
+};
+/// To all that the sphere reaches with errors of so many standard deviations.
+HWY_INLINE Growth growth_by(const Swelling& s, float deviations) {
+  return {s.deviation * deviations + s.remainder, s.deviation_slope * deviations + s.remainder_slope};
+}
+
 template <std::size_t N>
-HWY_INLINE SwollenChildren<N> place(const float* lanes, std::uint32_t count, const Swelling& s, float deviations) {
+HWY_INLINE SwollenChildren<N> place(const float* lanes, std::uint32_t count, const Swelling& s, const Growth& growth) {
   const Lanes d;
-  const V moved = hn::Set(d, s.deviation * deviations + s.remainder);
-  const V moved_slope = hn::Set(d, s.deviation_slope * deviations + s.remainder_slope);
+  const V moved = hn::Set(d, growth.constant);
+  const V moved_slope = hn::Set(d, growth.slope);
   const auto& r = s.X_AB.rotation;
   const auto& t = s.X_AB.translation;
   SwollenChildren<N> placed;
@@ -249,7 +260,7 @@ HWY_INLINE void meet_children(const SphereTree& tree_a, const SphereTree& tree_b
   const SphereTree::Node b = tree_b.nodes().data()[at_b];
   const std::size_t stride_a = tree_a.branching();  // 4, 8 or 16: a multiple of kRows
   const float* lanes_a = tree_a.lanes(at_a);
-  const SwollenChildren<N> placed = place<N>(tree_b.lanes(at_b), b.count, s, sink.deviations());
+  const SwollenChildren<N> placed = place<N>(tree_b.lanes(at_b), b.count, s, sink.growth(b.is_bottom()));
   if (a.is_bottom() && b.is_bottom()) {
     for_met<N>(lanes_a, stride_a, a.count, placed,
                [&](std::uint32_t, std::uint32_t, const MetPairs& pairs) HWY_ATTR { append<N>(pairs, buffer); });
@@ -283,10 +294,10 @@ HWY_INLINE void meet_children(const SphereTree& tree_a, const SphereTree& tree_b
   }
 }
 
-/// Visits all pairs of spheres that the errors bring together. `sink` says how many standard deviations count
-/// (deviations(), which may shrink on the way), takes the pairs (flush(buffer)) when there are enough(), and may end
-/// the descent (ended()). With kDeepestFirst that helps; without, a level is done at a time: what a pair of nodes needs
-/// then never waits for the pair before.
+/// Visits all pairs of spheres that the errors bring together. `sink` says how much larger spheres count (growth(true))
+/// and those about others (growth(false)), which may shrink on the way, takes the pairs (flush(buffer)) when there are
+/// enough(), and may end the descent (ended()). With kDeepestFirst that helps; without, a level is done at a time: what
+/// a pair of nodes needs then never waits for the pair before.
 template <std::size_t N, class Sink>
 HWY_INLINE void descend(const SphereTree& a, const SphereTree& b, const Swelling& s, DescentStack* stack, Sink& sink) {
   PairBuffer& buffer = stack->buffer;
@@ -384,6 +395,21 @@ HWY_INLINE PairGeometry geometry_of(const Pairs& pairs, const Swelling& s, std::
           pairs.b[1].data() + i,
           pairs.b[2].data() + i,
           pairs.radii.data() + i};
+}
+
+/// How far pairs are from touching.
+struct PairMargins {
+  V deviations;  ///< Standard deviations along n without which they cannot touch, the remainder against them.
+  V sure;        ///< m; not negative: they touch wherever the centre is within its ball.
+};
+
+HWY_INLINE PairMargins margins_of(const PairGeometry& g, const Swelling& s) {
+  const Lanes d;
+  const V missed = madd(g.pivot_square, hn::Set(d, s.remainder_slope), hn::Set(d, s.remainder));
+  const V gap = hn::Sub(g.distance, g.radii);
+  const V bound = madd(g.pivot_square, hn::Set(d, s.deviation_slope), hn::Set(d, s.deviation));
+  return {hn::Div(hn::Sub(gap, missed), hn::Max(g.deviation, hn::Set(d, 1e-30F))),
+          hn::Sub(hn::Sub(hn::Neg(gap), missed), hn::Mul(bound, hn::Set(d, s.ball_radius)))};
 }
 
 }  // namespace prescene::collision::HWY_NAMESPACE

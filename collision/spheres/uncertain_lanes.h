@@ -10,6 +10,7 @@
 
 #include "prescene/collision/spheres/relative_uncertainty.h"
 #include "prescene/collision/spheres/sphere_tree.h"
+#include "prescene/collision/spheres/uncertain_sphere_queries.h"
 #include "prescene/geometry/pose.h"
 
 namespace prescene::collision {
@@ -80,6 +81,8 @@ struct DescentStack {
 
 void find_critical_pairs(const SphereTree& a, const SphereTree& b, const Swelling& swelling, DescentStack* stack,
                          CriticalPairs* critical);
+
+OverlapState find_state(const SphereTree& a, const SphereTree& b, const Swelling& swelling, DescentStack* stack);
 
 /// Lines through the space of the six normal numbers behind the error: all have the direction `direction`.
 struct ErrorLines {

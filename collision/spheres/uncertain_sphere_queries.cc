@@ -87,6 +87,11 @@ void estimate(const TouchingIntervals& intervals, UncertainOverlap* overlap) {
 
 }  // namespace
 
+OverlapState overlap_state(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
+                           UncertainScratch& scratch) {
+  return find_state(a, b, Swelling(between, b), &scratch.memory().stack);
+}
+
 UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch) {
   UncertainScratch::Memory& memory = scratch.memory();

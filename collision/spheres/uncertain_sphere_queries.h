@@ -4,6 +4,7 @@
 //
 //   PRESCENE_TRY(const RelativeUncertainty between, RelativeUncertainty::make({X_WA, C_A}, {X_WB, C_B}));
 //   UncertainScratch scratch;
+//   if (overlap_state(cup, table, between, scratch) == OverlapState::kNone) ...       // surely apart
 //   const UncertainOverlap overlap = uncertain_overlap(cup, table, between, scratch);
 //   const UncertainWrench wrench = uncertain_wrench(cup, table, between, 1e4, scratch);
 //
@@ -64,8 +65,14 @@ class UncertainScratch {
   std::unique_ptr<Memory> memory_;
 };
 
-/// Whether the bodies touch. The descent keeps the 64 pairs of spheres that the shortest errors bring together, by the
-/// distance along the line of centres in standard deviations, and leaves out what has more of them; it ends at the
+/// Whether the bodies touch, without the probability: for the many pairs of bodies that are surely apart, and those
+/// that surely touch. Ends with the first pair of spheres that is certain.
+OverlapState overlap_state(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
+                           UncertainScratch& scratch);
+
+/// The same and how probable it is. Where more pairs touch at the mean than are kept it may say kPossible of what
+/// overlap_state() finds certain. The descent keeps the 64 pairs of spheres that the shortest errors bring together, by
+/// the distance along the line of centres in standard deviations, and leaves out what has more of them; it ends at the
 /// first pair that touches for certain. Lower bound: the most probable pair. Upper bound, the least of: no error
 /// shorter than the critical one makes the bodies touch; the sum over all pairs; a plane between the bodies is crossed
 /// at one of four points [Worsley 1982]. Estimate: 32 lines through the space of errors, along each of which it is

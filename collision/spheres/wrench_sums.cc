@@ -55,7 +55,7 @@ class WrenchSink {
     for (geometry::Matrix6d& m : bending_) m.setZero();
   }
 
-  float deviations() const { return reach_; }
+  Growth growth(bool) const { return growth_by(s_, reach_); }
   bool ended() const { return false; }
   std::size_t enough() const { return PairBuffer::kCapacity - 256; }
 

@@ -238,6 +238,7 @@ TEST(UncertainSphereQueries, BoundsHoldAndMomentsAgreeWithDraws) {
                 setting.name.c_str(), drawn.touching, overlap.lower, overlap.upper, overlap.probability,
                 overlap.probability_error, mean_off, covariance_off);
     EXPECT_EQ(overlap.state, setting.state);
+    EXPECT_EQ(overlap_state(*a, *b, *between, scratch), setting.state);
     EXPECT_LE(overlap.lower, drawn.touching + drawn.noise);
     EXPECT_GE(overlap.upper, drawn.touching - drawn.noise);
     EXPECT_LE(overlap.lower, overlap.probability);
@@ -272,6 +273,7 @@ TEST(UncertainSphereQueries, EveryInstructionSetAnswersAlike) {
         use_target(target);
         const UncertainOverlap again = uncertain_overlap(*a, *b, *between, scratch);
         EXPECT_EQ(again.state, overlap.state);
+        EXPECT_EQ(overlap_state(*a, *b, *between, scratch), overlap.state);
         EXPECT_EQ(again.critical_pairs, overlap.critical_pairs);
         EXPECT_EQ(again.lower, overlap.lower);
         EXPECT_EQ(again.upper, overlap.upper);
@@ -299,9 +301,71 @@ TEST(UncertainSphereQueries, KnownPosesAnswerAsTheyAre) {
     const double distance = std::hypot(0.02 * std::sqrt(2.0), 0.04 + gap);
     const double depth = std::max(0.0, 0.04 - distance);
     EXPECT_EQ(overlap.state, depth > 0.0 ? OverlapState::kCertain : OverlapState::kNone);
+    EXPECT_EQ(overlap_state(*a, *b, *between, scratch), overlap.state);
     EXPECT_NEAR(wrench.force.norm(), 4.0 * 4.0 * 0.5 * depth * (0.04 + gap) / distance, 1e-7);
     EXPECT_LE(wrench.covariance.norm(), 1e-12);
   }
+}
+
+/// Least distance along the line of centres in standard deviations, and by how much some pair is sure to touch, m.
+struct AllPairs {
+  double least_margin = std::numeric_limits<double>::infinity();
+  double surest = -std::numeric_limits<double>::infinity();
+};
+AllPairs look_at_all(const std::vector<PackedSphere>& a, const std::vector<PackedSphere>& b,
+                     const RelativeUncertainty& between) {
+  AllPairs all;
+  for (const PackedSphere& sphere_b : b) {
+    const Vector3d p = (between.X_AB() * sphere_b.centre).cast<double>();
+    const double arm = (p - between.pivot()).norm();
+    for (const PackedSphere& sphere_a : a) {
+      const Vector3d apart = p - sphere_a.centre.cast<double>();
+      const double gap = apart.norm() - static_cast<double>(sphere_a.radius) - static_cast<double>(sphere_b.radius);
+      const Vector3d n = apart.normalized();
+      const double deviation = std::sqrt(n.dot(between.covariance_at(p) * n));
+      all.least_margin = std::min(all.least_margin, (gap - between.remainder(arm)) / deviation);
+      all.surest =
+          std::max(all.surest, -gap - between.remainder(arm) - between.ball_radius() * between.deviation_bound(arm));
+    }
+  }
+  return all;
+}
+
+TEST(UncertainSphereQueries, TheStateIsThatOfAllPairs) {
+  RandomStream stream(7, core::Purpose::kTest);
+  UncertainScratch scratch;
+  const std::vector<PackedSphere> spheres_a = grid(5, 4, 3, 0.01F);
+  const std::vector<PackedSphere> spheres_b = grid(3, 3, 4, 0.012F);
+  const auto a = tree_of(spheres_a, 4);
+  const auto b = tree_of(spheres_b, 4);
+  std::array<int, 3> seen{};
+  for (int i = 0; i < 3000; ++i) {
+    const double scale = std::pow(10.0, stream.uniform(-4.0, -1.5));
+    const Vector3d direction(stream.normal(), stream.normal(), stream.normal());
+    const geometry::Quaterniond turn(stream.normal(), stream.normal(), stream.normal(), stream.normal());
+    const Pose X_AB = {turn.normalized(), stream.uniform(0.0, 0.12) * direction.normalized()};
+    const Matrix6d covariance = diagonal(Vector3d::Constant(10.0 * scale), Vector3d::Constant(scale));
+    const auto between = RelativeUncertainty::make({Pose::identity(), covariance}, {X_AB, covariance});
+    ASSERT_TRUE(between.ok());
+    const OverlapState state = overlap_state(*a, *b, *between, scratch);
+    ++seen[static_cast<std::size_t>(state)];
+    const AllPairs all = look_at_all(spheres_a, spheres_b, *between);
+    constexpr double kRounding = 1e-4;  // of margins, and of radii, m
+    if (state == OverlapState::kNone) {
+      EXPECT_GE(all.least_margin, between->region_radius() - kRounding);
+    } else {
+      // The kernels' bounds are tangents of those here, a little above them.
+      EXPECT_LE(all.least_margin, 1.02 * between->region_radius());
+    }
+    if (state == OverlapState::kCertain) {
+      EXPECT_GE(all.surest, -kRounding * 0.01);
+    }
+    const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
+    if (overlap.complete || overlap.state == OverlapState::kCertain) {
+      EXPECT_EQ(state, overlap.state);
+    }
+  }
+  EXPECT_THAT(seen, testing::Each(testing::Gt(150)));
 }
 
 TEST(UncertainSphereQueries, RefusesWhatIsNoCovariance) {
@@ -363,9 +427,11 @@ TEST(UncertainSphereQueries, DoNotAllocateOnceWarm) {
   const auto b = tree_of(setting.b, 16);
   UncertainScratch scratch;
   uncertain_overlap(*a, *b, *between, scratch);
+  overlap_state(*a, *b, *between, scratch);
   uncertain_wrench(*a, *b, *between, kStiffness, scratch);
   const auto before = tests::allocation_count();
   uncertain_overlap(*a, *b, *between, scratch);
+  overlap_state(*a, *b, *between, scratch);
   uncertain_wrench(*a, *b, *between, kStiffness, scratch);
   EXPECT_EQ(tests::allocation_count(), before);
 }
