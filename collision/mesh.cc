@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string>
 
+#include "mesh_parts.h"
 #include "prescene/collision/exact_triangles.h"
 #include "prescene/core/hash.h"
 
@@ -110,6 +111,11 @@ core::Result<std::shared_ptr<const Mesh>> Mesh::make(std::vector<Vector3f> verti
   }
   mesh->size_ = static_cast<float>((high - low).cast<double>().norm());
   return std::shared_ptr<const Mesh>(std::move(mesh));
+}
+
+const std::vector<Vector3f>& Mesh::corners_of_parts() const {
+  std::call_once(parts_found_, [this] { corners_of_parts_ = collision::corners_of_parts(vertices_, triangles_); });
+  return corners_of_parts_;
 }
 
 }  // namespace prescene::collision

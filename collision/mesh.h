@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,6 +58,9 @@ class Mesh {
   std::uint64_t content_hash() const { return content_hash_; }
   /// Length of the bounding box's diagonal, m: what is called the size of an object.
   float size() const { return size_; }
+  /// A corner of each piece, m: triangles are of one piece where corners of theirs are at the same place. Found when
+  /// it is first asked for, in about a tenth of a microsecond a vertex, by whichever thread asks.
+  const std::vector<Vector3f>& corners_of_parts() const;
 
  private:
   Mesh() = default;
@@ -67,6 +71,8 @@ class Mesh {
   MeshReport report_;
   std::uint64_t content_hash_ = 0;
   float size_ = 0.0F;
+  mutable std::once_flag parts_found_;
+  mutable std::vector<Vector3f> corners_of_parts_;
 };
 
 }  // namespace prescene::collision

@@ -60,6 +60,9 @@ struct BodyBox {
     box.axes = rotation_of(X) * axes;
     return box;
   }
+  bool contains(const Vector3d& p) const {
+    return ((axes.transpose() * (p - centre)).cwiseAbs() - half).maxCoeff() <= 1e-6 * half.maxCoeff();
+  }
   double reach(const Vector3d& direction) const { return (axes.transpose() * direction).cwiseAbs().dot(half); }
 };
 
@@ -124,19 +127,22 @@ class PenetrationSearch {
     return *found;
   }
 
-  /// Some points of one body inside of the other. A body of one piece would need one.
+  /// Whether a piece of one body is inside of the other. Only where the bodies do not collide: then a piece is where
+  /// any of its corners is.
   bool one_in_other(const Transform& X_AB) {
-    constexpr std::size_t kPoints = 4;
     const Matrix3d R_AB = rotation_of(X_AB);
     const Vector3d p_AB = translation_of(X_AB);
-    for (std::size_t i = 0; i < kPoints; ++i) {
-      const auto pick = [i](const Mesh& mesh) {
-        return mesh.vertices()[i * mesh.vertices().size() / kPoints].cast<double>().eval();
-      };
-      if (is_inside(a_, R_AB * pick(b_.mesh()) + p_AB, scratch_.queries(), counts_)) return true;
-      if (is_inside(b_, R_AB.transpose() * (pick(a_.mesh()) - p_AB), scratch_.queries(), counts_)) return true;
-    }
-    return false;
+    const auto inside = [this](const TriangleTree& body, const BodyBox& box, const Vector3d& p) {
+      return box.contains(p) && is_inside(body, p, scratch_.queries(), counts_);
+    };
+    const BodyBox box_a(a_.nodes()[0]), box_b(b_.nodes()[0]);
+    const std::vector<Vector3f>& of_a = a_.mesh().corners_of_parts();
+    const std::vector<Vector3f>& of_b = b_.mesh().corners_of_parts();
+    return std::any_of(of_b.begin(), of_b.end(),
+                       [&](const Vector3f& p) { return inside(a_, box_a, (X_AB * p).cast<double>()); }) ||
+           std::any_of(of_a.begin(), of_a.end(), [&](const Vector3f& p) {
+             return inside(b_, box_b, R_AB.transpose() * (p.cast<double>() - p_AB));
+           });
   }
 
   /// How far B must go for its box to have left that of A, at most.

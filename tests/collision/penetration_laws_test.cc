@@ -16,6 +16,7 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/tests/support/allocations.h"
+#include "prescene/tests/support/brute_force.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
 
@@ -48,9 +49,40 @@ geometry::Quaterniond rotation_from(core::RandomStream& random) {
   return geometry::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized();
 }
 
+/// How often the surface of a closed mesh winds around a point: the solid angles of its triangles
+/// [van Oosterom and Strackee 1983].
+double winding_number(const Mesh& mesh, const Vector3d& p) {
+  double angle = 0.0;
+  for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
+    std::array<Vector3d, 3> v;
+    for (std::size_t k = 0; k < 3; ++k) v[k] = mesh.corners(i)[k].cast<double>() - p;
+    const double n0 = v[0].norm(), n1 = v[1].norm(), n2 = v[2].norm();
+    angle += std::atan2(v[0].dot(v[1].cross(v[2])),
+                        n0 * n1 * n2 + v[0].dot(v[1]) * n2 + v[1].dot(v[2]) * n0 + v[2].dot(v[0]) * n1);
+  }
+  return angle / (2.0 * M_PI);
+}
+
+/// Whether corners of B are inside of A: all of small meshes, some of large ones.
+bool some_corner_inside(const Mesh& a, const Mesh& b, const Transform& X_AB) {
+  constexpr std::uint32_t kMostAngles = 200'000;
+  const std::uint32_t step = 1 + a.triangle_count() * b.triangle_count() / kMostAngles;
+  for (std::uint32_t i = 0; i < b.triangle_count(); i += step) {
+    if (winding_number(a, (X_AB * b.corners(i)[0]).cast<double>()) > 0.5) return true;
+  }
+  return false;
+}
+
+/// By other means than the query's.
+bool apart(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB) {
+  return !tests::collide_by_brute_force(a.mesh(), b.mesh(), X_AB) && !some_corner_inside(a.mesh(), b.mesh(), X_AB) &&
+         !some_corner_inside(b.mesh(), a.mesh(), inverse(X_AB));
+}
+
 /// What holds for any two solids.
 void expect_bounds(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB, const Penetration& found,
                    PenetrationScratch* scratch) {
+  EXPECT_TRUE(apart(a, b, found.X_AB_apart));
   EXPECT_GE(found.depth, found.least);
   EXPECT_GE(found.least, 0.0);
   EXPECT_NEAR(found.direction.norm(), 1.0, 1e-9);
@@ -161,6 +193,45 @@ TEST(Penetration, IsThatOfABodyInsideAnother) {
   const std::optional<Penetration> other = penetration(b, a, inverse(X_AB), {}, scratch);
   ASSERT_TRUE(other.has_value());
   EXPECT_NEAR(other->depth, 0.06, 1e-4);
+}
+
+TEST(Penetration, IsNotThatOfVerticesWithoutTriangles) {
+  geometry::TriangleMesh stray = geometry::make_mesh(geometry::BoxShape{{0.02, 0.02, 0.02}});
+  stray.vertices.insert(stray.vertices.begin(), {1.0, 0.0, 0.0});
+  for (auto& triangle : stray.triangles) {
+    for (std::uint32_t& index : triangle) ++index;
+  }
+  const TriangleTree a = tree_of(geometry::make_mesh(geometry::BoxShape{{0.3, 0.4, 0.5}}));
+  const TriangleTree b = tree_of(stray);
+  PenetrationScratch scratch;
+  const Transform X_AB = transform_of(Pose::from_translation({-1.0, 0.0, 0.0}));
+  ASSERT_TRUE(apart(a, b, X_AB));
+  EXPECT_FALSE(penetration(a, b, X_AB, {}, scratch).has_value());
+  EXPECT_FALSE(penetration(b, a, inverse(X_AB), {}, scratch).has_value());
+}
+
+// A body of two pieces, the lesser of which is inside of the other body while the greater is beside it.
+TEST(Penetration, IsThatOfEachPiece) {
+  const geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{0.3, 0.4, 0.5}});
+  const geometry::TriangleMesh crumb = geometry::make_mesh(geometry::BoxShape{{0.02, 0.02, 0.02}});
+  const geometry::TriangleMesh sphere =
+      geometry::transformed(geometry::make_mesh(geometry::Sphere{0.1}, 64), Pose::from_translation({0.5, 0.0, 0.0}));
+  const TriangleTree a = tree_of(box);
+  PenetrationScratch scratch;
+  for (const TriangleTree& b : {tree_of(geometry::joined(crumb, sphere)), tree_of(geometry::joined(sphere, crumb))}) {
+    core::RandomStream random(5, {});
+    for (int i = 0; i < 20; ++i) {
+      const Vector3d inside(random.uniform(-0.1, 0.1), random.uniform(-0.15, 0.15), random.uniform(-0.2, 0.2));
+      const Transform X_AB = transform_of(Pose::from_translation(inside));
+      ASSERT_FALSE(collide(a, b, X_AB, scratch.queries()));
+      const std::optional<Penetration> found = penetration(a, b, X_AB, {}, scratch);
+      ASSERT_TRUE(found.has_value());
+      expect_bounds(a, b, X_AB, *found, &scratch);
+      const Vector3d ways = Vector3d(0.16, 0.21, 0.26) - inside.cwiseAbs();
+      EXPECT_GE(found->depth, ways.minCoeff() - 1e-6);
+      EXPECT_TRUE(penetration(b, a, inverse(X_AB), {}, scratch).has_value());
+    }
+  }
 }
 
 TEST(Penetration, HoldsItsBoundsForSolidsThatAreNotConvex) {
