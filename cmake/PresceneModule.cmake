@@ -31,6 +31,7 @@ endfunction()
 # prescene_module(<name>
 #   FOLDER <folder>           of the sources, below the project's root; default: the current folder
 #   HEADERS <h>...            public, included as "prescene/<folder>/<h>"
+#   SHARED_HEADERS <h>...     as HEADERS, for our modules and tests only: not installed
 #   PRIVATE_HEADERS <h>...    for this module's own sources only, included as "<h>"
 #   SOURCES <cc>...           none: a module of headers only
 #   USES <module>...          our modules that public headers may include
@@ -41,7 +42,7 @@ endfunction()
 # makes the library prescene_<name>, alias and installed name prescene::<name>.
 function(prescene_module name)
   cmake_parse_arguments(PARSE_ARGV 1 M "NO_INSTALL" "FOLDER"
-                        "HEADERS;PRIVATE_HEADERS;SOURCES;USES;PRIVATE_USES;LINKS;PRIVATE_LINKS")
+                        "HEADERS;SHARED_HEADERS;PRIVATE_HEADERS;SOURCES;USES;PRIVATE_USES;LINKS;PRIVATE_LINKS")
   if(M_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "prescene_module(${name}): unknown arguments ${M_UNPARSED_ARGUMENTS}")
   endif()
@@ -66,7 +67,8 @@ function(prescene_module name)
   target_compile_features(${target} ${scope} cxx_std_20)
 
   set(root "${PROJECT_BINARY_DIR}/roots/${target}")
-  prescene_link_headers("${root}" "${M_FOLDER}" "${M_HEADERS}")
+  set(linked ${M_HEADERS} ${M_SHARED_HEADERS})
+  prescene_link_headers("${root}" "${M_FOLDER}" "${linked}")
   target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${root}>"
                                                 "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
 

@@ -14,8 +14,6 @@ using Node = Hierarchy::Node;
 
 // Ranges up to this size are grown by one thread: few enough to spread well, large enough to be worth a task.
 constexpr std::uint32_t kSubtreeItems = 4096;
-// Nodes this deep are cut into equal parts, so that no input makes a path much longer than this.
-constexpr int kDeepest = 48;
 
 struct Grower {
   Splitter& splitter;
@@ -23,7 +21,7 @@ struct Grower {
   std::uint32_t branching;
 
   Cuts cut(const Node& node, int depth) const {
-    if (depth < kDeepest) return splitter.split(node.begin, node.end);
+    if (depth < kDeepestBuilderCut) return splitter.split(node.begin, node.end);
     const std::uint32_t leaves = (node.end - node.begin + leaf_items - 1) / leaf_items;
     return equal_cuts(node.begin, node.end, std::min(branching, leaves));
   }
@@ -150,6 +148,7 @@ Hierarchy build_hierarchy(std::span<const Item> items, const HierarchyOptions& o
 
 Hierarchy grow_hierarchy(Splitter& splitter, std::uint32_t count, const HierarchyOptions& options,
                          core::ThreadPool& pool) {
+  PRESCENE_CHECK(count <= 1U << kMostItemsBits);
   PRESCENE_CHECK(options.branching >= 2 && options.branching <= kMostChildren);
   PRESCENE_CHECK(options.leaf_items >= 1 && options.leaf_items <= 64);
   const Grower grower{splitter, static_cast<std::uint32_t>(options.leaf_items),

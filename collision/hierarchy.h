@@ -47,6 +47,13 @@ struct HierarchyOptions {
   friend bool operator==(const HierarchyOptions&, const HierarchyOptions&) = default;
 };
 
+/// Nodes this deep are cut into equal parts, whatever the builder.
+inline constexpr int kDeepestBuilderCut = 48;
+/// Binary logarithm of the most items.
+inline constexpr int kMostItemsBits = 30;
+/// How far below the root a node can be: equal parts are halves at least.
+inline constexpr int kDeepestNode = kDeepestBuilderCut + kMostItemsBits;
+
 /// Node 0 is the root; the children of a node are consecutive and come after it. Every item is in one leaf.
 struct Hierarchy {
   struct Node {
@@ -60,7 +67,7 @@ struct Hierarchy {
   std::vector<Node> nodes;
 };
 
-/// At least one item (checked). The same for any number of threads; ends for any input, also when all centres are
+/// At least one item and at most 2^kMostItemsBits (checked). The same for any number of threads; ends for any input, also when all centres are
 /// equal: items that a builder cannot tell apart are cut into equal parts.
 Hierarchy build_hierarchy(std::span<const Item> items, const HierarchyOptions& options, core::ThreadPool& pool);
 

@@ -174,7 +174,7 @@ class BoxtreeQuery {
     return separated != 0;
   }
 
-  // Trees are at most some 60 levels deep.
+  // Trees are at most kDeepestNode levels deep.
   bool visit(const SideA& a, const SideB& b) {
     if (counts_ != nullptr) ++counts_->node_pairs;
     const bool leaf_a = is_leaf(a_, a.child);

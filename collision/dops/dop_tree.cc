@@ -22,7 +22,7 @@ TriangleCoordinates coordinates(const Triangle& t) {
   return {t[0].x(), t[0].y(), t[0].z(), t[1].x(), t[1].y(), t[1].z(), t[2].x(), t[2].y(), t[2].z()};
 }
 
-// Recursion instead of a stack of its own: trees are at most some 60 levels deep.
+// Recursion instead of a stack of its own: trees are at most kDeepestNode levels deep.
 template <bool kCounting>
 class Query {
  public:

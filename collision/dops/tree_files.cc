@@ -11,9 +11,9 @@
 #include "prescene/collision/dops/dop_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_shape.h"
 #include "prescene/core/check.h"
 #include "prescene/core/hash.h"
-#include "tree_shape.h"
 
 namespace prescene::collision {
 namespace {
@@ -115,7 +115,7 @@ bool is_sound(const Boxtree& tree) {
   if (tree.nodes().empty() || tree.root().index != 0) return false;
   for (std::uint32_t i = 0; i < tree.nodes().size(); ++i) {
     if ((tree.nodes()[i].header & 3U) == Boxtree::kTrims) {
-      if (!shape.add_child(i, i + 1) || (tree.nodes()[i + 1].header & 3U) == Boxtree::kTrims) return false;
+      if (!shape.add_continuation(i, i + 1) || (tree.nodes()[i + 1].header & 3U) == Boxtree::kTrims) return false;
       continue;
     }
     for (const Boxtree::Child& child : tree.children({i, 0})) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -13,6 +14,7 @@
 #include "prescene/collision/dops/dop_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/triangle_tree.h"
 #include "prescene/core/random.h"
 #include "prescene/tests/support/paths.h"
 
@@ -130,6 +132,44 @@ TEST_F(TreeFiles, DamageDoesNoHarm) {
   expect_harmless<BvhLiteTree>(BvhLiteOptions{.k = 6, .bits = 4, .leaf_items = 2});
   expect_harmless<Boxtree>(BoxtreeOptions{});
   expect_harmless<Boxtree>(BoxtreeOptions{.leaf_items = 3});
+}
+
+/// Triangles along a line, each a half as far out as the next, and in the end 2^18 of which half are always twice as
+/// far out as the others: as long as the middle is cut, each cut takes one triangle off; then all cuts are into equal
+/// parts, and after each a box is far too wide. No mesh makes deeper trees.
+std::shared_ptr<const Mesh> mesh_of_deep_trees() {
+  constexpr int kDoubled = 18, kSingle = 48;
+  std::vector<Vector3f> vertices;
+  std::vector<TriangleIndices> triangles;
+  const auto add = [&](int exponent) {
+    const float x = std::ldexp(1.0F, exponent);
+    const auto first = static_cast<std::uint32_t>(vertices.size());
+    for (const Vector3f& p : {Vector3f(x, x, x), Vector3f(1.01F * x, x, x), Vector3f(x, 1.01F * x, x)})
+      vertices.push_back(p);
+    triangles.push_back({first, first + 1, first + 2});
+  };
+  add(-80);
+  for (int i = 0; i < kDoubled; ++i) {
+    for (std::size_t more = triangles.size(); more > 0; --more) add(i - 79);
+  }
+  for (int i = 0; i < kSingle; ++i) add(kDoubled + i - 79);
+  auto made = Mesh::make(std::move(vertices), std::move(triangles), "deep");
+  EXPECT_TRUE(made.ok());
+  return *made;
+}
+
+TEST_F(TreeFiles, KeepTheDeepestTrees) {
+  const auto mesh = mesh_of_deep_trees();
+  const auto expect_kept = [&]<class Tree>(const Tree& tree) {
+    ASSERT_TRUE(tree.save(path()).ok());
+    const auto loaded = Tree::load(path(), mesh, tree.options());
+    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
+  };
+  expect_kept(Boxtree::build(mesh, {.builder = Builder::kMiddle}, pool_));
+  expect_kept(DopTree::build(mesh, {.k = 6, .builder = Builder::kMiddle}, pool_));
+  expect_kept(SimdopTree::build(mesh, {.k = 6, .branching = 2, .builder = Builder::kMiddle}, pool_));
+  expect_kept(BvhLiteTree::build(mesh, {.k = 6, .bits = 4, .branching = 2, .builder = Builder::kMiddle}, pool_));
+  expect_kept(TriangleTree::build(mesh, {.builder = Builder::kMiddle}, pool_));
 }
 
 TEST_F(TreeFiles, SaysWhatIsMissing) {

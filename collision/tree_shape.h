@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "prescene/collision/hierarchy.h"
 #include "prescene/collision/mesh.h"
 
 namespace prescene::collision {
@@ -17,13 +18,11 @@ class TreeShape {
     if (nodes > 0) depths_[0] = 0;
   }
 
-  /// Nodes are visited in order; false when `child` is not one that comes after its parent and has no other.
-  bool add_child(std::size_t parent, std::size_t child) {
-    if (child <= parent || child >= depths_.size() || depths_[child] != kUnseen) return false;
-    if (depths_[parent] >= kDeepest) return false;  // Also of a parent that was not seen.
-    depths_[child] = static_cast<std::uint8_t>(depths_[parent] + 1);
-    return true;
-  }
+  /// Nodes are visited in order; false when `child` is not one that comes after its parent and has no other, or is
+  /// deeper than a hierarchy's.
+  bool add_child(std::size_t parent, std::size_t child) { return add(parent, child, 1); }
+  /// A second node for what is one in the hierarchy.
+  bool add_continuation(std::size_t node, std::size_t continued) { return add(node, continued, 0); }
   bool add_children(std::size_t parent, std::size_t first, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) {
       if (!add_child(parent, first + i)) return false;
@@ -34,7 +33,16 @@ class TreeShape {
 
  private:
   static constexpr std::uint8_t kUnseen = 255;
-  static constexpr std::uint8_t kDeepest = 128;  // Hierarchies are at most some 80 deep.
+  static_assert(kDeepestNode < kUnseen);
+
+  bool add(std::size_t parent, std::size_t child, int levels) {
+    if (child <= parent || child >= depths_.size() || depths_[child] != kUnseen) return false;
+    const int depth = depths_[parent] + levels;
+    if (depth > kDeepestNode) return false;  // Also of a parent that was not seen.
+    depths_[child] = static_cast<std::uint8_t>(depth);
+    return true;
+  }
+
   std::vector<std::uint8_t> depths_;
 };
 
