@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // TriangleTree in files.
+#include <algorithm>
 #include <bit>
 #include <string>
 #include <vector>
 
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_shape.h"
 #include "prescene/collision/triangle_tree.h"
 #include "prescene/core/hash.h"
 
@@ -23,20 +25,25 @@ core::Status damaged(const std::string& what) {
   return core::data_loss("the tree in it is damaged: " + what + "; delete the file, it will be built anew");
 }
 
-/// Children come after their parents and are within the arrays, so that a descent ends.
+/// Nodes and leaves are those of a tree, so that a descent ends and stays inside of the arrays.
 core::Status check_nodes(std::span<const TriangleTreeNode> nodes, std::size_t blocks) {
   if (nodes.empty()) return damaged("it has no nodes");
+  TreeShape shape(nodes.size());
+  std::vector<bool> seen(blocks);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const TriangleTreeNode& node = nodes[i];
     const std::uint32_t leaves = node.leaf_mask();
     const auto leaf_count = static_cast<std::size_t>(std::popcount(leaves));
-    const std::size_t node_count = node.child_count() - leaf_count;
-    const bool children_fit = node.child_count() >= 1 && node.child_count() <= 16 && (leaves & ~node.child_mask()) == 0;
-    if (!children_fit ||
-        (node_count > 0 && (node.first_child() <= i || node.first_child() + node_count > nodes.size())) ||
-        (leaf_count > 0 && node.first_leaf() + leaf_count > blocks))
-      return damaged("node " + std::to_string(i) + " has children that do not exist");
+    bool sound = node.child_count() >= 1 && node.child_count() <= 16 && (leaves & ~node.child_mask()) == 0 &&
+                 shape.add_children(i, node.first_child(), node.child_count() - leaf_count);
+    for (std::size_t leaf = node.first_leaf(); sound && leaf < node.first_leaf() + leaf_count; ++leaf) {
+      sound = leaf < blocks && !seen[leaf];
+      if (sound) seen[leaf] = true;
+    }
+    if (!sound) return damaged("node " + std::to_string(i) + " has children that do not exist or are another's");
   }
+  if (!shape.complete() || std::find(seen.begin(), seen.end(), false) != seen.end())
+    return damaged("a part of it is nobody's child");
   return core::ok_status();
 }
 
