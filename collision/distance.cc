@@ -116,7 +116,7 @@ class NearestSearch {
     HWY_ALIGN float distances[16];
     HWY_ALIGN float between[3][16];
     const PairVerdict verdict = batch_.measure(best_, distances, between);
-    const std::uint32_t count = std::min(batch_.count(), PairBatch::kFull);
+    const std::uint32_t count = std::min(batch_.count(), MeasureBatch::kFull);
     if (counts_ != nullptr) counts_->triangle_tests += count;
     for (std::uint32_t i = 0; i < count; ++i) {
       // Zero for pairs that are not sure to be apart, and for a few that single precision cannot tell from it.
@@ -175,7 +175,7 @@ class NearestSearch {
     while (queue.pop(reach_, &pair)) {
       if (pair.a_children == 0) {
         add_leaves(pair.a, pair.b);
-        if (batch_.count() >= PairBatch::kFull && measure()) return;
+        if (batch_.count() >= MeasureBatch::kFull && measure()) return;
         continue;
       }
       if (place_near_pair(frame_, pair, a_.nodes().data(), b_.nodes().data(), reach_, &children_, counts_))
@@ -201,7 +201,7 @@ class NearestSearch {
   BlockPair best_pair_;
   Distance answer_;
   NearChildren children_;
-  PairBatch batch_;
+  MeasureBatch batch_;
 };
 
 bool find_nearest(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB, const DistanceOptions& options,

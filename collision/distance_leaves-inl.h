@@ -112,7 +112,7 @@ struct BlockPair {
 };
 
 /// Pairs of triangles that wait for being measured.
-class PairBatch {
+class MeasureBatch {
  public:
   static constexpr std::uint32_t kFull = 16;
 
