@@ -52,6 +52,7 @@ struct ContactSearch {
   const RigidMotion* motion;
   double rounding;   ///< What single precision does to the distance of two triangles, m.
   double tolerance;  ///< m
+  float scale;       ///< Lengths are about 1 when they are multiplied by this.
   std::uint64_t steps_left;
   FirstContact found;  ///< The earliest contact so far.
   double slack;        ///< So much before it, the bodies are within the tolerance.
@@ -159,6 +160,7 @@ inline void make_pair_times(const MovingPair& from, const ContactSearch& search,
   place_children(a, from.pair.a_children, X_ba, b.half_extent, &boxes_a);
   place_children(b, from.pair.b_children, X_ab, a.half_extent, &boxes_b);
   BoxRates rates;
+  rates.scale = search.scale;
   out->speed = make_box_rates(placed.field, placed.X_AB, a, b, boxes_b, &rates);
   const auto limit = static_cast<float>((search.found.time - static_cast<double>(from.time)) * (1.0 + 1e-6));
   for (std::uint32_t rows = from.pair.a_children; rows != 0; rows &= rows - 1) {
@@ -327,7 +329,8 @@ FirstContact first_contact(const TriangleTree& a, const TriangleTree& b, const R
   const Vector3d origin = start.X_AB.translation;
   const double extent = static_cast<double>(a.radius()) + static_cast<double>(b.radius()) + origin.lpNorm<1>() +
                         start.field.steady.lpNorm<1>() + std::sqrt(3.0) * start.field.swirl(origin).norm();
-  ContactSearch search{&a, &b, &motion, kRounding * extent, options.tolerance, options.step_limit, {}, 0.0};
+  const float scale = std::ldexp(1.0F, extent > 0.0 ? std::clamp(-std::ilogb(extent), -126, 126) : 0);
+  ContactSearch search{&a, &b, &motion, kRounding * extent, options.tolerance, scale, options.step_limit, {}, 0.0};
   if (!(search.tolerance > 0.0))
     search.tolerance = kDefaultTolerance * static_cast<double>(std::min(a.mesh().size(), b.mesh().size()));
   search.tolerance = std::max(search.tolerance, 4.0 * search.rounding);

@@ -20,9 +20,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace prescene::collision::HWY_NAMESPACE {
 
-/// How fast boxes of B's node move along six axes: those of A's node and those of B's.
+/// How fast boxes of B's node move along six axes: those of A's node and those of B's. Lengths are in `scale` to the
+/// metre, so that their squares do not vanish in single precision.
 struct BoxRates {
-  HWY_ALIGN float up[6][16];    ///< Most along the axis, m a unit of time.
+  float scale;
+  HWY_ALIGN float up[6][16];    ///< Most along the axis, a unit of time.
   HWY_ALIGN float down[6][16];  ///< Most against it.
   HWY_ALIGN float twice_acceleration[6][16];
 };
@@ -37,7 +39,7 @@ inline Eigen::Vector3d node_axis(const TriangleTreeNode& node, int k) {
 inline constexpr double kRateRounding = 64.0 / 16777216.0;
 
 /// `boxes` are those of node b, which is at X_AB, with velocities as in `field`. Returns about the largest of its
-/// speeds.
+/// speeds, m. rates->scale is given.
 inline float make_box_rates(const MotionField& field, const geometry::Pose& X_AB, const TriangleTreeNode& a,
                             const TriangleTreeNode& b, const ChildBoxes& boxes, BoxRates* rates) {
   using Eigen::Vector3d;
@@ -51,14 +53,15 @@ inline float make_box_rates(const MotionField& field, const geometry::Pose& X_AB
   const Vector3d swirl = field.swirl(origin);
   const double reach = static_cast<double>(b.diagonal);
   const double speed = field.steady.norm() + swirl.norm() + spin * reach;
-  const V16 slack = hn::Set(d, static_cast<float>(kRateRounding * speed));
+  const auto scale = static_cast<double>(rates->scale);
+  const V16 slack = hn::Set(d, static_cast<float>(scale * kRateRounding * speed));
   float base[6];
   float bend[6];
   float along[6][3];
   for (int axis = 0; axis < 6; ++axis) {
     const Vector3d n = axis < 3 ? node_axis(a, axis) : axes_b[axis - 3];
     const Vector3d across = n.cross(field.spin);  // n . (spin x p) = (n x spin) . p
-    base[axis] = static_cast<float>(n.dot(field.steady + swirl));
+    base[axis] = static_cast<float>(scale * n.dot(field.steady + swirl));
     bend[axis] = static_cast<float>(2.0 * across.norm());
     for (int m = 0; m < 3; ++m) along[axis][m] = static_cast<float>(across.dot(axes_b[m]));
   }
@@ -67,13 +70,13 @@ inline float make_box_rates(const MotionField& field, const geometry::Pose& X_AB
     V16 centre[3];
     V16 half[3];
     for (int m = 0; m < 3; ++m) {
-      centre[m] = hn::Load(d, boxes.centre[m] + lane);
-      half[m] = hn::Load(d, boxes.half[m] + lane);
+      centre[m] = hn::Mul(hn::Load(d, boxes.centre[m] + lane), hn::Set(d, rates->scale));
+      half[m] = hn::Mul(hn::Load(d, boxes.half[m] + lane), hn::Set(d, rates->scale));
     }
     V16 square = hn::Zero(d);
     V16 size = hn::Zero(d);
     for (int k = 0; k < 3; ++k) {
-      V16 s = hn::Set(d, static_cast<float>(swirl[k]));
+      V16 s = hn::Set(d, static_cast<float>(scale * swirl[k]));
       for (int m = 0; m < 3; ++m) {
         const double turned = field.spin.cross(axes_b[m])[k];
         s = hn::MulAdd(centre[m], hn::Set(d, static_cast<float>(turned)), s);
@@ -123,7 +126,8 @@ HWY_INLINE std::uint32_t closing_times(const ChildBoxes& a, std::uint32_t row, c
       const V16 centre = hn::Load(d, (of_a ? b.other_centre : b.centre)[k] + lane);
       const V16 half = hn::Load(d, (of_a ? b.other_half : b.half)[k] + lane);
       const V16 apart = hn::Sub(centre, hn::Set(d, (of_a ? a.centre : a.other_centre)[k][row]));
-      const V16 g = hn::Sub(hn::Abs(apart), hn::Add(half, hn::Set(d, (of_a ? a.half : a.other_half)[k][row])));
+      const V16 gap = hn::Sub(hn::Abs(apart), hn::Add(half, hn::Set(d, (of_a ? a.half : a.other_half)[k][row])));
+      const V16 g = hn::Mul(gap, hn::Set(d, rates.scale));
       const V16 rate =
           hn::IfThenElse(hn::Gt(apart, zero), hn::Load(d, rates.down[axis] + lane), hn::Load(d, rates.up[axis] + lane));
       latest = hn::Max(latest, closing_time(d, g, rate, hn::Load(d, rates.twice_acceleration[axis] + lane)));

@@ -73,7 +73,7 @@ void fit(const Matrix3f& R_NM, const Corners& corners, std::span<const ChildRang
   const Vector3f& reference = corners[std::size_t{3} * children[0].begin];
   Bounds all;
   for (const ChildRange& child : children) all.add(bounds_in(R_NM, reference, corners, child));
-  const float scale = reference.cwiseAbs().maxCoeff() + (all.high - all.low).norm();
+  const float scale = reference.cwiseAbs().maxCoeff() + (all.high - all.low).stableNorm();
   const Vector3f margin = Vector3f::Constant(kRounding * scale);
   const Vector3f origin = reference + R_NM.transpose() * (all.low - margin);
 
@@ -106,7 +106,7 @@ void fit(const Matrix3f& R_NM, const Corners& corners, std::span<const ChildRang
       node->high[axis][i] = static_cast<std::uint8_t>(1.0F + std::clamp(high, 0.0F, kSteps));
     }
   }
-  node->diagonal = diagonal.norm();
+  node->diagonal = diagonal.stableNorm();  // Squares of tiny lengths vanish.
 }
 
 TriangleTreeNode make_node(const Corners& corners, std::span<const ChildRange> children, bool rotated_frames) {

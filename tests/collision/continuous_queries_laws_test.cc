@@ -13,6 +13,7 @@
 
 #include "prescene/collision/triangle_pair_distance.h"
 #include "prescene/core/check.h"
+#include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/generators.h"
@@ -306,6 +307,37 @@ TEST_P(ContinuousQueries, AgreeWhenTheBodiesAreExchanged) {
     RC_ASSERT(std::abs(one.time - other.time) * approach < 2.0 * kTolerance + 1e-3 * approach);
   }));
   EXPECT_GT(contacts, 10);
+}
+
+// Lengths of which single precision cannot hold the squares.
+TEST_P(ContinuousQueries, FindTheSameTimesAtEveryScale) {
+  const geometry::TriangleMesh mesh_a = tests::make_bumpy_sphere(0.1, 300);
+  const geometry::TriangleMesh mesh_b = tests::make_knot(0.1, 300);
+  core::RandomStream random(8, {});
+  QueryScratch scratch;
+  const auto contact_at = [&](double scale, Pose start, Pose end) {
+    start.translation *= scale;
+    end.translation *= scale;
+    const TriangleTree a = tree_of(geometry::scaled(mesh_a, scale));
+    const TriangleTree b = tree_of(geometry::scaled(mesh_b, scale));
+    const RigidMotion motion = screw(start, end);
+    const FirstContact found = first_contact(a, b, motion, {}, scratch);
+    EXPECT_FALSE(first_sample(a, b, motion, found.time, 20, scratch).has_value()) << scale;
+    return found;
+  };
+  for (int i = 0; i < 10; ++i) {
+    const auto unit = [&] { return 2.0 * random.uniform() - 1.0; };
+    const auto rotation = [&] { return geometry::Quaterniond(2.0, unit(), unit(), unit()).normalized(); };
+    const Pose start{rotation(), {0.4, 0.05 * unit(), 0.05 * unit()}};
+    const Pose end{rotation(), {-0.4, 0.05 * unit(), 0.05 * unit()}};
+    const FirstContact expected = contact_at(1.0, start, end);
+    EXPECT_EQ(expected.outcome, MotionOutcome::kContact);
+    for (const double scale : {0x1p-98, 0x1p-70, 0x1p30}) {
+      const FirstContact found = contact_at(scale, start, end);
+      EXPECT_EQ(found.outcome, expected.outcome) << scale;
+      EXPECT_NEAR(found.time, expected.time, 1e-3) << scale;
+    }
+  }
 }
 
 TEST_P(ContinuousQueries, SayWhenTheyGiveUp) {
