@@ -80,6 +80,8 @@ class TreeFile {
   static core::Result<TreeFile> from_bytes(std::span<const std::uint8_t> bytes, const TreeFileKey& key,
                                            std::string_view name);
 
+  /// The path or name that messages begin with.
+  const std::string& name() const { return name_; }
   std::size_t section_count() const { return sections_.size(); }
   /// kDataLoss when there is no such section or its values have another size.
   template <TreeFileValue T>

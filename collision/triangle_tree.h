@@ -118,6 +118,7 @@ class TriangleTree {
                                                const TriangleTreeOptions& options);
 
  private:
+  TriangleTree() = default;
   static float radius_of(const Mesh& mesh);
   static core::Result<TriangleTree> from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
                                               const TriangleTreeOptions& options);

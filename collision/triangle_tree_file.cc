@@ -8,6 +8,7 @@
 #include "prescene/collision/tree_file.h"
 #include "prescene/collision/tree_shape.h"
 #include "prescene/collision/triangle_tree.h"
+#include "prescene/core/check.h"
 #include "prescene/core/hash.h"
 
 namespace prescene::collision {
@@ -16,9 +17,10 @@ namespace {
 constexpr std::string_view kKind = "triangle tree";
 constexpr std::uint32_t kLayout = 1;
 
-TreeFileKey key_of(const Mesh& mesh, const TriangleTreeOptions& options) {
+TreeFileKey key_of(const Mesh* mesh, const TriangleTreeOptions& options) {
+  PRESCENE_CHECK(mesh != nullptr);
   const std::uint64_t settings = core::Hasher().value(options.builder).value(options.rotated_frames).digest();
-  return {.kind = kKind, .layout = kLayout, .mesh_hash = mesh.content_hash(), .settings_hash = settings};
+  return {.kind = kKind, .layout = kLayout, .mesh_hash = mesh->content_hash(), .settings_hash = settings};
 }
 
 core::Status damaged(const std::string& what) {
@@ -84,7 +86,7 @@ core::Status check_blocks(std::span<const TriangleBlock> blocks, std::span<const
 }  // namespace
 
 core::Status TriangleTree::save(const std::filesystem::path& path) const {
-  return TreeFileWriter(key_of(*mesh_, options_))
+  return TreeFileWriter(key_of(mesh_.get(), options_))
       .add(nodes_.span())
       .add(blocks_.span())
       .add(references_.span())
@@ -92,7 +94,7 @@ core::Status TriangleTree::save(const std::filesystem::path& path) const {
 }
 
 std::vector<std::uint8_t> TriangleTree::bytes() const {
-  return TreeFileWriter(key_of(*mesh_, options_))
+  return TreeFileWriter(key_of(mesh_.get(), options_))
       .add(nodes_.span())
       .add(blocks_.span())
       .add(references_.span())
@@ -105,8 +107,8 @@ core::Result<TriangleTree> TriangleTree::from_file(const TreeFile& file, std::sh
   PRESCENE_TRY(tree.nodes_, file.section<TriangleTreeNode>(0));
   PRESCENE_TRY(tree.blocks_, file.section<TriangleBlock>(1));
   PRESCENE_TRY(tree.references_, file.section<TriangleReferences>(2));
-  PRESCENE_RETURN_IF_ERROR(check_nodes(tree.nodes_.span(), tree.blocks_.size()));
-  PRESCENE_RETURN_IF_ERROR(check_blocks(tree.blocks_.span(), tree.references_.span(), *mesh));
+  PRESCENE_RETURN_IF_ERROR(check_nodes(tree.nodes_.span(), tree.blocks_.size()).at(file.name()));
+  PRESCENE_RETURN_IF_ERROR(check_blocks(tree.blocks_.span(), tree.references_.span(), *mesh).at(file.name()));
   tree.radius_ = radius_of(*mesh);
   tree.mesh_ = std::move(mesh);
   tree.options_ = options;
@@ -115,16 +117,14 @@ core::Result<TriangleTree> TriangleTree::from_file(const TreeFile& file, std::sh
 
 core::Result<TriangleTree> TriangleTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
                                               const TriangleTreeOptions& options) {
-  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(*mesh, options)));
-  core::Result<TriangleTree> tree = from_file(file, std::move(mesh), options);
-  if (!tree) return tree.status().at(path.string());
-  return tree;
+  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(mesh.get(), options)));
+  return from_file(file, std::move(mesh), options);
 }
 
 core::Result<TriangleTree> TriangleTree::from_bytes(std::span<const std::uint8_t> bytes,
                                                     std::shared_ptr<const Mesh> mesh,
                                                     const TriangleTreeOptions& options) {
-  PRESCENE_TRY(const TreeFile file, TreeFile::from_bytes(bytes, key_of(*mesh, options), "tree"));
+  PRESCENE_TRY(const TreeFile file, TreeFile::from_bytes(bytes, key_of(mesh.get(), options), "tree"));
   return from_file(file, std::move(mesh), options);
 }
 

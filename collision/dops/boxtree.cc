@@ -141,6 +141,7 @@ BoxtreeSplit split_of(const Hierarchy::Node& node, const std::vector<BoxtreeBox>
 }
 
 Boxtree Boxtree::build(std::shared_ptr<const Mesh> mesh, const BoxtreeOptions& options, core::ThreadPool& pool) {
+  PRESCENE_CHECK(mesh != nullptr);
   const std::vector<Item> items = triangle_items(*mesh);
   Hierarchy shape =
       build_hierarchy(items, {.builder = options.builder, .branching = 2, .leaf_items = options.leaf_items}, pool);

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "prescene/collision/array.h"
 #include "prescene/collision/dops/realignment.h"
@@ -18,6 +20,7 @@
 #include "prescene/collision/mesh.h"
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
+#include "prescene/collision/tree_file.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
 
@@ -71,6 +74,10 @@ class Boxtree {
   core::Status save(const std::filesystem::path& path) const;
   static core::Result<Boxtree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
                                     const BoxtreeOptions& options);
+  /// The same in memory.
+  std::vector<std::uint8_t> file_bytes() const;
+  static core::Result<Boxtree> from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                          const BoxtreeOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const BoxtreeOptions& options() const { return options_; }
@@ -97,6 +104,11 @@ class Boxtree {
   std::size_t bytes() const { return nodes_.bytes() + order_.bytes(); }
 
  private:
+  Boxtree() = default;
+  TreeFileWriter file() const;
+  static core::Result<Boxtree> from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                         const BoxtreeOptions& options);
+
   std::shared_ptr<const Mesh> mesh_;
   BoxtreeOptions options_;
   BoxtreeBox box_;

@@ -134,6 +134,7 @@ class LiteBuilder {
 
 BvhLiteTree BvhLiteTree::build(std::shared_ptr<const Mesh> mesh, const BvhLiteOptions& options,
                                core::ThreadPool& pool) {
+  PRESCENE_CHECK(mesh != nullptr);
   PRESCENE_CHECK(options.bits == 4 || options.bits == 6 || options.bits == 8);
   const DopDirections& directions = DopDirections::of(options.k);
   BvhLiteTree tree;

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "prescene/collision/array.h"
@@ -22,6 +23,7 @@
 #include "prescene/collision/mesh.h"
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
+#include "prescene/collision/tree_file.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
 
@@ -56,6 +58,10 @@ class BvhLiteTree {
   core::Status save(const std::filesystem::path& path) const;
   static core::Result<BvhLiteTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
                                         const BvhLiteOptions& options);
+  /// The same in memory.
+  std::vector<std::uint8_t> file_bytes() const;
+  static core::Result<BvhLiteTree> from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                              const BvhLiteOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const BvhLiteOptions& options() const { return options_; }
@@ -73,6 +79,11 @@ class BvhLiteTree {
   std::size_t bytes() const { return nodes_.bytes() + order_.bytes() + sizeof(Planes); }
 
  private:
+  BvhLiteTree() = default;
+  TreeFileWriter file() const;
+  static core::Result<BvhLiteTree> from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                             const BvhLiteOptions& options);
+
   std::shared_ptr<const Mesh> mesh_;
   BvhLiteOptions options_;
   DopSpace space_;

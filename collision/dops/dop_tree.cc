@@ -105,6 +105,7 @@ class Query {
 }  // namespace
 
 DopTree DopTree::build(std::shared_ptr<const Mesh> mesh, const DopTreeOptions& options, core::ThreadPool& pool) {
+  PRESCENE_CHECK(mesh != nullptr);
   const DopDirections& directions = DopDirections::of(options.k);
   DopTree tree;
   tree.options_ = options;

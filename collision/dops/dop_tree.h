@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "prescene/collision/array.h"
 #include "prescene/collision/dops/directions.h"
@@ -18,6 +19,7 @@
 #include "prescene/collision/mesh.h"
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
+#include "prescene/collision/tree_file.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
 
@@ -45,6 +47,10 @@ class DopTree {
   core::Status save(const std::filesystem::path& path) const;
   static core::Result<DopTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
                                     const DopTreeOptions& options);
+  /// The same in memory.
+  std::vector<std::uint8_t> file_bytes() const;
+  static core::Result<DopTree> from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                          const DopTreeOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const DopTreeOptions& options() const { return options_; }
@@ -57,6 +63,11 @@ class DopTree {
   std::size_t bytes() const { return nodes_.bytes() + planes_.bytes() + order_.bytes(); }
 
  private:
+  DopTree() = default;
+  TreeFileWriter file() const;
+  static core::Result<DopTree> from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                         const DopTreeOptions& options);
+
   std::shared_ptr<const Mesh> mesh_;
   DopTreeOptions options_;
   DopSpace space_;

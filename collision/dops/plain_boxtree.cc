@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "prescene/core/check.h"
+
 namespace prescene::collision {
 namespace {
 
@@ -36,6 +38,7 @@ PlainBoxtree& PlainBoxtree::operator=(PlainBoxtree&&) noexcept = default;
 PlainBoxtree::~PlainBoxtree() = default;
 
 PlainBoxtree PlainBoxtree::build(std::shared_ptr<const Mesh> mesh, Builder builder, core::ThreadPool& pool) {
+  PRESCENE_CHECK(mesh != nullptr);
   const std::vector<Item> items = triangle_items(*mesh);
   const Hierarchy shape = build_hierarchy(items, {.builder = builder, .branching = 2, .leaf_items = 1}, pool);
   const std::vector<BoxtreeBox> exact = exact_boxes(shape, items);

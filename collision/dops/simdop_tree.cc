@@ -113,6 +113,7 @@ Array<Plane> arrange(const SimdopOptions& options, const Hierarchy& shape, const
 }  // namespace
 
 SimdopTree SimdopTree::build(std::shared_ptr<const Mesh> mesh, const SimdopOptions& options, core::ThreadPool& pool) {
+  PRESCENE_CHECK(mesh != nullptr);
   check(options);
   const DopDirections& directions = DopDirections::of(options.k);
   SimdopTree tree;

@@ -13,6 +13,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "prescene/collision/array.h"
 #include "prescene/collision/dops/directions.h"
@@ -21,6 +23,7 @@
 #include "prescene/collision/mesh.h"
 #include "prescene/collision/query_scratch.h"
 #include "prescene/collision/transform.h"
+#include "prescene/collision/tree_file.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
 
@@ -68,6 +71,10 @@ class SimdopTree {
   core::Status save(const std::filesystem::path& path) const;
   static core::Result<SimdopTree> load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
                                        const SimdopOptions& options);
+  /// The same in memory.
+  std::vector<std::uint8_t> file_bytes() const;
+  static core::Result<SimdopTree> from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                             const SimdopOptions& options);
 
   const Mesh& mesh() const { return *mesh_; }
   const SimdopOptions& options() const { return options_; }
@@ -86,6 +93,11 @@ class SimdopTree {
   std::size_t bytes() const { return nodes_.bytes() + plane_bytes() + leaf_begin_.bytes() + order_.bytes(); }
 
  private:
+  SimdopTree() = default;
+  TreeFileWriter file() const;
+  static core::Result<SimdopTree> from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                            const SimdopOptions& options);
+
   std::shared_ptr<const Mesh> mesh_;
   SimdopOptions options_;
   DopSpace space_;

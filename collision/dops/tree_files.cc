@@ -19,27 +19,28 @@ namespace prescene::collision {
 namespace {
 
 template <class... Settings>
-TreeFileKey key_of(std::string_view kind, const Mesh& mesh, Settings... settings) {
+TreeFileKey key_of(std::string_view kind, const Mesh* mesh, Settings... settings) {
+  PRESCENE_CHECK(mesh != nullptr);
   core::Hasher hasher;
   (hasher.value(settings), ...);
-  return {.kind = kind, .layout = 1, .mesh_hash = mesh.content_hash(), .settings_hash = hasher.digest()};
+  return {.kind = kind, .layout = 1, .mesh_hash = mesh->content_hash(), .settings_hash = hasher.digest()};
 }
 
-TreeFileKey key_of(const Mesh& mesh, const DopTreeOptions& o) {
+TreeFileKey key_of(const Mesh* mesh, const DopTreeOptions& o) {
   return key_of("k-dops", mesh, o.k, o.builder, o.leaf_items);
 }
-TreeFileKey key_of(const Mesh& mesh, const SimdopOptions& o) {
+TreeFileKey key_of(const Mesh* mesh, const SimdopOptions& o) {
   return key_of("simdop", mesh, o.k, o.branching, o.leaf_items, o.builder, o.precision, o.traversal);
 }
-TreeFileKey key_of(const Mesh& mesh, const BvhLiteOptions& o) {
+TreeFileKey key_of(const Mesh* mesh, const BvhLiteOptions& o) {
   return key_of("bvhlite", mesh, o.k, o.bits, o.branching, o.leaf_items, o.builder);
 }
-TreeFileKey key_of(const Mesh& mesh, const BoxtreeOptions& o) {
+TreeFileKey key_of(const Mesh* mesh, const BoxtreeOptions& o) {
   return key_of("boxtree", mesh, o.builder, o.leaf_items);
 }
 
-core::Status no_tree(const std::filesystem::path& path) {
-  return core::data_loss(path.string() + ": what it holds is not a tree of the mesh; delete it to have it made anew");
+core::Status no_tree(const std::string& name) {
+  return core::data_loss(name + ": what it holds is not a tree of the mesh; delete it to have it made anew");
 }
 
 bool is_sound(const DopTree& tree, std::size_t planes) {
@@ -127,14 +128,13 @@ bool is_sound(const Boxtree& tree) {
 
 }  // namespace
 
-core::Status DopTree::save(const std::filesystem::path& path) const {
-  TreeFileWriter writer(key_of(*mesh_, options_));
-  return writer.add(nodes_.span()).add(planes_.span()).add(order_.span()).write(path);
+TreeFileWriter DopTree::file() const {
+  TreeFileWriter writer(key_of(mesh_.get(), options_));
+  return writer.add(nodes_.span()).add(planes_.span()).add(order_.span());
 }
 
-core::Result<DopTree> DopTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
-                                    const DopTreeOptions& options) {
-  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(*mesh, options)));
+core::Result<DopTree> DopTree::from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                         const DopTreeOptions& options) {
   DopTree tree;
   PRESCENE_TRY(tree.nodes_, file.section<Node>(0));
   PRESCENE_TRY(tree.planes_, file.section<float>(1));
@@ -142,19 +142,33 @@ core::Result<DopTree> DopTree::load(const std::filesystem::path& path, std::shar
   tree.options_ = options;
   tree.space_ = DopSpace::of(*mesh);
   tree.mesh_ = std::move(mesh);
-  if (!is_sound(tree, tree.planes_.size())) return no_tree(path);
+  if (!is_sound(tree, tree.planes_.size())) return no_tree(file.name());
   return tree;
 }
 
-core::Status SimdopTree::save(const std::filesystem::path& path) const {
-  TreeFileWriter writer(key_of(*mesh_, options_));
-  writer.add(nodes_.span()).add(leaf_begin_.span()).add(order_.span());
-  return writer.add(single_planes_.span()).add(half_planes_.span()).write(path);
+core::Status DopTree::save(const std::filesystem::path& path) const { return file().write(path); }
+std::vector<std::uint8_t> DopTree::file_bytes() const { return file().bytes(); }
+
+core::Result<DopTree> DopTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                    const DopTreeOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(mesh.get(), options)));
+  return from_file(file, std::move(mesh), options);
 }
 
-core::Result<SimdopTree> SimdopTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
-                                          const SimdopOptions& options) {
-  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(*mesh, options)));
+core::Result<DopTree> DopTree::from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                          const DopTreeOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::from_bytes(bytes, key_of(mesh.get(), options), "tree"));
+  return from_file(file, std::move(mesh), options);
+}
+
+TreeFileWriter SimdopTree::file() const {
+  TreeFileWriter writer(key_of(mesh_.get(), options_));
+  writer.add(nodes_.span()).add(leaf_begin_.span()).add(order_.span());
+  return writer.add(single_planes_.span()).add(half_planes_.span());
+}
+
+core::Result<SimdopTree> SimdopTree::from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                               const SimdopOptions& options) {
   SimdopTree tree;
   PRESCENE_TRY(tree.nodes_, file.section<Node>(0));
   PRESCENE_TRY(tree.leaf_begin_, file.section<std::uint32_t>(1));
@@ -164,18 +178,32 @@ core::Result<SimdopTree> SimdopTree::load(const std::filesystem::path& path, std
   tree.options_ = options;
   tree.space_ = DopSpace::of(*mesh);
   tree.mesh_ = std::move(mesh);
-  if (!is_sound(tree)) return no_tree(path);
+  if (!is_sound(tree)) return no_tree(file.name());
   return tree;
 }
 
-core::Status BvhLiteTree::save(const std::filesystem::path& path) const {
-  TreeFileWriter writer(key_of(*mesh_, options_));
-  return writer.add(nodes_.span()).add(order_.span()).add(std::span<const float>(root_planes_)).write(path);
+core::Status SimdopTree::save(const std::filesystem::path& path) const { return file().write(path); }
+std::vector<std::uint8_t> SimdopTree::file_bytes() const { return file().bytes(); }
+
+core::Result<SimdopTree> SimdopTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                          const SimdopOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(mesh.get(), options)));
+  return from_file(file, std::move(mesh), options);
 }
 
-core::Result<BvhLiteTree> BvhLiteTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
-                                            const BvhLiteOptions& options) {
-  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(*mesh, options)));
+core::Result<SimdopTree> SimdopTree::from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                                const SimdopOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::from_bytes(bytes, key_of(mesh.get(), options), "tree"));
+  return from_file(file, std::move(mesh), options);
+}
+
+TreeFileWriter BvhLiteTree::file() const {
+  TreeFileWriter writer(key_of(mesh_.get(), options_));
+  return writer.add(nodes_.span()).add(order_.span()).add(std::span<const float>(root_planes_));
+}
+
+core::Result<BvhLiteTree> BvhLiteTree::from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                                 const BvhLiteOptions& options) {
   BvhLiteTree tree;
   PRESCENE_TRY(tree.nodes_, file.section<std::uint8_t>(0));
   PRESCENE_TRY(tree.order_, file.section<std::uint32_t>(1));
@@ -183,23 +211,37 @@ core::Result<BvhLiteTree> BvhLiteTree::load(const std::filesystem::path& path, s
   tree.options_ = options;
   tree.space_ = DopSpace::of(*mesh);
   tree.mesh_ = std::move(mesh);
-  if (root.size() != kPlanes || tree.nodes_.size() < tree.stride() + 16) return no_tree(path);
-  if ((tree.nodes_.size() - 16) % tree.stride() != 0) return no_tree(path);
+  if (root.size() != kPlanes || tree.nodes_.size() < tree.stride() + 16) return no_tree(file.name());
+  if ((tree.nodes_.size() - 16) % tree.stride() != 0) return no_tree(file.name());
   std::copy(root.begin(), root.end(), tree.root_planes_.begin());
   tree.node_count_ = (tree.nodes_.size() - 16) / tree.stride();
-  if (!is_sound(tree)) return no_tree(path);
+  if (!is_sound(tree)) return no_tree(file.name());
   return tree;
 }
 
-core::Status Boxtree::save(const std::filesystem::path& path) const {
-  TreeFileWriter writer(key_of(*mesh_, options_));
-  writer.add(nodes_.span()).add(order_.span()).add(std::span<const BoxtreeBox>(&box_, 1));
-  return writer.add(std::span<const Child>(&root_, 1)).write(path);
+core::Status BvhLiteTree::save(const std::filesystem::path& path) const { return file().write(path); }
+std::vector<std::uint8_t> BvhLiteTree::file_bytes() const { return file().bytes(); }
+
+core::Result<BvhLiteTree> BvhLiteTree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                            const BvhLiteOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(mesh.get(), options)));
+  return from_file(file, std::move(mesh), options);
 }
 
-core::Result<Boxtree> Boxtree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
-                                    const BoxtreeOptions& options) {
-  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(*mesh, options)));
+core::Result<BvhLiteTree> BvhLiteTree::from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                                  const BvhLiteOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::from_bytes(bytes, key_of(mesh.get(), options), "tree"));
+  return from_file(file, std::move(mesh), options);
+}
+
+TreeFileWriter Boxtree::file() const {
+  TreeFileWriter writer(key_of(mesh_.get(), options_));
+  writer.add(nodes_.span()).add(order_.span()).add(std::span<const BoxtreeBox>(&box_, 1));
+  return writer.add(std::span<const Child>(&root_, 1));
+}
+
+core::Result<Boxtree> Boxtree::from_file(const TreeFile& file, std::shared_ptr<const Mesh> mesh,
+                                         const BoxtreeOptions& options) {
   Boxtree tree;
   PRESCENE_TRY(tree.nodes_, file.section<Node>(0));
   PRESCENE_TRY(tree.order_, file.section<std::uint32_t>(1));
@@ -207,11 +249,26 @@ core::Result<Boxtree> Boxtree::load(const std::filesystem::path& path, std::shar
   PRESCENE_TRY(const Array<Child> root, file.section<Child>(3));
   tree.options_ = options;
   tree.mesh_ = std::move(mesh);
-  if (box.size() != 1 || root.size() != 1) return no_tree(path);
+  if (box.size() != 1 || root.size() != 1) return no_tree(file.name());
   tree.box_ = box[0];
   tree.root_ = root[0];
-  if (!is_sound(tree)) return no_tree(path);
+  if (!is_sound(tree)) return no_tree(file.name());
   return tree;
+}
+
+core::Status Boxtree::save(const std::filesystem::path& path) const { return file().write(path); }
+std::vector<std::uint8_t> Boxtree::file_bytes() const { return file().bytes(); }
+
+core::Result<Boxtree> Boxtree::load(const std::filesystem::path& path, std::shared_ptr<const Mesh> mesh,
+                                    const BoxtreeOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key_of(mesh.get(), options)));
+  return from_file(file, std::move(mesh), options);
+}
+
+core::Result<Boxtree> Boxtree::from_bytes(std::span<const std::uint8_t> bytes, std::shared_ptr<const Mesh> mesh,
+                                          const BoxtreeOptions& options) {
+  PRESCENE_TRY(const TreeFile file, TreeFile::from_bytes(bytes, key_of(mesh.get(), options), "tree"));
+  return from_file(file, std::move(mesh), options);
 }
 
 }  // namespace prescene::collision

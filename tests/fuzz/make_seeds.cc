@@ -18,6 +18,7 @@
 #include "prescene/interfaces/ros_messages/schemas.h"
 #include "prescene/tests/interfaces/ros_messages/schema_walk.h"
 #include "prescene/tests/support/paths.h"
+#include "tree_kinds.h"
 
 using namespace prescene;              // NOLINT(google-build-using-namespace)
 using namespace prescene::interfaces;  // NOLINT(google-build-using-namespace)
@@ -94,6 +95,17 @@ void write_tree_file_seeds() {
   write_seed("tree_file", "other_kind", collision::TreeFileWriter({.kind = "other"}).add(std::span(words)).bytes());
 }
 
+void write_tree_seeds() {
+  core::ThreadPool one(1);
+  for (std::size_t kind = 0; kind < tests::kTreeKinds; ++kind) {
+    tests::visit_tree_kind(kind, [&]<class Tree>(const auto& options) {
+      std::vector<std::uint8_t> bytes = tests::file_bytes(Tree::build(tests::tree_kinds_mesh(), options, one));
+      bytes.insert(bytes.begin(), static_cast<std::uint8_t>(kind));
+      write_seed("trees", std::to_string(kind), bytes);
+    });
+  }
+}
+
 void write_recording_seed(const std::string& name, McapCompression compression, std::size_t chunk_bytes) {
   const tests::ScratchDir scratch;
   auto writer = McapWriter::create(scratch.path() / "a", {.compression = compression, .chunk_bytes = chunk_bytes});
@@ -147,6 +159,7 @@ int main(int argc, char** argv) {
   write_image_seeds();
   write_mesh_seeds();
   write_tree_file_seeds();
+  write_tree_seeds();
   write_recording_seed("none", McapCompression::kNone, 600);
   write_recording_seed("lz4", McapCompression::kLz4, 1500);
   write_recording_seed("zstd", McapCompression::kZstd, 1500);

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include "dop_cases.h"
 #include "prescene/collision/dops/boxtree.h"
@@ -60,16 +58,6 @@ class TreeFiles : public ::testing::Test {
  protected:
   std::filesystem::path path() const { return folder_.path() / "tree"; }
 
-  std::vector<std::uint8_t> bytes() const {
-    std::ifstream file(path(), std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
-  void write(const std::vector<std::uint8_t>& bytes) const {
-    std::filesystem::remove(path());
-    std::ofstream file(path(), std::ios::binary);
-    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  }
-
   template <class Tree, class Options>
   void expect_kept(const Options& options) {
     for (const DopCase& pair : dop_cases()) {
@@ -78,6 +66,9 @@ class TreeFiles : public ::testing::Test {
       const auto loaded = Tree::load(path(), pair.a, options);
       ASSERT_TRUE(loaded.ok()) << loaded.status().message();
       EXPECT_TRUE(same(tree, *loaded)) << pair.name;
+      const auto from_memory = Tree::from_bytes(tree.file_bytes(), pair.a, options);
+      ASSERT_TRUE(from_memory.ok()) << from_memory.status().message();
+      EXPECT_TRUE(same(tree, *from_memory)) << pair.name;
       Options other = options;
       other.leaf_items += 1;
       EXPECT_EQ(Tree::load(path(), pair.a, other).status().code(), StatusCode::kInvalidInput);
@@ -90,8 +81,7 @@ class TreeFiles : public ::testing::Test {
   void expect_harmless(const Options& options) {
     const DopCase& pair = dop_cases()[2];
     const Tree right = Tree::build(pair.b, options, pool_);
-    ASSERT_TRUE(Tree::build(pair.a, options, pool_).save(path()).ok());
-    const std::vector<std::uint8_t> sound = bytes();
+    const std::vector<std::uint8_t> sound = Tree::build(pair.a, options, pool_).file_bytes();
     core::RandomStream random(1, core::Purpose::kTest);
     int refused = 0;
     for (int round = 0; round < 400; ++round) {
@@ -100,8 +90,7 @@ class TreeFiles : public ::testing::Test {
         damaged[256 + random.uniform_below(damaged.size() - 256)] ^=
             static_cast<std::uint8_t>(1U << random.uniform_below(8));
       seal_tree_file(damaged);
-      write(damaged);
-      const auto loaded = Tree::load(path(), pair.a, options);
+      const auto loaded = Tree::from_bytes(damaged, pair.a, options);
       if (!loaded.ok()) {
         ++refused;
         continue;
