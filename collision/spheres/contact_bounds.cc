@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "error_half_spaces.h"
 #include "prescene/collision/spheres/distance_probability.h"
 #include "prescene/core/random.h"
 
@@ -14,7 +15,6 @@ namespace prescene::collision {
 namespace {
 
 using Eigen::Vector3d;
-using geometry::Vector6d;
 
 double remainder_at(const RelativeUncertainty& between, const Vector3d& p) {
   return between.remainder((p - between.pivot()).norm());
@@ -39,34 +39,6 @@ double along_normal(const CriticalPairs& critical, std::size_t i, double deviati
   const double width = deviation > 0.0 ? 2.0 * static_cast<double>(critical.pairs.radii[i]) / deviation : 1e6;
   return core::normal_cdf(-margin) - core::normal_cdf(-margin - width);
 }
-
-/// P(one of four half-spaces of errors is entered): u_i . z >= h_i. At most the sum less the overlaps along a path.
-class HalfSpaces {
- public:
-  void add(const Vector6d& gradient, double gap) {
-    const double deviation = gradient.norm();
-    const std::size_t i = count_++;
-    unit_[i] = deviation > 0.0 ? Vector6d(gradient / deviation) : Vector6d(Vector6d::Zero());
-    threshold_[i] = deviation > 0.0 ? gap / deviation : (gap > 0.0 ? 40.0 : -40.0);
-  }
-  double probability() const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < count_; ++i) sum += core::normal_cdf(-threshold_[i]);
-    for (std::size_t i = 1; i < count_; ++i) {
-      // What is less than a thousandth of the sum is not worth the integral.
-      const double least = core::normal_cdf(-std::max(threshold_[i - 1], threshold_[i]));
-      if (least < 1e-3 * sum || sum < 1e-4) continue;
-      constexpr double kError = 1e-6;  // of joint_upper_tail
-      sum -= std::max(0.0, joint_upper_tail(threshold_[i - 1], threshold_[i], unit_[i - 1].dot(unit_[i])) - kError);
-    }
-    return std::min(1.0, sum);
-  }
-
- private:
-  std::array<Vector6d, 4> unit_;
-  std::array<double, 4> threshold_{};
-  std::size_t count_ = 0;
-};
 
 /// Bodies on both sides of a plane across `normal` touch only if some point of B crosses it. The height of B's points
 /// over the plane changes linearly with their place along the plane, so that one of the corners of a rectangle about
@@ -98,7 +70,7 @@ double crossing_bound(const SphereTree& a, const SphereTree& b, const RelativeUn
                 std::min(high_b(side[k], unknown), high_a(side[k], unknown) + moved)};
     if (range[k][0] > range[k][1]) return 0.0;
   }
-  HalfSpaces corners;
+  ErrorHalfSpaces corners;
   for (const auto& [i, j] : {std::pair(0U, 0U), std::pair(0U, 1U), std::pair(1U, 1U), std::pair(1U, 0U)}) {
     const Vector3d corner = lowest * normal + range[0][i] * side[0] + range[1][j] * side[1];
     corners.add(-between.displacement_at(corner).transpose() * normal, lowest - plane - missed);

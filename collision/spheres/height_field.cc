@@ -260,4 +260,51 @@ std::optional<double> HeightField::swept_sphere_contact(const Vector3d& from, co
   return first <= 1.0 ? std::optional(first) : std::nullopt;
 }
 
+double HeightField::reach_along(const Vector3d& direction, const Vector3d& centre, double radius) const {
+  const double limit = direction.dot(centre) + radius;
+  double reach = -std::numeric_limits<double>::infinity();
+  const auto take = [&](const Eigen::AlignedBox3d& part) {
+    if (!part.isEmpty())
+      reach = std::max(reach, direction.dot(part.center()) + 0.5 * direction.cwiseAbs().dot(part.sizes()));
+  };
+  // The sides, as far as they are near.
+  const Eigen::AlignedBox3d near(centre - Vector3d::Constant(radius), centre + Vector3d::Constant(radius));
+  const auto high = static_cast<double>(levels_.back().ranges[0].high);
+  const Vector3d end((grid_.columns - 1) * grid_.spacing_x, (grid_.rows - 1) * grid_.spacing_y, high);
+  const Vector3d bottom(0.0, 0.0, std::min(high, near.min().z()));
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::AlignedBox3d side(bottom, end);
+    side.max()[axis] = 0.0;
+    take(side.intersection(near));
+    side.min()[axis] = side.max()[axis] = end[axis];
+    take(side.intersection(near));
+  }
+  struct Square {
+    std::size_t level;
+    int column;
+    int row;
+  };
+  std::array<Square, 128> stack;  // As in nearest().
+  std::size_t size = 0;
+  stack[size++] = {levels_.size() - 1, 0, 0};
+  while (size > 0) {
+    const Square square = stack[--size];
+    const Eigen::AlignedBox3d about = box(square.level, square.column, square.row);
+    if (about.squaredExteriorDistance(centre) > radius * radius ||
+        direction.dot(about.center()) + 0.5 * direction.cwiseAbs().dot(about.sizes()) <= reach)
+      continue;
+    if (square.level == 0) {
+      for (const auto& [c, r] : {std::pair(0, 0), std::pair(1, 0), std::pair(0, 1), std::pair(1, 1)})
+        reach = std::max(reach, direction.dot(point(square.column + c, square.row + r)));
+      continue;
+    }
+    const Level& fine = levels_[square.level - 1];
+    for (int r = 2 * square.row; r < std::min(2 * square.row + 2, fine.rows); ++r) {
+      for (int c = 2 * square.column; c < std::min(2 * square.column + 2, fine.columns); ++c)
+        stack[size++] = {square.level - 1, c, r};
+    }
+  }
+  return std::min(reach, limit);
+}
+
 }  // namespace prescene::collision

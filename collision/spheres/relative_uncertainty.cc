@@ -38,6 +38,34 @@ double largest_eigenvalue(const Matrix3d& m) {
   return std::max(0.0, solver.eigenvalues()[2]) + 1e-7 * m.cwiseAbs().maxCoeff();
 }
 
+Matrix3d rotation_of(const Transform& X) {
+  return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X.rotation.data()).cast<double>();
+}
+Vector3d translation_of(const Transform& X) { return Eigen::Map<const Vector3f>(X.translation.data()).cast<double>(); }
+
+/// Bounds of turns about n, about axes across it, and of both; see kSizeFails: of three normal numbers, one alone or
+/// two exceed the radius a quarter as often at most.
+struct Turns {
+  double about;
+  double across;
+  double both;
+
+  Turns(const Matrix3d& covariance, const Vector3d& n, double reach)
+      : about(reach * std::sqrt(std::max(0.0, n.dot(covariance * n)))),
+        across(reach * std::sqrt(largest_across(covariance, n))),
+        both(std::hypot(about, across)) {}
+
+  static double largest_across(const Matrix3d& covariance, const Vector3d& n) {
+    const Vector3d u = n.unitOrthogonal();
+    const Vector3d v = n.cross(u);
+    const Vector3d Cu = covariance * u;
+    const double uu = u.dot(Cu);
+    const double vv = v.dot(covariance * v);
+    const double uv = v.dot(Cu);
+    return std::max(0.0, 0.5 * (uu + vv) + std::hypot(0.5 * (uu - vv), uv)) + 1e-12 * (uu + vv);
+  }
+};
+
 /// Lower triangular factor of a semidefinite matrix: rows without variance of their own get no column.
 bool factorize(const Matrix6d& covariance, Matrix6d& factor) {
   factor.setZero();
@@ -106,8 +134,7 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
 void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose& b) {
   const Matrix3d rotation = covariance_.topLeftCorner<3, 3>();
   const Matrix3d mixed = covariance_.bottomLeftCorner<3, 3>();  // E[tau phi^T]
-  const Vector3d p_AB(static_cast<double>(X_AB_.translation[0]), static_cast<double>(X_AB_.translation[1]),
-                      static_cast<double>(X_AB_.translation[2]));
+  const Vector3d p_AB = translation_of(X_AB_);
   pivot_ = p_AB;
   // The trace of covariance_at(p) is p^T M p + 2 v . p + const with M = tr(C) I - C and v = E[tau x phi].
   if (rotation.trace() > 0.0) {
@@ -121,17 +148,62 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
   linear_ = 2.0 * std::sqrt(largest_eigenvalue(mixed_at_pivot.transpose() * mixed_at_pivot));
   quadratic_ = largest_eigenvalue(rotation);
 
-  // |exp(phi) c - c - phi x c| <= |phi|^2 |c| / 2, and the errors of B are turned by those of A.
   const double reach = three_dimensional_radius(kSizeFails);
   const auto size = [&](const Matrix3d& covariance) { return reach * std::sqrt(largest_eigenvalue(covariance)); };
   const double turn_a = size(a.covariance.topLeftCorner<3, 3>());
   const double turn_b = size(b.covariance.topLeftCorner<3, 3>());
   const double shift = size(a.covariance.bottomRightCorner<3, 3>()) + size(b.covariance.bottomRightCorner<3, 3>());
-  const double of_b = 0.5 * turn_b * turn_b * (1.0 + turn_a) + turn_a * turn_b;
-  const double of_a = 0.5 * turn_a * turn_a;
-  remainder_slope_ = of_a + of_b + kFloatRounding;
-  remainder_ = of_b * (pivot_ - p_AB).norm() + of_a * pivot_.norm() + turn_a * shift +
-               kFloatRounding * (pivot_.norm() + p_AB.norm());
+  const double rounding = kFloatRounding * (pivot_.norm() + p_AB.norm());
+  // |exp(phi) c - c - phi x c| <= |phi|^2 |c| / 2, and the errors of the body that moves are turned by those of the one
+  // that looks.
+  const auto of_moving = [](double moving, double looking) {
+    return 0.5 * moving * moving * (1.0 + looking) + looking * moving;
+  };
+  const auto of_looking = [](double looking) { return 0.5 * looking * looking; };
+  remainder_slope_ = of_looking(turn_a) + of_moving(turn_b, turn_a) + kFloatRounding;
+  remainder_ = of_moving(turn_b, turn_a) * (pivot_ - p_AB).norm() + of_looking(turn_a) * pivot_.norm() +
+               turn_a * shift + rounding;
+  reversed_remainder_slope_ = of_looking(turn_b) + of_moving(turn_a, turn_b) + kFloatRounding;
+  turns_a_ = a.covariance.topLeftCorner<3, 3>();
+  const Matrix3d R_AB = rotation_of(X_AB_);
+  turns_b_ = R_AB * b.covariance.topLeftCorner<3, 3>() * R_AB.transpose();
+  most_turn_a_ = turn_a;
+  most_turn_b_ = turn_b;
+  most_shift_ = shift;
+  reversed_remainder_ = of_moving(turn_a, turn_b) * pivot_.norm() + of_looking(turn_b) * (pivot_ - p_AB).norm() +
+                        turn_b * shift + rounding;
+}
+
+RelativeUncertainty::Along RelativeUncertainty::reversed_along(const Vector3d& n, const Vector3d& p,
+                                                               double radius) const {
+  Along along;
+  along.tilt = std::sqrt(Turns::largest_across(covariance_.topLeftCorner<3, 3>(), n));
+  const Vector3d p_AB = translation_of(X_AB_);
+  const double of_p = p.norm() + radius;
+  const double from_b = (p - p_AB).norm() + radius;
+  along.remainder = 2.0 * kFloatRounding * (of_p + from_b + p_AB.norm());
+  const double reach = three_dimensional_radius(kSizeFails);
+  // n . (exp(phi) p - p - phi x p) with phi = about n + across, by the formula of Rodrigues: 1 - cos t <= t^2 / 2 and
+  // t - sin t <= t^3 / 6, and n . phi x (phi x p) = about (across . p) - across^2 (n . p).
+  if (most_turn_a_ > 0.0) {
+    const Turns a(turns_a_, n, reach);
+    const double height = std::abs(n.dot(p)) + radius;
+    const double beside = p.cross(n).norm() + radius;
+    along.remainder += a.across * (0.5 * (a.about * beside + a.across * height) + a.both * a.both / 6.0 * beside);
+  }
+  // B's turns turn n, and what they see has moved by A's errors.
+  if (most_turn_b_ > 0.0) {
+    const Turns b(turns_b_, n, reach);
+    const double moved = most_turn_a_ * of_p + most_shift_;
+    along.remainder += b.across * (moved + (0.5 * b.both + b.both * b.both / 6.0) * (from_b + moved));
+  }
+  along.remainder = std::min(along.remainder, reversed_remainder((p - pivot_).norm() + radius));
+  return along;
+}
+
+double RelativeUncertainty::reversed_displacement(const Vector3d& p) const {
+  const double moved = most_turn_a_ * p.norm() + most_shift_;
+  return moved + most_turn_b_ * ((p - translation_of(X_AB_)).norm() + moved);
 }
 
 Eigen::Matrix<double, 3, 6> RelativeUncertainty::displacement_at(const Vector3d& p) const {

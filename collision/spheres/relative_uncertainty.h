@@ -56,6 +56,19 @@ class RelativeUncertainty {
   double deviation_bound(double distance_to_pivot) const;
   /// Bound of what the first order misses at p, m; also holds the rounding of single precision.
   double remainder(double distance_to_pivot) const { return remainder_ + remainder_slope_ * distance_to_pivot; }
+  /// The same for A's points as seen from B: the one at p (m, in A) moves by -d(p) to first order.
+  double reversed_remainder(double distance_to_pivot) const {
+    return reversed_remainder_ + reversed_remainder_slope_ * distance_to_pivot;
+  }
+  /// How A's points move along a direction n (of unit length, in A) as seen from B: -n . d(p) to first order. Turns
+  /// about n, however large, hardly count.
+  struct Along {
+    double tilt = 0.0;       ///< Standard deviation of turns about axes across n, at most.
+    double remainder = 0.0;  ///< Bound of what the first order misses for all points within `radius` of p, m.
+  };
+  Along reversed_along(const Eigen::Vector3d& n, const Eigen::Vector3d& p, double radius = 0.0) const;
+  /// Bound of how far A's point at p moves as seen from B, m; fails as remainder() does.
+  double reversed_displacement(const Eigen::Vector3d& p) const;
   /// Where B is least uncertain, in A, m.
   const Eigen::Vector3d& pivot() const { return pivot_; }
 
@@ -85,6 +98,14 @@ class RelativeUncertainty {
   double quadratic_ = 0.0;
   double remainder_ = 0.0;
   double remainder_slope_ = 0.0;
+  double reversed_remainder_ = 0.0;
+  double reversed_remainder_slope_ = 0.0;
+  // Of the bodies' own turns, in A's axes, and bounds of turns and shifts.
+  Eigen::Matrix3d turns_a_ = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d turns_b_ = Eigen::Matrix3d::Zero();
+  double most_turn_a_ = 0.0;
+  double most_turn_b_ = 0.0;
+  double most_shift_ = 0.0;
 };
 
 }  // namespace prescene::collision

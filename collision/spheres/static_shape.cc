@@ -194,6 +194,10 @@ std::optional<double> TriangleSurface::swept_sphere_contact(const Vector3d& from
   return t <= 1.0 ? std::optional(t) : std::nullopt;
 }
 
+double TriangleSurface::reach_along(const Vector3d& direction, const Vector3d& centre, double radius) const {
+  return std::min(search_->reach_along(direction, centre, radius), direction.dot(centre) + radius);
+}
+
 bool TriangleSurface::is_within(const Vector3d& p_BQ, double below) const {
   if (below <= 0.0) return nearest(p_BQ, below).has_value();
   return search_->is_within(p_BQ, below * below) || (side_ == SurfaceSide::kSolid && search_->winding(p_BQ) > 0);

@@ -47,6 +47,13 @@ class StaticShape {
   /// B): 0 when it does at the start. Off by rounding in double precision, also for motions that graze. No allocation.
   virtual std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                                      double radius) const = 0;
+  /// Whether the shape is convex: then it lies behind the plane across the normal of each nearest place outside of it.
+  virtual bool is_convex() const { return false; }
+  /// Bound of how far the surface reaches: not less than direction . p for any of its points p within `radius` of
+  /// `centre` (m, in B); `direction` is of unit length. No allocation.
+  virtual double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const {
+    return direction.dot(centre) + radius;
+  }
 };
 
 /// All points with normal . p <= offset.
@@ -58,6 +65,7 @@ class HalfSpace final : public StaticShape {
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
   std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double radius) const override;
+  bool is_convex() const override { return true; }
   const Eigen::Vector3d& normal() const { return normal_; }
   double offset() const { return offset_; }
 
@@ -76,6 +84,7 @@ class PrimitiveShape final : public StaticShape {
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
   std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double radius) const override;
+  bool is_convex() const override { return true; }
 
  private:
   explicit PrimitiveShape(const geometry::Primitive& primitive) : primitive_(primitive) {}
@@ -98,6 +107,7 @@ class TriangleSurface final : public StaticShape {
   bool is_within(const Eigen::Vector3d& p_BQ, double below) const override;
   std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double radius) const override;
+  double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const override;
 
  private:
   TriangleSurface() = default;
@@ -125,6 +135,7 @@ class HeightField final : public StaticShape {
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
   std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double radius) const override;
+  double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const override;
   /// Of the surface above a point of the ground, m; nothing outside of the grid.
   std::optional<double> height(double x, double y) const;
 

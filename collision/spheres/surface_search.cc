@@ -164,6 +164,24 @@ double SurfaceSearch::first_contact(const SweptSphere& sphere) const {
   return first;
 }
 
+double SurfaceSearch::reach_along(const Vector3d& direction, const Vector3d& centre, double radius) const {
+  double reach = -std::numeric_limits<double>::infinity();
+  const double squared = radius * radius;
+  descend(
+      [&](const Box& box) {
+        const Eigen::AlignedBox3d b = aligned(box);
+        return direction.dot(b.center()) + 0.5 * direction.cwiseAbs().dot(b.sizes()) > reach &&
+               squared_distance(box, centre) <= squared;
+      },
+      [&](const Corners& t) {
+        const double of_this = std::max({direction.dot(t.a), direction.dot(t.b), direction.dot(t.c)});
+        if (of_this > reach && (nearest_on_triangle(centre, t.a, t.b, t.c) - centre).squaredNorm() <= squared)
+          reach = of_this;
+        return false;
+      });
+  return reach;
+}
+
 int SurfaceSearch::winding(const Vector3d& q) const {
   // Signed crossings of the ray from q along +z.
   int winding = 0;

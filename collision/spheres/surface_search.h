@@ -39,6 +39,9 @@ class SurfaceSearch {
   bool is_within(const Eigen::Vector3d& q, double bound) const;
   /// When the sphere first touches a triangle; SweptSphere::kNever when it does not. No allocation.
   double first_contact(const SweptSphere& sphere) const;
+  /// The largest direction . p over the corners of triangles within `radius` of `centre`; minus infinity when there are
+  /// none. No allocation.
+  double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const;
   /// How often a closed, oriented surface winds around q: 1 inside of one solid, 2 where two overlap, 0 outside. The
   /// signs of shared edges agree between their triangles, so that no crossing is missed or counted twice.
   int winding(const Eigen::Vector3d& q) const;

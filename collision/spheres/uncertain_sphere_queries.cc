@@ -9,6 +9,7 @@
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
 #include "uncertain_lanes.h"
+#include "uncertain_memory.h"
 
 namespace prescene::collision {
 
@@ -24,10 +25,8 @@ constexpr std::uint64_t kLineSeed = 1;
 // Pairs further apart touch with 0.13 % and push with 2e-4 of a deviation on average.
 constexpr float kWrenchReach = 3.0F;
 
-using LinePoints = std::array<Vector6d, ErrorLines::kCount>;
-
-LinePoints line_points() {
-  LinePoints points;
+std::array<Vector6d, ErrorLines::kCount> line_points() {
+  std::array<Vector6d, ErrorLines::kCount> points;
   const core::SobolNet net(6, kLineSeed);
   std::array<double, 6> uniform{};
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -39,15 +38,7 @@ LinePoints line_points() {
 
 }  // namespace
 
-struct UncertainScratch::Memory {
-  DescentStack stack;
-  CriticalPairs critical;
-  ErrorLines lines;
-  TouchingIntervals intervals;
-  LinePoints points = line_points();
-};
-
-UncertainScratch::UncertainScratch() : memory_(std::make_unique<Memory>()) {}
+UncertainScratch::UncertainScratch() : memory_(std::make_unique<Memory>()) { memory_->points = line_points(); }
 UncertainScratch::~UncertainScratch() = default;
 UncertainScratch::UncertainScratch(UncertainScratch&&) noexcept = default;
 UncertainScratch& UncertainScratch::operator=(UncertainScratch&&) noexcept = default;
@@ -55,8 +46,8 @@ UncertainScratch& UncertainScratch::operator=(UncertainScratch&&) noexcept = def
 namespace {
 
 /// Lines along the error that brings the most critical pair together, in the direction that closes its gap.
-void set_lines(const CriticalPair& leader, const RelativeUncertainty& between, const LinePoints& points,
-               ErrorLines* lines) {
+void set_lines(const CriticalPair& leader, const RelativeUncertainty& between,
+               const std::array<Vector6d, ErrorLines::kCount>& points, ErrorLines* lines) {
   Vector6d direction = -between.displacement_at(leader.b).transpose() * leader.normal();
   const double length = direction.norm();
   direction = length > 0.0 ? Vector6d(direction / length) : Vector6d(Vector6d::Unit(0));
