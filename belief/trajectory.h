@@ -36,6 +36,7 @@ struct Trajectory {
   std::vector<std::pair<int, int>> final_contacts;
   TrajectoryEnd end = TrajectoryEnd::kDuration;
   double simulated_seconds = 0.0;
+  double flown_seconds = 0.0;  ///< Of these, what took no search for contacts.
   friend bool operator==(const Trajectory&, const Trajectory&) = default;
 
   const WorldState& start() const { return states.front(); }

@@ -131,6 +131,15 @@ bool ActionPlayer::finished(double time) const {
   return true;
 }
 
+bool ActionPlayer::over(double time) const {
+  const auto done = [](const Step& step) { return step.done; };
+  const auto moved = [](const Hold& hold) {
+    return hold.control == Control::kCarried || hold.control == Control::kPoured;
+  };
+  return finished(time) && std::all_of(steps_.begin(), steps_.end(), done) &&
+         std::none_of(objects_.begin(), objects_.end(), moved);
+}
+
 void ActionPlayer::advance(double time, double dt, const std::vector<Pose>& poses, std::vector<Released>& released) {
   // Times are met to the nearest step, and rounding of step * count must not delay one.
   const double due = time + 0.5 * dt;

@@ -39,6 +39,8 @@ class ActionPlayer {
   Vector3d pusher_position(int pusher, double time) const;
   /// No action is due or under way, and no timeline has a waypoint to come.
   bool finished(double time) const;
+  /// Everything that was to come has been done, so that no kinematic body moves from `time` on.
+  bool over(double time) const;
 
   void save(ByteWriter& out) const;
   void restore(ByteReader& in);

@@ -124,11 +124,19 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
   // A duration is met to the nearest step; rounding in its division must not add one.
   const auto steps = static_cast<std::int64_t>(std::ceil(request.stop.duration / dt - 1e-6));
   double next_sample = request.sample_interval;
-  std::int64_t done = 0;
+  std::int64_t done = 0, flights = 0;
   while (done < steps) {
     if (cancellation && (done & 63) == 0 && cancellation->requested()) {
       trajectory.end = belief::TrajectoryEnd::kCancelled;
       break;
+    }
+    if (scene_->options.skip_flight) {
+      // Up to the step before the next that is kept or the last, which are taken as any other.
+      const double until = request.sample_interval > 0.0 ? std::min(next_sample / dt - 1.5, steps - 1.0) : steps - 1.0;
+      const int flown =
+          world.fly(static_cast<int>(std::min(until - static_cast<double>(done), 1e6)), request.stop.world_radius);
+      done += flown;
+      flights += flown;
     }
     const double begin = world.time();
     world.step();
@@ -161,6 +169,7 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
   }
   worker.contacts.finish(trajectory.contacts);
   trajectory.simulated_seconds = static_cast<double>(done) * dt;
+  trajectory.flown_seconds = static_cast<double>(flights) * dt;
 }
 
 }  // namespace

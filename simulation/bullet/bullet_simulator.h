@@ -36,6 +36,8 @@ struct BulletOptions {
   double touching_distance = 2e-4;
   /// Contacts that part for less than this are one interval, s; >= 0.
   double contact_merge_time = 0.02;
+  /// Steps in which nothing can touch anything are taken without looking for contacts; the same bits either way.
+  bool skip_flight = true;
   RestRule rest;
   DecompositionSettings decomposition;
 };

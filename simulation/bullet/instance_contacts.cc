@@ -6,25 +6,25 @@
 #include "instance_world.h"
 
 namespace prescene::simulation {
-namespace {
 
-// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
-constexpr double kContactMargin = 5e-4;
-
-}  // namespace
+InstanceWorld::Bounds InstanceWorld::parts_box(int index, const Frame& X_WO) const {
+  Bounds box{Vector3d::Constant(1e30), Vector3d::Constant(-1e30)};
+  const Matrix3d absolute = X_WO.R.cwiseAbs();
+  for (const Part& part : compiled(index).parts) {
+    const Vector3d center = X_WO * part.box_center;
+    const Vector3d half = absolute * part.box_half_size;
+    box.low = box.low.cwiseMin(center - half);
+    box.high = box.high.cwiseMax(center + half);
+  }
+  return box;
+}
 
 void InstanceWorld::sweep(int index) {
   Moving& m = moving_[static_cast<std::size_t>(index)];
   const CompiledBody& body = compiled(index);
-  m.low = Vector3d::Constant(1e30);
-  m.high = Vector3d::Constant(-1e30);
-  const Matrix3d absolute = m.X_WO.R.cwiseAbs();
-  for (const Part& part : body.parts) {
-    const Vector3d center = m.X_WO * part.box_center;
-    const Vector3d half = absolute * part.box_half_size;
-    m.low = m.low.cwiseMin(center - half);
-    m.high = m.high.cwiseMax(center + half);
-  }
+  const Bounds box = parts_box(index, m.X_WO);
+  m.low = box.low;
+  m.high = box.high;
   const double speed = std::max(m.velocity.norm(), m.velocity_before.norm());
   const double spin = std::max(m.spin.norm(), m.spin_before.norm());
   m.travel = dt() * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body_motion.h"
 #include "prescene/core/check.h"
 
 namespace prescene::simulation {
@@ -20,20 +21,6 @@ std::unique_ptr<btRigidBody> make_rigid_body() {
   return body;
 }
 
-Matrix3d world_inertia(const Quaterniond& R_WO, const CompiledBody& body, double mass) {
-  const Matrix3d R_WP = R_WO.toRotationMatrix() * body.R_OP;
-  return R_WP * (mass * body.unit_moments).asDiagonal() * R_WP.transpose();
-}
-
-Matrix3d world_inverse_inertia(const Quaterniond& R_WO, const CompiledBody& body, double mass) {
-  const Matrix3d R_WP = R_WO.toRotationMatrix() * body.R_OP;
-  return R_WP * (mass * body.unit_moments).cwiseInverse().asDiagonal() * R_WP.transpose();
-}
-
-Quaterniond turned(const Quaterniond& R, const Vector3d& rotation_vector) {
-  return (geometry::exp_rotation(rotation_vector) * R).normalized();
-}
-
 }  // namespace
 
 InstanceWorld::InstanceWorld(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)), player_(*scene_) {
@@ -47,6 +34,15 @@ InstanceWorld::InstanceWorld(std::shared_ptr<const CompiledScene> scene) : scene
   contact_keys_.reserve(kTypicalContacts);
   warm_.reserve(kTypicalContacts);
   points_.reserve(kTypicalContacts);
+  for (int i = 0; i < scene_->support_count; ++i) {
+    const CompiledBody& body = scene_->bodies[static_cast<std::size_t>(scene_->object_count + i)];
+    const Frame X_WS(body.X_WO);
+    for (const Part& part : body.parts) {
+      const Vector3d center = X_WS * part.box_center;
+      const Vector3d half = X_WS.R.cwiseAbs() * part.box_half_size + Vector3d::Constant(kContactMargin);
+      fixed_parts_.push_back({center - half, center + half});
+    }
+  }
 }
 
 const CompiledBody& InstanceWorld::compiled(int body) const {
@@ -176,23 +172,13 @@ void InstanceWorld::place_kinematic() {
 }
 
 void InstanceWorld::place_dynamic() {
-  const Vector3d& gravity = scene_->scene.gravity_W;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const Object& object = objects_[i];
     Moving& m = moving_[i];
     m.present = !object.frozen;
     if (object.held || object.frozen) continue;
-    const CompiledBody& body = scene_->bodies[i];
-    // Without contact the step ends here: a parabola, and a rotation that keeps the angular momentum (midpoint rule).
-    Flight& flight = flights_[i];
-    flight.v_WCm = object.v_WCm + dt() * gravity;
-    flight.p_WCm = object.p_WCm + 0.5 * dt() * (object.v_WCm + flight.v_WCm);
-    const Vector3d momentum = world_inertia(object.R_WO, body, 1.0) * object.w_WO;
-    const Quaterniond middle = turned(object.R_WO, 0.5 * dt() * object.w_WO);
-    const Vector3d w_middle = world_inverse_inertia(middle, body, 1.0) * momentum;
-    flight.R_WO = turned(object.R_WO, dt() * w_middle);
-    flight.w_WO = world_inverse_inertia(flight.R_WO, body, 1.0) * momentum;
-
+    flights_[i] = flight_of(object, scene_->bodies[i]);
+    const Flight& flight = flights_[i];
     m.dynamic = true;
     m.X_WO = Frame(object_pose(object));
     m.p_WCm = object.p_WCm;

@@ -26,11 +26,18 @@ struct Touch {
 
 class InstanceWorld {
  public:
+  /// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
+  static constexpr double kContactMargin = 5e-4;
+
   explicit InstanceWorld(std::shared_ptr<const CompiledScene> scene);
 
   /// Starts over from `start`; nothing of what was before remains.
   void reset(const belief::WorldState& start, const std::vector<belief::Action>& actions, core::RandomStream stream);
   void step();
+  /// Takes up to `most` steps at once in which nothing can touch anything, as bounds on the ways of all objects say,
+  /// and returns how many: 0 when something might. Leaves the same bits as that many calls of step(). Ends early where
+  /// something becomes calm, and does not start where an object might get beyond `world_radius` (m).
+  int fly(int most, double world_radius);
 
   double time() const;
   double dt() const { return scene_->options.step; }
@@ -82,6 +89,10 @@ class InstanceWorld {
     bool held = false;
     bool frozen = false;
   };
+  struct Flight {
+    Vector3d p_WCm, v_WCm, w_WO;
+    Quaterniond R_WO;
+  };
   /// Geometry and motion of any body during a step.
   struct Moving {
     Frame X_WO;
@@ -107,9 +118,23 @@ class InstanceWorld {
     bool supported = false;      // some contact held it all along
     bool bounced = false;
   };
-  struct Flight {
-    Vector3d p_WCm, v_WCm, w_WO;
-    Quaterniond R_WO;
+
+  /// A box fixed in W.
+  struct Bounds {
+    Vector3d low = Vector3d::Zero();
+    Vector3d high = Vector3d::Zero();
+    bool overlaps(const Bounds& other) const {
+      return (low.array() <= other.high.array()).all() && (other.low.array() <= high.array()).all();
+    }
+  };
+  /// What bounds an object's way through the air; of one call of fly().
+  struct Flyer {
+    int object = 0;
+    Vector3d low = Vector3d::Zero();  // of its parts as they stand now, from its centre of mass
+    Vector3d high = Vector3d::Zero();
+    double radius = 0.0;  // of its farthest point from its centre of mass
+    double spin = 0.0;    // rad/s, never exceeded
+    Bounds bounds;        // of all that it and its steps' reach meet within the horizon
   };
 
   int body_count() const { return static_cast<int>(scene_->bodies.size()) + player_.pusher_count(); }
@@ -117,6 +142,10 @@ class InstanceWorld {
   void run_actions();
   void place_kinematic();
   void place_dynamic();
+  Flight flight_of(const Object& object, const CompiledBody& body) const;
+  bool list_flyers();
+  bool clear_for(int steps, double world_radius);
+  Bounds parts_box(int body, const Frame& X_WO) const;
   void sweep(int body);
   void find_contacts();
   void find_pair(int a, int b);
@@ -143,6 +172,8 @@ class InstanceWorld {
   SolverSettings settings_;
   std::vector<Moving> moving_;
   std::vector<Flight> flights_;
+  std::vector<Flyer> flyers_;
+  std::vector<Bounds> fixed_parts_;  // of the supports, with the margin at which contacts are made
   std::vector<ContactPoint> points_;
   std::vector<SolverContact> contacts_;
   std::vector<std::uint64_t> contact_keys_;
