@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "mesh_holes.h"
+#include "prescene/collision/point_queries.h"
 #include "prescene/core/check.h"
-#include "surface_search.h"
+#include "surface_descent.h"
 
 namespace prescene::collision {
 namespace {
@@ -164,43 +165,49 @@ std::optional<double> PrimitiveShape::swept_sphere_contact(const Vector3d& from,
   return t;
 }
 
-core::Result<TriangleSurface> TriangleSurface::make(std::shared_ptr<const Mesh> mesh, SurfaceSide side) {
-  PRESCENE_CHECK(mesh != nullptr);
-  if (side == SurfaceSide::kSolid) PRESCENE_RETURN_IF_ERROR(check_closed(*mesh, open_edges(*mesh)));
-  TriangleSurface surface;
-  surface.search_ = std::make_shared<const SurfaceSearch>(mesh->vertices(), mesh->triangles());
-  surface.mesh_ = std::move(mesh);
-  surface.side_ = side;
-  return surface;
+core::Result<TriangleSurface> TriangleSurface::make(std::shared_ptr<const TriangleTree> tree, SurfaceSide side) {
+  PRESCENE_CHECK(tree != nullptr);
+  const Mesh& mesh = tree->mesh();
+  if (side == SurfaceSide::kSolid) PRESCENE_RETURN_IF_ERROR(check_closed(mesh, open_edges(mesh)));
+  return TriangleSurface(std::move(tree), side);
+}
+
+core::Result<TriangleSurface> TriangleSurface::make(std::shared_ptr<const Mesh> mesh, SurfaceSide side,
+                                                    core::ThreadPool& pool) {
+  return make(std::make_shared<const TriangleTree>(TriangleTree::build(std::move(mesh), {}, pool)), side);
+}
+
+bool TriangleSurface::is_inside(const Vector3d& p_BQ) const {
+  return side_ == SurfaceSide::kSolid && winding_number(*tree_, p_BQ) > 0;
 }
 
 std::optional<Nearest> TriangleSurface::nearest(const Vector3d& p_BQ, double below) const {
-  const bool inside = side_ == SurfaceSide::kSolid && search_->winding(p_BQ) > 0;
+  const bool inside = is_inside(p_BQ);
   if (!inside && below <= 0.0) return std::nullopt;
-  const auto found = inside ? search_->nearest(p_BQ) : search_->nearest(p_BQ, below * below);
-  if (found.triangle == SurfaceSearch::kNone) return std::nullopt;
-  const double distance = std::sqrt(found.squared_distance);
+  const auto found = inside ? nearest_point(*tree_, p_BQ) : nearest_point(*tree_, p_BQ, below);
+  if (!found) return std::nullopt;
   // On the surface itself: the way that the triangle faces.
-  const auto corners = mesh_->corners(found.triangle);
+  const auto corners = tree_->mesh().corners(found->triangle);
   const Vector3d facing = (corners[1] - corners[0]).cast<double>().cross((corners[2] - corners[0]).cast<double>());
-  const Vector3d out = inside ? Vector3d(found.point - p_BQ) : Vector3d(p_BQ - found.point);
-  return if_below({inside ? -distance : distance, direction(out, direction(facing, Vector3d::UnitZ()))}, below);
+  const Vector3d out = inside ? Vector3d(found->point - p_BQ) : Vector3d(p_BQ - found->point);
+  return if_below({inside ? -found->distance : found->distance, direction(out, direction(facing, Vector3d::UnitZ()))},
+                  below);
 }
 
 std::optional<double> TriangleSurface::swept_sphere_contact(const Vector3d& from, const Vector3d& to,
                                                             double radius) const {
-  if (side_ == SurfaceSide::kSolid && search_->winding(from) > 0) return 0.0;
-  const double t = search_->first_contact(SweptSphere(from, to, radius));
+  if (is_inside(from)) return 0.0;
+  const double t = first_contact(*tree_, SweptSphere(from, to, radius));
   return t <= 1.0 ? std::optional(t) : std::nullopt;
 }
 
 double TriangleSurface::reach_along(const Vector3d& direction, const Vector3d& centre, double radius) const {
-  return std::min(search_->reach_along(direction, centre, radius), direction.dot(centre) + radius);
+  return std::min(collision::reach_along(*tree_, direction, centre, radius), direction.dot(centre) + radius);
 }
 
 bool TriangleSurface::is_within(const Vector3d& p_BQ, double below) const {
   if (below <= 0.0) return nearest(p_BQ, below).has_value();
-  return search_->is_within(p_BQ, below * below) || (side_ == SurfaceSide::kSolid && search_->winding(p_BQ) > 0);
+  return collision::is_within(*tree_, p_BQ, below) || is_inside(p_BQ);
 }
 
 }  // namespace prescene::collision

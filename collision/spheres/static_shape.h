@@ -3,7 +3,7 @@
 // closed, and height fields. Supports are rarely solids that spheres could fill.
 //
 //   PRESCENE_TRY(const HalfSpace table, HalfSpace::make({0, 0, 1}, 0.72));
-//   PRESCENE_TRY(const TriangleSurface shelf, TriangleSurface::make(mesh, SurfaceSide::kBoth));
+//   PRESCENE_TRY(const TriangleSurface shelf, TriangleSurface::make(mesh, SurfaceSide::kBoth, pool));
 //   const Restitution push = restitution(cup, shelf, X_CS, {}, scratch);     // static_shape_queries.h
 #pragma once
 
@@ -12,15 +12,16 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "prescene/collision/mesh.h"
+#include "prescene/collision/triangle_tree.h"
+#include "prescene/core/parallel.h"
 #include "prescene/core/status.h"
 #include "prescene/geometry/primitives.h"
 
 namespace prescene::collision {
-
-class SurfaceSearch;
 
 /// A shape that knows its distance from a point. Immutable.
 class StaticShape {
@@ -98,23 +99,27 @@ enum class SurfaceSide {
   kSolid,  ///< What the surface encloses belongs to the shape: it must be closed.
 };
 
-/// Triangles.
+/// Triangles, and the tree over them that the queries of triangles use as well: it may be shared and come from a file.
 class TriangleSurface final : public StaticShape {
  public:
-  /// Fails with kInvalidInput, naming the mesh and a place, when it shall be solid and is open.
-  static core::Result<TriangleSurface> make(std::shared_ptr<const Mesh> mesh, SurfaceSide side);
+  /// Fails with kInvalidInput, naming the mesh and a place, when it shall be solid and is open. The tree is there
+  /// (checked).
+  static core::Result<TriangleSurface> make(std::shared_ptr<const TriangleTree> tree, SurfaceSide side);
+  /// The same with a tree of its own.
+  static core::Result<TriangleSurface> make(std::shared_ptr<const Mesh> mesh, SurfaceSide side, core::ThreadPool& pool);
   std::optional<Nearest> nearest(const Eigen::Vector3d& p_BQ, double below) const override;
   bool is_within(const Eigen::Vector3d& p_BQ, double below) const override;
   std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double radius) const override;
   double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const override;
+  const std::shared_ptr<const TriangleTree>& tree() const { return tree_; }
 
  private:
-  TriangleSurface() = default;
+  TriangleSurface(std::shared_ptr<const TriangleTree> tree, SurfaceSide side) : tree_(std::move(tree)), side_(side) {}
+  bool is_inside(const Eigen::Vector3d& p_BQ) const;
 
-  std::shared_ptr<const Mesh> mesh_;
-  std::shared_ptr<const SurfaceSearch> search_;
-  SurfaceSide side_ = SurfaceSide::kBoth;
+  std::shared_ptr<const TriangleTree> tree_;
+  SurfaceSide side_;
 };
 
 /// Heights over a regular grid of points; the ground below them belongs to the shape as far as the grid goes. Each cell

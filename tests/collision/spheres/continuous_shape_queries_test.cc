@@ -228,8 +228,8 @@ TEST(ContinuousShapeQueries, MotionsAlongASurfaceEnd) {
   top.triangles = {{0, 1, 2}, {0, 2, 3}};
   std::vector<std::unique_ptr<StaticShape>> tables;
   tables.push_back(std::make_unique<HalfSpace>(*HalfSpace::make(Vector3d::UnitZ(), 0.0)));
-  tables.push_back(
-      std::make_unique<TriangleSurface>(*TriangleSurface::make(*Mesh::make(top, "top"), SurfaceSide::kBoth)));
+  tables.push_back(std::make_unique<TriangleSurface>(
+      *TriangleSurface::make(*Mesh::make(top, "top"), SurfaceSide::kBoth, shape_pool())));
   tables.push_back(std::make_unique<HeightField>(*HeightField::make({3, 3, 1.0, 1.0, std::vector<float>(9)}, "field")));
   SweepScratch scratch;
   for (const std::unique_ptr<StaticShape>& table : tables) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "every_shape.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/triangle_distance.h"
 #include "prescene/tests/support/generators.h"
@@ -46,7 +47,7 @@ TEST(PrimitiveShape, AgreesWithItsMesh) {
   // Of shapes with flat faces, exactly.
   const geometry::BoxShape box{{0.2, 0.3, 0.4}};
   const auto shape = *PrimitiveShape::make(box);
-  const auto solid = *TriangleSurface::make(to_mesh(geometry::make_mesh(box)), SurfaceSide::kSolid);
+  const auto solid = *TriangleSurface::make(to_mesh(geometry::make_mesh(box)), SurfaceSide::kSolid, shape_pool());
   EXPECT_TRUE(rc::check([&] {
     const Vector3d p = *tests::vectors(0.4);
     RC_ASSERT(std::abs(shape.nearest(p, kFar)->distance - solid.nearest(p, kFar)->distance) < 1e-6);
@@ -56,7 +57,8 @@ TEST(PrimitiveShape, AgreesWithItsMesh) {
        std::vector<geometry::Primitive>{geometry::Cylinder{0.2, 0.3}, geometry::Cone{0.2, 0.3},
                                         geometry::Capsule{0.1, 0.3}, geometry::Sphere{0.2}}) {
     const auto exact = *PrimitiveShape::make(round);
-    const auto facets = *TriangleSurface::make(to_mesh(geometry::make_mesh(round, 256)), SurfaceSide::kSolid);
+    const auto facets =
+        *TriangleSurface::make(to_mesh(geometry::make_mesh(round, 256)), SurfaceSide::kSolid, shape_pool());
     core::RandomStream stream(4, core::Purpose::kTest);
     for (int i = 0; i < 200; ++i) {
       const Vector3d p(stream.uniform(-0.4, 0.4), stream.uniform(-0.4, 0.4), stream.uniform(-0.4, 0.4));
@@ -77,13 +79,29 @@ TEST(TriangleSurface, SheetPushesToBothSides) {
   geometry::TriangleMesh sheet;
   sheet.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   sheet.triangles = {{0, 1, 2}};
-  const auto surface = *TriangleSurface::make(to_mesh(sheet), SurfaceSide::kBoth);
+  const auto surface = *TriangleSurface::make(to_mesh(sheet), SurfaceSide::kBoth, shape_pool());
   EXPECT_EQ(surface.nearest({0.2, 0.2, 0.1}, kFar)->normal, Vector3d(0, 0, 1));
   EXPECT_EQ(surface.nearest({0.2, 0.2, -0.1}, kFar)->normal, Vector3d(0, 0, -1));
   EXPECT_EQ(surface.nearest({0.2, 0.2, 0.0}, kFar)->normal, Vector3d(0, 0, 1));
   EXPECT_FALSE(surface.nearest({0.2, 0.2, 0.1}, 0.05).has_value());
-  EXPECT_THAT(TriangleSurface::make(to_mesh(sheet), SurfaceSide::kSolid).status().message(),
+  EXPECT_THAT(TriangleSurface::make(to_mesh(sheet), SurfaceSide::kSolid, shape_pool()).status().message(),
               HasSubstr("mesh 'shelf': it is open"));
+}
+
+TEST(TriangleSurface, SharesATreeThatCameFromAFile) {
+  const auto mesh = to_mesh(geometry::make_open_bin({0.3, 0.2, 0.1}, 0.01));
+  const TriangleTree built = TriangleTree::build(mesh, {}, shape_pool());
+  const auto loaded = TriangleTree::from_bytes(built.bytes(), mesh, {});
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const auto tree = std::make_shared<const TriangleTree>(*loaded);
+  const auto shared = *TriangleSurface::make(tree, SurfaceSide::kSolid);
+  const auto own = *TriangleSurface::make(mesh, SurfaceSide::kSolid, shape_pool());
+  EXPECT_EQ(shared.tree(), tree);
+  core::RandomStream stream(5, core::Purpose::kTest);
+  for (int i = 0; i < 200; ++i) {
+    const Vector3d p(stream.uniform(-0.3, 0.3), stream.uniform(-0.3, 0.3), stream.uniform(-0.1, 0.3));
+    EXPECT_EQ(shared.nearest(p, kFar)->distance, own.nearest(p, kFar)->distance);
+  }
 }
 
 TEST(TriangleSurface, DistancesObeyTheirLaws) {
@@ -91,8 +109,8 @@ TEST(TriangleSurface, DistancesObeyTheirLaws) {
     const auto mesh = to_mesh(*tests::closed_meshes());
     const Vector3d p = *tests::vectors(1.0);
     const Vector3d way = *tests::vectors(0.2);
-    check_laws(*TriangleSurface::make(mesh, SurfaceSide::kSolid), p, way);
-    check_laws(*TriangleSurface::make(mesh, SurfaceSide::kBoth), p, way);
+    check_laws(*TriangleSurface::make(mesh, SurfaceSide::kSolid, shape_pool()), p, way);
+    check_laws(*TriangleSurface::make(mesh, SurfaceSide::kBoth, shape_pool()), p, way);
   }));
 }
 

@@ -141,12 +141,12 @@ std::shared_ptr<const StaticShape> sheet() {
   geometry::TriangleMesh top;
   top.vertices = {{-0.5, -0.4, 0}, {0.5, -0.4, 0}, {0.5, 0.4, 0}, {-0.5, 0.4, 0}};
   top.triangles = {{0, 1, 2}, {0, 2, 3}};
-  return shared(TriangleSurface::make(*Mesh::make(top, "top"), SurfaceSide::kBoth));
+  return shared(TriangleSurface::make(*Mesh::make(top, "top"), SurfaceSide::kBoth, shape_pool()));
 }
 
 std::shared_ptr<const StaticShape> table(SurfaceSide side) {
   const auto mesh = geometry::make_mesh(geometry::BoxShape{{0.6, 0.5, 0.04}});
-  return shared(TriangleSurface::make(*Mesh::make(mesh, "table"), side));
+  return shared(TriangleSurface::make(*Mesh::make(mesh, "table"), side, shape_pool()));
 }
 
 std::shared_ptr<const StaticShape> field(float step) {
