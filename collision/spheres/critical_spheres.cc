@@ -45,12 +45,12 @@ class Keeper {
     if (critical_.size < CriticalSpheres::kMost) {
       critical_.spheres[critical_.size++] = sphere;
     } else {
-      CriticalSphere& worst = *find_worst();
-      leave_out(worst.margin);
-      worst = sphere;
+      leave_out(worst_->margin);
+      *worst_ = sphere;
     }
     if (critical_.size < CriticalSpheres::kMost) return;
-    limit_ = std::min(limit_, find_worst()->rank);
+    worst_ = find_worst();
+    limit_ = std::min(limit_, worst_->rank);
     // All touch at the mean: finding more of them would take as long as finding all.
     if (limit_ <= 0.0) end();
   }
@@ -73,7 +73,8 @@ class Keeper {
 
   CriticalSpheres& critical_;
   double region_;
-  double limit_ = kLargestMargin;  // The largest rank kept once there is no more room.
+  CriticalSphere* worst_ = nullptr;  // Once there is no more room.
+  double limit_ = kLargestMargin;    // The largest rank kept once there is no more room.
   bool ended_ = false;
 };
 
@@ -89,7 +90,7 @@ CriticalSphere UncertainShape::look_at(const PackedSphere& sphere, const StaticS
   critical.radius = static_cast<double>(sphere.radius);
   critical.normal = placement_.R_AB * nearest.normal;
   critical.gap = nearest.distance - critical.radius;
-  critical.slope = -between_.displacement_at(critical.centre).transpose() * critical.normal;
+  critical.slope = between_.slope_along(critical.normal, critical.centre);
   critical.deviation = critical.slope.norm();
   critical.rank = in_deviations(critical.gap, critical.deviation);
   return critical;
@@ -102,25 +103,25 @@ UncertainShape::Bounds UncertainShape::bounds_of(const PackedSphere& bounding,
   const double far = to_pivot(c) + radius;
   const double gap = nearest.distance - radius;
   const double deviation = between_.deviation_bound(far);
-  Bounds bounds{in_deviations(gap, deviation), 0.0};
   if (convex_ && nearest.distance > 0.0) {
     // What touches the shape has come to the plane before it.
     const Vector3d n = placement_.R_AB * nearest.normal;
-    const RelativeUncertainty::Along along = between_.reversed_along(n, c, radius);
-    const double along_n = (between_.displacement_at(c).transpose() * n).norm() + radius * along.tilt;
-    bounds.margin = in_deviations(gap - along.remainder, std::min(along_n, deviation));
-  } else {
-    // Distances change by at most the displacement.
-    bounds.margin = in_deviations(gap - between_.reversed_remainder(far), deviation);
+    const double along_n = std::min(between_.slope_along(n, c).norm() + radius * along(n).tilt(), deviation);
+    return {in_deviations(gap, along_n), in_deviations(gap - along(n).remainder(c, radius), along_n)};
   }
-  return bounds;
+  // Distances change by at most the displacement.
+  return {in_deviations(gap, deviation), in_deviations(gap - between_.reversed_remainder(far), deviation)};
+}
+
+const RelativeUncertainty::Along& UncertainShape::along(const Vector3d& n) const {
+  if (n != along_.direction()) along_ = between_.reversed_along(n);
+  return along_;
 }
 
 double UncertainShape::margin_of(const CriticalSphere& sphere) const {
   const bool outside = sphere.gap + sphere.radius > 0.0;
   if (convex_ && outside)
-    return in_deviations(sphere.gap - between_.reversed_along(sphere.normal, sphere.centre).remainder,
-                         sphere.deviation);
+    return in_deviations(sphere.gap - along(sphere.normal).remainder(sphere.centre), sphere.deviation);
   const double far = to_pivot(sphere.centre);
   return in_deviations(sphere.gap - between_.reversed_remainder(far), between_.deviation_bound(far));
 }
@@ -189,7 +190,7 @@ double UncertainShape::touches_ball(const CriticalSphere& sphere, double ball, d
   if (const double radii = sphere.radius + ball; sideways < radii) {
     const double half = std::sqrt((radii - sideways) * (radii + sideways));
     const double deviation = std::max(sphere.deviation, kLeastDeviation);
-    const double missed_along = between_.reversed_along(sphere.normal, sphere.centre).remainder;
+    const double missed_along = along(sphere.normal).remainder(sphere.centre);
     // Written so that nothing cancels where the ball is huge.
     const double depth = sphere.radius + (ball - apart) - sideways * sideways / (radii + half) - missed_along;
     probability = core::normal_cdf(depth / deviation) - core::normal_cdf((missed_along - apart - half) / deviation) -
@@ -225,7 +226,7 @@ double UncertainShape::touches_face(const CriticalSphere& sphere) const {
   const double far = to_pivot(sphere.centre);
   const double missed = between_.reversed_remainder(far);
   const double most = between_.reversed_displacement(sphere.centre);
-  const double missed_along = between_.reversed_along(sphere.normal, sphere.centre).remainder;
+  const double missed_along = along(sphere.normal).remainder(sphere.centre);
   const double distance = sphere.gap + sphere.radius;
   const double deviation = std::max(sphere.deviation, kLeastDeviation);
   // Points of the shape's surface are known to that, m.
@@ -309,7 +310,7 @@ double UncertainShape::crossing_bound(const CriticalSphere& leader) const {
     outside += 1.0 - between_.confidence();
   }
   const double lowest = -reach_along(a_, -n, 0.02 * leader.deviation);
-  const double gap = lowest - plane - between_.reversed_along(n, middle, radius).remainder;
+  const double gap = lowest - plane - along(n).remainder(middle, radius);
   if (gap <= 0.0) return 1.0;
   std::array<Vector3d, 2> side;
   side[0] = n.unitOrthogonal();
@@ -322,7 +323,7 @@ double UncertainShape::crossing_bound(const CriticalSphere& leader) const {
   ErrorHalfSpaces corners;
   for (const auto& [i, j] : {std::pair(0U, 0U), std::pair(0U, 1U), std::pair(1U, 1U), std::pair(1U, 0U)}) {
     const Vector3d corner = lowest * n + range[0][i] * side[0] + range[1][j] * side[1];
-    corners.add(between_.displacement_at(corner).transpose() * n, gap);
+    corners.add(between_.slope_along(-n, corner), gap);
   }
   return corners.probability() + outside;
 }

@@ -21,7 +21,12 @@ inline constexpr double kLeastDeviation = 1e-30;
 class UncertainShape {
  public:
   UncertainShape(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between)
-      : a_(a), b_(b), between_(between), placement_(a, between.X_AB()), convex_(b.is_convex()) {}
+      : a_(a),
+        b_(b),
+        between_(between),
+        placement_(a, between.X_AB()),
+        convex_(b.is_convex()),
+        along_(between.reversed_along(Eigen::Vector3d::UnitZ())) {}
 
   void find_critical(std::vector<UncertainScratch::Memory::OpenNode>* stack, CriticalSpheres* critical) const;
   /// Calls found(sphere) for each sphere whose gap is at most `reach` standard deviations along the normal.
@@ -40,6 +45,7 @@ class UncertainShape {
   };
 
   double to_pivot(const Eigen::Vector3d& c) const { return (c - between_.pivot()).norm(); }
+  const RelativeUncertainty::Along& along(const Eigen::Vector3d& n) const;
   Bounds bounds_of(const PackedSphere& bounding, const StaticShape::Nearest& nearest) const;
   CriticalSphere look_at(const PackedSphere& sphere, const StaticShape::Nearest& nearest) const;
   double margin_of(const CriticalSphere& sphere) const;
@@ -56,6 +62,7 @@ class UncertainShape {
   const RelativeUncertainty& between_;
   ShapePlacement placement_;
   bool convex_;
+  mutable RelativeUncertainty::Along along_;  // Of the last normal: neighbours often have the same.
 };
 
 template <class Found>

@@ -16,6 +16,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using geometry::Matrix6d;
+using geometry::Vector6d;
 
 constexpr double kSymmetric = 1e-6;
 // What is left of a pivot by cancellation, relative to the diagonal.
@@ -42,29 +43,6 @@ Matrix3d rotation_of(const Transform& X) {
   return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X.rotation.data()).cast<double>();
 }
 Vector3d translation_of(const Transform& X) { return Eigen::Map<const Vector3f>(X.translation.data()).cast<double>(); }
-
-/// Bounds of turns about n, about axes across it, and of both; see kSizeFails: of three normal numbers, one alone or
-/// two exceed the radius a quarter as often at most.
-struct Turns {
-  double about;
-  double across;
-  double both;
-
-  Turns(const Matrix3d& covariance, const Vector3d& n, double reach)
-      : about(reach * std::sqrt(std::max(0.0, n.dot(covariance * n)))),
-        across(reach * std::sqrt(largest_across(covariance, n))),
-        both(std::hypot(about, across)) {}
-
-  static double largest_across(const Matrix3d& covariance, const Vector3d& n) {
-    const Vector3d u = n.unitOrthogonal();
-    const Vector3d v = n.cross(u);
-    const Vector3d Cu = covariance * u;
-    const double uu = u.dot(Cu);
-    const double vv = v.dot(covariance * v);
-    const double uv = v.dot(Cu);
-    return std::max(0.0, 0.5 * (uu + vv) + std::hypot(0.5 * (uu - vv), uv)) + 1e-12 * (uu + vv);
-  }
-};
 
 /// Lower triangular factor of a semidefinite matrix: rows without variance of their own get no column.
 bool factorize(const Matrix6d& covariance, Matrix6d& factor) {
@@ -148,8 +126,10 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
   linear_ = 2.0 * std::sqrt(largest_eigenvalue(mixed_at_pivot.transpose() * mixed_at_pivot));
   quadratic_ = largest_eigenvalue(rotation);
 
-  const double reach = three_dimensional_radius(kSizeFails);
-  const auto size = [&](const Matrix3d& covariance) { return reach * std::sqrt(largest_eigenvalue(covariance)); };
+  size_radius_ = three_dimensional_radius(kSizeFails);
+  const auto size = [&](const Matrix3d& covariance) {
+    return size_radius_ * std::sqrt(largest_eigenvalue(covariance));
+  };
   const double turn_a = size(a.covariance.topLeftCorner<3, 3>());
   const double turn_b = size(b.covariance.topLeftCorner<3, 3>());
   const double shift = size(a.covariance.bottomRightCorner<3, 3>()) + size(b.covariance.bottomRightCorner<3, 3>());
@@ -174,31 +154,54 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
                         turn_b * shift + rounding;
 }
 
-RelativeUncertainty::Along RelativeUncertainty::reversed_along(const Vector3d& n, const Vector3d& p,
-                                                               double radius) const {
-  Along along;
-  along.tilt = std::sqrt(Turns::largest_across(covariance_.topLeftCorner<3, 3>(), n));
-  const Vector3d p_AB = translation_of(X_AB_);
+double RelativeUncertainty::Along::largest_across(const Matrix3d& covariance) const {
+  const Vector3d u = n_.unitOrthogonal();
+  const Vector3d v = n_.cross(u);
+  const Vector3d Cu = covariance * u;
+  const double uu = u.dot(Cu);
+  const double vv = v.dot(covariance * v);
+  const double uv = v.dot(Cu);
+  const double half = 0.5 * (uu - vv);
+  return std::max(0.0, 0.5 * (uu + vv) + std::sqrt(half * half + uv * uv)) + 1e-12 * (uu + vv);
+}
+
+// See kSizeFails: of three normal numbers, one alone or two exceed the radius a quarter as often at most.
+RelativeUncertainty::Along::Turns RelativeUncertainty::Along::turns(const Matrix3d& covariance) const {
+  Turns turns;
+  const double about = std::max(0.0, n_.dot(covariance * n_));
+  const double across = largest_across(covariance);
+  turns.about = between_->size_radius_ * std::sqrt(about);
+  turns.across = between_->size_radius_ * std::sqrt(across);
+  turns.both = between_->size_radius_ * std::sqrt(about + across);
+  return turns;
+}
+
+RelativeUncertainty::Along::Along(const RelativeUncertainty& between, const Vector3d& n)
+    : between_(&between), n_(n), tilt_(std::sqrt(largest_across(between.covariance_.topLeftCorner<3, 3>()))) {
+  if (between.most_turn_a_ > 0.0) a_ = turns(between.turns_a_);
+  if (between.most_turn_b_ > 0.0) b_ = turns(between.turns_b_);
+}
+
+double RelativeUncertainty::Along::remainder(const Vector3d& p, double radius) const {
+  const Vector3d p_AB = translation_of(between_->X_AB_);
   const double of_p = p.norm() + radius;
   const double from_b = (p - p_AB).norm() + radius;
-  along.remainder = 2.0 * kFloatRounding * (of_p + from_b + p_AB.norm());
-  const double reach = three_dimensional_radius(kSizeFails);
+  double missed = 2.0 * kFloatRounding * (of_p + from_b + p_AB.norm());
   // n . (exp(phi) p - p - phi x p) with phi = about n + across, by the formula of Rodrigues: 1 - cos t <= t^2 / 2 and
   // t - sin t <= t^3 / 6, and n . phi x (phi x p) = about (across . p) - across^2 (n . p).
-  if (most_turn_a_ > 0.0) {
-    const Turns a(turns_a_, n, reach);
-    const double height = std::abs(n.dot(p)) + radius;
-    const double beside = p.cross(n).norm() + radius;
-    along.remainder += a.across * (0.5 * (a.about * beside + a.across * height) + a.both * a.both / 6.0 * beside);
-  }
+  const double height = std::abs(n_.dot(p)) + radius;
+  const double beside = p.cross(n_).norm() + radius;
+  missed += a_.across * (0.5 * (a_.about * beside + a_.across * height) + a_.both * a_.both / 6.0 * beside);
   // B's turns turn n, and what they see has moved by A's errors.
-  if (most_turn_b_ > 0.0) {
-    const Turns b(turns_b_, n, reach);
-    const double moved = most_turn_a_ * of_p + most_shift_;
-    along.remainder += b.across * (moved + (0.5 * b.both + b.both * b.both / 6.0) * (from_b + moved));
-  }
-  along.remainder = std::min(along.remainder, reversed_remainder((p - pivot_).norm() + radius));
-  return along;
+  const double moved = between_->most_turn_a_ * of_p + between_->most_shift_;
+  missed += b_.across * (moved + (0.5 * b_.both + b_.both * b_.both / 6.0) * (from_b + moved));
+  return std::min(missed, between_->reversed_remainder((p - between_->pivot_).norm() + radius));
+}
+
+Vector6d RelativeUncertainty::slope_along(const Vector3d& n, const Vector3d& p) const {
+  Vector6d weights;
+  weights << p.cross(n), n;
+  return -(factor_.transpose() * weights);
 }
 
 double RelativeUncertainty::reversed_displacement(const Vector3d& p) const {

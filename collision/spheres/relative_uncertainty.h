@@ -62,11 +62,37 @@ class RelativeUncertainty {
   }
   /// How A's points move along a direction n (of unit length, in A) as seen from B: -n . d(p) to first order. Turns
   /// about n, however large, hardly count.
-  struct Along {
-    double tilt = 0.0;       ///< Standard deviation of turns about axes across n, at most.
-    double remainder = 0.0;  ///< Bound of what the first order misses for all points within `radius` of p, m.
+  class Along {
+   public:
+    const Eigen::Vector3d& direction() const { return n_; }
+    /// Standard deviation of turns about axes across n, at most.
+    double tilt() const { return tilt_; }
+    /// Bound of what the first order misses for all points within `radius` of p, m.
+    double remainder(const Eigen::Vector3d& p, double radius = 0.0) const;
+
+   private:
+    friend class RelativeUncertainty;
+    Along(const RelativeUncertainty& between, const Eigen::Vector3d& n);
+
+    // Bounds of a body's turns about n, about axes across it, and of both.
+    struct Turns {
+      double about = 0.0;
+      double across = 0.0;
+      double both = 0.0;
+    };
+    Turns turns(const Eigen::Matrix3d& covariance) const;
+    double largest_across(const Eigen::Matrix3d& covariance) const;
+
+    const RelativeUncertainty* between_;
+    Eigen::Vector3d n_;
+    double tilt_;
+    Turns a_;
+    Turns b_;
   };
-  Along reversed_along(const Eigen::Vector3d& n, const Eigen::Vector3d& p, double radius = 0.0) const;
+  /// The answer refers to this object.
+  Along reversed_along(const Eigen::Vector3d& n) const { return Along(*this, n); }
+  /// -n . d(p) = slope_along(n, p) . z with z standard normal in six dimensions.
+  geometry::Vector6d slope_along(const Eigen::Vector3d& n, const Eigen::Vector3d& p) const;
   /// Bound of how far A's point at p moves as seen from B, m; fails as remainder() does.
   double reversed_displacement(const Eigen::Vector3d& p) const;
   /// Where B is least uncertain, in A, m.
@@ -103,6 +129,7 @@ class RelativeUncertainty {
   // Of the bodies' own turns, in A's axes, and bounds of turns and shifts.
   Eigen::Matrix3d turns_a_ = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d turns_b_ = Eigen::Matrix3d::Zero();
+  double size_radius_ = 0.0;  // Standard deviations of the largest turns and shifts.
   double most_turn_a_ = 0.0;
   double most_turn_b_ = 0.0;
   double most_shift_ = 0.0;

@@ -48,7 +48,7 @@ struct UncertainScratch::Memory {
   /// Of a descent of one tree.
   struct OpenNode {
     std::uint32_t node;
-    double rank;    ///< No sphere below has less, where that is positive.
+    double rank;    ///< About the least of the spheres below.
     double margin;  ///< No sphere below has less.
   };
 

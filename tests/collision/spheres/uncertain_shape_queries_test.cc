@@ -388,8 +388,8 @@ TEST(UncertainShapeQueries, FirstOrderAndRemainderBoundTheDisplacementSeenFromTh
       const Vector3d random(stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-1, 1));
       const Vector3d n = i % 2 == 0 ? Vector3d(Vector3d::UnitZ()) : Vector3d(random.normalized());
       const double missed = std::abs(n.dot(moved + linear));
-      ASSERT_LE(missed, between->reversed_along(n, p).remainder);
-      ASSERT_LE(missed, between->reversed_along(n, p + Vector3d(0.01, 0.02, -0.02), 0.03).remainder);
+      ASSERT_LE(missed, between->reversed_along(n).remainder(p));
+      ASSERT_LE(missed, between->reversed_along(n).remainder(p + Vector3d(0.01, 0.02, -0.02), 0.03));
     }
   }
 }
