@@ -194,6 +194,12 @@ ShapeImpact impact_of(const SphereTree& a, const StaticShape& b, const Motion& m
   return impact;
 }
 
+bool is_finite(const Transform& X) {
+  const auto finite = [](float x) { return std::isfinite(x); };
+  return std::all_of(X.rotation.begin(), X.rotation.end(), finite) &&
+         std::all_of(X.translation.begin(), X.translation.end(), finite);
+}
+
 // The motion is cut so that spheres leave their chords by at most this share of the body's radius: less cuts more often
 // and prunes better.
 constexpr double kMostOff = 0.02;
@@ -209,6 +215,7 @@ int pieces_of(const SphereTree& a, const ScrewMotion& motion) {
 
 std::optional<ShapeImpact> time_of_impact(const SphereTree& a, const StaticShape& b, const Transform& X_AB_start,
                                           const Transform& X_AB_end, SweepScratch& scratch) {
+  if (!is_finite(X_AB_start) || !is_finite(X_AB_end)) return std::nullopt;
   StraightMotion motion(a, b, X_AB_start, X_AB_end);
   sweep(a, scratch, motion);
   if (!motion.earliest.found) return std::nullopt;

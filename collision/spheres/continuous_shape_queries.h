@@ -26,7 +26,8 @@ struct ShapeImpact {
 };
 
 /// Seen from B, A's spheres move along straight lines from where X_AB_start puts them to where X_AB_end does. Exact for
-/// that motion up to rounding in double precision; it is a rigid one when B does not turn.
+/// that motion up to rounding in double precision; it is a rigid one when B does not turn. Nothing for a transform that
+/// is not finite (to_transform refuses those).
 std::optional<ShapeImpact> time_of_impact(const SphereTree& a, const StaticShape& b, const Transform& X_AB_start,
                                           const Transform& X_AB_end, SweepScratch& scratch);
 

@@ -251,6 +251,22 @@ TEST(ContinuousShapeQueries, MotionsAlongASurfaceEnd) {
   }
 }
 
+TEST(ContinuousShapeQueries, TransformsThatAreNotFiniteMeetNothing) {
+  RandomStream stream(25, core::Purpose::kTest);
+  const auto tree = tree_of(cloud(stream, 20));
+  SweepScratch scratch;
+  for (const std::unique_ptr<StaticShape>& shape : every_shape()) {
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+      Transform shifted;
+      shifted.translation[1] = bad;
+      Transform turned;
+      turned.rotation[4] = bad;
+      EXPECT_FALSE(time_of_impact(*tree, *shape, Transform(), shifted, scratch));
+      EXPECT_FALSE(time_of_impact(*tree, *shape, turned, Transform(), scratch));
+    }
+  }
+}
+
 TEST(ContinuousShapeQueries, DoNotAllocateOnceWarm) {
   if (!tests::can_count_allocations()) GTEST_SKIP() << "allocations are not counted in this build";
   RandomStream stream(24, core::Purpose::kTest);
