@@ -19,6 +19,8 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double kLargestMargin = 1e6;
+// Places on the surface of a shape are off by no more, m.
+constexpr double kOnSurface = 1e-9;
 constexpr double kFails = RelativeUncertainty::kRemainderFails;
 
 /// Keeps the spheres with the least ranks.
@@ -208,7 +210,6 @@ double UncertainShape::touches_ball(const CriticalSphere& sphere, double ball, d
 /// nearest place and ends `to` behind it: by the corners of an octagon about it.
 bool UncertainShape::contains_prism(const CriticalSphere& sphere, double radius, double from, double to) const {
   constexpr double kCorner = 1.0823922002923940;  // 1 / cos(pi / 8)
-  constexpr double kOnSurface = 1e-9;
   const Vector3d n = placement_.R_AB.transpose() * sphere.normal;
   const Vector3d place = placement_.to_shape(sphere.centre) - (sphere.gap + sphere.radius) * n;
   const Vector3d u = n.unitOrthogonal();
@@ -221,16 +222,16 @@ bool UncertainShape::contains_prism(const CriticalSphere& sphere, double radius,
   return true;
 }
 
-/// P(the sphere touches the face of a convex shape that is nearest to it).
+/// P(the sphere touches the face that is nearest to it).
 double UncertainShape::touches_face(const CriticalSphere& sphere) const {
   const double far = to_pivot(sphere.centre);
   const double missed = between_.reversed_remainder(far);
   const double most = between_.reversed_displacement(sphere.centre);
-  const double missed_along = along(sphere.normal).remainder(sphere.centre);
   const double distance = sphere.gap + sphere.radius;
   const double deviation = std::max(sphere.deviation, kLeastDeviation);
-  // Points of the shape's surface are known to that, m.
-  constexpr double kSlack = 2e-9;
+  // The shape's surface is known to that, m.
+  const double slack = convex_ ? kOnSurface : kOnSurface + 0.01 * sphere.deviation;
+  const double off = along(sphere.normal).remainder(sphere.centre) + 2.0 * slack;
   for (const double k : {6.0, 4.0, 3.0, 2.0, 1.0}) {
     double sideways = k * between_.deviation_bound(far) + missed;
     double tail = sideways_tail(k);
@@ -238,23 +239,35 @@ double UncertainShape::touches_face(const CriticalSphere& sphere) const {
       sideways = most;
       tail = 0.0;
     }
-    for (const double depth : {1e4, 64.0 * sphere.radius, 8.0 * sphere.radius, sphere.radius, 0.0}) {
-      if (!contains_prism(sphere, sideways, 0.0, depth)) continue;
-      const double high = core::normal_cdf((sphere.radius - distance - missed_along - kSlack) / deviation);
-      const double low = core::normal_cdf((missed_along + kSlack - sphere.radius - depth - distance) / deviation);
-      return high - low - tail;
-    }
+    const std::optional<double> depth = face_depth(sphere, sideways, slack);
+    if (!depth) continue;
+    const double high = core::normal_cdf((sphere.radius - distance - off) / deviation);
+    const double low = core::normal_cdf((off - sphere.radius - *depth - distance) / deviation);
+    return high - low - tail;
   }
   return 0.0;
+}
+
+/// How deep the shape is at least within that radius of the place nearest to the sphere, where it is flat.
+std::optional<double> UncertainShape::face_depth(const CriticalSphere& sphere, double radius, double slack) const {
+  if (convex_) {
+    for (const double depth : {1e4, 64.0 * sphere.radius, 8.0 * sphere.radius, sphere.radius, 0.0}) {
+      if (contains_prism(sphere, radius, 0.0, depth)) return depth;
+    }
+    return std::nullopt;
+  }
+  const Vector3d n = placement_.R_AB.transpose() * sphere.normal;
+  const Vector3d place = placement_.to_shape(sphere.centre) - (sphere.gap + sphere.radius) * n;
+  if (b_.is_flat_about(place, n.normalized(), radius, slack)) return 0.0;
+  return std::nullopt;
 }
 
 double UncertainShape::surely_touching(const CriticalSphere& sphere) const {
   // The shape's nearest place, or what it is inside of, and what is behind that.
   const double distance = sphere.gap + sphere.radius;
   double probability = touches_ball(sphere, std::max(0.0, -distance), std::max(0.0, distance));
-  if (convex_) {
-    probability = std::max(probability, touches_face(sphere));
-  } else {
+  probability = std::max(probability, touches_face(sphere));
+  if (!convex_) {
     const Vector3d centre = placement_.to_shape(sphere.centre);
     const Vector3d normal = placement_.R_AB.transpose() * sphere.normal;
     for (const double depth : {64.0 * sphere.radius, 8.0 * sphere.radius, sphere.radius}) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "prescene/collision/spheres/relative_uncertainty.h"
 #include "prescene/collision/spheres/sphere_tree.h"
@@ -53,6 +54,7 @@ class UncertainShape {
   double surely_touching(const CriticalSphere& sphere) const;
   double touches_ball(const CriticalSphere& sphere, double ball, double apart) const;
   double touches_face(const CriticalSphere& sphere) const;
+  std::optional<double> face_depth(const CriticalSphere& sphere, double radius, double slack) const;
   bool contains_prism(const CriticalSphere& sphere, double radius, double from, double to) const;
   double touching_bound(const CriticalSphere& sphere) const;
   double crossing_bound(const CriticalSphere& leader) const;

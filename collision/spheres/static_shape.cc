@@ -177,6 +177,15 @@ core::Result<TriangleSurface> TriangleSurface::make(std::shared_ptr<const Mesh> 
   return make(std::make_shared<const TriangleTree>(TriangleTree::build(std::move(mesh), {}, pool)), side);
 }
 
+TriangleSurface::TriangleSurface(std::shared_ptr<const TriangleTree> tree, SurfaceSide side)
+    : tree_(std::move(tree)),
+      rims_(std::make_shared<const std::vector<std::uint8_t>>(find_rims(tree_->mesh()))),
+      side_(side) {}
+
+bool TriangleSurface::is_flat_about(const Vector3d& place, const Vector3d& normal, double radius, double slack) const {
+  return collision::is_flat_about(*tree_, *rims_, place, normal, radius, slack);
+}
+
 bool TriangleSurface::is_inside(const Vector3d& p_BQ) const {
   return side_ == SurfaceSide::kSolid && winding_number(*tree_, p_BQ) > 0;
 }

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -54,6 +55,12 @@ class StaticShape {
   /// `centre` (m, in B); `direction` is of unit length. No allocation.
   virtual double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const {
     return direction.dot(centre) + radius;
+  }
+  /// Whether the surface is flat about one of its places: all points within `radius` (m) of it on the plane across
+  /// `normal` (of unit length) are within `slack` of the surface. May deny it where it is so. No allocation.
+  virtual bool is_flat_about(const Eigen::Vector3d& /*place*/, const Eigen::Vector3d& /*normal*/, double /*radius*/,
+                             double /*slack*/) const {
+    return false;
   }
 };
 
@@ -112,13 +119,17 @@ class TriangleSurface final : public StaticShape {
   std::optional<double> swept_sphere_contact(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double radius) const override;
   double reach_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre, double radius) const override;
+  bool is_flat_about(const Eigen::Vector3d& place, const Eigen::Vector3d& normal, double radius,
+                     double slack) const override;
   const std::shared_ptr<const TriangleTree>& tree() const { return tree_; }
 
  private:
-  TriangleSurface(std::shared_ptr<const TriangleTree> tree, SurfaceSide side) : tree_(std::move(tree)), side_(side) {}
+  TriangleSurface(std::shared_ptr<const TriangleTree> tree, SurfaceSide side);
   bool is_inside(const Eigen::Vector3d& p_BQ) const;
 
   std::shared_ptr<const TriangleTree> tree_;
+  /// A bit for each edge of a triangle that does not go on in just one other that faces the same way.
+  std::shared_ptr<const std::vector<std::uint8_t>> rims_;
   SurfaceSide side_;
 };
 

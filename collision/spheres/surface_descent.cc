@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <tuple>
 
 #include "surface_search.h"
 
@@ -128,7 +129,98 @@ void look_below(const TriangleTree& tree, std::uint32_t index, Reach* reach) {
   }
 }
 
+/// Triangles about a place that lie in the plane across a normal. Where they are only joined at edges that two of them
+/// share and facing the same way, and nothing else comes to the plane, a walk on them ends nowhere.
+struct FlatPart {
+  const Vector3d& place;
+  const Vector3d& normal;
+  double radius;
+  double slack;
+  int facing = 0;
+
+  bool allows(const std::array<Vector3d, 3>& corners, std::uint8_t rims) {
+    if ((nearest_on_triangle(place, corners[0], corners[1], corners[2]) - place).norm() > radius + slack) return true;
+    std::array<double, 3> heights{};
+    for (std::size_t k = 0; k < 3; ++k) heights[k] = normal.dot(corners[k] - place);
+    const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+    if (*low > slack || *high < -slack) return true;
+    if (*low < -slack || *high > slack) return false;
+    const double area = normal.dot((corners[1] - corners[0]).cross(corners[2] - corners[0]));
+    const int side = area > 0.0 ? 1 : (area < 0.0 ? -1 : 0);
+    if (side == 0 || side == -facing) return false;
+    facing = side;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3d& from = corners[k];
+      const Vector3d& to = corners[(k + 1) % 3];
+      if ((rims >> k & 1U) != 0 && (nearest_on_triangle(place, from, to, to) - place).norm() <= radius + slack)
+        return false;
+    }
+    return true;
+  }
+};
+
+bool look_below(const TriangleTree& tree, std::uint32_t index, std::span<const std::uint8_t> rims, FlatPart* part) {
+  const TriangleTreeNode& node = tree.nodes()[index];
+  const NodeFrame frame(node);
+  const Vector3d place = frame.place(part->place);
+  const double reach = part->radius + part->slack + frame.slack(place.norm());
+  for (std::size_t child = 0; child < node.child_count(); ++child) {
+    if (frame.child(child).exteriorDistance(place) > reach) continue;
+    const std::uint32_t next = below(node, child);
+    if (!is_leaf(node, child)) {
+      if (!look_below(tree, next, rims, part)) return false;
+      continue;
+    }
+    const TriangleBlock& block = tree.blocks()[next];
+    const TriangleReferences& references = tree.references()[next];
+    for (std::size_t k = 0; k < 4 && references[k] != kNoTriangle; ++k) {
+      if (!part->allows({corner_of(block, 0, k), corner_of(block, 1, k), corner_of(block, 2, k)}, rims[references[k]]))
+        return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
+
+std::vector<std::uint8_t> find_rims(const Mesh& mesh) {
+  struct Edge {
+    std::uint32_t low;
+    std::uint32_t high;
+    bool forward;
+    std::uint8_t place;
+    std::uint32_t triangle;
+  };
+  std::vector<Edge> edges;
+  edges.reserve(std::size_t{3} * mesh.triangle_count());
+  for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
+    const TriangleIndices& t = mesh.triangles()[i];
+    for (std::uint8_t k = 0; k < 3; ++k) {
+      const std::uint32_t from = t[k];
+      const std::uint32_t to = t[(k + 1U) % 3U];
+      edges.push_back({std::min(from, to), std::max(from, to), from < to, k, i});
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const Edge& x, const Edge& y) {
+    return std::tuple(x.low, x.high, x.triangle, x.place) < std::tuple(y.low, y.high, y.triangle, y.place);
+  });
+  std::vector<std::uint8_t> rims(mesh.triangle_count(), 0);
+  for (std::size_t i = 0; i < edges.size();) {
+    std::size_t end = i + 1;
+    while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
+    const bool joined = end == i + 2 && edges[i].forward != edges[i + 1].forward;
+    for (; i < end; ++i) {
+      if (!joined) rims[edges[i].triangle] |= static_cast<std::uint8_t>(1U << edges[i].place);
+    }
+  }
+  return rims;
+}
+
+bool is_flat_about(const TriangleTree& tree, std::span<const std::uint8_t> rims, const Vector3d& place,
+                   const Vector3d& normal, double radius, double slack) {
+  FlatPart part{place, normal, radius, slack};
+  return look_below(tree, 0, rims, &part) && part.facing != 0;
+}
 
 double first_contact(const TriangleTree& tree, const SweptSphere& sphere) {
   double first = SweptSphere::kNever;

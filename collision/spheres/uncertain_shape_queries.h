@@ -21,9 +21,9 @@ namespace prescene::collision {
 /// Whether they touch. The descent keeps the 64 spheres that the shortest errors bring to the shape, `critical_pairs`,
 /// and ends at the first that touches for certain. `state` is kNone or kCertain where a bound says so with the
 /// confidence of `between`.
-/// Lower bound: the most probable sphere touches the nearest place of the shape or a ball that lies behind it: for a
-/// half-space, its probability in closed form. Of a sheet, only the place itself is known to be there: where the error
-/// along it is as large as the sphere, that says little.
+/// Lower bound: the most probable sphere touches the face that it is nearest to, as far as that is known to reach (for
+/// a half-space, its probability in closed form), a ball that lies behind that, or just the nearest place: of a height
+/// field and of a surface that is not flat that says little where the error along it is as large as the sphere.
 /// Upper bound, the least of: no error shorter than the critical one makes the bodies touch; the sum over all spheres,
 /// each by its margin along the normal for convex shapes and in any direction for others; a plane before the shape (for
 /// shapes that are not convex: what of it the body may reach) is crossed at one of four points [Worsley 1982].

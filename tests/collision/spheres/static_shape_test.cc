@@ -88,6 +88,48 @@ TEST(TriangleSurface, SheetPushesToBothSides) {
               HasSubstr("mesh 'shelf': it is open"));
 }
 
+TEST(TriangleSurface, KnowsWhereItIsFlat) {
+  // A sheet of many triangles with a hole in the middle, and a step at x = 1.
+  geometry::TriangleMesh sheet;
+  for (int i = 0; i <= 20; ++i) {
+    for (int j = 0; j <= 10; ++j) sheet.vertices.push_back({0.1 * i, 0.1 * j, i > 10 ? 0.05 : 0.0});
+  }
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    for (std::uint32_t j = 0; j < 10; ++j) {
+      const std::uint32_t a = 11 * i + j;
+      if (i == 3 && j == 5) continue;
+      sheet.triangles.push_back({a, a + 11, a + 12});
+      sheet.triangles.push_back({a, a + 12, a + 1});
+    }
+  }
+  const auto surface = *TriangleSurface::make(to_mesh(sheet), SurfaceSide::kBoth, shape_pool());
+  const auto flat = [&](double x, double y, double radius) {
+    return surface.is_flat_about({x, y, x > 1.1 ? 0.05 : 0.0}, Vector3d::UnitZ(), radius, 1e-6);
+  };
+  core::RandomStream stream(6, core::Purpose::kTest);
+  int yes = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const double x = stream.uniform(0.02, 1.98);
+    const double y = stream.uniform(0.02, 0.98);
+    if (std::max(std::abs(x - 0.35), std::abs(y - 0.55)) < 0.051 || (x > 0.999 && x < 1.101)) continue;
+    const double to_hole =
+        std::hypot(std::max(std::abs(x - 0.35) - 0.05, 0.0), std::max(std::abs(y - 0.55) - 0.05, 0.0));
+    const double room = std::min({x, 2.0 - x, y, 1.0 - y, to_hole, x < 1.0 ? 1.0 - x : x - 1.1});
+    EXPECT_FALSE(flat(x, y, room + 1e-4));
+    EXPECT_TRUE(flat(x, y, room - 1e-4));
+    ++yes;
+  }
+  EXPECT_GT(yes, 1500);
+  EXPECT_FALSE(surface.is_flat_about({0.8, 0.2, 0.0}, Vector3d(0.1, 0, 1).normalized(), 0.05, 1e-6));
+  // Facing the other way, and folded onto itself.
+  EXPECT_TRUE(surface.is_flat_about({0.8, 0.2, 0.0}, -Vector3d::UnitZ(), 0.05, 1e-6));
+  geometry::TriangleMesh folded;
+  folded.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.2, 0.9, 0}};
+  folded.triangles = {{0, 1, 2}, {1, 0, 3}};
+  const auto fold = *TriangleSurface::make(to_mesh(folded), SurfaceSide::kBoth, shape_pool());
+  EXPECT_FALSE(fold.is_flat_about({0.3, 0.05, 0.0}, Vector3d::UnitZ(), 0.1, 1e-6));
+}
+
 TEST(TriangleSurface, SharesATreeThatCameFromAFile) {
   const auto mesh = to_mesh(geometry::make_open_bin({0.3, 0.2, 0.1}, 0.01));
   const TriangleTree built = TriangleTree::build(mesh, {}, shape_pool());

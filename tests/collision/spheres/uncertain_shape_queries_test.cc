@@ -232,7 +232,7 @@ std::vector<Setting> settings() {
                0.06,
                true,
                20'000});
-  s.push_back({"sheet, lying on it", box, sheet(), {above(0.0002), lying}, fixed, kPossible, 1.0, 0.06, true, 50'000});
+  s.push_back({"sheet, lying on it", box, sheet(), {above(0.0002), lying}, fixed, kPossible, 0.3, 0.06, true, 50'000});
   s.push_back(
       {"sheet, touching", box, sheet(), {above(-0.005), millimetres}, fixed, kCertain, 0.01, 0.02, true, 20'000});
   s.push_back({"cylinder, its side",
