@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+// Free flight of all live instances, and which of them come near what.
+#include <cmath>
+
+#include "lane_state.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "flight.cc"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, which includes this file once for each instruction set.
+#include <hwy/highway.h>
+
+#include "lane_math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace prescene::simulation::HWY_NAMESPACE {
+
+using D = hn::CappedTag<Real, kLaneMultiple>;
+using V = hn::Vec<D>;
+
+HWY_INLINE Vec3<V> load(const Rows<3>& rows, int at) {
+  const D d;
+  return {hn::Load(d, rows[0] + at), hn::Load(d, rows[1] + at), hn::Load(d, rows[2] + at)};
+}
+HWY_INLINE Quat<V> load(const Rows<4>& rows, int at) {
+  const D d;
+  return {hn::Load(d, rows[0] + at), hn::Load(d, rows[1] + at), hn::Load(d, rows[2] + at), hn::Load(d, rows[3] + at)};
+}
+HWY_INLINE Mat3<V> load(const Rows<9>& rows, int at) {
+  const D d;
+  return {{hn::Load(d, rows[0] + at), hn::Load(d, rows[1] + at), hn::Load(d, rows[2] + at)},
+          {hn::Load(d, rows[3] + at), hn::Load(d, rows[4] + at), hn::Load(d, rows[5] + at)},
+          {hn::Load(d, rows[6] + at), hn::Load(d, rows[7] + at), hn::Load(d, rows[8] + at)}};
+}
+HWY_INLINE void store(const Vec3<V>& a, const Rows<3>& rows, int at) {
+  const D d;
+  hn::Store(a.x, d, rows[0] + at);
+  hn::Store(a.y, d, rows[1] + at);
+  hn::Store(a.z, d, rows[2] + at);
+}
+HWY_INLINE void store(const Quat<V>& a, const Rows<4>& rows, int at) {
+  const D d;
+  hn::Store(a.w, d, rows[0] + at);
+  hn::Store(a.x, d, rows[1] + at);
+  hn::Store(a.y, d, rows[2] + at);
+  hn::Store(a.z, d, rows[3] + at);
+}
+HWY_INLINE void store(const Mat3<V>& m, const Rows<9>& rows, int at) {
+  store(m.r0, Rows<3>{rows[0], rows[1], rows[2]}, at);
+  store(m.r1, Rows<3>{rows[3], rows[4], rows[5]}, at);
+  store(m.r2, Rows<3>{rows[6], rows[7], rows[8]}, at);
+}
+
+void fly_lanes(const LockstepScene* scene, int count, LaneState* state) {
+  const D d;
+  const V dt = set<V>(scene->settings.dt);
+  const V half_dt = set<V>(0.5 * scene->settings.dt);
+  const Vec3<V> gravity = set3<V>(scene->settings.gravity);
+  const Vec3<V> moments = set3<V>(scene->unit_moments);
+  const Vec3<V> inverse = set3<V>(1.0 / scene->unit_moments[0], 1.0 / scene->unit_moments[1],
+                                  1.0 / scene->unit_moments[2]);
+  const V radius = set<V>(scene->radius);
+  for (int at = 0; at < count; at += static_cast<int>(hn::Lanes(d))) {
+    const Vec3<V> p = load(state->p, at);
+    const Vec3<V> v = load(state->v, at);
+    const Vec3<V> w = load(state->w, at);
+    const Quat<V> q = load(state->q, at);
+    // A parabola, and a rotation that keeps the angular momentum (midpoint rule).
+    const Vec3<V> flown_v = v + gravity * dt;
+    const Vec3<V> flown_p = p + (v + flown_v) * half_dt;
+    const Mat3<V> R = matrix_of(q);
+    const Vec3<V> momentum = R * times(moments, transposed(R, w));
+    const Mat3<V> R_middle = matrix_of(turned(q, w * half_dt));
+    const Vec3<V> w_middle = R_middle * times(inverse, transposed(R_middle, momentum));
+    const Quat<V> flown_q = turned(q, w_middle * dt);
+    const Mat3<V> R_flown = matrix_of(flown_q);
+    const Vec3<V> flown_w = R_flown * times(inverse, transposed(R_flown, momentum));
+    store(flown_p, state->flown_p, at);
+    store(flown_v, state->flown_v, at);
+    store(flown_w, state->flown_w, at);
+    store(flown_q, state->flown_q, at);
+    store(R, state->R, at);
+    const V speed = hn::Max(length(v), length(flown_v));
+    const V spin = hn::Max(length(w), length(flown_w));
+    hn::Store(dt * (speed + spin * (radius + length(load(state->com, at)))), d, state->travel + at);
+  }
+}
+
+void find_pairs_lanes(const LockstepScene* scene, int part_index, const std::uint8_t* wanted, int count,
+                      LaneState* state, LanePairs* pairs) {
+  const D d;
+  const ConvexPart& part = scene->parts[static_cast<std::size_t>(part_index)];
+  const V zero = set<V>(0.0);
+  const V ball = set<V>(part.ball);
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  for (int at = 0; at < count; at += lanes) {
+    std::uint32_t allowed = 0;
+    for (int i = 0; i < lanes && at + i < count; ++i) allowed |= static_cast<std::uint32_t>(wanted[at + i] != 0) << i;
+    if (allowed == 0) continue;
+    const Mat3<V> R = load(state->R, at);
+    const Vec3<V> center = load(state->p, at) + R * (set3<V>(part.center) - load(state->com, at));
+    const V range = hn::Load(d, state->travel + at) + set<V>(kLaneMargin);
+    const Vec3<V> half = abs(R) * set3<V>(part.box_half) + Vec3<V>{range, range, range};
+    for (std::size_t f = 0; f < scene->fixed.size(); ++f) {
+      const FixedPart& fixed = scene->fixed[f];
+      const Vec3<V> apart = center - set3<V>(fixed.shape.center);
+      const Vec3<V> reach = half + set3<V>(fixed.shape.box_half);
+      const auto overlap = hn::And(hn::Le(hn::Abs(apart.x), reach.x),
+                                   hn::And(hn::Le(hn::Abs(apart.y), reach.y), hn::Le(hn::Abs(apart.z), reach.z)));
+      std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(d, overlap, bits);
+      std::uint32_t near = (bits[0] | static_cast<std::uint32_t>(bits[1]) << 8) & allowed;
+      if (near == 0) continue;
+      if (fixed.shape.kind == CoreKind::kHull) {
+        for (int i = 0; i < lanes; ++i) {
+          if (near >> i & 1U) pairs->hulls[f].push_back({at + i, static_cast<std::int32_t>(f)});
+        }
+        continue;
+      }
+      const Vec3<V> c = transposed(set_matrix<V>(fixed.R_WB), apart);
+      const Vec3<V> a{hn::Abs(c.x), hn::Abs(c.y), hn::Abs(c.z)};
+      const Vec3<V> box = set3<V>(fixed.full_half);
+      const Vec3<V> out{hn::Max(a.x - box.x, zero), hn::Max(a.y - box.y, zero), hn::Max(a.z - box.z, zero)};
+      const V ball_reach = ball + range;
+      const auto in_ball = hn::Le(dot(out, out), ball_reach * ball_reach);
+      // Over the inner part of a face: whatever the object's turn, its nearest point is over the face, too.
+      const auto inner_x = hn::Le(a.x + ball, box.x);
+      const auto inner_y = hn::Le(a.y + ball, box.y);
+      const auto inner_z = hn::Le(a.z + ball, box.z);
+      const auto over_x = hn::And(hn::Ge(a.x, box.x), hn::And(inner_y, inner_z));
+      const auto over_y = hn::And(hn::Ge(a.y, box.y), hn::And(inner_z, inner_x));
+      const auto over_z = hn::And(hn::Ge(a.z, box.z), hn::And(inner_x, inner_y));
+      const auto bits_of = [&](auto mask) HWY_ATTR {
+        std::uint8_t b[8] = {};
+        hn::StoreMaskBits(d, mask, b);
+        return b[0] | static_cast<std::uint32_t>(b[1]) << 8;
+      };
+      near &= bits_of(in_ball);
+      if (near == 0) continue;
+      const std::uint32_t over[3] = {bits_of(over_x), bits_of(over_y), bits_of(over_z)};
+      const std::uint32_t back[3] = {bits_of(hn::Lt(c.x, zero)), bits_of(hn::Lt(c.y, zero)),
+                                     bits_of(hn::Lt(c.z, zero))};
+      for (int i = 0; i < lanes; ++i) {
+        if (!(near >> i & 1U)) continue;
+        int face = -1;
+        for (int k = 0; k < 3; ++k) {
+          if (over[k] >> i & 1U) face = 2 * k + static_cast<int>(back[k] >> i & 1U);
+        }
+        if (face >= 0) {
+          pairs->planes.push_back({at + i, static_cast<std::int32_t>(6 * f) + face});
+        } else {
+          pairs->boxes.push_back({at + i, static_cast<std::int32_t>(f)});
+        }
+      }
+    }
+  }
+}
+
+void measure_lanes(const LockstepScene* scene, int count, LaneState* state) {
+  const D d;
+  const Vec3<V> moments = set3<V>(scene->unit_moments);
+  const Vec3<V> origin = set3<V>(scene->origin);
+  for (int at = 0; at < count; at += static_cast<int>(hn::Lanes(d))) {
+    const Vec3<V> v = load(state->v, at);
+    const Vec3<V> w = load(state->w, at);
+    const Vec3<V> w_P = transposed(matrix_of(load(state->q, at)), w);
+    const Vec3<V> p = load(state->p, at) + origin;
+    const V v2 = dot(v, v);
+    const V half = set<V>(0.5);
+    hn::Store(half * v2 + half * dot(w_P, times(moments, w_P)), d, state->energy + at);
+    hn::Store(dot(p, p), d, state->distance2 + at);
+    hn::Store(hn::Max(v2, dot(w, w)), d, state->speed2 + at);
+  }
+}
+
+}  // namespace prescene::simulation::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace prescene::simulation {
+
+HWY_EXPORT(fly_lanes);
+HWY_EXPORT(find_pairs_lanes);
+HWY_EXPORT(measure_lanes);
+
+void fly(const LockstepScene& scene, int count, LaneState& state) {
+  HWY_DYNAMIC_DISPATCH(fly_lanes)(&scene, count, &state);
+}
+
+void find_pairs(const LockstepScene& scene, int part, std::span<const std::uint8_t> wanted, LaneState& state,
+                LanePairs& pairs) {
+  HWY_DYNAMIC_DISPATCH(find_pairs_lanes)
+  (&scene, part, wanted.data(), static_cast<int>(wanted.size()), &state, &pairs);
+}
+
+void measure(const LockstepScene& scene, int count, LaneState& state) {
+  HWY_DYNAMIC_DISPATCH(measure_lanes)(&scene, count, &state);
+}
+
+void land(std::span<const std::int32_t> slots, LaneState& state) {
+  for (const std::int32_t slot : slots) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      state.p[i][slot] = state.flown_p[i][slot];
+      state.v[i][slot] = state.flown_v[i][slot];
+      state.w[i][slot] = state.flown_w[i][slot];
+    }
+    for (std::size_t i = 0; i < 4; ++i) state.q[i][slot] = state.flown_q[i][slot];
+  }
+}
+
+}  // namespace prescene::simulation
+#endif

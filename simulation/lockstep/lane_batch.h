@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs instances through the slots of an engine: what ends makes room for the next one in the queue.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "lane_engine.h"
+#include "lane_rest.h"
+#include "prescene/core/progress.h"
+
+namespace prescene::simulation {
+
+/// What the object did to a support in a step. Bodies as in belief::ContactInterval; the first is the object, 0.
+struct LaneTouch {
+  int body = 0;
+  double impulse = 0.0;   ///< N s
+  double normal_z = 0.0;  ///< Of the mean normal.
+};
+/// Touching bodies of a slot's last step, ascending, into `touches` (scratch reused).
+void touches_of(LaneEngine& engine, int slot, double mass, std::vector<LaneTouch>& touches);
+
+/// The instances of one call of Simulator::run, shared by its threads.
+struct LaneQueue {
+  std::span<const belief::WorldState> starts;
+  const RunRequest* request = nullptr;
+  std::span<belief::Trajectory> trajectories;
+  const core::Cancellation* cancellation = nullptr;
+  std::atomic<std::size_t> next{0};
+};
+
+class LaneBatch {
+ public:
+  explicit LaneBatch(std::shared_ptr<const CompiledLockstep> scene);
+
+  /// Takes instances from the queue until it is empty and all taken are done; at most `live` at once.
+  void run(LaneQueue& queue, int live);
+
+ private:
+  enum class Mode {
+    kRuns,
+    kCalm,    // calm for long enough; the next contacts found tell whether it stands
+    kNudged,  // being nudged
+  };
+  struct Open {
+    belief::ContactInterval interval;
+    bool open = false;
+  };
+  struct Slot {
+    std::size_t index = 0;
+    Mode mode = Mode::kRuns;
+    std::int64_t done = 0;
+    int calm_steps = 0;
+    bool tested = false;  // and found to balance, in this calm
+    double next_sample = 0.0;
+    std::vector<LaneTouch> touches;
+    std::vector<Open> open;  // by body
+    NudgeTest nudges;
+  };
+
+  bool take(LaneQueue& queue);
+  void start(Slot& slot, int at, std::size_t index, LaneQueue& queue);
+  void after_step(int at);
+  void note_touches(int at);
+  /// Samples or ends a slot that goes on; the part of a step that a test of balance delays.
+  void go_on(int at);
+  void finish(int at, belief::TrajectoryEnd end);
+  void read(int at, belief::WorldState& state) const;
+  void remove_ended();
+
+  std::shared_ptr<const CompiledLockstep> scene_;
+  LaneEngine engine_;
+  LaneQueue* queue_ = nullptr;
+  std::vector<std::unique_ptr<Slot>> slots_;
+  int live_ = 0;
+  std::vector<std::uint8_t> steps_;  // by slot: moves in this step
+  std::vector<std::uint8_t> wanted_;
+  std::vector<std::uint8_t> ended_;
+  int rest_steps_ = 0;
+  std::int64_t most_steps_ = 0;
+};
+
+}  // namespace prescene::simulation

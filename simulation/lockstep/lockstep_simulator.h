@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// A simulator for many instances of one scene in which one rigid body meets fixed surroundings: 8 to 16 instances at
+// once in the lanes of vectors. Physics as in prescene/simulation/bullet (docs/simulation.md), restated; what a scene
+// has beyond it the factory refuses, so that callers take that simulator.
+//
+//   PRESCENE_TRY(auto simulator, make_lockstep_simulator(scene, shapes, LockstepOptions{}));
+//
+// Instances that are in the same stage of a step (flying, near a plane, near a box, being solved) share a vector, in
+// whatever order they come; no operation mixes lanes, and none is fused. An instance's bits therefore depend neither on
+// which others are simulated with it, nor on threads, nor on the instruction set.
+#pragma once
+
+#include <memory>
+
+#include "prescene/core/status.h"
+#include "prescene/simulation/shape_store.h"
+#include "prescene/simulation/simulator.h"
+
+namespace prescene::simulation {
+
+/// Those that have the same names as in BulletOptions mean the same.
+struct LockstepOptions {
+  double step = 1.0 / 240.0;         ///< s, in [1e-4, 0.02]
+  int solver_iterations = 60;        ///< In [1, 1000].
+  double solver_accuracy = 2e-6;     ///< m/s, >= 1e-7: impulses are single precision.
+  double overlap_recovery = 0.2;     ///< In (0, 1].
+  double restitution_speed = 0.02;   ///< m/s, >= 0
+  double impact_speed = 0.2;         ///< m/s, >= 0
+  double edge_rounding = 2e-4;       ///< m, in [1e-5, 0.01]
+  double touching_distance = 2e-4;   ///< m, >= 0
+  double contact_merge_time = 0.02;  ///< s, >= 0
+  RestRule rest;
+  DecompositionSettings decomposition;
+  /// Instances that a thread has under way at once, in [1, 1024]. More fill the vectors better; memory grows by some
+  /// 8 KiB each.
+  int live_instances = 96;
+};
+
+/// Ranges of the options: the message names the field.
+core::Status validate(const LockstepOptions& options);
+
+/// Whether `request` can be run: its actions must be none. kUnsupported names the action otherwise. run() and
+/// make_instance() check it.
+core::Status lockstep_supports(const RunRequest& request);
+
+/// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
+/// scene has
+///   - one object, not held, of boxes, spheres, cylinders, capsules and hulls (convex_hull, convex_parts, decompose) of
+///     at most 64 vertices, sides of at most 16, and at most 16 parts;
+///   - supports of boxes and such hulls, at most 256 parts together;
+///   - no robot body with a shape, and no actions.
+core::Result<std::unique_ptr<Simulator>> make_lockstep_simulator(const belief::Scene& scene, ShapeStore& shapes,
+                                                                 const LockstepOptions& options = {});
+
+}  // namespace prescene::simulation
