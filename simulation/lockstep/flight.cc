@@ -57,8 +57,8 @@ void fly_lanes(const LockstepScene* scene, int count, LaneState* state) {
   const V half_dt = set<V>(0.5 * scene->settings.dt);
   const Vec3<V> gravity = set3<V>(scene->settings.gravity);
   const Vec3<V> moments = set3<V>(scene->unit_moments);
-  const Vec3<V> inverse = set3<V>(1.0 / scene->unit_moments[0], 1.0 / scene->unit_moments[1],
-                                  1.0 / scene->unit_moments[2]);
+  const Vec3<V> inverse =
+      set3<V>(1.0 / scene->unit_moments[0], 1.0 / scene->unit_moments[1], 1.0 / scene->unit_moments[2]);
   const V radius = set<V>(scene->radius);
   for (int at = 0; at < count; at += static_cast<int>(hn::Lanes(d))) {
     const Vec3<V> p = load(state->p, at);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sequential impulses in lanes: the method of Bullet's stepper (simulation/bullet/contact_solver.h), for one body in its
-// own frame P. Spins are scaled by the root of their moment, so that a row is six numbers and its response 1 + |turn|^2;
-// impulses are per kilogram.
+// Sequential impulses in lanes: the method of Bullet's stepper (simulation/bullet/contact_solver.h), for one body in
+// its own frame P. Spins are scaled by the root of their moment, so that a row is six numbers and its response 1 +
+// |turn|^2; impulses are per kilogram.
 #include <algorithm>
 #include <cmath>
 
@@ -24,24 +24,24 @@ using M = hn::Mask<D>;
 
 /// Rows of a contact in scratch memory, each a vector.
 enum Field : int {
-  kNormal = 0,         // direction 3, turn 3
+  kNormal = 0,  // direction 3, turn 3
   kTangent1 = 6,
   kTangent2 = 12,
-  kInverse = 18,       // 1 / response of the normal row
-  kTarget = 19,        // normal velocity to reach, less what it is
-  kBase1 = 20,         // slip velocities without impulses
+  kInverse = 18,  // 1 / response of the normal row
+  kTarget = 19,   // normal velocity to reach, less what it is
+  kBase1 = 20,    // slip velocities without impulses
   kBase2 = 21,
   kSlipStep = 22,
   kMu = 23,
   kImpulse = 24,
   kSlip1 = 25,
   kSlip2 = 26,
-  kPush = 27,          // normal pseudo velocity to reach
+  kPush = 27,  // normal pseudo velocity to reach
   kPushImpulse = 28,
   kRollingArm = 29,
-  kRolling = 30,       // rolling impulse, scaled spin: 3
-  kPositionW = 33,     // 3
-  kHit = 36,           // 1 or 0
+  kRolling = 30,    // rolling impulse, scaled spin: 3
+  kPositionW = 33,  // 3
+  kHit = 36,        // 1 or 0
   kBounced = 37,
   kHitTime = 38,
   kPart = 39,
@@ -61,8 +61,8 @@ class LaneSolver {
 
  private:
   Real* field(int contact, int f) const {
-    return memory_ + (static_cast<std::size_t>(contact) * SolverScratch::kFields + static_cast<std::size_t>(f)) *
-                         kLaneMultiple;
+    return memory_ +
+           (static_cast<std::size_t>(contact) * SolverScratch::kFields + static_cast<std::size_t>(f)) * kLaneMultiple;
   }
   V get(int contact, int f) const { return hn::Load(D(), field(contact, f)); }
   void put(int contact, int f, V value) const { hn::Store(value, D(), field(contact, f)); }
@@ -201,8 +201,7 @@ void LaneSolver::load_contact(int k) {
   const V acceleration = (speed - speed_before) * per_dt;
   const V hit_time = hn::IfThenElseZero(hn::And(hit, open), time_to_close(gap, speed_before, acceleration, dt));
   const V speed_at_hit = speed_before + acceleration * hit_time;
-  const V bounce =
-      hn::Max(zero, acceleration * (dt - hit_time) - restitution_ * column(9) * speed_at_hit);
+  const V bounce = hn::Max(zero, acceleration * (dt - hit_time) - restitution_ * column(9) * speed_at_hit);
   const V target = select(hit, bounce, resting);
   put(k, kTarget, target - speed);
   put(k, kHit, hn::IfThenElseZero(hit, one));
@@ -259,8 +258,8 @@ void LaneSolver::iterate() {
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   const V accuracy = set<V>(settings_.accuracy);
-  const V rolling_step = one / (inverse_root_.x * inverse_root_.x + inverse_root_.y * inverse_root_.y +
-                                inverse_root_.z * inverse_root_.z);
+  const V rolling_step =
+      one / (inverse_root_.x * inverse_root_.x + inverse_root_.y * inverse_root_.y + inverse_root_.z * inverse_root_.z);
   auto active = hn::Eq(zero, zero);
   for (int iteration = 0; iteration < settings_.iterations; ++iteration) {
     V largest = zero;
@@ -483,8 +482,7 @@ namespace prescene::simulation {
 
 HWY_EXPORT(solve_lanes);
 
-void solve(const LockstepScene& scene, std::span<const std::int32_t> slots, LaneState& state,
-           SolverScratch& scratch) {
+void solve(const LockstepScene& scene, std::span<const std::int32_t> slots, LaneState& state, SolverScratch& scratch) {
   if (slots.empty()) return;
   HWY_DYNAMIC_DISPATCH(solve_lanes)(&scene, slots.data(), slots.size(), &state, scratch.memory());
 }

@@ -156,11 +156,9 @@ HWY_INLINE Quat<V> turned(const Quat<V>& q, const Vec3<V>& turn) {
   const Vec3<V> h = turn * set<V>(0.125);
   const V s = dot(h, h);
   const V cosine =
-      set<V>(1.0) -
-      s * (set<V>(1.0 / 2) - s * (set<V>(1.0 / 24) - s * (set<V>(1.0 / 720) - s * set<V>(1.0 / 40320))));
-  const V sine =
-      set<V>(1.0) -
-      s * (set<V>(1.0 / 6) - s * (set<V>(1.0 / 120) - s * (set<V>(1.0 / 5040) - s * set<V>(1.0 / 362880))));
+      set<V>(1.0) - s * (set<V>(1.0 / 2) - s * (set<V>(1.0 / 24) - s * (set<V>(1.0 / 720) - s * set<V>(1.0 / 40320))));
+  const V sine = set<V>(1.0) -
+                 s * (set<V>(1.0 / 6) - s * (set<V>(1.0 / 120) - s * (set<V>(1.0 / 5040) - s * set<V>(1.0 / 362880))));
   Quat<V> e{cosine, sine * h.x, sine * h.y, sine * h.z};
   e = e * e;
   e = e * e;

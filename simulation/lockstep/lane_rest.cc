@@ -77,8 +77,7 @@ LaneFooting footing_of(LaneEngine& engine, int slot) {
     footing.height = std::max(footing.height, down.dot(r));
     points[count++] = {u.dot(r), v.dot(r)};
   }
-  footing.firm =
-      margin_inside({points.data(), count}) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
+  footing.firm = margin_inside({points.data(), count}) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
   return footing;
 }
 

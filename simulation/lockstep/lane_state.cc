@@ -8,7 +8,7 @@ namespace prescene::simulation {
 LaneState::LaneState(int slots) : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple) {
   constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 3 + 3 * 3 + 4 + 9 + 1 + 3;
   const auto size = static_cast<std::size_t>(slots_);
-  memory_.reset(static_cast<Real*>(::operator new[](kRows * size * sizeof(Real), std::align_val_t{64})));
+  memory_.reset(static_cast<Real*>(::operator new[](kRows* size * sizeof(Real), std::align_val_t{64})));
   std::fill_n(memory_.get(), kRows * size, Real(0));
   Real* next = memory_.get();
   const auto row = [&] {
@@ -39,9 +39,21 @@ LaneState::LaneState(int slots) : slots_((slots + kLaneMultiple - 1) / kLaneMult
   warm_.resize(size * kMaxContacts);
 }
 
+void ContactStage::flush(const std::int32_t* slots, LaneState& state) {
+  for (std::size_t lane = 0; lane < counts_.size(); ++lane) {
+    if (counts_[lane] == 0) continue;
+    const std::int32_t slot = slots[lane];
+    int& count = state.contact_count[static_cast<std::size_t>(slot)];
+    const int room = std::min(counts_[lane], kMaxContacts - count);
+    std::copy_n(contacts_[lane].data(), room, state.contacts(slot) + count);
+    count += room;
+    counts_[lane] = 0;
+  }
+}
+
 SolverScratch::SolverScratch()
-    : memory_(static_cast<Real*>(::operator new[](
-          (static_cast<std::size_t>(kMaxContacts) * kFields + 64) * kLaneMultiple * sizeof(Real),
-          std::align_val_t{64}))) {}
+    : memory_(static_cast<Real*>(
+          ::operator new[]((static_cast<std::size_t>(kMaxContacts) * kFields + 64) * kLaneMultiple * sizeof(Real),
+                           std::align_val_t{64}))) {}
 
 }  // namespace prescene::simulation

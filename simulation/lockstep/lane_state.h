@@ -17,10 +17,16 @@ namespace prescene::simulation {
 /// are differences of points that are a rounding radius apart.
 using Real = float;
 
-inline constexpr int kLaneMultiple = 16;   ///< Slots come in multiples of the widest vector.
-inline constexpr int kMaxContacts = 32;    ///< Of an instance in a step.
-inline constexpr int kMaxLoop = 16;        ///< Corners of a side of a hull.
-inline constexpr int kRimPoints = 8;       ///< That stand for the rim of a cylinder.
+inline constexpr int kLaneMultiple = 16;  ///< Slots come in multiples of the widest vector.
+inline constexpr int kMaxContacts = 32;   ///< Of an instance in a step.
+inline constexpr int kMaxLoop = 16;       ///< Corners of a side of a hull.
+/// Points that stand for the rim of a cylinder, the first one where it is lowest: at 0, 30, 90, 150, 180, ... degrees.
+/// The two beside the lowest are as far from it as those of Bullet's stepper, since they take the energy out of a
+/// wobble.
+inline constexpr int kRimPoints = 8;
+inline constexpr double kRimCosine[kRimPoints] = {1,  0.86602540378443865,  0, -0.86602540378443865,
+                                                  -1, -0.86602540378443865, 0, 0.86602540378443865};
+inline constexpr double kRimSine[kRimPoints] = {0, 0.5, 1, 0.5, 0, -0.5, -1, -0.5};
 
 enum class CoreKind { kPoint, kSegment, kBox, kCylinder, kHull };
 
@@ -48,7 +54,7 @@ struct FixedPart {
   ConvexPart shape;              ///< kBox or kHull.
   std::array<double, 9> R_WB{};  ///< Of boxes; hulls are already turned.
   std::array<double, 3> full_half{};
-  int body = 0;                  ///< As belief::ContactInterval counts them.
+  int body = 0;  ///< As belief::ContactInterval counts them.
   Real friction = 0, impact_friction = 0, restitution = 0, rolling_arm = 0;
 };
 
@@ -74,7 +80,7 @@ struct LockstepScene {
   std::array<double, 3> origin{};  ///< Positions of lanes are from here, W.
   std::vector<ConvexPart> parts;   ///< Of the object.
   std::vector<FixedPart> fixed;
-  std::vector<FixedPlane> planes;  ///< Six a fixed part; of boxes only.
+  std::vector<FixedPlane> planes;               ///< Six a fixed part; of boxes only.
   std::array<double, 3> unit_moments{1, 1, 1};  ///< m^2
   double radius = 0.0;                          ///< Farthest point of the object from O.
   double rolling_arm = 0.0;                     ///< Of the object.
@@ -134,6 +140,22 @@ class LaneState {
   std::vector<WarmContact> warm_;
 };
 
+/// Contacts of the pairs of one vector. A slot may have several of its lanes: it gets their contacts one lane after the
+/// other, as it would from vectors of its own.
+class ContactStage {
+ public:
+  void add(int lane, const LaneContact& contact) {
+    int& count = counts_[static_cast<std::size_t>(lane)];
+    if (count < kMaxContacts) contacts_[static_cast<std::size_t>(lane)][static_cast<std::size_t>(count++)] = contact;
+  }
+  /// Appends what was added to the contacts of the lanes' slots, as far as there is room.
+  void flush(const std::int32_t* slots, LaneState& state);
+
+ private:
+  std::array<int, kLaneMultiple> counts_{};
+  std::array<std::array<LaneContact, kMaxContacts>, kLaneMultiple> contacts_;
+};
+
 /// Pairs that may touch in this step, by what they need.
 struct LanePairs {
   struct Plane {
@@ -142,8 +164,8 @@ struct LanePairs {
   struct Near {
     std::int32_t slot, fixed;
   };
-  std::vector<Plane> planes;            ///< The object is over the inner part of a face.
-  std::vector<Near> boxes;              ///< About edges of boxes.
+  std::vector<Plane> planes;             ///< The object is over the inner part of a face.
+  std::vector<Near> boxes;               ///< About edges of boxes.
   std::vector<std::vector<Near>> hulls;  ///< By fixed part.
 };
 

@@ -105,8 +105,7 @@ class LockstepInstance : public Instance {
     get(slot);
     if (!whole || at != snapshot.bytes.size() || version != kSnapshotVersion || slot.warm_count < 0 ||
         slot.warm_count > kMaxContacts) {
-      return core::invalid_input(
-          "the snapshot is of another simulator or scene; restore it where it was saved");
+      return core::invalid_input("the snapshot is of another simulator or scene; restore it where it was saved");
     }
     kept_ = kept;
     start_ = std::move(start);

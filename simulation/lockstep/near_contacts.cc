@@ -93,8 +93,7 @@ void side_of_box(const Vec3<V>& low, const Vec3<V>& high, const Vec3<V>& directi
   const V along = select(x_side, direction.x, select(y_side, direction.y, direction.z));
   const auto front = hn::Ge(along, zero);
   const V sign = select(front, one, hn::Neg(one));
-  side.normal = {hn::IfThenElseZero(x_side, sign), hn::IfThenElseZero(y_side, sign),
-                 hn::IfThenElseZero(z_side, sign)};
+  side.normal = {hn::IfThenElseZero(x_side, sign), hn::IfThenElseZero(y_side, sign), hn::IfThenElseZero(z_side, sign)};
   side.count = set<V>(4.0);
   side.most = 4;
   // Around +x: (y, z), +y: (z, x), +z: (x, y), by (-,-) (+,-) (+,+) (-,+); the other way round for the other sides.
@@ -115,9 +114,6 @@ void side_of_box(const Vec3<V>& low, const Vec3<V>& high, const Vec3<V>& directi
 /// The side, rim, line or point of the object's part that faces `direction`; both in S.
 void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side& side) {
   constexpr double kFlat = 1e-3;  // rad: up to it a rim keeps its points
-  constexpr double kRoot = 0.70710678118654752;
-  constexpr double kCosine[kRimPoints] = {1, kRoot, 0, -kRoot, -1, -kRoot, 0, kRoot};
-  constexpr double kSine[kRimPoints] = {0, kRoot, 1, kRoot, 0, -kRoot, -1, -kRoot};
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   side.normal = {zero, zero, zero};
@@ -153,8 +149,8 @@ void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side& side) 
       side.count = select(rim, set<V>(kRimPoints), set<V>(2.0));
       side.normal = {zero, zero, hn::IfThenElseZero(rim, sense)};
       for (int k = 0; k < kRimPoints; ++k) {
-        const V c = set<V>(kCosine[k]);
-        const V t = sense * set<V>(kSine[k]);
+        const V c = set<V>(kRimCosine[k]);
+        const V t = sense * set<V>(kRimSine[k]);
         const Vec3<V> on_rim{r * (cx * c - cy * t), r * (cx * t + cy * c), end};
         const Vec3<V> on_line{r * cx, r * cy, k == 0 ? hn::Neg(top) : top};
         side.corner[k] = select(rim, on_rim, on_line);
@@ -194,8 +190,8 @@ struct NearPair {
 /// Appends points to the contacts of their slots.
 class NearWriter {
  public:
-  NearWriter(const NearLanes& lanes, const NearPair& pair, LaneState* state)
-      : lanes_(lanes), pair_(pair), state_(state), lowest_(set<V>(1e30)) {
+  NearWriter(const NearLanes& lanes, const NearPair& pair, ContactStage& stage)
+      : lanes_(lanes), pair_(pair), stage_(stage), lowest_(set<V>(1e30)) {
     const D d;
     const Vec3<V> n = pair.R_PB * pair.normal;
     hn::Store(n.x, d, normal_[0]);
@@ -212,8 +208,7 @@ class NearWriter {
     lowest_ = select(mask, hn::Min(lowest_, gap), lowest_);
     std::uint32_t bits = bits_of(mask) & lanes_.valid;
     if (bits == 0) return;
-    const Vec3<V> middle =
-        pair_.middle + pair_.R_PB * (core - pair_.normal * (pair_.radius_a + set<V>(0.5) * gap));
+    const Vec3<V> middle = pair_.middle + pair_.R_PB * (core - pair_.normal * (pair_.radius_a + set<V>(0.5) * gap));
     HWY_ALIGN double x[kLaneMultiple], y[kLaneMultiple], z[kLaneMultiple], g[kLaneMultiple];
     hn::Store(middle.x, d, x);
     hn::Store(middle.y, d, y);
@@ -221,23 +216,20 @@ class NearWriter {
     hn::Store(gap, d, g);
     for (int i = 0; bits != 0; ++i, bits >>= 1) {
       if (!(bits & 1U)) continue;
-      const std::int32_t slot = lanes_.slot[i];
-      int& count = state_->contact_count[static_cast<std::size_t>(slot)];
-      if (count == kMaxContacts) continue;
       const auto real = [](double value) { return static_cast<Real>(value); };
-      state_->contacts(slot)[count++] = {{real(x[i]), real(y[i]), real(z[i])},
-                                         {real(normal_[0][i]), real(normal_[1][i]), real(normal_[2][i])},
-                                         real(g[i]),
-                                         lanes_.part[i],
-                                         0,
-                                         0};
+      stage_.add(i, {{real(x[i]), real(y[i]), real(z[i])},
+                     {real(normal_[0][i]), real(normal_[1][i]), real(normal_[2][i])},
+                     real(g[i]),
+                     lanes_.part[i],
+                     0,
+                     0});
     }
   }
 
  private:
   const NearLanes& lanes_;
   const NearPair& pair_;
-  LaneState* state_;
+  ContactStage& stage_;
   V lowest_;
   HWY_ALIGN double normal_[3][kLaneMultiple];
 };
@@ -272,9 +264,11 @@ void cut_sides(const NearPair& pair, const Side& a, const Side& b, M wanted, Nea
   const int edges = a.most == 2 ? 1 : a.most;
   for (int i = 0; i < edges; ++i) {
     const int next = i + 1 < a.most ? i + 1 : 0;
-    auto crosses = hn::And(cut, hn::Lt(set<V>(i), a.count));
-    // The second side of a line is the first one back.
-    if (i > 0) crosses = hn::And(crosses, hn::Gt(a.count, set<V>(2.0)));
+    // Lanes with fewer corners repeat the last one; from there the last side leads back. A line has no way back.
+    auto crosses = cut;
+    if (edges > 1) {
+      crosses = hn::And(cut, i == edges - 1 ? hn::Gt(a.count, set<V>(2.0)) : hn::Lt(set<V>(i + 1), a.count));
+    }
     V from = zero;
     V to = one;
     for (int j = 0; j < b.most; ++j) {
@@ -317,10 +311,9 @@ void cut_sides(const NearPair& pair, const Side& a, const Side& b, M wanted, Nea
 /// Pairs with boxes (B in lanes) or with one hull.
 template <class OnB, class FacingB, class Deepest>
 HWY_INLINE void touch_pair(const NearLanes& lanes, NearPair& pair, M wanted, const Vec3<V>& guess, const OnB& on_b,
-                           const FacingB& facing_b, const Deepest& deepest, LaneState* state) {
-  const auto on_a = [&](const Vec3<V>& direction) HWY_ATTR {
-    return pair.R_BS * support_of(*pair.part, transposed(pair.R_BS, direction));
-  };
+                           const FacingB& facing_b, const Deepest& deepest, ContactStage& stage) {
+  const auto on_a = [&](const Vec3<V>& direction)
+                        HWY_ATTR { return pair.R_BS * support_of(*pair.part, transposed(pair.R_BS, direction)); };
   const Nearest<V> nearest = nearest_points(guess, pair.range + pair.radii, wanted, on_a, on_b);
   wanted = hn::AndNot(nearest.apart, wanted);
   if (hn::AllFalse(D(), wanted)) return;
@@ -339,7 +332,7 @@ HWY_INLINE void touch_pair(const NearLanes& lanes, NearPair& pair, M wanted, con
   }
   wanted = hn::And(wanted, hn::Le(distance - pair.radii, pair.range));
   if (hn::AllFalse(D(), wanted)) return;
-  NearWriter writer(lanes, pair, state);
+  NearWriter writer(lanes, pair, stage);
   if (pair.part->kind != CoreKind::kPoint) {
     Side a, b;
     side_of_part(*pair.part, transposed(pair.R_BS, neg(pair.normal)), a);
@@ -395,6 +388,7 @@ void touch_boxes_lanes(const LockstepScene* scene, int part_index, const LanePai
   const std::size_t width = hn::Lanes(d);
   const V zero = set<V>(0.0);
   NearLanes lanes;
+  ContactStage stage;
   for (std::size_t begin = 0; begin < count; begin += width) {
     gather(*scene, part, pairs + begin, std::min(width, count - begin), *state, lanes);
     const Mat3<V> R = matrix(lanes.R);
@@ -419,13 +413,11 @@ void touch_boxes_lanes(const LockstepScene* scene, int part_index, const LanePai
     const Vec3<V> high{hn::Min(whole_high.x, reach), hn::Min(whole_high.y, reach), hn::Min(whole_high.z, reach)};
     const auto wanted = hn::And(hn::Le(low.x, high.x), hn::And(hn::Le(low.y, high.y), hn::Le(low.z, high.z)));
     const auto on_b = [&](const Vec3<V>& direction) HWY_ATTR {
-      return Vec3<V>{select(hn::Ge(direction.x, zero), high.x, low.x),
-                     select(hn::Ge(direction.y, zero), high.y, low.y),
+      return Vec3<V>{select(hn::Ge(direction.x, zero), high.x, low.x), select(hn::Ge(direction.y, zero), high.y, low.y),
                      select(hn::Ge(direction.z, zero), high.z, low.z)};
     };
-    const auto facing_b = [&](const Vec3<V>& direction, Side& side) HWY_ATTR {
-      side_of_box(low, high, direction, side);
-    };
+    const auto facing_b = [&](const Vec3<V>& direction, Side& side)
+                              HWY_ATTR { side_of_box(low, high, direction, side); };
     const auto deepest = [&](const auto& on_a, Vec3<V>& normal, V& depth, Vec3<V>& lowest) HWY_ATTR {
       for (int face = 0; face < 6; ++face) {
         const double sign = face < 3 ? 1.0 : -1.0;
@@ -441,7 +433,8 @@ void touch_boxes_lanes(const LockstepScene* scene, int part_index, const LanePai
     // From the box's nearest point to the middle of the object.
     const Vec3<V> guess{hn::Neg(hn::Min(hn::Max(zero, low.x), high.x)), hn::Neg(hn::Min(hn::Max(zero, low.y), high.y)),
                         hn::Neg(hn::Min(hn::Max(zero, low.z), high.z))};
-    touch_pair(lanes, pair, wanted, guess, on_b, facing_b, deepest, state);
+    touch_pair(lanes, pair, wanted, guess, on_b, facing_b, deepest, stage);
+    stage.flush(lanes.slot, *state);
   }
 }
 
@@ -451,6 +444,7 @@ void touch_hull_lanes(const LockstepScene* scene, int part_index, const LanePair
   const ConvexPart& part = scene->parts[static_cast<std::size_t>(part_index)];
   const std::size_t width = hn::Lanes(d);
   NearLanes lanes;
+  ContactStage stage;
   const ConvexPart& hull = scene->fixed[static_cast<std::size_t>(pairs[0].fixed)].shape;
   for (std::size_t begin = 0; begin < count; begin += width) {
     gather(*scene, part, pairs + begin, std::min(width, count - begin), *state, lanes);
@@ -480,7 +474,8 @@ void touch_hull_lanes(const LockstepScene* scene, int part_index, const LanePair
         lowest = select(better, point, lowest);
       }
     };
-    touch_pair(lanes, pair, all_lanes(), c, on_b, facing_b, deepest, state);
+    touch_pair(lanes, pair, all_lanes(), c, on_b, facing_b, deepest, stage);
+    stage.flush(lanes.slot, *state);
   }
 }
 

@@ -161,8 +161,7 @@ HWY_INLINE Nearest<V> nearest_points(const Vec3<V>& guess, V limit, MOf<V> wante
     const Vec3<V> a = on_a(neg(result.v));
     const Vec3<V> p = a - on_b(result.v);
     const V along = dot(result.v, p);
-    const auto apart =
-        hn::And(active, hn::And(hn::Gt(along, zero), hn::Gt(along * along, result.squared * limit2)));
+    const auto apart = hn::And(active, hn::And(hn::Gt(along, zero), hn::Gt(along * along, result.squared * limit2)));
     result.apart = hn::Or(result.apart, apart);
     const auto converged = hn::Le(result.squared - along, set<V>(kConverged) * result.squared);
     active = hn::AndNot(hn::Or(apart, converged), active);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts of the object with faces that it is over the inner part of: there the nearest point is the lowest one and the
-// normal the face's, whatever else the fixed part has.
+// Contacts of the object with faces that it is over the inner part of: there the nearest point is the lowest one and
+// the normal the face's, whatever else the fixed part has.
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "lane_state.h"
 
@@ -36,8 +34,9 @@ struct PlaneLanes {
 /// Appends points to the contacts of their slots.
 class PlaneWriter {
  public:
-  PlaneWriter(const PlaneLanes& lanes, std::uint32_t valid, const Vec3<V>& normal, V range, V radius, LaneState* state)
-      : lanes_(lanes), valid_(valid), normal_(normal), range_(range), radius_(radius), state_(state) {
+  PlaneWriter(const PlaneLanes& lanes, std::uint32_t valid, const Vec3<V>& normal, V range, V radius,
+              ContactStage& stage)
+      : lanes_(lanes), valid_(valid), normal_(normal), range_(range), radius_(radius), stage_(stage) {
     const D d;
     hn::Store(normal.x, d, stored_normal_[0]);
     hn::Store(normal.y, d, stored_normal_[1]);
@@ -60,15 +59,12 @@ class PlaneWriter {
     hn::Store(gap, d, g);
     for (int i = 0; bits != 0; ++i, bits >>= 1) {
       if (!(bits & 1U)) continue;
-      const std::int32_t slot = lanes_.slot[i];
-      int& count = state_->contact_count[static_cast<std::size_t>(slot)];
-      if (count == kMaxContacts) continue;
-      state_->contacts(slot)[count++] = {{x[i], y[i], z[i]},
-                                         {stored_normal_[0][i], stored_normal_[1][i], stored_normal_[2][i]},
-                                         g[i],
-                                         lanes_.part[i],
-                                         0,
-                                         0};
+      stage_.add(i, {{x[i], y[i], z[i]},
+                     {stored_normal_[0][i], stored_normal_[1][i], stored_normal_[2][i]},
+                     g[i],
+                     lanes_.part[i],
+                     0,
+                     0});
     }
   }
 
@@ -77,7 +73,7 @@ class PlaneWriter {
   std::uint32_t valid_;
   Vec3<V> normal_;
   V range_, radius_;
-  LaneState* state_;
+  ContactStage& stage_;
   HWY_ALIGN Real stored_normal_[3][kLaneMultiple];
 };
 
@@ -102,8 +98,8 @@ HWY_INLINE void box_corners(const ConvexPart& part, const Vec3<V>& n, const Add&
     const Vec3<V> first{u ? half.x : hn::Neg(half.x), u ? half.y : hn::Neg(half.y), zero};
     const Vec3<V> second{zero, v ? half.y : hn::Neg(half.y), v ? half.z : hn::Neg(half.z)};
     // Around x: (y, z); around y: (x, z); around z: (x, y).
-    add(Vec3<V>{select(x_side, facing.x, first.x),
-                select(y_side, facing.y, select(x_side, first.y, second.y)), select(z_side, facing.z, second.z)},
+    add(Vec3<V>{select(x_side, facing.x, first.x), select(y_side, facing.y, select(x_side, first.y, second.y)),
+                select(z_side, facing.z, second.z)},
         all_lanes());
   }
 }
@@ -125,9 +121,8 @@ HWY_INLINE void cylinder_points(const ConvexPart& part, const Vec3<V>& n, const 
   const V top = set<V>(part.half[2]);
   const V low = select(hn::Gt(n.z, zero), hn::Neg(top), top);
   for (int k = 0; k < kRimPoints; ++k) {
-    const double angle = 2.0 * std::numbers::pi * k / kRimPoints;
-    const V c = set<V>(std::cos(angle));
-    const V t = set<V>(std::sin(angle));
+    const V c = set<V>(kRimCosine[k]);
+    const V t = set<V>(kRimSine[k]);
     const Vec3<V> on_rim{r * (cx * c - cy * t), r * (cx * t + cy * c), low};
     if (k < 2) {
       const Vec3<V> on_side{r * cx, r * cy, k == 0 ? hn::Neg(top) : top};
@@ -187,6 +182,7 @@ void touch_planes_lanes(const LockstepScene* scene, int part_index, const LanePa
   const Mat3<V> R_PS = set_matrix<V>(part.R_PS);
   const V radius = set<V>(part.radius);
   PlaneLanes lanes;
+  ContactStage stage;
   for (std::size_t begin = 0; begin < count; begin += width) {
     const std::size_t filled = std::min(width, count - begin);
     for (std::size_t i = 0; i < width; ++i) {
@@ -214,8 +210,8 @@ void touch_planes_lanes(const LockstepScene* scene, int part_index, const LanePa
     const Vec3<V> n = transposed(R, n_W);
     const V height = dot(n_W, column(lanes.p)) - hn::Load(d, lanes.offset);
     const Vec3<V> middle = set3<V>(part.center) - column(lanes.com);
-    const std::uint32_t valid = filled == 32 ? ~0U : (1U << filled) - 1U;
-    PlaneWriter writer(lanes, valid, n, hn::Load(d, lanes.range), radius, state);
+    const std::uint32_t valid = (1U << filled) - 1U;
+    PlaneWriter writer(lanes, valid, n, hn::Load(d, lanes.range), radius, stage);
     const Vec3<V> n_S = transposed(R_PS, n);
     const auto add = [&](const Vec3<V>& core, hn::Mask<D> mask) HWY_ATTR {
       const Vec3<V> point = middle + R_PS * core;
@@ -239,6 +235,7 @@ void touch_planes_lanes(const LockstepScene* scene, int part_index, const LanePa
         hull_corners(part, n_S, add);
         break;
     }
+    stage.flush(lanes.slot, *state);
   }
 }
 

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+// The same bits whichever instances are simulated together, on any number of threads and with any instruction set; and
+// what is refused.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+
+#include "lockstep_scenes.h"
+#include "prescene/geometry/sampling.h"
+#include "prescene/tests/support/allocations.h"
+#include "prescene/tests/support/uncertain_scenes.h"
+
+namespace prescene::tests {
+namespace {
+
+using geometry::BoxShape;
+
+/// Two boxes and a hull that fall into a bin of boxes with a hull inside: every kind of contact.
+Scene busy_scene() {
+  Scene scene = carton_over_bin();
+  const auto carton = geometry::make_gable_carton(0.07, 0.07, 0.15, 0.2);
+  belief::CollisionShape roof = hull_of(geometry::make_gable_carton(0.06, 0.06, 0.02, 0.05));
+  scene.supports.push_back(support_of("roof", {roof}, Pose::from_translation({0.0, 0.0, 0.035})));
+  belief::ObjectModel& model = scene.models[0];
+  model.collision = {hull_of(carton),
+                     belief::PrimitiveShape{BoxShape{{0.12, 0.03, 0.03}}, Pose::from_translation({0, 0, -0.05})},
+                     belief::PrimitiveShape{geometry::Cylinder{0.02, 0.12}, Pose::from_translation({0, 0, 0.05})}};
+  model.contact.rolling_friction = 1e-4;
+  scene.exclusive_outcomes.clear();
+  return scene;
+}
+
+simulation::RunRequest short_request() {
+  simulation::RunRequest request;
+  request.stop.duration = 1.2;
+  request.sample_interval = 0.1;
+  return request;
+}
+
+TEST(LockstepDeterminism, AnyThreadCountOrderSplitAndReuseGivesTheSameBits) {
+  const Scene scene = busy_scene();
+  const std::vector<WorldState> starts = drawn_starts(scene, 60, 3);
+  const simulation::RunRequest request = short_request();
+  const auto simulator = lockstep_of(scene);
+  const std::vector<belief::Trajectory> reference = run_all(*simulator, starts, request);
+  std::size_t contacts = 0;
+  for (const belief::Trajectory& t : reference) contacts += t.contacts.size();
+  ASSERT_GT(contacts, 100U);
+  for (const int threads : {1, 2, 3})
+    EXPECT_TRUE(run_all(*simulator, starts, request, threads) == reference) << threads;
+
+  std::vector<WorldState> reversed(starts.rbegin(), starts.rend());
+  std::vector<belief::Trajectory> runs = run_all(*simulator, reversed, request);
+  std::reverse(runs.begin(), runs.end());
+  EXPECT_TRUE(runs == reference);
+
+  LockstepOptions few;
+  few.live_instances = 5;
+  EXPECT_TRUE(run_all(*lockstep_of(scene, few), starts, request) == reference);
+  for (std::size_t i = 0; i < 10; ++i) {
+    EXPECT_TRUE(run_all(*lockstep_of(scene), {starts[i]}, request)[0] == reference[i]) << i;
+  }
+}
+
+TEST(LockstepDeterminism, AllInstructionSetsGiveTheSameBits) {
+  const Scene scene = busy_scene();
+  const std::vector<WorldState> starts = drawn_starts(scene, 40, 4);
+  const simulation::RunRequest request = short_request();
+  const std::vector<belief::Trajectory> reference = run_all(*lockstep_of(scene), starts, request);
+  hwy::SetSupportedTargetsForTest(0);
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().DeInit();
+    EXPECT_TRUE(run_all(*lockstep_of(scene), starts, request) == reference) << hwy::TargetName(target);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().DeInit();
+}
+
+TEST(LockstepDeterminism, InstancesStepAsRunsDo) {
+  const Scene scene = busy_scene();
+  simulation::RunRequest request = short_request();
+  request.stop.stop_at_rest = false;
+  const auto simulator = lockstep_of(scene);
+  auto instance = simulator->make_instance({}, core::RandomStream(1, core::Purpose::kTest));
+  for (const WorldState& start : drawn_starts(scene, 5, 5)) {
+    instance->set_state(start);
+    step_for(*instance, request.stop.duration);
+    EXPECT_TRUE(instance->state() == run_all(*simulator, {start}, request)[0].final());
+  }
+}
+
+TEST(LockstepDeterminism, SavedAndRestoredInstancesStepAlike) {
+  const Scene scene = busy_scene();
+  const auto simulator = lockstep_of(scene);
+  const core::RandomStream stream(5, core::Purpose::kTest);
+  auto original = simulator->make_instance({}, stream);
+  auto used = simulator->make_instance({}, stream);
+  for (const WorldState& start : drawn_starts(scene, 4, 6)) {
+    original->set_state(start);
+    for (const int when : {20, 95, 170, 260}) {
+      for (int n = 0; n < when; ++n) original->step();
+      const simulation::Snapshot snapshot = original->save();
+      auto fresh = simulator->make_instance({}, stream);
+      ASSERT_TRUE(used->restore(snapshot).ok());
+      ASSERT_TRUE(fresh->restore(snapshot).ok());
+      for (int n = 0; n < 60; ++n) {
+        original->step();
+        used->step();
+        fresh->step();
+        ASSERT_EQ(original->save().bytes, used->save().bytes) << when << " + " << n;
+        ASSERT_EQ(original->save().bytes, fresh->save().bytes) << when << " + " << n;
+      }
+      ASSERT_EQ(original->at_rest(), used->at_rest());
+      ASSERT_EQ(original->save().bytes, used->save().bytes) << "asking whether it rests changed it";
+      used->step();  // out of phase for the next restore
+    }
+  }
+  simulation::Snapshot half = original->save();
+  half.bytes.resize(half.bytes.size() / 2);
+  EXPECT_EQ(original->restore(half).code(), core::StatusCode::kInvalidInput);
+}
+
+TEST(LockstepDeterminism, WarmedUpStepsDoNotAllocate) {
+  if (!can_count_allocations()) GTEST_SKIP() << "allocations can't be counted under sanitizers";
+  const Scene scene = busy_scene();
+  auto instance = lockstep_instance_of(scene);
+  const std::vector<WorldState> starts = drawn_starts(scene, 2, 7);
+  instance->set_state(starts[0]);
+  for (int n = 0; n < 300; ++n) instance->step();
+  instance->set_state(starts[1]);
+  const std::uint64_t before = allocation_count();
+  for (int n = 0; n < 300; ++n) instance->step();
+  EXPECT_EQ(allocation_count(), before);
+}
+
+TEST(LockstepDeterminism, CancelledRunsEnd) {
+  const Scene scene = busy_scene();
+  const std::vector<WorldState> starts = drawn_starts(scene, 150, 8);
+  core::Cancellation cancellation;
+  cancellation.request();
+  core::ThreadPool pool(2);
+  std::vector<belief::Trajectory> runs(starts.size());
+  lockstep_of(scene)->run(starts, short_request(), core::RandomStream(1, core::Purpose::kTest), 0, pool, runs,
+                          &cancellation);
+  for (const belief::Trajectory& run : runs) {
+    EXPECT_EQ(run.end, belief::TrajectoryEnd::kCancelled);
+    EXPECT_EQ(run.states.size(), 2U);
+  }
+}
+
+core::Status refusal(const Scene& scene) {
+  simulation::ShapeStore shapes(simulation::hacd_decomposer());
+  const auto simulator = simulation::make_lockstep_simulator(scene, shapes);
+  return simulator.ok() ? core::ok_status() : simulator.status();
+}
+
+TEST(LockstepRefusals, NameTheBodyAndTheReason) {
+  using testing::HasSubstr;
+  const Scene good = floor_scene(primitive_model("box", BoxShape{{0.1, 0.1, 0.1}}));
+  EXPECT_TRUE(refusal(good).ok());
+  const auto expect_refused = [](const Scene& scene, const char* text) {
+    const core::Status status = refusal(scene);
+    EXPECT_EQ(status.code(), core::StatusCode::kUnsupported) << text;
+    EXPECT_THAT(status.message(), HasSubstr(text));
+  };
+  Scene two = good;
+  add_object(two, primitive_model("box2", BoxShape{{0.1, 0.1, 0.1}}), "second");
+  expect_refused(two, "one object");
+  expect_refused(floor_scene(primitive_model("cone", geometry::Cone{0.03, 0.1})), "object, shape 1: cones");
+  Scene surface = good;
+  const auto bin = std::make_shared<const geometry::TriangleMesh>(geometry::make_open_bin({0.3, 0.3, 0.2}, 0.01));
+  surface.supports.push_back(support_of("bin", {belief::MeshShape{bin, Pose{}, belief::MeshUse::kSurface}}, Pose{}));
+  expect_refused(surface, "bin, shape 1: triangle surfaces");
+  Scene round = good;
+  round.supports.push_back(support_of("post", {belief::PrimitiveShape{geometry::Cylinder{0.03, 0.2}, Pose{}}}, Pose{}));
+  expect_refused(round, "post has a round shape");
+  Scene push = good;
+  push.actions.push_back({0.1, belief::Push{}});
+  expect_refused(push, "push");
+  LockstepOptions options;
+  options.live_instances = 0;
+  simulation::ShapeStore shapes(nullptr);
+  EXPECT_EQ(simulation::make_lockstep_simulator(good, shapes, options).status().code(),
+            core::StatusCode::kInvalidInput);
+}
+
+}  // namespace
+}  // namespace prescene::tests
