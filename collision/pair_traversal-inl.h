@@ -25,9 +25,8 @@ namespace prescene::collision::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Sixteen bytes or integers at once to look at all children of a node, eight floats at once for those that are left.
+// Sixteen bytes at once to look at all children of a node, eight floats at once for those that are left.
 using Bytes16 = hn::CappedTag<std::uint8_t, 16>;
-using Ints16 = hn::CappedTag<std::int32_t, 16>;
 using Floats16 = hn::CappedTag<float, 16>;
 using OneBlock = hn::CappedTag<float, 4>;
 using V16 = hn::Vec<Floats16>;

@@ -24,7 +24,6 @@ struct RayQuery {
   const TriangleReferences* references;
   std::vector<RayStep>* steps;
   std::uint64_t node_count = 0;
-  std::uint64_t box_tests = 0;
   std::uint64_t block_tests = 0;
 };
 

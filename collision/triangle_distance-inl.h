@@ -217,7 +217,8 @@ HWY_INLINE LaneDistance<D> distance_lanes(D d, const Corners<D>& a, const Corner
 }
 
 /// Writes the distances of 16 pairs: zero for hits and for pairs of which the verdict is unsure, infinity for those
-/// that are not active or whose distance is `limit` or more (up to a rounding; not all such pairs are found).
+/// that are not active or whose distance is `limit` or more (up to a rounding; not all such pairs are found). With
+/// kBetween also the vectors from the nearest point of a to that of b, as three rows.
 template <bool kBetween = false, class LoadA, class LoadB>
 HWY_INLINE PairVerdict distance_of_16(const LoadA& load_a, const LoadB& load_b, float limit, float* distances,
                                       std::uint32_t active, float (*between)[16] = nullptr) {
@@ -236,18 +237,6 @@ HWY_INLINE PairVerdict distance_of_16(const LoadA& load_a, const LoadB& load_b, 
     verdict.unsure |= bits_of_mask(d, lanes.verdict.unsure) << first;
   }
   return verdict;
-}
-
-/// Pair i: triangle i of a and of b, both float[9][16].
-HWY_INLINE PairVerdict distance_of_pairs(const float* a, const float* b, float limit, float* distances,
-                                         std::uint32_t active = 0xFFFF) {
-  return distance_of_16(SixteenOf{a}, SixteenOf{b}, limit, distances, active);
-}
-
-/// Pair i: `one`, nine floats that are `stride` apart, and triangle i of b, float[9][16].
-HWY_INLINE PairVerdict distance_of_one_against_16(const float* one, std::size_t stride, const float* b, float limit,
-                                                  float* distances, std::uint32_t active = 0xFFFF) {
-  return distance_of_16(OneOf{one, stride}, SixteenOf{b}, limit, distances, active);
 }
 
 /// Pair 4 i + k: triangle i of a and triangle k of b, both float[9][4].

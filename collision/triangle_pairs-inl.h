@@ -2,10 +2,9 @@
 // Intersection tests of up to 16 pairs of triangles at once, for the kernels of this library: include it in a source
 // that is compiled for each target by foreach_target.h.
 //
-//   PairVerdict v = test_pairs(a, b);                 // 16 arbitrary pairs: a and b are float[9][16]
-//   PairVerdict v = test_one_against_16(one, b);      // one triangle against 16
-//   PairVerdict v = test_4_against_4(a, b);           // two leaves of four: float[9][4] each, pair 4 i + k
-//   LaneVerdict<D> v = test_lanes(d, a, b, active);   // vectors at hand
+//   PairVerdict v = test_16(SixteenOf{a}, SixteenOf{b}, active);   // 16 arbitrary pairs: a and b are float[9][16]
+//   PairVerdict v = test_4_against_4(a, b);                        // two leaves of four: float[9][4] each, pair 4 i +
+//   k LaneVerdict<D> v = test_lanes(d, a, b, active);                // vectors at hand
 //
 // An answer is never wrong: a pair whose determinants are not clear of rounding is "unsure". With the corners of one
 // triangle on both sides of the other's plane and vice versa, both meet the line of the two planes in an interval;
@@ -246,15 +245,6 @@ struct SixteenOf {
   }
 };
 
-/// The same triangle for all pairs; nine coordinates `stride` floats apart.
-struct OneOf {
-  const float* coordinates;
-  std::size_t stride;
-  HWY_INLINE Corners<PairTag> operator()(PairTag d, std::size_t /*first*/) const {
-    return broadcast_corners(d, coordinates, stride);
-  }
-};
-
 /// Triangle i / 4 of float[9][4] for pair i.
 struct EachOfFour {
   const float* rows;
@@ -295,17 +285,6 @@ HWY_INLINE PairVerdict test_16(const LoadA& load_a, const LoadB& load_b, std::ui
     verdict.unsure |= bits_of_mask(d, lanes.unsure) << first;
   }
   return verdict;
-}
-
-/// Pair i: triangle i of a and of b, both float[9][16].
-HWY_INLINE PairVerdict test_pairs(const float* a, const float* b, std::uint32_t active = 0xFFFF) {
-  return test_16(SixteenOf{a}, SixteenOf{b}, active);
-}
-
-/// Pair i: `one`, nine floats that are `stride` apart, and triangle i of b, float[9][16].
-HWY_INLINE PairVerdict test_one_against_16(const float* one, std::size_t stride, const float* b,
-                                           std::uint32_t active = 0xFFFF) {
-  return test_16(OneOf{one, stride}, SixteenOf{b}, active);
 }
 
 /// Pair 4 i + k: triangle i of a and triangle k of b, both float[9][4].
