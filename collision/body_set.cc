@@ -12,6 +12,7 @@
 #include <cmath>
 #include <limits>
 
+#include "prescene/collision/lanes-inl.h"
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/core/check.h"
 
@@ -29,9 +30,7 @@ std::uint32_t meeting_lanes(const BodySet::Boxes& boxes, const WorldBox& box) {
       meet = hn::And(meet, hn::Le(hn::Load(d, boxes.low[k].data() + lane), hn::Set(d, box.high[k])));
       meet = hn::And(meet, hn::Ge(hn::Load(d, boxes.high[k].data() + lane), hn::Set(d, box.low[k])));
     }
-    HWY_ALIGN std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, meet, bytes);
-    bits |= (static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8U) << lane;
+    bits |= bits_of_mask(d, meet) << lane;
   }
   return bits;
 }

@@ -27,17 +27,18 @@ HWY_INLINE bool for_intersecting_blocks(const TriangleTree& a, const TriangleTre
   const TriangleBlock* blocks_a = a.blocks().data();
   const TriangleBlock* blocks_b = b.blocks().data();
   std::uint64_t exact_tests = 0;
-  std::uint64_t block_pairs = 0;
+  std::uint64_t triangle_tests = 0;
   const auto leaf = [&](const LeafPair& leaves) HWY_ATTR {
     TriangleBlock placed_b;
     place_block(X_AB, blocks_b[leaves.block_b], &placed_b);
     const std::uint32_t hits = intersecting(blocks_a[leaves.block_a], placed_b, &exact_tests);
-    ++block_pairs;
+    if (counts != nullptr)
+      triangle_tests += triangles_in(a.references()[leaves.block_a]) * triangles_in(b.references()[leaves.block_b]);
     return hits != 0 && found(leaves.block_a, leaves.block_b, hits);
   };
   if (counts == nullptr) return for_overlapping_leaves<false>(a, b, X_AB, roots(a, b), scratch, counts, leaf);
   const bool ended = for_overlapping_leaves<true>(a, b, X_AB, roots(a, b), scratch, counts, leaf);
-  counts->triangle_tests += 16 * block_pairs;
+  counts->triangle_tests += triangle_tests;
   counts->exact_tests += exact_tests;
   return ended;
 }

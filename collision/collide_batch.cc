@@ -175,7 +175,7 @@ HWY_INLINE std::uint32_t overlapping_in(const Configurations& lanes, const NodeR
         worst = hn::Max(worst, hn::Sub(hn::Abs(along), reach));
       }
     }
-    overlapping |= mask_bits(d, hn::Le(worst, hn::Zero(d))) << lane;
+    overlapping |= bits_of_mask(d, hn::Le(worst, hn::Zero(d))) << lane;
   }
   return overlapping;
 }
@@ -193,7 +193,7 @@ HWY_INLINE float largest_displacement(const Configurations& lanes, const Triangl
       v = hn::MulAdd(hn::Load(d, lanes.turn[3 * c + 2] + lane), hn::Set(d, b.origin[2]), v);
       squares = hn::MulAdd(v, v, squares);
     }
-    largest = hn::Max(largest, hn::IfThenElseZero(mask_of(d, alive >> lane), squares));
+    largest = hn::Max(largest, hn::IfThenElseZero(mask_of_bits(d, alive >> lane), squares));
   }
   return std::sqrt(hn::GetLane(hn::MaxOfLanes(d, largest))) + lanes.largest_turn * b.diagonal;
 }
@@ -205,6 +205,7 @@ struct BatchQuery {
   std::span<const Transform> X_AB;
   QueryScratch* scratch;
   QueryCounts* counts;
+  bool counting;       ///< Whether somebody asked for the counts.
   std::uint32_t open;  ///< Bits of the configurations that are not known to touch.
   std::uint64_t exact_tests;
 
@@ -212,7 +213,9 @@ struct BatchQuery {
   HWY_INLINE bool leaves_touch(std::uint32_t configuration, std::uint32_t block_a, std::uint32_t block_b) {
     TriangleBlock placed_b;
     place_block(X_AB[configuration], tree_b.blocks()[block_b], &placed_b);
-    counts->triangle_tests += 16;
+    if (counting) {
+      counts->triangle_tests += triangles_in(tree_a.references()[block_a]) * triangles_in(tree_b.references()[block_b]);
+    }
     return intersecting(tree_a.blocks()[block_a], placed_b, &exact_tests) != 0;
   }
 };
@@ -233,10 +236,10 @@ constexpr int kFew = 3;
 
 /// Bits of the configurations, of at most 16, in which the trees intersect.
 std::uint32_t collide_lanes(const TriangleTree& tree_a, const TriangleTree& tree_b, std::span<const Transform> X_AB,
-                            const Transform& mean, QueryScratch* scratch, QueryCounts* counts) {
+                            const Transform& mean, QueryScratch* scratch, QueryCounts* counts, bool counting) {
   const Configurations lanes = make_configurations(tree_a, tree_b, X_AB, mean);
   const std::uint32_t all = (1U << X_AB.size()) - 1U;
-  BatchQuery batch{tree_a, tree_b, X_AB, scratch, counts, all, 0};
+  BatchQuery batch{tree_a, tree_b, X_AB, scratch, counts, counting, all, 0};
   QueryFrame query = make_query_frame(tree_a, tree_b, mean);
   const TriangleTreeNode* nodes_a = tree_a.nodes().data();
   const TriangleTreeNode* nodes_b = tree_b.nodes().data();
@@ -335,8 +338,8 @@ void collide(const TriangleTree& a, const TriangleTree& b, std::span<const Trans
   QueryCounts unused;
   for (std::size_t first = 0; first < X_AB.size(); first += kAtOnce) {
     const std::span<const Transform> some = X_AB.subspan(first, std::min(kAtOnce, X_AB.size() - first));
-    const std::uint32_t hits =
-        HWY_DYNAMIC_DISPATCH(collide_lanes)(a, b, some, mean_of(some), &scratch, counts != nullptr ? counts : &unused);
+    const std::uint32_t hits = HWY_DYNAMIC_DISPATCH(collide_lanes)(
+        a, b, some, mean_of(some), &scratch, counts != nullptr ? counts : &unused, counts != nullptr);
     for (std::size_t i = 0; i < some.size(); ++i) touching[first + i] = (hits >> i & 1U) != 0;
   }
 }

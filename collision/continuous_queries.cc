@@ -29,11 +29,7 @@ struct Placed {
 
 inline Placed place_at(const RigidMotion& motion, double time) {
   Placed placed{motion.pose(time), {}, motion.field(time)};
-  const Eigen::Matrix3f R = placed.X_AB.rotation.toRotationMatrix().cast<float>();
-  for (int row = 0; row < 3; ++row) {
-    for (int col = 0; col < 3; ++col) placed.rounded.rotation[static_cast<std::size_t>(3 * row + col)] = R(row, col);
-    placed.rounded.translation[static_cast<std::size_t>(row)] = static_cast<float>(placed.X_AB.translation[row]);
-  }
+  placed.rounded = rounded_transform(placed.X_AB.rotation.toRotationMatrix(), placed.X_AB.translation);
   return placed;
 }
 
@@ -237,7 +233,9 @@ inline void take_up_leaves(const MovingPair& from, ContactSearch* search, std::v
     for (const Vector3f& corner : triangle_of(a, i)) box.extend(corner.cast<double>());
   }
   const double error = static_cast<double>(kDistanceError) * box.sizes().maxCoeff() + search->rounding;
-  if (counts != nullptr) counts->triangle_tests += 16;
+  if (counts != nullptr)
+    counts->triangle_tests += std::uint64_t{triangles_in(search->a->references()[from.pair.a])} *
+                              triangles_in(search->b->references()[from.pair.b]);
   double earliest = std::numeric_limits<double>::infinity();
   for (std::uint32_t pair = 0; pair < 16; ++pair) {
     const TrianglePair triangles{search->a->references()[from.pair.a][pair / 4],

@@ -111,13 +111,21 @@ class NearestSearch {
     return keep_known(triangle_pair_distance(mesh_a.corners(seed.a), placed(mesh_b.corners(seed.b))), nullptr);
   }
 
+  /// Not one that fills up a leaf.
+  bool is_of_meshes(const BlockPair& pair) const {
+    return a_.references()[pair.block_a][pair.pair / 4] != kNoTriangle &&
+           b_.references()[pair.block_b][pair.pair % 4] != kNoTriangle;
+  }
+
   /// Measures pairs that wait. Returns whether that ends the search.
   HWY_NOINLINE bool measure() {
     HWY_ALIGN float distances[16];
     HWY_ALIGN float between[3][16];
     const PairVerdict verdict = batch_.measure(best_, distances, between);
     const std::uint32_t count = std::min(batch_.count(), MeasureBatch::kFull);
-    if (counts_ != nullptr) counts_->triangle_tests += count;
+    if (counts_ != nullptr) {
+      for (std::uint32_t i = 0; i < count; ++i) counts_->triangle_tests += is_of_meshes(batch_.pair(i)) ? 1 : 0;
+    }
     for (std::uint32_t i = 0; i < count; ++i) {
       // Zero for pairs that are not sure to be apart, and for a few that single precision cannot tell from it.
       if (distances[i] == 0.0F || (!found_ && distances[i] >= certain_ && distances[i] < best_)) {

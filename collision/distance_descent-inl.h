@@ -122,7 +122,7 @@ HWY_INLINE std::uint32_t place_near_children(const TriangleTreeNode& node, const
     }
     hn::Store(hn::MulAdd(half_along(near.along), hn::Set(d, near.sign), centre_along(near.along, near.start)), d,
               boxes->end + lane);
-    bits |= mask_bits(d, hn::Le(square, hn::Set(d, limit))) << lane;
+    bits |= bits_of_mask(d, hn::Le(square, hn::Set(d, limit))) << lane;
   }
   return bits;
 }
@@ -154,7 +154,7 @@ HWY_INLINE std::uint32_t bound_near(const NearBoxes& p, std::uint32_t row, const
     const V16 square = hn::Max(hn::Mul(along, along), hn::Max(in_q, in_p));
     const V16 key = hn::IfThenElse(hn::Gt(worst, zero), square, worst);
     hn::Store(key, d, keys + lane);
-    bits |= mask_bits(d, hn::Le(key, hn::Set(d, limit))) << lane;
+    bits |= bits_of_mask(d, hn::Le(key, hn::Set(d, limit))) << lane;
   }
   return bits;
 }

@@ -67,8 +67,8 @@ struct Hierarchy {
   std::vector<Node> nodes;
 };
 
-/// At least one item and at most 2^kMostItemsBits (checked). The same for any number of threads; ends for any input, also when all centres are
-/// equal: items that a builder cannot tell apart are cut into equal parts.
+/// At least one item and at most 2^kMostItemsBits (checked). The same for any number of threads; ends for any input,
+/// also when all centres are equal: items that a builder cannot tell apart are cut into equal parts.
 Hierarchy build_hierarchy(std::span<const Item> items, const HierarchyOptions& options, core::ThreadPool& pool);
 
 /// One item a triangle; weight is its area.

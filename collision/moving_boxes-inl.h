@@ -133,7 +133,7 @@ HWY_INLINE std::uint32_t closing_times(const ChildBoxes& a, std::uint32_t row, c
       latest = hn::Max(latest, closing_time(d, g, rate, hn::Load(d, rates.twice_acceleration[axis] + lane)));
     }
     hn::Store(latest, d, times + lane);
-    bits |= mask_bits(d, hn::Le(latest, hn::Set(d, limit))) << lane;
+    bits |= bits_of_mask(d, hn::Le(latest, hn::Set(d, limit))) << lane;
   }
   return bits;
 }

@@ -25,18 +25,9 @@ TriangleTree tree_of_origin() {
   return TriangleTree::build(*mesh, {}, pool);
 }
 
-Vector3d translation_of(const Transform& X) {
-  return {static_cast<double>(X.translation[0]), static_cast<double>(X.translation[1]),
-          static_cast<double>(X.translation[2])};
-}
-
-Matrix3d rotation_of(const Transform& X) {
-  return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X.rotation.data()).cast<double>();
-}
-
 Transform moved(const Transform& X, const Vector3d& by) {
   Transform result = X;
-  const Vector3d p = translation_of(X) + by;
+  const Vector3d p = translation_vector(X) + by;
   for (int i = 0; i < 3; ++i) result.translation[static_cast<std::size_t>(i)] = static_cast<float>(p[i]);
   return result;
 }
@@ -56,8 +47,8 @@ struct BodyBox {
   }
   BodyBox placed(const Transform& X) const {
     BodyBox box = *this;
-    box.centre = rotation_of(X) * centre + translation_of(X);
-    box.axes = rotation_of(X) * axes;
+    box.centre = rotation_matrix(X) * centre + translation_vector(X);
+    box.axes = rotation_matrix(X) * axes;
     return box;
   }
   bool contains(const Vector3d& p) const {
@@ -97,7 +88,7 @@ class PenetrationSearch {
         box_a_(a.nodes()[0]),
         box_b_(BodyBox(b.nodes()[0]).placed(X_AB)) {
     const double extent =
-        static_cast<double>(a.radius()) + static_cast<double>(b.radius()) + translation_of(X_AB).lpNorm<1>();
+        static_cast<double>(a.radius()) + static_cast<double>(b.radius()) + translation_vector(X_AB).lpNorm<1>();
     rounding_ = 0x1p-20 * extent;
   }
 
@@ -110,7 +101,7 @@ class PenetrationSearch {
     Penetration result;
     result.X_AB_apart = moved(X_AB_, length_ * direction_);
     // What was really done, after rounding.
-    const Vector3d translation = translation_of(result.X_AB_apart) - translation_of(X_AB_);
+    const Vector3d translation = translation_vector(result.X_AB_apart) - translation_vector(X_AB_);
     result.depth = translation.norm();
     if (result.depth > 0.0) result.direction = translation / result.depth;
     const Distance touching = distance_at(result.X_AB_apart);
@@ -130,8 +121,8 @@ class PenetrationSearch {
   /// Whether a piece of one body is inside of the other. Only where the bodies do not collide: then a piece is where
   /// any of its corners is.
   bool one_in_other(const Transform& X_AB) {
-    const Matrix3d R_AB = rotation_of(X_AB);
-    const Vector3d p_AB = translation_of(X_AB);
+    const Matrix3d R_AB = rotation_matrix(X_AB);
+    const Vector3d p_AB = translation_vector(X_AB);
     const auto inside = [this](const TriangleTree& body, const BodyBox& box, const Vector3d& p) {
       return box.contains(p) && is_inside(body, p, scratch_.queries(), counts_);
     };
@@ -202,7 +193,7 @@ class PenetrationSearch {
     const auto normal_of = [](const std::array<Vector3f, 3>& t) {
       return (t[1] - t[0]).cast<double>().cross((t[2] - t[0]).cast<double>()).eval();
     };
-    const Matrix3d R_AB = rotation_of(X_AB_);
+    const Matrix3d R_AB = rotation_matrix(X_AB_);
     const Vector3d origin = middle_of(a_.mesh().corners(pairs[0].a));
     for (const TrianglePair& pair : pairs) {
       const std::array<Vector3f, 3> triangle_a = a_.mesh().corners(pair.a);
@@ -213,7 +204,7 @@ class PenetrationSearch {
       const double size_a = n_a.norm() + std::numeric_limits<double>::min();
       const double size_b = n_b.norm() + std::numeric_limits<double>::min();
       const Vector3d p_a = middle_of(triangle_a);
-      const Vector3d p_b = R_AB * middle_of(triangle_b) + translation_of(X_AB_);
+      const Vector3d p_b = R_AB * middle_of(triangle_b) + translation_vector(X_AB_);
       const Vector3d p = (p_a * size_b + p_b * size_a) / (size_a + size_b) - origin;
       normal_a_ += n_a / size_a;
       normal_b_ += n_b / size_b;
@@ -274,8 +265,8 @@ class PenetrationSearch {
   };
 
   CommonDepth common_depth(const Vector3d& p) {
-    const Matrix3d R_AB = rotation_of(X_AB_);
-    const Vector3d p_B = R_AB.transpose() * (p - translation_of(X_AB_));
+    const Matrix3d R_AB = rotation_matrix(X_AB_);
+    const Vector3d p_B = R_AB.transpose() * (p - translation_vector(X_AB_));
     if (!is_inside(a_, p, scratch_.queries(), counts_) || !is_inside(b_, p_B, scratch_.queries(), counts_)) return {};
     CommonDepth depth;
     const auto add = [&](const TriangleTree& body, const Vector3d& q, const Matrix3d& R) {

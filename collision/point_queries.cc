@@ -57,7 +57,7 @@ HWY_INLINE std::uint32_t distances_from_boxes(const TriangleTreeNode& node, cons
     }
     const V16 least = hn::Mul(sum, hn::Set(d, 1.0F - kRounding));
     hn::Store(least, d, squared + lane);
-    bits |= mask_bits(d, hn::Lt(least, hn::Set(d, limit))) << lane;
+    bits |= bits_of_mask(d, hn::Lt(least, hn::Set(d, limit))) << lane;
   }
   return bits & node.child_mask();
 }

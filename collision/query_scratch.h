@@ -7,11 +7,14 @@
 
 namespace prescene::collision {
 
-/// Work of a query; added to, never reset.
+/// Work of a query; added to, never reset. A vector of pairs counts as so many; what only fills it up does not count
+/// as triangles, so that these numbers compare between trees. In those of volumes the default tree counts its first
+/// look at a pair of nodes, by bytes, as 32.
 struct QueryCounts {
-  std::uint64_t node_pairs = 0;      ///< Pairs of nodes whose children were tested against each other.
-  std::uint64_t volume_tests = 0;    ///< Pairs of bounding volumes.
-  std::uint64_t triangle_tests = 0;  ///< Pairs of triangles.
+  /// Pairs of nodes whose children were tested against each other; of rays, nodes whose children were.
+  std::uint64_t node_pairs = 0;
+  std::uint64_t volume_tests = 0;    ///< Pairs of bounding volumes; of rays, volumes.
+  std::uint64_t triangle_tests = 0;  ///< Pairs of triangles of the meshes; of rays, triangles.
   std::uint64_t exact_tests = 0;     ///< Pairs of triangles that single precision could not decide.
 };
 

@@ -141,7 +141,7 @@ HWY_INLINE std::uint32_t boxes_on_ray(const TriangleTreeNode& node, const BoxRay
       to = hn::Min(to, hn::MulAdd(out, per_step, hn::Set(d, at.first_far[k])));
     }
     hn::Store(from, d, near + lane);
-    hits |= mask_bits(d, hn::Le(from, to)) << lane;
+    hits |= bits_of_mask(d, hn::Le(from, to)) << lane;
   }
   return hits & node.child_mask();
 }
@@ -206,9 +206,9 @@ HWY_INLINE std::uint32_t rays_on_box(const TriangleTreeNode& node, std::uint32_t
       from = hn::Max(from, hn::Min(low, high));
       to = hn::Min(to, hn::Max(low, high));
     }
-    const auto meets = hn::And(hn::Le(from, to), mask_of(d, active >> lane));
+    const auto meets = hn::And(hn::Le(from, to), mask_of_bits(d, active >> lane));
     first = hn::Min(first, hn::IfThenElse(meets, from, first));
-    hits |= mask_bits(d, meets) << lane;
+    hits |= bits_of_mask(d, meets) << lane;
   }
   *nearest = hn::GetLane(hn::MinOfLanes(d, first));
   return hits;

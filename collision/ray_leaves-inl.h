@@ -78,7 +78,7 @@ HWY_INLINE std::uint32_t meet_block(const ShearedRay& ray, const TriangleBlock& 
     hn::Store(v, d, hits->areas[1] + lane);
     hn::Store(w, d, hits->areas[2] + lane);
     hn::Store(sum, d, hits->sum + lane);
-    bits |= mask_bits(d, hit) << lane;
+    bits |= bits_of_mask(d, hit) << lane;
   }
   return bits;
 }

@@ -23,9 +23,13 @@ struct RayQuery {
   const TriangleBlock* blocks;
   const TriangleReferences* references;
   std::vector<RayStep>* steps;
+  QueryCounts* counts;
   std::uint64_t node_count = 0;
-  std::uint64_t block_tests = 0;
 };
+
+HWY_INLINE void count_leaf(const RayQuery& query, std::uint32_t block) {
+  if (query.counts != nullptr) query.counts->triangle_tests += triangles_in(query.references[block]);
+}
 
 struct OneRay {
   ShearedRay sheared;
@@ -78,7 +82,7 @@ HWY_INLINE bool follow(RayQuery* query, std::uint32_t root, std::size_t bottom, 
     if (step.near > s_max) continue;
     const std::uint32_t below = step.below();
     if (step.is_leaf()) {
-      ++query->block_tests;
+      count_leaf(*query, below);
       if (!keep_nearest(ray->sheared, query->blocks[below], query->references[below], &ray->nearest)) continue;
       if constexpr (kAny) return true;
       s_max = at_most(ray->box, ray->nearest.s);
@@ -111,7 +115,7 @@ HWY_INLINE void test_leaf(RayQuery* query, std::uint32_t block, std::uint32_t ra
   for (; rays != 0; rays &= rays - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(rays));
     OneRay& ray = packet->rays[i];
-    ++query->block_tests;
+    count_leaf(*query, block);
     if (!keep_nearest(ray.sheared, query->blocks[block], query->references[block], &ray.nearest)) continue;
     if constexpr (kAny) packet->active &= ~(1U << i);
     packet->boxes.s_max[i] = at_most(ray.box, ray.nearest.s);
@@ -129,7 +133,7 @@ HWY_INLINE void follow_packet(RayQuery* query, Packet* packet) {
     const RayStep step = steps[--top];
     std::uint32_t reach = 0;
     for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d))
-      reach |= mask_bits(d, hn::Ge(hn::Load(d, packet->boxes.s_max + lane), hn::Set(d, step.near))) << lane;
+      reach |= bits_of_mask(d, hn::Ge(hn::Load(d, packet->boxes.s_max + lane), hn::Set(d, step.near))) << lane;
     const std::uint32_t rays = step.rays & packet->active & reach;
     const std::uint32_t below = step.below();
     if (step.is_leaf()) {
@@ -159,8 +163,8 @@ HWY_INLINE void follow_packet(RayQuery* query, Packet* packet) {
   }
 }
 
-inline RayQuery make_query(const TriangleTree& tree, QueryScratch* scratch) {
-  return {tree.nodes().data(), tree.blocks().data(), tree.references().data(), &scratch->ray_steps()};
+inline RayQuery make_query(const TriangleTree& tree, QueryScratch* scratch, QueryCounts* counts) {
+  return {tree.nodes().data(), tree.blocks().data(), tree.references().data(), &scratch->ray_steps(), counts};
 }
 
 inline bool make_ray(const TriangleTree& tree, const Ray& given, OneRay* ray) {
@@ -171,11 +175,10 @@ inline bool make_ray(const TriangleTree& tree, const Ray& given, OneRay* ray) {
   return true;
 }
 
-inline void add_counts(const RayQuery& query, QueryCounts* counts) {
-  if (counts == nullptr) return;
-  counts->node_pairs += query.node_count;
-  counts->volume_tests += 16 * query.node_count;
-  counts->triangle_tests += 4 * query.block_tests;
+inline void add_counts(const RayQuery& query) {
+  if (query.counts == nullptr) return;
+  query.counts->node_pairs += query.node_count;
+  query.counts->volume_tests += 16 * query.node_count;
 }
 
 inline RayHit to_hit(const Ray& given, const OneRay& ray) {
@@ -191,9 +194,9 @@ bool nearest_hit_lanes(const TriangleTree& tree, const Ray& given, QueryScratch*
                        RayHit* hit) {
   OneRay ray;
   if (!make_ray(tree, given, &ray)) return false;
-  RayQuery query = make_query(tree, scratch);
+  RayQuery query = make_query(tree, scratch, counts);
   const bool found = follow<false>(&query, 0, 0, &ray);
-  add_counts(query, counts);
+  add_counts(query);
   if (found) *hit = to_hit(given, ray);
   return found;
 }
@@ -201,9 +204,9 @@ bool nearest_hit_lanes(const TriangleTree& tree, const Ray& given, QueryScratch*
 bool any_hit_lanes(const TriangleTree& tree, const Ray& given, QueryScratch* scratch, QueryCounts* counts) {
   OneRay ray;
   if (!make_ray(tree, given, &ray)) return false;
-  RayQuery query = make_query(tree, scratch);
+  RayQuery query = make_query(tree, scratch, counts);
   const bool found = follow<true>(&query, 0, 0, &ray);
-  add_counts(query, counts);
+  add_counts(query);
   return found;
 }
 
@@ -229,7 +232,7 @@ inline void make_packet(const TriangleTree& tree, std::span<const Ray> given, Pa
 
 void nearest_hits_lanes(const TriangleTree& tree, std::span<const Ray> rays, std::span<std::optional<RayHit>> hits,
                         QueryScratch* scratch, QueryCounts* counts) {
-  RayQuery query = make_query(tree, scratch);
+  RayQuery query = make_query(tree, scratch, counts);
   Packet packet;
   for (std::size_t first = 0; first < rays.size(); first += 16) {
     const std::span<const Ray> given = rays.subspan(first, std::min<std::size_t>(16, rays.size() - first));
@@ -240,12 +243,12 @@ void nearest_hits_lanes(const TriangleTree& tree, std::span<const Ray> rays, std
       if (packet.rays[i].nearest.triangle != kNoTriangle) hits[first + i] = to_hit(given[i], packet.rays[i]);
     }
   }
-  add_counts(query, counts);
+  add_counts(query);
 }
 
 void any_hits_lanes(const TriangleTree& tree, std::span<const Ray> rays, std::span<bool> hits, QueryScratch* scratch,
                     QueryCounts* counts) {
-  RayQuery query = make_query(tree, scratch);
+  RayQuery query = make_query(tree, scratch, counts);
   Packet packet;
   for (std::size_t first = 0; first < rays.size(); first += 16) {
     const std::span<const Ray> given = rays.subspan(first, std::min<std::size_t>(16, rays.size() - first));
@@ -253,7 +256,7 @@ void any_hits_lanes(const TriangleTree& tree, std::span<const Ray> rays, std::sp
     follow_packet<true>(&query, &packet);
     for (std::size_t i = 0; i < given.size(); ++i) hits[first + i] = packet.rays[i].nearest.triangle != kNoTriangle;
   }
-  add_counts(query, counts);
+  add_counts(query);
 }
 
 }  // namespace prescene::collision::HWY_NAMESPACE

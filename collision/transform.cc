@@ -12,16 +12,6 @@ namespace {
 // How far a quaternion's length, or a matrix from a rotation, may be off: what text files with four digits give.
 constexpr double kRigidTolerance = 1e-3;
 
-Transform rounded(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& p_AB) {
-  Transform X_AB;
-  for (int row = 0; row < 3; ++row) {
-    for (int col = 0; col < 3; ++col)
-      X_AB.rotation[static_cast<std::size_t>(3 * row + col)] = static_cast<float>(R_AB(row, col));
-    X_AB.translation[static_cast<std::size_t>(row)] = static_cast<float>(p_AB[row]);
-  }
-  return X_AB;
-}
-
 core::Status check(const geometry::Pose& X, const char* name) {
   if (!X.is_finite())
     return core::invalid_input(std::string(name) + " is not finite; check the pose that was given: " + to_string(X));
@@ -41,14 +31,27 @@ core::Status check_translation(const Eigen::Vector3d& p) {
 
 }  // namespace
 
-Transform inverse(const Transform& X_AB) {
-  Eigen::Matrix3d R_AB;
+Eigen::Matrix3d rotation_matrix(const Transform& X_AB) {
+  return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X_AB.rotation.data()).cast<double>();
+}
+
+Eigen::Vector3d translation_vector(const Transform& X_AB) {
+  return Eigen::Map<const Eigen::Vector3f>(X_AB.translation.data()).cast<double>();
+}
+
+Transform rounded_transform(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& p_AB) {
+  Transform X_AB;
   for (int row = 0; row < 3; ++row) {
     for (int col = 0; col < 3; ++col)
-      R_AB(row, col) = static_cast<double>(X_AB.rotation[static_cast<std::size_t>(3 * row + col)]);
+      X_AB.rotation[static_cast<std::size_t>(3 * row + col)] = static_cast<float>(R_AB(row, col));
+    X_AB.translation[static_cast<std::size_t>(row)] = static_cast<float>(p_AB[row]);
   }
-  const Eigen::Vector3d p_AB = Eigen::Map<const Eigen::Vector3f>(X_AB.translation.data()).cast<double>();
-  return rounded(R_AB.transpose(), -(R_AB.transpose() * p_AB));
+  return X_AB;
+}
+
+Transform inverse(const Transform& X_AB) {
+  const Eigen::Matrix3d R_BA = rotation_matrix(X_AB).transpose();
+  return rounded_transform(R_BA, -(R_BA * translation_vector(X_AB)));
 }
 
 core::Result<Transform> relative_transform(const geometry::Pose& X_WA, const geometry::Pose& X_WB) {
@@ -58,13 +61,13 @@ core::Result<Transform> relative_transform(const geometry::Pose& X_WA, const geo
   const Eigen::Matrix3d R_WB = X_WB.rotation.normalized().toRotationMatrix();
   const Eigen::Vector3d p_AB = R_WA.transpose() * (X_WB.translation - X_WA.translation);
   PRESCENE_RETURN_IF_ERROR(check_translation(p_AB));
-  return rounded(R_WA.transpose() * R_WB, p_AB);
+  return rounded_transform(R_WA.transpose() * R_WB, p_AB);
 }
 
 core::Result<Transform> to_transform(const geometry::Pose& X_AB) {
   PRESCENE_RETURN_IF_ERROR(check(X_AB, "X_AB"));
   PRESCENE_RETURN_IF_ERROR(check_translation(X_AB.translation));
-  return rounded(X_AB.rotation.normalized().toRotationMatrix(), X_AB.translation);
+  return rounded_transform(X_AB.rotation.normalized().toRotationMatrix(), X_AB.translation);
 }
 
 core::Result<Transform> to_transform(const Eigen::Matrix4d& X_AB) {

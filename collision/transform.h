@@ -35,6 +35,12 @@ inline Vector3f operator*(const Transform& X_AB, const Vector3f& p_BQ) {
           ((r[6] * p_BQ.x() + r[7] * p_BQ.y()) + r[8] * p_BQ.z()) + t[2]};
 }
 
+/// Exactly, in double precision.
+Eigen::Matrix3d rotation_matrix(const Transform& X_AB);
+Eigen::Vector3d translation_vector(const Transform& X_AB);
+/// Each number rounded, and nothing checked.
+Transform rounded_transform(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& p_AB);
+
 /// X_BA, rounded: inverse(X) * (X * p) is p within a few units in the last place of |p| and the translation.
 Transform inverse(const Transform& X_AB);
 

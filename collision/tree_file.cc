@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/tree_file.h"
 
+#include "prescene/collision/tree_file_seal.h"
+
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>

@@ -106,8 +106,4 @@ class TreeFile {
   std::vector<Section> sections_;
 };
 
-/// Gives the bytes of a file the checksum that belongs to them, for tests of what is checked behind it. Nothing when
-/// they are too few.
-void seal_tree_file(std::span<std::uint8_t> bytes);
-
 }  // namespace prescene::collision

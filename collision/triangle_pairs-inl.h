@@ -33,6 +33,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "prescene/collision/lanes-inl.h"
 #include "prescene/collision/transform.h"
 #include "prescene/collision/triangle_pairs.h"
 
@@ -221,18 +222,6 @@ HWY_INLINE Corners<D> placed(D d, const Transform& X_AB, const Corners<D>& corne
     return Vectors<D>{axis(0), axis(1), axis(2)};
   };
   return {place(corners_B[0]), place(corners_B[1]), place(corners_B[2])};
-}
-
-HWY_INLINE hn::Mask<PairTag> mask_of_bits(PairTag d, std::uint32_t bits) {
-  alignas(8) const std::array<std::uint8_t, 8> bytes = {static_cast<std::uint8_t>(bits),
-                                                        static_cast<std::uint8_t>(bits >> 8U)};
-  return hn::LoadMaskBits(d, bytes.data());
-}
-
-HWY_INLINE std::uint32_t bits_of_mask(PairTag d, hn::Mask<PairTag> mask) {
-  alignas(8) std::array<std::uint8_t, 8> bytes = {};
-  hn::StoreMaskBits(d, mask, bytes.data());
-  return static_cast<std::uint32_t>(bytes[0] | (bytes[1] << 8U));
 }
 
 // Where the triangles of pairs come from: each loads those of the pairs `first` and on.

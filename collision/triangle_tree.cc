@@ -148,6 +148,55 @@ std::vector<std::uint32_t> ranks(const Hierarchy& shape) {
   return rank;
 }
 
+/// A node of the hierarchy with children, and where its children are among their own kinds.
+TriangleTreeNode make_inner_node(const Hierarchy& shape, const Hierarchy::Node& from,
+                                 const std::vector<std::uint32_t>& rank, const Corners& corners, bool rotated_frames) {
+  std::array<ChildRange, kBranching> children;
+  std::uint32_t leaf_mask = 0;
+  std::array<std::uint32_t, 2> first = {0, 0};
+  for (std::uint32_t c = from.child_count; c-- > 0;) {
+    const Hierarchy::Node& child = shape.nodes[from.first_child + c];
+    children[c] = {child.begin, child.end};
+    first[child.is_leaf() ? 1 : 0] = rank[from.first_child + c];
+    if (child.is_leaf()) leaf_mask |= 1U << c;
+  }
+  TriangleTreeNode node = make_node(corners, std::span(children).first(from.child_count), rotated_frames);
+  node.children_word = TriangleTreeNode::kWordBit | from.child_count << 16U | leaf_mask;
+  node.first_child_word = TriangleTreeNode::kWordBit | first[0];
+  node.first_leaf_word = TriangleTreeNode::kWordBit | first[1];
+  return node;
+}
+
+/// What a tree consists of.
+struct Parts {
+  std::vector<TriangleTreeNode> nodes;
+  std::vector<TriangleBlock> blocks;
+  std::vector<TriangleReferences> references;
+};
+
+Parts make_parts(const Hierarchy& shape, const Corners& corners, bool rotated_frames, core::ThreadPool& pool) {
+  const std::vector<std::uint32_t> rank = ranks(shape);
+  const auto leaves = static_cast<std::size_t>(
+      std::count_if(shape.nodes.begin(), shape.nodes.end(), [](auto& n) { return n.is_leaf(); }));
+  Parts parts;
+  parts.nodes.resize(shape.nodes.size() - leaves);
+  parts.blocks.resize(leaves);
+  parts.references.resize(leaves);
+  constexpr std::size_t kNodesAtOnce = 64;
+  pool.for_blocks(shape.nodes.size(), kNodesAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Hierarchy::Node& from = shape.nodes[i];
+      if (from.is_leaf()) {
+        parts.blocks[rank[i]] = make_block(corners, {from.begin, from.end});
+        parts.references[rank[i]] = make_references(shape.order, {from.begin, from.end});
+      } else {
+        parts.nodes[rank[i]] = make_inner_node(shape, from, rank, corners, rotated_frames);
+      }
+    }
+  });
+  return parts;
+}
+
 /// A lone leaf gets a root above it, so that every tree begins with a node.
 void ensure_root(Hierarchy* shape) {
   if (!shape->nodes[0].is_leaf()) return;
@@ -181,45 +230,14 @@ TriangleTree TriangleTree::build(std::shared_ptr<const Mesh> mesh, const Triangl
     }
   });
 
-  const std::vector<std::uint32_t> rank = ranks(shape);
-  const auto leaves = static_cast<std::size_t>(
-      std::count_if(shape.nodes.begin(), shape.nodes.end(), [](auto& n) { return n.is_leaf(); }));
-  std::vector<TriangleTreeNode> nodes(shape.nodes.size() - leaves);
-  std::vector<TriangleBlock> blocks(leaves);
-  std::vector<TriangleReferences> references(leaves);
-  constexpr std::size_t kNodesAtOnce = 64;
-  pool.for_blocks(shape.nodes.size(), kNodesAtOnce, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Hierarchy::Node& from = shape.nodes[i];
-      if (from.is_leaf()) {
-        blocks[rank[i]] = make_block(corners, {from.begin, from.end});
-        references[rank[i]] = make_references(shape.order, {from.begin, from.end});
-        continue;
-      }
-      std::array<ChildRange, kBranching> children;
-      std::uint32_t leaf_mask = 0;
-      std::array<std::uint32_t, 2> first = {0, 0};
-      for (std::uint32_t c = from.child_count; c-- > 0;) {
-        const Hierarchy::Node& child = shape.nodes[from.first_child + c];
-        children[c] = {child.begin, child.end};
-        first[child.is_leaf() ? 1 : 0] = rank[from.first_child + c];
-        if (child.is_leaf()) leaf_mask |= 1U << c;
-      }
-      TriangleTreeNode node = make_node(corners, std::span(children).first(from.child_count), options.rotated_frames);
-      node.children_word = TriangleTreeNode::kWordBit | from.child_count << 16U | leaf_mask;
-      node.first_child_word = TriangleTreeNode::kWordBit | first[0];
-      node.first_leaf_word = TriangleTreeNode::kWordBit | first[1];
-      nodes[rank[i]] = node;
-    }
-  });
-
+  Parts parts = make_parts(shape, corners, options.rotated_frames, pool);
   TriangleTree tree;
   tree.radius_ = radius_of(*mesh);
   tree.mesh_ = std::move(mesh);
   tree.options_ = options;
-  tree.nodes_ = Array<TriangleTreeNode>(std::move(nodes));
-  tree.blocks_ = Array<TriangleBlock>(std::move(blocks));
-  tree.references_ = Array<TriangleReferences>(std::move(references));
+  tree.nodes_ = Array<TriangleTreeNode>(std::move(parts.nodes));
+  tree.blocks_ = Array<TriangleBlock>(std::move(parts.blocks));
+  tree.references_ = Array<TriangleReferences>(std::move(parts.references));
   return tree;
 }
 

@@ -10,6 +10,8 @@
 // [Gottschalk et al. 1996]. Leaves hold up to four triangles, copied in the order of the leaves.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -79,6 +81,9 @@ struct alignas(16) TriangleBlock {
 /// Their indices in the mesh; kNoTriangle where the leaf has fewer.
 using TriangleReferences = std::array<std::uint32_t, 4>;
 inline constexpr std::uint32_t kNoTriangle = ~std::uint32_t{0};
+inline std::uint32_t triangles_in(const TriangleReferences& leaf) {
+  return static_cast<std::uint32_t>(4 - std::count(leaf.begin(), leaf.end(), kNoTriangle));
+}
 
 struct TriangleTreeMemory {
   std::size_t node_bytes = 0;

@@ -51,20 +51,6 @@ HWY_INLINE void unpack_planes(const std::uint16_t* planes, std::size_t count, fl
 HWY_INLINE float scalar_plane(const float* plane) { return *plane; }
 HWY_INLINE float scalar_plane(const std::uint16_t* plane) { return from_half(*plane); }
 
-/// Bits `first` and on of `bits` as a mask, and back.
-template <class D>
-HWY_INLINE hn::Mask<D> mask_of(D d, std::uint32_t bits, std::size_t first) {
-  alignas(8) const std::array<std::uint8_t, 8> bytes = {static_cast<std::uint8_t>(bits >> first),
-                                                        static_cast<std::uint8_t>(bits >> first >> 8U)};
-  return hn::LoadMaskBits(d, bytes.data());
-}
-template <class D>
-HWY_INLINE std::uint32_t bits_of(D d, hn::Mask<D> mask, std::size_t first) {
-  alignas(8) std::array<std::uint8_t, 8> bytes = {};
-  hn::StoreMaskBits(d, mask, bytes.data());
-  return static_cast<std::uint32_t>(bytes[0] | bytes[1] << 8U) << first;
-}
-
 /// The constants of all steps when planes are relative to points of the nodes; aligned.
 HWY_INLINE void shift_constants(const SimdopSteps& steps, const SimdopTree::Node& a, const SimdopTree::Node& b,
                                 float* shifted) {
@@ -123,7 +109,7 @@ HWY_INLINE void one_versus_all(const SimdopSteps& steps, const float* constant, 
   const std::size_t lanes = hn::Lanes(d);
   HWY_ALIGN std::array<float, SimdopSteps::kMost * kBranching> bounds;
   for (std::size_t first = 0; first < kBranching; first += lanes) {
-    const auto wanted = mask_of(d, wanted_b, first);
+    const auto wanted = mask_of_bits(d, wanted_b >> first);
     if (hn::AllFalse(d, wanted)) continue;
     std::size_t done = 0;
     for (std::uint32_t rest = wanted_a; rest != 0; rest &= rest - 1) {
@@ -143,7 +129,7 @@ HWY_INLINE void one_versus_all(const SimdopSteps& steps, const float* constant, 
         alive = hn::AndNot(apart, alive);
         if (hn::AllFalse(d, alive)) break;
       }
-      overlaps[i] |= bits_of(d, alive, first);
+      overlaps[i] |= bits_of_mask(d, alive) << first;
     }
   }
 }
@@ -172,7 +158,7 @@ HWY_INLINE void all_versus_each(const SimdopSteps& steps, const float* constant,
   for (std::uint32_t rest = wanted_b; rest != 0; rest &= rest - 1) {
     const auto child_b = static_cast<std::size_t>(std::countr_zero(rest));
     for (std::size_t first = 0; first < kBranching; first += hn::Lanes(d)) {
-      auto alive = mask_of(d, wanted_a, first);
+      auto alive = mask_of_bits(d, wanted_a >> first);
       for (std::size_t s = 0; s < steps.count && !hn::AllFalse(d, alive); s += 2) {
         for (; done < s + 2; ++done) {
           unpack_row<kBranching>(d, planes_a + done * kBranching, buffer.data() + done * kBranching);
@@ -186,7 +172,7 @@ HWY_INLINE void all_versus_each(const SimdopSteps& steps, const float* constant,
         const auto lower = hn::Lt(hn::LoadU(d, rows + kBranching), hn::Set(d, bounds[(s + 1) * kBranching + child_b]));
         alive = hn::AndNot(hn::Or(upper, lower), alive);
       }
-      for (std::uint32_t found = bits_of(d, alive, first); found != 0; found &= found - 1)
+      for (std::uint32_t found = bits_of_mask(d, alive) << first; found != 0; found &= found - 1)
         overlaps[static_cast<std::size_t>(std::countr_zero(found))] |= 1U << child_b;
     }
   }
@@ -200,7 +186,7 @@ HWY_INLINE void all_versus_one(const SimdopSteps& steps, const float* constant, 
   std::array<float, SimdopSteps::kMost> bounds;
   std::size_t done = 0;
   for (std::size_t first = 0; first < kBranching; first += hn::Lanes(d)) {
-    auto alive = mask_of(d, wanted_a, first);
+    auto alive = mask_of_bits(d, wanted_a >> first);
     for (std::size_t s = 0; s < steps.count && !hn::AllFalse(d, alive); s += 2) {
       for (; done < s + 2; ++done) {
         bounds[done] = constant[done];
@@ -213,7 +199,7 @@ HWY_INLINE void all_versus_one(const SimdopSteps& steps, const float* constant, 
       const auto lower = load_planes(d, planes_a + (s + 1) * kBranching + first);
       alive = hn::AndNot(hn::Or(hn::Lt(upper, hn::Set(d, bounds[s])), hn::Lt(lower, hn::Set(d, bounds[s + 1]))), alive);
     }
-    for (std::uint32_t rest = bits_of(d, alive, first); rest != 0; rest &= rest - 1)
+    for (std::uint32_t rest = bits_of_mask(d, alive) << first; rest != 0; rest &= rest - 1)
       overlaps[static_cast<std::size_t>(std::countr_zero(rest))] |= 1U << child_b;
   }
 }
@@ -238,7 +224,7 @@ HWY_INLINE void four_versus_four(const SimdopSteps& steps, const float* constant
   for (std::uint32_t i = 0; i < 4; ++i) wanted |= (wanted_a >> i & 1U) != 0 ? wanted_b << 4U * i : 0U;
   std::uint32_t found = 0;
   for (std::size_t first = 0; first < 16; first += hn::Lanes(d)) {
-    auto alive = mask_of(d, wanted, first);
+    auto alive = mask_of_bits(d, wanted >> first);
     for (std::size_t s = 0; s < steps.count && !hn::AllFalse(d, alive); s += 2) {
       const auto upper =
           hn::Lt(each_of_four(d, planes_a + 4 * s, first), realigned_fours(d, steps, constant, s, planes_b, first));
@@ -246,7 +232,7 @@ HWY_INLINE void four_versus_four(const SimdopSteps& steps, const float* constant
                                 realigned_fours(d, steps, constant, s + 1, planes_b, first));
       alive = hn::AndNot(hn::Or(upper, lower), alive);
     }
-    found |= bits_of(d, alive, first);
+    found |= bits_of_mask(d, alive) << first;
   }
   for (std::size_t i = 0; i < 4; ++i) overlaps[i] |= found >> 4 * i & 15U;
 }

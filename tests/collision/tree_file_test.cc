@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_file_seal.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>

@@ -11,6 +11,7 @@
 #include "prescene/collision/distance_queries.h"
 #include "prescene/collision/ray_queries.h"
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_file_seal.h"
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_file_seal.h"
 #include "prescene/core/check.h"
 
 using namespace prescene::collision;  // NOLINT(google-build-using-namespace)

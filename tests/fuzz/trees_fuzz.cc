@@ -12,6 +12,7 @@
 #include "prescene/collision/penetration.h"
 #include "prescene/collision/ray_queries.h"
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_file_seal.h"
 #include "prescene/collision/triangle_queries.h"
 #include "tree_kinds.h"
 

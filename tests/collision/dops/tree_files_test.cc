@@ -12,6 +12,7 @@
 #include "prescene/collision/dops/dop_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_file_seal.h"
 #include "prescene/collision/triangle_tree.h"
 #include "prescene/core/random.h"
 #include "prescene/tests/support/paths.h"

@@ -12,6 +12,7 @@
 
 #include "prescene/collision/spheres/sphere_queries.h"
 #include "prescene/collision/tree_file.h"
+#include "prescene/collision/tree_file_seal.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 
