@@ -17,7 +17,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/generators.h"
-#include "target_test.h"
+#include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "prescene/collision/hierarchy.h"
 #include "prescene/core/random.h"
+#include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {
@@ -72,12 +73,9 @@ TEST(NeuralGas, IsTheSameForEveryInstructionSet) {
   const HierarchyOptions options{.builder = Builder::kWeightedNeuralGas, .branching = 11};
   const Hierarchy tree = build_hierarchy(items, options, pool);
   for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().DeInit();
+    const UseTarget only(target);
     EXPECT_EQ(build_hierarchy(items, options, pool).order, tree.order) << hwy::TargetName(target);
   }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/triangle_distance.h"
 #include "prescene/tests/support/allocations.h"
-#include "target_test.h"
+#include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {

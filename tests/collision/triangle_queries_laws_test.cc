@@ -15,6 +15,7 @@
 #include "prescene/collision/triangle_pair_distance.h"
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/generators.h"
+#include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {
@@ -160,14 +161,11 @@ TEST(TriangleQueries, AnswerAlikeForEveryTreeAndInstructionSet) {
         const std::array<Transform, 3> batch = {X_AB, X_AB, X_AB};
         std::array<bool, 3> answers{};
         for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-          hwy::SetSupportedTargetsForTest(target);
-          hwy::GetChosenTarget().DeInit();
+          const UseTarget only(target);
           RC_ASSERT(collide(a, b, X_AB, scratch) == expected);
           collide(a, b, batch, answers, scratch);
           RC_ASSERT(answers[0] == expected && answers[2] == expected);
         }
-        hwy::SetSupportedTargetsForTest(0);
-        hwy::GetChosenTarget().DeInit();
       }
     }
   }));

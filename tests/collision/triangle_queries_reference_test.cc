@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The default tree against brute force by exact predicates and against FCL, on 10,000 configurations of each of a dozen
-// pairs of meshes: scattered ones, and ones around poses that just touch. FCL decides in double precision on B's
-// vertices before they are rounded, with tolerances of its own; where it says something else, the exact reference has
-// the word.
+// pairs of meshes: scattered ones, and ones around poses that just touch; the trees of k-DOPs and boxes on every tenth
+// of them. FCL decides in double precision on B's vertices before they are rounded, with tolerances of its own; where
+// it says something else, the exact reference has the word.
 #include <gmock/gmock.h>
 #include <hwy/targets.h>
 
@@ -16,6 +16,10 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/collision/dops/boxtree.h"
+#include "prescene/collision/dops/bvhlite_tree.h"
+#include "prescene/collision/dops/dop_tree.h"
+#include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/tests/peers/mesh_collision.h"
@@ -23,6 +27,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
 #include "prescene/tests/support/paths.h"
+#include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {
@@ -42,13 +47,9 @@ struct Compared {
   int fcl_differs = 0;
   int wrong = 0;           ///< Answers of the tree that brute force refutes.
   int batch_differs = 0;   ///< Configurations that a batch answers otherwise than a single query.
+  int trees_differ = 0;    ///< Answers of other trees, to every tenth configuration, that are not the default tree's.
   int targets_differ = 0;  ///< Configurations that instruction sets answer differently.
 };
-
-void use_targets(std::int64_t allowed) {
-  hwy::SetSupportedTargetsForTest(allowed);
-  hwy::GetChosenTarget().DeInit();
-}
 
 std::vector<Transform> make_configurations(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b,
                                            tests::MeshPairPeer* fcl) {
@@ -94,6 +95,41 @@ int differences(const std::vector<bool>& a, const std::vector<bool>& b) {
   return count;
 }
 
+/// How often another kind of tree answers every tenth configuration differently.
+template <class Tree, class Options, class Ask>
+int differences_of_tree(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b,
+                        const Options& options, const std::vector<Transform>& configurations,
+                        const std::vector<bool>& expected, const Ask& ask) {
+  constexpr std::size_t kStep = 10;
+  core::ThreadPool pool(1);
+  const Tree tree_a = Tree::build(a, options, pool), tree_b = Tree::build(b, options, pool);
+  int count = 0;
+  for (std::size_t i = 0; i < configurations.size(); i += kStep)
+    count += ask(tree_a, tree_b, configurations[i]) != expected[i] ? 1 : 0;
+  return count;
+}
+
+int differences_of_trees(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b,
+                         const std::vector<Transform>& configurations, const std::vector<bool>& expected) {
+  QueryScratch scratch;
+  BvhLiteScratch bvhlite_scratch;
+  const auto plain = [](const auto& tree_a, const auto& tree_b, const Transform& X_AB) {
+    return collide(tree_a, tree_b, X_AB);
+  };
+  const auto simdop = [&](const SimdopTree& tree_a, const SimdopTree& tree_b, const Transform& X_AB) {
+    return collide(tree_a, tree_b, X_AB, scratch);
+  };
+  const auto bvhlite = [&](const BvhLiteTree& tree_a, const BvhLiteTree& tree_b, const Transform& X_AB) {
+    return collide(tree_a, tree_b, X_AB, bvhlite_scratch);
+  };
+  int count = differences_of_tree<DopTree>(a, b, DopTreeOptions{}, configurations, expected, plain);
+  count += differences_of_tree<Boxtree>(a, b, BoxtreeOptions{}, configurations, expected, plain);
+  for (const PlanePrecision precision : {PlanePrecision::kSingle, PlanePrecision::kHalf})
+    count +=
+        differences_of_tree<SimdopTree>(a, b, SimdopOptions{.precision = precision}, configurations, expected, simdop);
+  return count + differences_of_tree<BvhLiteTree>(a, b, BvhLiteOptions{.bits = 4}, configurations, expected, bvhlite);
+}
+
 Compared compare(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b) {
   core::ThreadPool pool(1);
   const TriangleTree tree_a = TriangleTree::build(a, {}, pool), tree_b = TriangleTree::build(b, {}, pool);
@@ -111,13 +147,13 @@ Compared compare(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<con
       compared.wrong += by_tree[i] != tests::collide_by_brute_force(*a, *b, configurations[i]) ? 1 : 0;
     }
   }
+  compared.trees_differ = differences_of_trees(a, b, configurations, by_tree);
   compared.configurations = static_cast<int>(configurations.size());
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    use_targets(target);
+    const UseTarget only(target);
     compared.targets_differ += differences(answers(tree_a, tree_b, configurations), by_tree);
     compared.batch_differs += differences(answers_of_batches(tree_a, tree_b, configurations), by_tree);
   }
-  use_targets(0);
   return compared;
 }
 
@@ -129,6 +165,7 @@ void expect_same_answers(const std::shared_ptr<const Mesh>& a, const std::shared
       a->name().c_str(), b->name().c_str(), a->triangle_count(), b->triangle_count(), compared.configurations,
       compared.by_brute_force, compared.colliding, compared.fcl_differs);
   EXPECT_EQ(compared.wrong, 0);
+  EXPECT_EQ(compared.trees_differ, 0);
   EXPECT_EQ(compared.targets_differ, 0);
   EXPECT_EQ(compared.batch_differs, 0);
   EXPECT_EQ(compared.configurations, kScattered + kTouching * kAround);

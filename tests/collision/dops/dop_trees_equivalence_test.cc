@@ -14,14 +14,10 @@
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/collision_meshes.h"
+#include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {
-
-void use_target(std::int64_t target) {
-  hwy::SetSupportedTargetsForTest(target);
-  hwy::GetChosenTarget().DeInit();
-}
 
 class DopTrees : public ::testing::Test {
  protected:

@@ -11,10 +11,20 @@
 
 namespace prescene::collision {
 
+/// HWY_DYNAMIC_DISPATCH goes to this target; 0: to the best again.
 inline void use_target(std::int64_t target) {
   hwy::SetSupportedTargetsForTest(target);
   hwy::GetChosenTarget().DeInit();
 }
+
+/// The same as long as it lives, also where an assertion throws.
+class UseTarget {
+ public:
+  explicit UseTarget(std::int64_t target) { use_target(target); }
+  UseTarget(const UseTarget&) = delete;
+  UseTarget& operator=(const UseTarget&) = delete;
+  ~UseTarget() { use_target(0); }
+};
 
 /// Runs with HWY_DYNAMIC_DISPATCH going to the target that is the parameter.
 class TargetTest : public testing::TestWithParam<std::int64_t> {
