@@ -195,7 +195,8 @@ HWY_INLINE float largest_displacement(const Configurations& lanes, const Triangl
     }
     largest = hn::Max(largest, hn::IfThenElseZero(mask_of_bits(d, alive >> lane), squares));
   }
-  return std::sqrt(hn::GetLane(hn::MaxOfLanes(d, largest))) + lanes.largest_turn * b.diagonal;
+  constexpr float kLostBySquaring = 1e-22F;  // m: squares of less than that are no numbers of single precision
+  return std::sqrt(hn::GetLane(hn::MaxOfLanes(d, largest))) + kLostBySquaring + lanes.largest_turn * b.diagonal;
 }
 
 /// The two trees, the configurations and what is known of them.

@@ -16,6 +16,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace prescene::collision::HWY_NAMESPACE {
 
+DistanceOptions without_nan(DistanceOptions options) {
+  if (std::isnan(options.limit)) options.limit = std::numeric_limits<double>::infinity();
+  return options;
+}
+
 class NearestSearch {
  public:
   /// `any_will_do`: the first pair within the limit ends the search.
@@ -24,12 +29,12 @@ class NearestSearch {
       : a_(a),
         b_(b),
         X_AB_(X_AB),
-        options_(options),
+        options_(without_nan(options)),
         any_will_do_(any_will_do),
         scratch_(scratch),
         counts_(counts),
         frame_(make_distance_frame(a, b, X_AB)) {
-    const double limit = options.limit;
+    const double limit = options_.limit;
     // Where single precision does not tell whether a distance is within the limit.
     const double error = 4.0 * static_cast<double>(kDistanceError) *
                          (static_cast<double>(a.radius()) + static_cast<double>(b.radius()) + std::max(limit, 0.0));
@@ -64,7 +69,7 @@ class NearestSearch {
     float reach = best;
     if (found_) {
       const double tolerance =
-          std::max({options_.absolute_tolerance, options_.relative_tolerance * static_cast<double>(best), 0.0});
+          std::max({0.0, options_.absolute_tolerance, options_.relative_tolerance * static_cast<double>(best)});
       reach = std::max(0.0F, static_cast<float>(static_cast<double>(best) - tolerance));
     }
     const float in_units = reach * frame_.scale;
@@ -195,7 +200,7 @@ class NearestSearch {
   const TriangleTree& a_;
   const TriangleTree& b_;
   const Transform& X_AB_;
-  const DistanceOptions& options_;
+  DistanceOptions options_;
   bool any_will_do_;
   QueryScratch* scratch_;
   QueryCounts* counts_;
@@ -234,6 +239,7 @@ std::optional<Distance> distance(const TriangleTree& a, const TriangleTree& b, c
 
 bool within_distance(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB, double margin,
                      QueryScratch& scratch, QueryCounts* counts) {
+  if (!(margin >= 0.0)) return false;
   Distance answer;
   DistanceOptions options;
   options.limit = margin;

@@ -22,14 +22,15 @@
 namespace prescene::collision {
 
 struct DistanceOptions {
-  /// The answer is at most the larger of the two above the least distance, besides rounding. Negative: zero.
+  /// The answer is at most the larger of the two above the least distance, besides rounding. Negative or not a number:
+  /// zero.
   double relative_tolerance = 0.0;  ///< Times the answer.
   double absolute_tolerance = 0.0;  ///< m
-  /// Whether anything is nearer than this, m, is all that is asked; the nearer, the faster.
+  /// Whether anything is nearer than this, m, is all that is asked; the nearer, the faster. Not a number: no limit.
   double limit = std::numeric_limits<double>::infinity();
   /// Two triangles that are known to be near, as the answer a moment ago; makes a query faster. Triangles that the
   /// meshes do not have are ignored.
-  TrianglePair seed;
+  TrianglePair seed = {};
 };
 
 struct Distance {

@@ -82,7 +82,7 @@ class PenetrationSearch {
       : a_(a),
         b_(b),
         X_AB_(X_AB),
-        tolerance_(std::max(options.tolerance, 1e-6)),
+        tolerance_(std::clamp(options.tolerance >= 0.0 ? options.tolerance : 0.0, 1e-6, 1.0)),
         scratch_(*scratch),
         counts_(counts),
         box_a_(a.nodes()[0]),

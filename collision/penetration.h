@@ -33,7 +33,7 @@ namespace prescene::collision {
 
 struct PenetrationOptions {
   /// How far along its direction the translation may go on after the bodies have come apart, as a share of its length.
-  /// Smaller than 1e-6 counts as 1e-6.
+  /// Less than 1e-6 or not a number counts as 1e-6, more than 1 as 1.
   double tolerance = 1e-3;
 };
 

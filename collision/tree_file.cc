@@ -13,6 +13,7 @@
 #include <atomic>
 #include <bit>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <new>
 #include <system_error>
@@ -107,10 +108,20 @@ class Descriptor {
 
 Status write_error(const std::filesystem::path& path, int error) {
   if (error == ENOENT) return core::not_found(path.string() + ": its folder does not exist; make it first");
+  if (error == ENOTDIR) return core::invalid_input(path.string() + ": its folder is a file; choose another path");
   const std::string text = path.string() + ": cannot be written: " + reason(error);
   if (error == ENOSPC || error == EDQUOT || error == EFBIG)
     return core::resource_exhausted(text + "; free some space or choose another folder for trees");
   return core::unavailable(text + "; choose another folder for trees");
+}
+
+// Hardly ever the same twice, also where processes have the same number one after the other.
+std::string partial_name() {
+  static std::atomic<unsigned> count = 0;
+  core::Hasher hasher;
+  hasher.value(static_cast<std::int64_t>(::getpid())).value(count.fetch_add(1));
+  hasher.value(static_cast<std::int64_t>(std::chrono::system_clock::now().time_since_epoch().count()));
+  return ".tree-" + core::hash_text(hasher.digest()) + ".partial";
 }
 
 // Zero or the error.
@@ -219,12 +230,25 @@ std::vector<std::uint8_t> TreeFileWriter::bytes() const {
 }
 
 Status TreeFileWriter::write(const std::filesystem::path& path) const {
-  // Two writers of one file, threads or processes, each have their own partial file.
-  static std::atomic<unsigned> count = 0;
-  std::filesystem::path partial = path;
-  partial += ".partial-" + std::to_string(::getpid()) + "-" + std::to_string(count.fetch_add(1));
-  int error = write_all(partial, bytes());
-  if (error == 0 && ::rename(partial.c_str(), path.c_str()) != 0) error = errno;
+  // What is no file stays what it is, and a link stays a link: the file that it leads to is written.
+  std::error_code ignored;
+  const std::filesystem::path target =
+      std::filesystem::is_symlink(path, ignored) ? std::filesystem::weakly_canonical(path, ignored) : path;
+  const std::filesystem::file_status before = std::filesystem::status(target, ignored);
+  if (std::filesystem::exists(before) && !std::filesystem::is_regular_file(before))
+    return core::invalid_input(path.string() + ": it is not a file; choose another path");
+
+  const std::vector<std::uint8_t> contents = bytes();
+  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
+  int error = EEXIST;
+  std::filesystem::path partial;
+  // Two writers of one file, threads or processes, each have their own partial file; others that were killed may have
+  // left theirs.
+  for (int attempt = 0; error == EEXIST && attempt < 100; ++attempt) {
+    partial = folder / partial_name();
+    error = write_all(partial, contents);
+  }
+  if (error == 0 && ::rename(partial.c_str(), target.c_str()) != 0) error = errno;
   if (error == 0) return core::ok_status();
   if (error != EEXIST) ::unlink(partial.c_str());
   return write_error(path, error);

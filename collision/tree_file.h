@@ -54,7 +54,8 @@ class TreeFileWriter {
   }
 
   std::vector<std::uint8_t> bytes() const;
-  /// Writes beside the target and renames: readers see the old file or the new one. kNotFound when the folder does not
+  /// Writes beside the target and renames: readers see the old file or the new one. A link stays, the file that it
+  /// leads to is written. kInvalidInput when there is something else than a file, kNotFound when the folder does not
   /// exist, kResourceExhausted when the disk is full, kUnavailable for other failures; the text begins with the path.
   core::Status write(const std::filesystem::path& path) const;
 

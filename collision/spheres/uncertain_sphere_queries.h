@@ -32,8 +32,9 @@ enum class OverlapState {
 struct UncertainOverlap {
   OverlapState state = OverlapState::kNone;
   double probability = 0.0;  ///< Best estimate that some pair of spheres touches; within the bounds.
-  double probability_error =
-      0.0;             ///< Two standard errors of the estimate's sampling; half the bounds' gap when certain.
+  /// Two standard errors of the estimate's sampling, half the bounds' gap when certain. The estimate itself is of first
+  /// order in rotations: with deviations of 0.3 rad it can be off by 0.2, with 1 rad by anything within the bounds.
+  double probability_error = 0.0;
   double lower = 0.0;  ///< Bounds that hold without exception, also for rotations that are not small.
   double upper = 1.0;
   std::uint32_t critical_pairs = 0;  ///< Pairs that estimate and bounds rest on.

@@ -163,6 +163,24 @@ TEST_F(DistanceQueries, KeepTheirTolerancesAndLimits) {
   });
 }
 
+TEST_F(DistanceQueries, TakeOptionsThatAreNoNumbersAsNone) {
+  check([] {
+    const TriangleTree a = tree_of(*tests::closed_meshes());
+    const TriangleTree b = tree_of(*tests::closed_meshes());
+    const Transform X_AB = any_pose(a.mesh(), b.mesh());
+    QueryScratch scratch;
+    const std::optional<Distance> plain = distance(a, b, X_AB, {}, scratch);
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    for (const DistanceOptions& options :
+         {DistanceOptions{.relative_tolerance = kNone}, DistanceOptions{.absolute_tolerance = kNone},
+          DistanceOptions{.limit = kNone}}) {
+      const std::optional<Distance> same = distance(a, b, X_AB, options, scratch);
+      RC_ASSERT(same.has_value());
+      RC_ASSERT(same->distance == plain->distance);
+    }
+  });
+}
+
 TEST_F(DistanceQueries, AnswerTheSameFromAnySeed) {
   check([] {
     const TriangleTree a = tree_of(*tests::closed_meshes());

@@ -177,6 +177,18 @@ TEST(Penetration, OfBoxesIsTheirLeastOverlap) {
   EXPECT_LT(worst, 1.05);
 }
 
+TEST(Penetration, TakesAnyTolerance) {
+  const TriangleTree box = tree_of(geometry::make_mesh(geometry::BoxShape{{0.1, 0.07, 0.04}}));
+  PenetrationScratch scratch;
+  for (const double tolerance : {std::numeric_limits<double>::quiet_NaN(), -1.0, 0.0, 1.0, 1e3, 1e300,
+                                 std::numeric_limits<double>::infinity()}) {
+    const std::optional<Penetration> found = penetration(box, box, Transform{}, {.tolerance = tolerance}, scratch);
+    ASSERT_TRUE(found.has_value());
+    EXPECT_GE(found->depth, 0.04 - 1e-6);
+    EXPECT_LE(found->depth, 0.5) << "within twice the way out at most";
+  }
+}
+
 TEST(Penetration, IsThatOfABodyInsideAnother) {
   const TriangleTree a = tree_of(geometry::make_mesh(geometry::BoxShape{{0.3, 0.4, 0.5}}));
   const TriangleTree b = tree_of(geometry::make_mesh(geometry::BoxShape{{0.02, 0.02, 0.02}}));

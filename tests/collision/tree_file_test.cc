@@ -218,6 +218,32 @@ TEST(TreeFile, NamesWhatTheFileSystemRefuses) {
   EXPECT_EQ(no_folder.code(), StatusCode::kNotFound);
   EXPECT_THAT(no_folder.message(), HasSubstr("folder does not exist"));
   EXPECT_FALSE(content.writer().write(dir.path()).ok()) << "a folder is in the way";
+  std::ofstream(dir.path() / "file").close();
+  EXPECT_THAT(content.writer().write(dir.path() / "file" / "a.tree").message(), HasSubstr("its folder is a file"));
+}
+
+TEST(TreeFile, LeavesInPlaceWhatIsNoFile) {
+  const tests::ScratchDir dir;
+  const Content content;
+  const auto pipe = dir.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(content.writer().write(pipe).code(), StatusCode::kInvalidInput);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+
+  const auto target = dir.path() / "target.tree";
+  const auto link = dir.path() / "link.tree";
+  ASSERT_TRUE(content.writer().write(target).ok());
+  std::filesystem::create_symlink("target.tree", link);
+  core::RandomStream random(4, core::Purpose::kTest);
+  const Content other = random_content(random, 100);
+  ASSERT_TRUE(other.writer().write(link).ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(std::filesystem::file_size(target), other.writer().bytes().size());
+
+  // As long as a name may be.
+  const auto long_name = dir.path() / std::string(255, 'a');
+  EXPECT_TRUE(content.writer().write(long_name).ok());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir.path()), {}), 4) << "a partial file was left";
 }
 
 TEST(TreeFile, WritersOfOneFileDoNotMix) {

@@ -13,6 +13,7 @@
 
 #include "prescene/collision/exact_triangles.h"
 #include "prescene/collision/triangle_pair_distance.h"
+#include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/target_test.h"
@@ -205,6 +206,30 @@ TEST(TriangleQueries, AnswerBatchesLikeSingleQueries) {
   }));
   EXPECT_GT(touching, configurations / 10);
   EXPECT_LT(touching, configurations);
+}
+
+TEST(TriangleQueries, AnswerBatchesOfTinyBodiesLikeSingleQueries) {
+  core::ThreadPool pool(1);
+  core::RandomStream random(3, core::Purpose::kTest);
+  QueryScratch scratch;
+  int touching = 0;
+  for (int exponent = -60; exponent >= -140; exponent -= 4) {
+    const auto on_grid = [&] { return std::ldexp(static_cast<float>(random.uniform_below(4)), exponent); };
+    const auto point = [&] { return Vector3f(on_grid(), on_grid(), on_grid()); };
+    for (int i = 0; i < 100; ++i) {
+      const TriangleTree a = TriangleTree::build(*Mesh::make({point(), point(), point()}, {{0, 1, 2}}, "a"), {}, pool);
+      const TriangleTree b = TriangleTree::build(*Mesh::make({point(), point(), point()}, {{0, 1, 2}}, "b"), {}, pool);
+      std::array<Transform, 16> batch{};
+      for (Transform& X : batch) X.translation = {on_grid(), on_grid(), on_grid()};
+      std::array<bool, 16> answers{};
+      collide(a, b, batch, answers, scratch);
+      for (std::size_t k = 0; k < batch.size(); ++k) {
+        EXPECT_EQ(answers[k], collide(a, b, batch[k], scratch)) << "2^" << exponent;
+        touching += answers[k] ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(touching, 1000);
 }
 
 TEST(TriangleQueries, DoNotAllocateOnceWarm) {
