@@ -96,6 +96,8 @@ std::string end_word(TrajectoryEnd end) {
       return "diverged";
     case TrajectoryEnd::kCancelled:
       return "cancelled";
+    case TrajectoryEnd::kDecided:
+      return "decided";
   }
   PRESCENE_CHECK_MSG(false, "a TrajectoryEnd outside of its enumeration");
 }

@@ -11,8 +11,8 @@
 
 namespace prescene::belief {
 
-/// Why an instance ended.
-enum class TrajectoryEnd { kAtRest, kDuration, kLeftTheWorld, kDiverged, kCancelled };
+/// Why an instance ended. kDecided: what was asked of it could not change any more; it was not run to rest.
+enum class TrajectoryEnd { kAtRest, kDuration, kLeftTheWorld, kDiverged, kCancelled, kDecided };
 
 /// Two things touched during [begin, end]. Bodies are numbered objects first, then supports, then robot bodies, in the
 /// scene's order; pushers made by actions follow. first < second.

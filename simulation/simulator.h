@@ -36,9 +36,22 @@ struct RestRule {
   double time = 0.2;     ///< s
 };
 
+/// Looks at instances under way and says which may end, because what is asked of them is decided. Pure; called from
+/// several threads.
+class EndRule {
+ public:
+  virtual ~EndRule() = default;
+  /// `seconds_left` of the run's duration.
+  virtual bool ends(const belief::WorldState& state, double seconds_left) const = 0;
+};
+
 struct RunRequest {
   std::vector<belief::Action> actions;  ///< Instead of the scene's; times from the start of the run.
   StopRule stop;
+  /// Asked every so many steps; an instance that it ends has TrajectoryEnd::kDecided. Must outlive the run; simulators
+  /// may do without it.
+  const EndRule* end_rule = nullptr;
+  int end_rule_steps = 4;
   /// States are kept every so many seconds (first and last always); 0 = first and last only.
   double sample_interval = 0.0;
 };

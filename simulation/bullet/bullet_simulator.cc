@@ -20,6 +20,7 @@ struct Worker {
   InstanceWorld world;
   RestDetector rest;
   ContactLog contacts;
+  belief::WorldState seen;  // by the end rule
 };
 
 class BulletInstance : public Instance {
@@ -125,6 +126,7 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
   const auto steps = static_cast<std::int64_t>(std::ceil(request.stop.duration / dt - 1e-6));
   double next_sample = request.sample_interval;
   std::int64_t done = 0, flights = 0;
+  int until_asked = request.end_rule_steps;
   while (done < steps) {
     if (cancellation && (done & 63) == 0 && cancellation->requested()) {
       trajectory.end = belief::TrajectoryEnd::kCancelled;
@@ -152,6 +154,14 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
     const bool ended = request.stop.stop_at_rest ? worker.rest.at_rest(world, cancellation) : world.all_frozen();
     if (ended) trajectory.end = left ? belief::TrajectoryEnd::kLeftTheWorld : belief::TrajectoryEnd::kAtRest;
     if (ended || last) break;
+    if (request.end_rule && --until_asked <= 0) {
+      until_asked = request.end_rule_steps;
+      world.read(worker.seen);
+      if (request.end_rule->ends(worker.seen, request.stop.duration - elapsed)) {
+        trajectory.end = belief::TrajectoryEnd::kDecided;
+        break;
+      }
+    }
     if (request.sample_interval > 0.0 && elapsed >= next_sample - 0.5 * dt) {
       trajectory.states.emplace_back();
       world.read(trajectory.states.back());

@@ -8,6 +8,7 @@
 #include "instance_plan.h"
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
+#include "prescene/simulation/uncertain/certifier.h"
 
 namespace prescene::simulation {
 namespace {
@@ -72,49 +73,123 @@ class Forecast {
   double shown_ = 0.0;
 };
 
+/// All that running instances takes.
+struct Runner {
+  const Simulator& simulator;
+  std::span<const Variable> variables;
+  RunRequest request;
+  const core::RandomStream& stream;
+  core::ThreadPool& pool;
+  const core::Cancellation* cancellation;
+  const std::vector<StartSampler>& samplers;
+  const Certifier* certifier;  // null: run all to rest
+  double audit_share;
+};
+
+void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& record) {
+  record.classes.clear();
+  record.certified = run.end == belief::TrajectoryEnd::kDecided;
+  if (record.certified) {
+    const double left = runner.request.stop.duration - run.simulated_seconds;
+    std::optional<std::vector<int>> decided = runner.certifier->classes(run.states.back(), left);
+    PRESCENE_CHECK_MSG(decided, "a certifier that answers differently when it is asked again");
+    record.classes = *std::move(decided);
+  }
+  for (std::size_t v = 0; v < runner.variables.size(); ++v) {
+    if (!record.certified) record.classes.push_back(runner.variables[v].classify(run));
+    PRESCENE_CHECK(record.classes[v] >= 0 &&
+                   static_cast<std::size_t>(record.classes[v]) < runner.variables[v].classes.size());
+  }
+  record.final = std::move(run.states.back());
+  record.end = run.end;
+  record.simulated_seconds += run.simulated_seconds;
+  record.flown_seconds += run.flown_seconds;
+}
+
+/// Runs the instances of these numbers to rest and replaces their records; returns how many, in order, were not
+/// cancelled. `mismatches` counts those whose classes change.
+std::size_t run_to_rest(const Runner& runner, const std::vector<std::size_t>& numbers,
+                        std::vector<InstanceRecord>& records, int* mismatches) {
+  RunRequest request = runner.request;
+  request.end_rule = nullptr;
+  for (std::size_t n = 0; n < numbers.size(); ++n) {
+    InstanceRecord& record = records[numbers[n]];
+    const belief::WorldState start = runner.samplers[static_cast<std::size_t>(record.component)].draw(record.point);
+    belief::Trajectory run;
+    runner.simulator.run(std::span(&start, 1), request, runner.stream, static_cast<std::uint32_t>(numbers[n]),
+                         runner.pool, std::span(&run, 1), runner.cancellation);
+    if (run.end == belief::TrajectoryEnd::kCancelled) return n;
+    const std::vector<int> before = record.classes;
+    note_run(runner, run, record);
+    *mismatches += record.classes != before;
+  }
+  return numbers.size();
+}
+
 /// Runs `planned` (numbers first, first + 1, ... of the order) and appends the records of those that were finished
 /// before any that was cancelled. Returns false when one was.
-bool run_chunk(const Simulator& simulator, const std::vector<StartSampler>& samplers,
-               std::span<const PlannedInstance> planned, std::span<const Variable> variables, const RunRequest& request,
-               const core::RandomStream& stream, core::ThreadPool& pool, const core::Cancellation* cancellation,
-               std::vector<InstanceRecord>& records) {
+bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, std::vector<InstanceRecord>& records,
+               CertificateUse& certificates) {
   const std::size_t first = records.size();
   std::vector<belief::WorldState> starts(planned.size());
-  pool.for_each_index(planned.size(), [&](std::size_t i) {
-    starts[i] = samplers[static_cast<std::size_t>(planned[i].component)].draw(planned[i].point);
+  runner.pool.for_each_index(planned.size(), [&](std::size_t i) {
+    starts[i] = runner.samplers[static_cast<std::size_t>(planned[i].component)].draw(planned[i].point);
   });
   std::vector<belief::Trajectory> runs(planned.size());
-  simulator.run(starts, request, stream, static_cast<std::uint32_t>(first), pool, runs, cancellation);
+  RunRequest request = runner.request;
+  request.end_rule = runner.certifier;
+  runner.simulator.run(starts, request, runner.stream, static_cast<std::uint32_t>(first), runner.pool, runs,
+                       runner.cancellation);
 
   std::size_t finished = 0;
   while (finished < runs.size() && runs[finished].end != belief::TrajectoryEnd::kCancelled) ++finished;
   records.resize(first + finished);
-  pool.for_each_index(finished, [&](std::size_t i) {
+  runner.pool.for_each_index(finished, [&](std::size_t i) {
     InstanceRecord& record = records[first + i];
     record.component = planned[i].component;
     record.point = planned[i].point;
-    for (const Variable& variable : variables) {
-      const int found = variable.classify(runs[i]);
-      PRESCENE_CHECK(found >= 0 && static_cast<std::size_t>(found) < variable.classes.size());
-      record.classes.push_back(found);
-    }
-    record.final = std::move(runs[i].states.back());
-    record.end = runs[i].end;
-    record.simulated_seconds = runs[i].simulated_seconds;
+    note_run(runner, runs[i], record);
   });
-  return finished == runs.size();
+  std::vector<std::size_t> audited;
+  for (std::size_t n = first; n < first + finished; ++n) {
+    if (!records[n].certified) continue;
+    ++certificates.certified;
+    core::RandomStream draw = runner.stream.for_purpose(core::Purpose::kAudit).at(0, static_cast<std::uint32_t>(n));
+    if (draw.uniform() < runner.audit_share) audited.push_back(n);
+  }
+  const std::size_t done = run_to_rest(runner, audited, records, &certificates.mismatches);
+  certificates.audited += static_cast<int>(done);
+  if (done < audited.size()) records.resize(audited[done]);
+  return finished == runs.size() && done == audited.size();
+}
+
+/// Runs to rest what ended by its certificate; cut to what was repaired when cancelled (false).
+bool repair(const Runner& runner, std::vector<InstanceRecord>& records, CertificateUse& certificates) {
+  std::vector<std::size_t> numbers;
+  for (std::size_t n = 0; n < records.size(); ++n)
+    if (records[n].certified) numbers.push_back(n);
+  certificates.switched_off = true;
+  int changed = 0;
+  const std::size_t done = run_to_rest(runner, numbers, records, &changed);
+  if (done < numbers.size()) records.resize(numbers[done]);
+  return done == numbers.size();
 }
 
 /// Fills in weights, intervals and the total from the records.
 void evaluate(const StartDistribution& starts, std::span<const Variable> variables, const EstimatorOptions& options,
               OutcomeEstimate& estimate) {
-  estimate.simulated_seconds = 0.0;
+  estimate.simulated_seconds = estimate.flown_seconds = 0.0;
   estimate.variables.clear();
   estimate.converged = false;
   if (estimate.instances.empty()) return;
 
   std::vector<ComponentClasses> components(starts.components.size());
   for (std::size_t k = 0; k < components.size(); ++k) components[k].weight = starts.components[k].weight;
+  const CertificateUse& use = estimate.certificates;
+  double doubt = 0.0;
+  if (!use.switched_off && use.mismatches > 0)
+    doubt = static_cast<double>(use.mismatches) / use.audited * use.certified /
+            static_cast<double>(estimate.instances.size());
   estimate.converged = true;
   for (std::size_t v = 0; v < variables.size(); ++v) {
     for (ComponentClasses& component : components) component.classes.clear();
@@ -122,7 +197,11 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
       components[static_cast<std::size_t>(record.component)].classes.push_back(record.classes[v]);
     VariableEstimate& variable = estimate.variables.emplace_back();
     for (std::size_t c = 0; c < variables[v].classes.size(); ++c) {
-      variable.classes.push_back(class_estimate(components, static_cast<int>(c), options.confidence));
+      ClassEstimate& found =
+          variable.classes.emplace_back(class_estimate(components, static_cast<int>(c), options.confidence));
+      found.half_width += doubt;
+      found.low = std::max(0.0, found.low - doubt);
+      found.high = std::min(1.0, found.high + doubt);
       estimate.converged = estimate.converged && variable.classes.back().half_width <= options.tolerance;
     }
   }
@@ -131,6 +210,7 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
   for (const InstanceRecord& record : estimate.instances) {
     counts[static_cast<std::size_t>(record.component)] += 1.0;
     estimate.simulated_seconds += record.simulated_seconds;
+    estimate.flown_seconds += record.flown_seconds;
   }
   double weight_sum = 0.0;
   for (std::size_t k = 0; k < counts.size(); ++k)
@@ -182,7 +262,10 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
   const std::size_t limit =
       static_cast<std::size_t>(options.exact_instances ? *options.exact_instances : options.max_instances);
 
+  PRESCENE_CHECK(options.audit_share >= 0.0 && options.audit_share <= 1.0);
   OutcomeEstimate estimate;
+  Runner runner{simulator,         variables,          request, stream, pool, cancellation, samplers,
+                options.certifier, options.audit_share};
   Forecast forecast(options, progress);
   std::optional<EstimateStop> stop;
   while (!stop) {
@@ -191,13 +274,17 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     while (!stop && estimate.instances.size() < target) {
       const std::size_t done = estimate.instances.size();
       const auto planned = std::span(plan.order()).subspan(done, std::min(chunk_size(pool), target - done));
-      if (!run_chunk(simulator, samplers, planned, variables, request, stream, pool, cancellation,
-                     estimate.instances) ||
+      if (!run_chunk(runner, planned, estimate.instances, estimate.certificates) ||
           (cancellation && cancellation->requested()))
         stop = EstimateStop::kCancelled;
       else if (options.max_seconds && !options.exact_instances && watch.seconds() >= *options.max_seconds)
         stop = EstimateStop::kTimeLimit;
       forecast.tell(static_cast<double>(estimate.instances.size()));
+    }
+    const CertificateUse& use = estimate.certificates;
+    if (runner.certifier && use.mismatches > options.tolerated_mismatch * use.audited) {
+      runner.certifier = nullptr;
+      if (!repair(runner, estimate.instances, estimate.certificates)) stop = EstimateStop::kCancelled;
     }
     evaluate(starts, variables, options, estimate);
     forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate));

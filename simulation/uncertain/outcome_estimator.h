@@ -31,12 +31,17 @@ struct Variable {
   std::vector<std::string> classes;  ///< At least one.
   /// Index of the class that an instance belongs to. Pure; called from several threads.
   std::function<int(const belief::Trajectory&)> classify;
+  /// What the classes mean, for certificates: class i is that outcome i is the first that holds, the last class that
+  /// none does. Empty: they mean something else.
+  std::vector<belief::Outcome> outcomes = {};
 };
 /// One variable an exclusive group (its classes end with "other"), one of two classes (name, "not name") an outcome, in
 /// this order. Refers to `scene` by shared ownership.
 std::vector<Variable> variables_of(const std::shared_ptr<const belief::Scene>& scene,
                                    std::vector<belief::Outcome> outcomes,
                                    std::vector<belief::ExclusiveOutcomes> exclusive_outcomes);
+
+class Certifier;
 
 struct EstimatorOptions {
   double tolerance = 0.02;             ///< Half width of the intervals at which to stop, > 0.
@@ -45,6 +50,11 @@ struct EstimatorOptions {
   int max_instances = 4096;            ///< > 0.
   std::optional<double> max_seconds;   ///< Wall time. What it was worth is OutcomeEstimate::instances.
   std::optional<int> exact_instances;  ///< Replay: just this many, whatever the intervals say; > 0.
+  /// Ends instances whose classes are decided (certifier.h), made for the same variables and request. Their `final` is
+  /// then no place of rest: leave it out where that is used. Must outlive the estimate.
+  const Certifier* certifier = nullptr;
+  double audit_share = 0.02;         ///< Of the decided instances that are run to rest all the same, in [0, 1].
+  double tolerated_mismatch = 0.01;  ///< Share of the audited with another class beyond which nothing is certified.
 };
 
 /// One simulated instance, without its path. Run it again with `run_instance` for that.
@@ -56,6 +66,18 @@ struct InstanceRecord {
   belief::WorldState final;
   belief::TrajectoryEnd end = belief::TrajectoryEnd::kDuration;
   double simulated_seconds = 0.0;
+  double flown_seconds = 0.0;  ///< Of these, what took no search for contacts.
+  bool certified = false;      ///< Ended by its certificate, and not audited since.
+};
+
+/// Instances that ended by a certificate, and what the audit found.
+struct CertificateUse {
+  int certified = 0;   ///< Decided early, those that were audited among them.
+  int audited = 0;     ///< Of these run to rest, too.
+  int mismatches = 0;  ///< Of these with another class than certified.
+  /// Too many mismatches: all instances were run to rest after all, and the intervals owe nothing to certificates.
+  bool switched_off = false;
+  friend bool operator==(const CertificateUse&, const CertificateUse&) = default;
 };
 
 struct ClassEstimate {
@@ -82,9 +104,11 @@ std::string to_string(EstimateStop stop);
 struct OutcomeEstimate {
   std::vector<VariableEstimate> variables;  ///< As the variables given; empty when no instance was finished.
   std::vector<InstanceRecord> instances;    ///< In the order in which they count: a shorter estimate is a prefix.
-  double simulated_seconds = 0.0;           ///< Of all instances together.
-  double wall_seconds = 0.0;                ///< The only field that differs between runs of equal `instances.size()`.
-  bool converged = false;                   ///< Every half width is within the tolerance, however the work ended.
+  double simulated_seconds = 0.0;           ///< Of all instances together, audits and repairs included.
+  double flown_seconds = 0.0;               ///< Of these, what took no search for contacts.
+  CertificateUse certificates;
+  double wall_seconds = 0.0;  ///< The only field that differs between runs of equal `instances.size()`.
+  bool converged = false;     ///< Every half width is within the tolerance, however the work ended.
   EstimateStop stop = EstimateStop::kConverged;
 };
 
@@ -92,7 +116,8 @@ struct OutcomeEstimate {
 /// time limit or cancellation, for equal numbers of instances (rerun with exact_instances for that number). `variables`
 /// may be empty: then the first step at min_instances or above ends it. `stream` seeds the nets and what is random in
 /// the simulator's actions. Progress is told between chunks of instances, from the calling thread; its seconds_left
-/// come from the rate at which the widest interval shrinks.
+/// come from the rate at which the widest interval shrinks. With a certifier, the share of audited instances that had
+/// another class times the share certified is added to every half width.
 OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistribution& starts,
                                   std::span<const Variable> variables, const RunRequest& request,
                                   const core::RandomStream& stream, const EstimatorOptions& options,

@@ -15,6 +15,7 @@ std::vector<Variable> variables_of(const std::shared_ptr<const belief::Scene>& s
     variable.name = group.name;
     for (const belief::Outcome& outcome : group.outcomes) variable.classes.push_back(outcome.name);
     variable.classes.push_back("other");
+    variable.outcomes = group.outcomes;
     variable.classify = [scene, group = std::move(group)](const belief::Trajectory& trajectory) {
       return belief::classify(*scene, trajectory, group);
     };
@@ -22,6 +23,7 @@ std::vector<Variable> variables_of(const std::shared_ptr<const belief::Scene>& s
   for (belief::Outcome& outcome : outcomes) {
     Variable& variable = variables.emplace_back();
     variable.classes = {outcome.name, "not " + outcome.name};
+    variable.outcomes = {outcome};
     variable.classify = [scene, outcome = std::move(outcome)](const belief::Trajectory& trajectory) {
       return belief::holds(*scene, trajectory, outcome) ? 0 : 1;
     };

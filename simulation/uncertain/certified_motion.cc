@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "certified_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace prescene::simulation {
+namespace {
+
+// Room for what the integrator and the solver add to the energy, and for overlap that is pushed out (m).
+constexpr double kEnergy = 1.05;
+constexpr double kRise = 1e-3;
+// m below a barrier that still counts as over it.
+constexpr double kBarrierRoom = 5e-4;
+// Sliding to a stop takes at most this many times what friction says, and this much more (m).
+constexpr double kSlide = 1.25;
+constexpr double kSlideRoom = 3e-3;
+// rad: supports are level to this, and objects that others stand on.
+constexpr double kLevel = 1e-3;
+constexpr double kLevelObject = 0.02;
+// Share of its energy above the floor that a body keeps when it lands; more would be a bouncing ball.
+constexpr double kKeptInLanding = 0.75;
+constexpr double kBouncy = 0.7;
+// s: a fall is over by then.
+constexpr double kFallTime = 1.0;
+// m: the smallest radius of edges in contacts (BulletOptions::edge_rounding).
+constexpr double kLeastEdge = 2e-4;
+
+bool disjoint_and_parting(const geometry::Box& a, const geometry::Box& b, const Vector3d& v) {
+  for (int k = 0; k < 2; ++k) {
+    if (a.min()[k] >= b.max()[k] && v[k] >= 0.0) return true;
+    if (a.max()[k] <= b.min()[k] && v[k] <= 0.0) return true;
+  }
+  return false;
+}
+
+double depth_of(const ConvexPolytope& hull, const Vector3d& p) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const ConvexPolytope::Face& face : hull.faces) least = std::min(least, face.offset - face.normal.dot(p));
+  return least;
+}
+
+std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model) {
+  auto hull = make_polytope(belief::collision_mesh(model).vertices);
+  if (!hull) return std::nullopt;
+  CertifiedObject object;
+  object.hull = *std::move(hull);
+  object.shapes = shape_hulls(model.collision);
+  object.center_of_mass = belief::mean(model.center_of_mass);
+  object.center_play = belief::dimensions(model.center_of_mass) > 0 ? 2e-3 : 1e-9;
+  object.edge_radius = std::max(kLeastEdge, model.contact.edge_radius);
+  for (const ConvexPolytope& shape : object.shapes)
+    object.inner_radius = std::max(object.inner_radius, depth_of(shape, object.center_of_mass) - object.center_play);
+  for (const Vector3d& v : object.hull.vertices)
+    object.outer_radius = std::max(object.outer_radius, (v - object.center_of_mass).norm() + object.center_play);
+  return object;
+}
+
+}  // namespace
+
+std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene& scene,
+                                                             const CertifierOptions& options) {
+  const Vector3d& gravity = scene.gravity_W;
+  if (gravity.x() != 0.0 || gravity.y() != 0.0 || !(gravity.z() < 0.0)) return nullptr;
+  auto made = std::make_unique<MotionCertifier>();
+  made->options_ = options;
+  made->gravity_ = -gravity.z();
+  made->robot_ = !scene.robot.empty();
+  for (const belief::SceneObject& object : scene.objects) {
+    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object));
+    if (!certified) return nullptr;
+    made->objects_.push_back(*std::move(certified));
+    made->unit_inertias_.push_back(scene.model_of(object).unit_inertia);
+  }
+  for (std::size_t s = 0; s < scene.supports.size(); ++s) {
+    const belief::Support& support = scene.supports[s];
+    std::vector<LevelFace> faces;
+    append_level_faces(shape_hulls(support.collision), support.X_WS, kLevel, faces);
+    for (LevelFace& face : faces) made->faces_.push_back({std::move(face), static_cast<int>(s)});
+    const belief::ContactProperties& contact = support.contact;
+    made->support_friction_.push_back(
+        std::min(belief::mean(contact.friction),
+                 contact.impact_friction ? belief::mean(*contact.impact_friction) : belief::mean(contact.friction)));
+    for (const belief::CollisionShape& shape : support.collision) {
+      const geometry::Box box =
+          geometry::bounding_box(geometry::transformed(belief::collision_mesh({shape}), support.X_WS));
+      made->shapes_.push_back({box, static_cast<int>(s)});
+      made->lowest_top_ = std::min(made->lowest_top_, box.max().z());
+    }
+  }
+  return made;
+}
+
+bool MotionCertifier::assess(const belief::WorldState& state, double seconds_left,
+                             std::vector<SureMotion>& motions) const {
+  if (state.objects.size() != objects_.size()) return false;
+  motions.assign(objects_.size(), SureMotion{});
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const belief::ObjectState& object = state.objects[i];
+    const CertifiedObject& known = objects_[i];
+    const Vector3d& center_O = object.physical.center_of_mass;
+    if (object.mode == belief::MotionMode::kHeld || (center_O - known.center_of_mass).norm() > known.center_play)
+      return false;
+    SureMotion& motion = motions[i];
+    const geometry::Matrix3d R = object.X_WO.rotation.toRotationMatrix();
+    motion.center = object.X_WO * center_O;
+    motion.velocity = object.V_WO.linear + object.V_WO.angular.cross(R * center_O);
+    const Vector3d w_O = R.transpose() * object.V_WO.angular;
+    motion.weight = object.physical.mass * gravity_;
+    motion.spin = 0.5 * object.physical.mass * w_O.dot(unit_inertias_[i] * w_O);
+    motion.kinetic = motion.spin + 0.5 * object.physical.mass * motion.velocity.squaredNorm();
+    motion.box.setEmpty();
+    for (const Vector3d& v : known.hull.vertices) motion.box.extend(object.X_WO.translation + R * v);
+  }
+  stand(state, motions);
+  bound_heights(motions);
+  if (!robot_ && seconds_left >= kFallTime)
+    for (std::size_t i = 0; i < motions.size(); ++i)
+      if (state.objects[i].physical.restitution <= kBouncy) motions[i].landing = landing_of(motions, i);
+  return true;
+}
+
+void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMotion>& motions) const {
+  std::vector<LevelFace> tops;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    SureMotion& motion = motions[i];
+    const Eigen::Vector2d foot = motion.center.head<2>();
+    const LevelFace* best = nullptr;
+    const auto consider = [&](const LevelFace& face) {
+      const bool better = face.height <= motion.center.z() && (!best || face.height > motion.plane);
+      if (!better || distance_inside(face, foot) <= 0.0) return false;
+      best = &face;
+      motion.plane = face.height;
+      return true;
+    };
+    for (const FixedFace& fixed : faces_)
+      if (consider(fixed.face)) motion.base = static_cast<int>(objects_.size()) + fixed.support;
+    LevelFace on_object;
+    for (std::size_t j = 0; j < motions.size(); ++j) {
+      if (j == i || !motions[j].box.intersects(geometry::Box(Vector3d(foot.x(), foot.y(), -1e30),
+                                                             Vector3d(foot.x(), foot.y(), motion.center.z()))))
+        continue;
+      tops.clear();
+      append_level_faces(objects_[j].shapes, state.objects[j].X_WO, kLevelObject, tops);
+      for (const LevelFace& top : tops)
+        if (consider(top)) {
+          on_object = top;
+          best = &on_object;
+          motion.base = static_cast<int>(j);
+        }
+    }
+    if (!best) continue;
+
+    const belief::PhysicalParameters& physical = state.objects[i].physical;
+    const auto count = static_cast<int>(objects_.size());
+    const bool on_support = motion.base >= count;
+    const belief::PhysicalParameters* under =
+        on_support ? nullptr : &state.objects[static_cast<std::size_t>(motion.base)].physical;
+    const double friction = std::min(physical.friction, physical.impact_friction) *
+                            (on_support ? support_friction_[static_cast<std::size_t>(motion.base - count)]
+                                        : std::min(under->friction, under->impact_friction));
+    const Vector3d relative = on_support
+                                  ? motion.velocity
+                                  : Vector3d(motion.velocity - motions[static_cast<std::size_t>(motion.base)].velocity);
+    // All turning may become sliding or hopping; a hop's way is that of a throw.
+    const double turning = 2.0 * motion.spin * gravity_ / motion.weight;
+    const double sideways = relative.head<2>().squaredNorm() + turning;
+    const double gap = std::max(0.0, motion.box.min().z() - motion.plane);
+    const double upwards = relative.z() * relative.z() + turning + 2.0 * gravity_ * gap;
+    motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom +
+                   2.0 * std::sqrt(sideways * upwards) / gravity_;
+    const double edge = options_.shorten_arms ? distance_inside(*best, foot) - motion.reach : 1e30;
+    motion.trap = trap_of(objects_[i].hull, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
+                          objects_[i].edge_radius);
+  }
+}
+
+void MotionCertifier::bound_heights(std::vector<SureMotion>& motions) const {
+  double kinetic = 0.0;
+  for (const SureMotion& motion : motions) kinetic += motion.kinetic;
+  // Suppose that all that may be trapped are, and let go those that the energy of that supposition frees, until none is
+  // left over: the first to break out would have had to do it with this energy.
+  for (bool changed = true; changed;) {
+    changed = false;
+    double potential = 0.0;
+    const auto falls_by = [&](std::size_t j) {
+      const SureMotion& motion = motions[j];
+      const double lowest = motion.trap ? motion.plane + motion.trap->lowest : lowest_top_ + objects_[j].inner_radius;
+      return motion.weight * std::max(0.0, motion.center.z() - lowest);
+    };
+    for (std::size_t j = 0; j < motions.size(); ++j) potential += falls_by(j);
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+      SureMotion& motion = motions[i];
+      motion.highest = motion.center.z() + kRise + (kEnergy * kinetic + potential - falls_by(i)) / motion.weight;
+      if (!motion.trap) continue;
+      const bool base_stays = motion.base >= static_cast<int>(motions.size()) ||
+                              motions[static_cast<std::size_t>(motion.base)].trap.has_value();
+      if (base_stays && motion.highest - motion.plane < motion.trap->barrier - kBarrierRoom) continue;
+      motion.trap.reset();
+      changed = true;
+      break;  // the others had counted on it
+    }
+  }
+}
+
+std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>& motions, std::size_t object) const {
+  const SureMotion& motion = motions[object];
+  double floor = -std::numeric_limits<double>::infinity();
+  double lowest_beside = std::numeric_limits<double>::infinity();
+  for (const FixedShape& shape : shapes_) {
+    if (shape.box.max().z() <= motion.box.min().z()) {
+      floor = std::max(floor, shape.box.max().z());
+    } else {
+      if (!disjoint_and_parting(motion.box, shape.box, motion.velocity)) return std::nullopt;
+      lowest_beside = std::min(lowest_beside, shape.box.max().z());
+    }
+  }
+  for (std::size_t j = 0; j < motions.size(); ++j) {
+    if (j == object) continue;
+    if (!disjoint_and_parting(motion.box, motions[j].box, motion.velocity - motions[j].velocity)) return std::nullopt;
+    lowest_beside = std::min(lowest_beside, motions[j].box.min().z());
+  }
+  const double rebound = floor + kKeptInLanding * (motion.highest - floor);
+  if (!(floor < motion.box.min().z() && (std::isinf(floor) || rebound < lowest_beside + objects_[object].inner_radius)))
+    return std::nullopt;
+  return floor;
+}
+
+bool MotionCertifier::alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const {
+  const SureMotion& motion = motions[object];
+  const Vector3d room = Vector3d::Constant(motion.reach + 0.01);
+  geometry::Box around(motion.box.min() - room, motion.box.max() + room);
+  around.min().z() = motion.box.min().z() - 2e-3;
+  const auto count = static_cast<int>(objects_.size());
+  for (const FixedShape& shape : shapes_)
+    if (count + shape.support != motion.base && around.intersects(shape.box)) return false;
+  for (std::size_t j = 0; j < motions.size(); ++j)
+    if (j != object && static_cast<int>(j) != motion.base && around.intersects(motions[j].box)) return false;
+  return !robot_;
+}
+
+bool MotionCertifier::support_above(int support, double height) const {
+  return std::all_of(shapes_.begin(), shapes_.end(),
+                     [&](const FixedShape& shape) { return shape.support != support || shape.box.max().z() > height; });
+}
+
+}  // namespace prescene::simulation

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is sure of the way that each object of an instance still has: how high it may get, whether it stays on its face,
+// whether it has fallen past everything.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "prescene/belief/scene.h"
+#include "prescene/simulation/uncertain/certifier.h"
+#include "prescene/simulation/uncertain/face_trap.h"
+
+namespace prescene::simulation {
+
+/// What of an object does not change from instance to instance.
+struct CertifiedObject {
+  ConvexPolytope hull;                 ///< Of the whole body, in O.
+  std::vector<ConvexPolytope> shapes;  ///< In O.
+  Vector3d center_of_mass = Vector3d::Zero();
+  double center_play = 0.0;   ///< How far an instance's centre of mass may be from that, m.
+  double inner_radius = 0.0;  ///< Of a ball about any such centre that the body holds, m; 0 = none known.
+  double outer_radius = 0.0;  ///< Of a ball about any such centre that holds the body, m.
+  double edge_radius = 0.0;   ///< m
+};
+
+/// One object of one instance.
+struct SureMotion {
+  Vector3d center = Vector3d::Zero();  ///< Of mass, W.
+  Vector3d velocity = Vector3d::Zero();
+  double weight = 0.0;   ///< N
+  double kinetic = 0.0;  ///< J
+  double spin = 0.0;     ///< J, of these in turning
+  double highest = 0.0;  ///< z that the centre of mass can't exceed, m.
+  geometry::Box box;     ///< Of the hull as it is now, W.
+  /// It stays on its lowest face, on a plane.
+  std::optional<Trap> trap;
+  double plane = 0.0;  ///< z of that plane.
+  int base = -1;       ///< Body whose plane it is, numbered as in ContactInterval.
+  double reach = 0.0;  ///< How far the centre of mass may still go sideways, m.
+  /// It has fallen past what is higher than this, and will not come up again.
+  std::optional<double> landing;
+};
+
+class MotionCertifier {
+ public:
+  /// Null where the scene is not understood.
+  static std::unique_ptr<const MotionCertifier> make(const belief::Scene& scene, const CertifierOptions& options);
+
+  const std::vector<CertifiedObject>& objects() const { return objects_; }
+  /// Into `motions`; false where something is held, or not as the scene says.
+  bool assess(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
+  /// Nothing but `motions[object].base` is near enough to be touched while it stays there.
+  bool alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const;
+  /// Every shape of the support ends above `height`.
+  bool support_above(int support, double height) const;
+
+ private:
+  struct FixedFace {
+    LevelFace face;
+    int support = 0;
+  };
+  struct FixedShape {
+    geometry::Box box;
+    int support = 0;
+  };
+
+  void stand(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
+  void bound_heights(std::vector<SureMotion>& motions) const;
+  std::optional<double> landing_of(const std::vector<SureMotion>& motions, std::size_t object) const;
+
+  CertifierOptions options_;
+  double gravity_ = 0.0;
+  std::vector<CertifiedObject> objects_;
+  std::vector<geometry::Matrix3d> unit_inertias_;
+  std::vector<FixedFace> faces_;
+  std::vector<FixedShape> shapes_;
+  std::vector<double> support_friction_;
+  double lowest_top_ = std::numeric_limits<double>::infinity();
+  bool robot_ = false;
+};
+
+}  // namespace prescene::simulation

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// Certified classes are those that instances have when they run on to rest; an audit finds certificates that are not.
+#include "prescene/simulation/uncertain/certifier.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/tests/support/uncertain_scenes.h"
+
+namespace prescene::simulation {
+namespace {
+
+/// The benchmark runs more; rolling (B) and stacked (D) bodies take long to come to rest.
+#ifdef NDEBUG
+constexpr std::array kInstances = {5000, 2000, 5000, 2000};
+#else
+constexpr std::array kInstances = {300, 200, 300, 200};
+#endif
+
+core::RandomStream test_stream() { return {11, core::Purpose::kTest}; }
+
+struct Problem {
+  explicit Problem(std::shared_ptr<const belief::Scene> given) : scene(std::move(given)) {
+    ShapeStore shapes;
+    simulator = *make_bullet_simulator(*scene, shapes);
+    starts = start_of(scene);
+    variables = variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
+    request.stop.duration = scene->duration;
+  }
+  OutcomeEstimate run(const EstimatorOptions& options, int threads = 2) const {
+    core::ThreadPool pool(threads);
+    return estimate_outcomes(*simulator, starts, variables, request, test_stream(), options, pool);
+  }
+  OutcomeEstimate run_exactly(int instances, const Certifier* certifier, double audit_share) const {
+    EstimatorOptions options;
+    options.exact_instances = instances;
+    options.certifier = certifier;
+    options.audit_share = audit_share;
+    return run(options);
+  }
+
+  std::shared_ptr<const belief::Scene> scene;
+  std::unique_ptr<Simulator> simulator;
+  StartDistribution starts;
+  std::vector<Variable> variables;
+  RunRequest request;
+};
+
+class Certificates : public testing::TestWithParam<int> {};
+
+TEST_P(Certificates, AreRightWhenInstancesRunOnToRest) {
+  const tests::NamedScene named = tests::uncertain_scenes()[static_cast<std::size_t>(GetParam())];
+  const int count = kInstances[static_cast<std::size_t>(GetParam())];
+  const Problem problem(named.scene);
+  const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+  ASSERT_TRUE(certifier);
+  const OutcomeEstimate whole = problem.run_exactly(count, nullptr, 0.0);
+  const OutcomeEstimate certified = problem.run_exactly(count, certifier.get(), 0.0);
+  int wrong = 0;
+  for (std::size_t i = 0; i < whole.instances.size(); ++i)
+    wrong += whole.instances[i].classes != certified.instances[i].classes;
+  EXPECT_LE(wrong, 1) << named.name;
+  EXPECT_GE(certified.certificates.certified, count * 8 / 10) << named.name;
+  // They end a good deal earlier, or certificates are not worth their name.
+  EXPECT_LT(certified.simulated_seconds, 0.8 * whole.simulated_seconds) << named.name;
+  EXPECT_EQ(whole.certificates, CertificateUse{});
+}
+INSTANTIATE_TEST_SUITE_P(OfScenes, Certificates, testing::Range(0, 4));
+
+TEST(Certificates, ThatForgetTheEdgesOfSupportsAreCaughtAndRepaired) {
+  const Problem problem(tests::uncertain_scenes()[3].scene);
+  CertifierOptions forgetful;
+  forgetful.shorten_arms = false;
+  const auto certifier = make_certifier(problem.scene, problem.variables, problem.request, forgetful);
+  const OutcomeEstimate found = problem.run_exactly(1000, certifier.get(), 0.02);
+  EXPECT_TRUE(found.certificates.switched_off);
+  EXPECT_GT(found.certificates.mismatches, 0);
+  const OutcomeEstimate whole = problem.run_exactly(1000, nullptr, 0.0);
+  EXPECT_EQ(found.variables, whole.variables);
+  for (std::size_t i = 0; i < whole.instances.size(); ++i) {
+    EXPECT_EQ(found.instances[i].classes, whole.instances[i].classes);
+    EXPECT_EQ(found.instances[i].final, whole.instances[i].final);
+  }
+}
+
+TEST(Certificates, GiveTheSameBitsForAnyNumberOfThreads) {
+  const Problem problem(tests::uncertain_scenes()[0].scene);
+  const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+  EstimatorOptions options;
+  options.tolerance = 0.05;
+  options.certifier = certifier.get();
+  options.audit_share = 0.1;
+  const OutcomeEstimate one = problem.run(options, 1);
+  const OutcomeEstimate two = problem.run(options, 2);
+  EXPECT_GT(one.certificates.audited, 0);
+  EXPECT_EQ(one.certificates, two.certificates);
+  EXPECT_EQ(one.variables, two.variables);
+  EXPECT_EQ(one.simulated_seconds, two.simulated_seconds);
+  ASSERT_EQ(one.instances.size(), two.instances.size());
+  for (std::size_t i = 0; i < one.instances.size(); ++i) {
+    EXPECT_EQ(one.instances[i].classes, two.instances[i].classes);
+    EXPECT_EQ(one.instances[i].final, two.instances[i].final);
+  }
+}
+
+TEST(Certificates, OfAlwaysTheSameOutcomeLeaveAnIntervalOfSomeWidth) {
+  auto scene = std::make_shared<belief::Scene>(tests::tumbling_box());
+  scene->exclusive_outcomes.clear();
+  scene->outcomes = {{"below", "box", {belief::Condition{belief::BelowHeight{2.0}}}}};
+  const Problem problem(scene);
+  const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+  const OutcomeEstimate found = problem.run_exactly(64, certifier.get(), 0.02);
+  EXPECT_EQ(found.certificates.certified, 64);
+  EXPECT_EQ(found.variables[0].classes[0].probability, 1.0);
+  EXPECT_GT(found.variables[0].classes[0].half_width, 0.005);
+}
+
+TEST(Certificates, AreNotGivenForWhatTheyDoNotUnderstand) {
+  const auto none_for = [](belief::Condition condition) {
+    auto scene = std::make_shared<belief::Scene>(tests::tumbling_box());
+    scene->outcomes = {{"asked", "box", {std::move(condition)}}};
+    const Problem problem(scene);
+    return make_certifier(problem.scene, problem.variables, problem.request) == nullptr;
+  };
+  EXPECT_TRUE(none_for({belief::MovedMoreThan{0.1}}));
+  EXPECT_TRUE(none_for({belief::Touched{"floor"}}));
+  EXPECT_TRUE(none_for({belief::StillMoving{}}));
+  EXPECT_TRUE(none_for({belief::BelowHeight{0.1}, belief::When::kEver}));
+  EXPECT_FALSE(none_for({belief::BelowHeight{0.1}}));
+
+  auto scene = std::make_shared<belief::Scene>(tests::tumbling_box());
+  scene->gravity_W = {0.5, 0.0, -9.7};
+  const Problem problem(scene);
+  EXPECT_EQ(make_certifier(problem.scene, problem.variables, problem.request), nullptr);
+}
+
+TEST(Certificates, AreNeverGivenToWhatRolls) {
+  // A bottle on its side rolls towards the edge, slowly; whether it gets there is not for its energy to say.
+  const Problem problem(tests::uncertain_scenes()[1].scene);
+  const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+  belief::WorldState state = belief::mean_start(*problem.scene);
+  state.objects[0].X_WO.rotation = geometry::exp_rotation({1.5707963267948966, 0.0, 0.0});
+  state.objects[0].X_WO.translation = {-0.2, 0.0, 0.035};
+  state.objects[0].V_WO.linear = {0.01, 0.0, 0.0};
+  state.objects[0].V_WO.angular = {0.0, 0.01 / 0.035, 0.0};
+  EXPECT_FALSE(certifier->classes(state, 4.0));
+  // One that stands still at the same place does stand.
+  state = belief::mean_start(*problem.scene);
+  state.objects[0].X_WO = geometry::Pose::from_translation({-0.2, 0.0, 0.12});
+  state.objects[0].V_WO = {};
+  EXPECT_EQ(certifier->classes(state, 4.0), std::vector<int>{1});
+  // Half of its foot beyond the edge it is not sure.
+  state.objects[0].X_WO.translation.x() = -0.001;
+  EXPECT_FALSE(certifier->classes(state, 4.0));
+}
+
+}  // namespace
+}  // namespace prescene::simulation
