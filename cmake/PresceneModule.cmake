@@ -82,12 +82,21 @@ function(prescene_module name)
   endif()
 endfunction()
 
+# For sources whose loops are worth more than -O2. Not in debug builds: with sanitizers they would take minutes each.
+set(PRESCENE_KERNEL_OPTIONS "$<$<NOT:$<CONFIG:Debug>>:-O3>")
+
 # prescene_simd_sources(<target>): its sources may be compiled once for each instruction set, through Highway. They then
 # include themselves by their name, so their folder is searched for headers. Left out are SSSE3, which is of no use beside
-# SSE4, and the vectors of unknown length of SVE, which cannot be members of the structs of our kernels.
+# SSE4, and the vectors of unknown length of SVE, which cannot be members of the structs of our kernels. Sanitizers see two
+# of the sets: one with vectors and the one without.
+set(_disabled HWY_SSSE3 HWY_SVE HWY_SVE2 HWY_SVE_256 HWY_SVE2_128)
+if(PRESCENE_SANITIZERS)
+  list(APPEND _disabled HWY_SSE4 HWY_AVX3 HWY_AVX3_DL)
+endif()
+list(JOIN _disabled "|" _disabled)
+set(PRESCENE_DISABLED_SIMD_TARGETS "HWY_DISABLED_TARGETS=(${_disabled})")
 function(prescene_simd_sources target)
-  target_compile_definitions(${target} PRIVATE
-    "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+  target_compile_definitions(${target} PRIVATE "${PRESCENE_DISABLED_SIMD_TARGETS}")
   target_include_directories(${target} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
 endfunction()
 
