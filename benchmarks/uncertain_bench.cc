@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compares the estimator of outcome probabilities (nets, flights without contact search, certificates) with plain Monte
+// Carlo in the same simulator, which steps every instance to rest and stops by Wald's interval.
+//
+//   bench_uncertain [--quick] [--seeds=N] [--instances=N] [--benchmark_out=PATH]
+//
+// --seeds: estimates a scene (1000; quick 24). --instances: runs to rest a scene (12500; quick 400).
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "prescene/benchmarks/report.h"
+#include "prescene/benchmarks/statistics.h"
+#include "prescene/benchmarks/uncertain_measure.h"
+
+namespace prescene::benchmarks {
+namespace {
+
+constexpr double kTolerance = 0.03;
+constexpr double kConfidence = 0.90;
+constexpr int kRepetitions = 400;  // of plain Monte Carlo on the bank
+constexpr char kBaseline[] = "plain Monte Carlo, same simulator and step, Wald's stop at the same interval";
+
+struct Arguments {
+  int seeds = 1000;
+  int instances = 12'500;
+  int truth = 32'768;
+  int walls = 100;
+  std::string out;
+};
+
+bool parse(int count, char** words, Arguments* arguments) {
+  for (int i = 1; i < count; ++i)
+    if (std::string_view(words[i]) == "--quick") {
+      arguments->seeds = 24;
+      arguments->instances = 400;
+      arguments->truth = 4096;
+      arguments->walls = 10;
+    }
+  for (int i = 1; i < count; ++i) {
+    const std::string_view word = words[i];
+    const char* value = words[i] + std::min(word.find('=') + 1, word.size());
+    if (word == "--quick") continue;
+    if (word.starts_with("--benchmark_out=")) {
+      arguments->out = value;
+    } else if (word.starts_with("--seeds=") && std::atoi(value) > 1) {
+      arguments->seeds = std::atoi(value);
+    } else if (word.starts_with("--instances=") && std::atoi(value) > 0) {
+      arguments->instances = std::atoi(value);
+    } else {
+      std::fprintf(stderr, "usage: %s [--quick] [--seeds=N] [--instances=N] [--benchmark_out=PATH]\n", words[0]);
+      return false;
+    }
+  }
+  return true;
+}
+
+/// What is wanted of scenes A to D.
+struct Wanted {
+  double seconds_must, seconds_aim, cpu_must, cpu_aim, coverage;
+};
+constexpr std::array<Wanted, 4> kWanted = {{{5.0, 10.0, 5.0, 30.0, 0.88},
+                                            {3.5, 7.0, 3.5, 20.0, 0.88},
+                                            {2.0, 3.0, 2.0, 8.0, 0.85},
+                                            {5.0, 17.0, 5.0, 40.0, 0.88}}};
+
+struct Tables {
+  Table cost{"cost",
+             {"scene", "way", "instances", "stepped instance-s", "cpu ms", "steps an instance", "of these flown",
+              "cpu us an instance"},
+             {}};
+  Table coverage{"coverage", {"scene", "class", "probability", "covered", "seeds"}, {}};
+  Table certificates{
+      "certificates", {"scene", "instances", "certified", "wrong", "audited", "mismatches", "switched off"}, {}};
+};
+
+void add_coverage(const UncertainProblem& problem, const Estimates& estimates, const std::vector<double>& truth,
+                  const Wanted& wanted, Tables* tables, Report* report) {
+  double least = 1.0, most = 0.0;
+  for (std::size_t c = 0; c < truth.size(); ++c) {
+    if (!(truth[c] > 0.05 && truth[c] < 0.95)) continue;
+    double covered = 0.0;
+    for (const simulation::OutcomeEstimate& one : estimates.all) {
+      const simulation::ClassEstimate& found = one.variables[0].classes[c];
+      covered += std::abs(found.probability - truth[c]) <= found.half_width;
+    }
+    covered /= static_cast<double>(estimates.all.size());
+    least = std::min(least, covered);
+    most = std::max(most, covered);
+    tables->coverage.rows.push_back({problem.name, problem.variables[0].classes[c], truth[c], covered,
+                                     static_cast<std::int64_t>(estimates.all.size())});
+  }
+  report->add({.work = "coverage of the 90 % interval, " + problem.name + ", least class",
+               .better = Better::kWithin,
+               .must = Goal{wanted.coverage, 1.0},
+               .aim = Goal{0.88, 0.96},
+               .reached = least,
+               .unit = "",
+               .n = static_cast<std::int64_t>(estimates.all.size()),
+               .baseline = "shares of one long net",
+               .why = "greatest class " + std::to_string(most).substr(0, 5)});
+}
+
+void measure(const UncertainProblem& problem, const Wanted& wanted, const Arguments& arguments, int* certified,
+             int* wrong, Tables* tables, Report* report) {
+  const auto classes = static_cast<int>(problem.variables[0].classes.size());
+  std::fprintf(stderr, "%s: %d instances to rest\n", problem.name.c_str(), arguments.instances);
+  const Bank bank = make_bank(problem, arguments.instances);
+  const Cost plain = plain_cost(bank, classes, kTolerance, kConfidence, kRepetitions);
+  std::fprintf(stderr, "%s: %d estimates\n", problem.name.c_str(), arguments.seeds);
+  const Estimates ours = run_estimates(problem, kTolerance, kConfidence, arguments.seeds);
+
+  double seconds = 0.0;
+  for (const double one : bank.seconds) seconds += one / static_cast<double>(bank.seconds.size());
+  constexpr double kSteps = 240.0;
+  tables->cost.rows.push_back(
+      {problem.name, "plain", plain.instances, plain.seconds, 1e3 * plain.cpu, kSteps * seconds, 0.0, 1e6 * bank.cpu});
+  tables->cost.rows.push_back({problem.name, "prescene", ours.mean.instances, ours.mean.seconds, 1e3 * ours.mean.cpu,
+                               kSteps * bank.certified_seconds, kSteps * bank.flown_seconds, 1e6 * bank.certified_cpu});
+  tables->certificates.rows.push_back(
+      {problem.name, static_cast<std::int64_t>(arguments.instances), static_cast<std::int64_t>(bank.certified),
+       static_cast<std::int64_t>(bank.wrong), static_cast<std::int64_t>(ours.audited),
+       static_cast<std::int64_t>(ours.mismatches), static_cast<std::int64_t>(ours.switched_off)});
+  *certified += bank.certified;
+  *wrong += bank.wrong;
+  report->add({.work = "instance-seconds to a promised 90 % interval of +-3 %, " + problem.name,
+               .must = at_least(wanted.seconds_must),
+               .aim = at_least(wanted.seconds_aim),
+               .reached = plain.seconds / ours.mean.seconds,
+               .unit = "x less",
+               .n = arguments.seeds,
+               .baseline = kBaseline,
+               .why = "flights without contact search are not counted; audits are"});
+  report->add({.work = "CPU time to a promised 90 % interval of +-3 %, " + problem.name,
+               .must = at_least(wanted.cpu_must),
+               .aim = at_least(wanted.cpu_aim),
+               .reached = plain.cpu / ours.mean.cpu,
+               .unit = "x less",
+               .n = arguments.seeds,
+               .baseline = kBaseline,
+               .why = "making the certifier is counted; Bullet, no lockstep stepper"});
+  add_coverage(problem, ours, true_shares(problem, arguments.truth), wanted, tables, report);
+}
+
+void add_not_measured(Report* report) {
+  const auto without = [&](const std::string& work, Better better, Goal must, Goal aim, const std::string& unit,
+                           const std::string& why) {
+    Target target;
+    target.work = work;
+    target.better = better;
+    target.must = must;
+    target.aim = aim;
+    target.unit = unit;
+    target.baseline = "none";
+    target.why = why;
+    report->add(std::move(target));
+  };
+  const std::array<std::pair<const char*, double>, 4> heat = {{{"A", 6.0}, {"B", 4.0}, {"C", 20.0}, {"D", 2.0}}};
+  for (const auto& [scene, must] : heat)
+    without(std::string("heat map at Monte Carlo's N = 1000 quality, ") + scene, Better::kHigher, at_least(must),
+            at_least(must), "x fewer instances", "not measured by this program");
+  without("tree-contact step vs Bullet's convex decomposition", Better::kHigher, at_least(1.0), at_least(2.0), "x",
+          "the simulator collides convex parts, not sphere trees");
+  without("real tosses, report half, Brier", Better::kLower, at_most(0.10), at_most(0.05), "",
+          "measured by `prescene evaluate cube_tosses`");
+}
+
+int run(const Arguments& arguments) {
+  Report report("uncertain", "none");
+  report.note("Scenes A to D of tests/support/uncertain_scenes.cc, 240 Hz, one thread but for wall times.");
+  Tables tables;
+  int certified = 0, wrong = 0;
+  const std::vector<tests::NamedScene> scenes = tests::uncertain_scenes();
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    const UncertainProblem problem(scenes[i]);
+    measure(problem, kWanted[i], arguments, &certified, &wrong, &tables, &report);
+    if (i == 0) {
+      const std::vector<double> times = wall_times(problem, kTolerance, 0.95, 2, arguments.walls);
+      report.add({.work = "wall time to +-3 % at 95 %, A, 2 threads, median",
+                  .better = Better::kLower,
+                  .must = at_most(100.0),
+                  .aim = at_most(20.0),
+                  .reached = 1e3 * median(times),
+                  .unit = "ms",
+                  .n = arguments.walls,
+                  .baseline = "none",
+                  .why = "certifier included"});
+    }
+    if (i == 3)
+      report.add({.work = "a certifier that forgets the edges of supports is caught by the audit, D",
+                  .must = at_least(1.0),
+                  .aim = std::nullopt,
+                  .reached = audit_catches_mutation(problem, 1000) ? 1.0 : 0.0,
+                  .unit = "1 = yes",
+                  .n = 1,
+                  .baseline = "none",
+                  .why = "1000 instances"});
+  }
+  report.add({.work = "certificates wrong",
+              .better = Better::kLower,
+              .must = at_most(1.0),
+              .aim = std::nullopt,
+              .reached = 1e4 * wrong / std::max(1, certified),
+              .unit = "in 10,000",
+              .n = certified,
+              .baseline = "the same instances run on to rest",
+              .why = std::to_string(wrong) + " of " + std::to_string(certified)});
+  add_not_measured(&report);
+  report.add(tables.cost);
+  report.add(tables.coverage);
+  report.add(tables.certificates);
+  std::fputs(report.text().c_str(), stdout);
+  for (const Table* table : {&tables.cost, &tables.coverage, &tables.certificates})
+    std::printf("\n%s", text_of(*table).c_str());
+  if (arguments.out.empty()) return 0;
+  const core::Status status = report.write(arguments.out);
+  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
+  return status.ok() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace prescene::benchmarks
+
+int main(int count, char** words) {
+  prescene::benchmarks::Arguments arguments;
+  if (!prescene::benchmarks::parse(count, words, &arguments)) return 2;
+  return prescene::benchmarks::run(arguments);
+}
