@@ -243,8 +243,8 @@ Passage passage_of(const belief::InsideVolume& volume, const CertifiedObject& ob
   const auto inside = [&](const Vector3d& low, const Vector3d& high) {
     return may_be_inside(volume, offset, low, high);
   };
-  return {std::make_shared<const SpillLevels>(surfaces, domain, object.inner_radius, outside, true),
-          std::make_shared<const SpillLevels>(surfaces, domain, object.inner_radius, inside, false)};
+  const auto leave = std::make_shared<const SpillLevels>(surfaces, domain, object.inner_radius, outside, true);
+  return {leave, std::make_shared<const SpillLevels>(*leave, inside, false)};
 }
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace {
 
 using geometry::Vector3d;
 
-constexpr double kCellsPerRadius = 4.0;
+constexpr double kCellsPerRadius = 3.0;
 constexpr double kMostCells = 64.0;  // along an edge of the domain
 // m: bodies sink into each other by about this much, and round shapes are meshes here.
 constexpr double kSlack = 1e-3;
@@ -52,6 +52,11 @@ SpillLevels::SpillLevels(const std::vector<geometry::TriangleMesh>& surfaces, co
   const double distance = ball_radius - kSlack - 0.5 * std::sqrt(3.0) * size_;
   if (distance > 0.0)
     for (const geometry::TriangleMesh& surface : surfaces) close_near(surface, distance);
+  flood(region, region_beyond);
+}
+
+SpillLevels::SpillLevels(const SpillLevels& same_places, const Region& region, bool region_beyond)
+    : origin_(same_places.origin_), size_(same_places.size_), count_(same_places.count_), closed_(same_places.closed_) {
   flood(region, region_beyond);
 }
 

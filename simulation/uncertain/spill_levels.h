@@ -27,6 +27,8 @@ class SpillLevels {
   /// `region_beyond`.
   SpillLevels(const std::vector<geometry::TriangleMesh>& surfaces, const geometry::Box& domain, double ball_radius,
               const Region& region, bool region_beyond);
+  /// The same places for the ball, another region: most of the work is finding the places.
+  SpillLevels(const SpillLevels& same_places, const Region& region, bool region_beyond);
 
   /// Height (m) that the centre must reach to get from p to the region, at least; minus infinity inside of it and where
   /// the grid knows of no place for the ball, infinity where no way leads.

@@ -73,7 +73,7 @@ TEST(SpillLevels, ABinSpillsOverItsRim) {
   for (const double z : {0.06, 0.15, 0.22}) {
     // The region begins above the hollow.
     EXPECT_LE(levels.level({0.0, 0.0, z}), 0.25);
-    EXPECT_GT(levels.level({0.0, 0.0, z}), 0.25 - 2.0 * radius / 4.0);
+    EXPECT_GT(levels.level({0.0, 0.0, z}), 0.25 - 2.0 * radius / 3.0);
   }
   EXPECT_EQ(levels.level({0.0, 0.0, 0.30}), -std::numeric_limits<double>::infinity());
   EXPECT_EQ(levels.level({0.5, 0.0, 0.10}), -std::numeric_limits<double>::infinity());
