@@ -89,7 +89,8 @@ class PenetrationSearch {
         box_b_(BodyBox(b.nodes()[0]).placed(X_AB)) {
     const double extent =
         static_cast<double>(a.radius()) + static_cast<double>(b.radius()) + translation_vector(X_AB).lpNorm<1>();
-    rounding_ = 0x1p-20 * extent;
+    // Bodies that are points have no extent; they too come apart.
+    rounding_ = 0x1p-20 * extent + static_cast<double>(std::numeric_limits<float>::min());
   }
 
   std::optional<Penetration> run() {
@@ -154,6 +155,7 @@ class PenetrationSearch {
     double low = 0.0;
     double high = 0.0;
     if (std::isfinite(length_)) {
+      if (length_ <= rounding_) return;  // Shorter ones mean nothing.
       high = (1.0 - tolerance_) * length_;
       if (!apart(high * u)) return;
     } else {

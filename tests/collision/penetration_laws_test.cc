@@ -246,6 +246,17 @@ TEST(Penetration, IsThatOfEachPiece) {
   }
 }
 
+TEST(Penetration, EndsForPoints) {
+  PenetrationScratch scratch;
+  for (const double x : {0.0, 56.0}) {
+    const TriangleTree point = tree_of({{{x, 0.0, 0.0}}, {{0, 0, 0}}});
+    const std::optional<Penetration> found = penetration(point, point, {}, {}, scratch);
+    ASSERT_TRUE(found.has_value());
+    EXPECT_LE(found->depth, 1e-5 * x + 1e-30);
+    EXPECT_FALSE(collide(point, point, found->X_AB_apart, scratch.queries()));
+  }
+}
+
 TEST(Penetration, HoldsItsBoundsForSolidsThatAreNotConvex) {
   const TriangleTree a = tree_of(tests::make_knot(0.1, 4000));
   const TriangleTree b = tree_of(tests::make_bumpy_sphere(0.05, 3000));
