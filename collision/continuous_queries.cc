@@ -20,6 +20,9 @@ namespace prescene::collision {
 
 using Eigen::Vector3d;
 
+// What a rounding does at least, m.
+inline constexpr auto kSmallestFloat = static_cast<double>(std::numeric_limits<float>::denorm_min());
+
 /// B, or a triangle of it, at a time.
 struct Placed {
   geometry::Pose X_AB;
@@ -250,7 +253,7 @@ inline void take_up_leaves(const MovingPair& from, ContactSearch* search, std::v
 }
 
 FirstContact first_contact_lanes(ContactSearch* search, double extent, QueryScratch* scratch, QueryCounts* counts) {
-  const auto slack = static_cast<float>(36.0 / 16777216.0 * extent);
+  const auto slack = static_cast<float>(36.0 / 16777216.0 * extent + 36.0 * kSmallestFloat);
   const std::uint64_t steps = search->steps_left;
   std::vector<MovingPair>& heap = scratch->moving_pairs();
   heap.clear();
@@ -328,7 +331,9 @@ FirstContact first_contact(const TriangleTree& a, const TriangleTree& b, const R
   const double extent = static_cast<double>(a.radius()) + static_cast<double>(b.radius()) + origin.lpNorm<1>() +
                         start.field.steady.lpNorm<1>() + std::sqrt(3.0) * start.field.swirl(origin).norm();
   const float scale = std::ldexp(1.0F, extent > 0.0 ? std::clamp(-std::ilogb(extent), -126, 126) : 0);
-  ContactSearch search{&a, &b, &motion, kRounding * extent, options.tolerance, scale, options.step_limit, {}, 0.0};
+  ContactSearch search{
+      &a, &b, &motion, kRounding * extent + 16.0 * kSmallestFloat, options.tolerance, scale, options.step_limit,
+      {}, 0.0};
   if (!(search.tolerance > 0.0))
     search.tolerance = kDefaultTolerance * static_cast<double>(std::min(a.mesh().size(), b.mesh().size()));
   search.tolerance = std::max(search.tolerance, 4.0 * search.rounding);

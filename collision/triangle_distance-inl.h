@@ -198,11 +198,14 @@ HWY_NOINLINE LaneDistance<D> measure_lanes(D d, const Corners<D>& a, const Corne
   if constexpr (kBetween) between = {hn::Mul(between.x, up), hn::Mul(between.y, up), hn::Mul(between.z, up)};
   const LaneVerdict<D> verdict = test_lanes(d, a, b, near);
   const auto infinity = hn::Set(d, std::numeric_limits<float>::infinity());
-  return {hn::IfThenElse(near, hn::IfThenZeroElse(hn::Or(verdict.hit, verdict.unsure), distance), infinity), verdict,
-          between};
+  // A pair so small, so far out that its scaled coordinates are not finite.
+  const auto lost = hn::Not(hn::Lt(found.squared, infinity));
+  const auto unsure = hn::Or(hn::Or(verdict.hit, verdict.unsure), lost);
+  return {hn::IfThenElse(near, hn::IfThenZeroElse(unsure, distance), infinity), verdict, between};
 }
 
-/// Zero for hits and lanes that the verdict is unsure of. Lanes that are not active, and those whose boxes are at least
+/// Zero for hits and lanes that the verdict is unsure of, and where the triangles are within 2^-100 of their distance
+/// from the origin, which may be too near to be scaled. Lanes that are not active, and those whose boxes are at least
 /// `limit` apart along an axis, get infinity. Distances keep their relative precision for triangles of any size: each
 /// pair is scaled by a power of two.
 template <bool kBetween = false, class D>
@@ -216,7 +219,7 @@ HWY_INLINE LaneDistance<D> distance_lanes(D d, const Corners<D>& a, const Corner
           {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
 }
 
-/// Writes the distances of 16 pairs: zero for hits and for pairs of which the verdict is unsure, infinity for those
+/// Writes the distances of 16 pairs: zero where distance_lanes says zero, infinity for those
 /// that are not active or whose distance is `limit` or more (up to a rounding; not all such pairs are found). With
 /// kBetween also the vectors from the nearest point of a to that of b, as three rows.
 template <bool kBetween = false, class LoadA, class LoadB>

@@ -248,6 +248,24 @@ TEST_F(DistanceQueries, AreSymmetricAndRigid) {
   });
 }
 
+// Nearer than single precision can scale where they are.
+TEST_F(DistanceQueries, OfPointsThatNearlyTouch) {
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    const UseTarget only(target);
+    for (const double x : {0.0, 56.0, 1e9}) {
+      const TriangleTree point = tree_of({{{x, 0.0, 0.0}}, {{0, 0, 0}}});
+      QueryScratch scratch;
+      for (const float z : {1e-44F, 1e-40F, 1e-37F, 1e-30F, 1e-20F}) {
+        Transform X_AB;
+        X_AB.translation = {0.0F, 0.0F, z};
+        const std::optional<Distance> found = distance(point, point, X_AB, {}, scratch);
+        ASSERT_TRUE(found.has_value()) << x << " " << z;
+        EXPECT_NEAR(found->distance, static_cast<double>(z), 1e-6 * static_cast<double>(z));
+      }
+    }
+  }
+}
+
 TEST_F(DistanceQueries, ChangeNoMoreThanTheTranslation) {
   check([] {
     const TriangleTree a = tree_of(*tests::closed_meshes());

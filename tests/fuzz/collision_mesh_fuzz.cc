@@ -85,17 +85,19 @@ void check_rays(const TriangleTree& tree, const Eigen::Vector3d& origin, QuerySc
     ray.origin = origin;
     ray.direction = (mesh.vertices()[t[0]] + mesh.vertices()[t[1]]).cast<double>() / 2.0 - origin;
     std::optional<double> nearest;
+    double rounding = 0.0;
     if (const std::optional<ShearedRay> sheared = shear(ray)) {
       for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
         const auto hit = meet(*sheared, mesh.corners(i));
         if (hit && (!nearest || hit->s < *nearest)) nearest = hit->s;
       }
-      if (nearest) *nearest /= sheared->metres;
+      if (nearest) *nearest = std::max(*nearest / sheared->metres, ray.t_min);
+      rounding = 1e-13 * (static_cast<double>(tree.radius()) + origin.norm()) / sheared->metres;
     }
     const std::optional<RayHit> found = nearest_hit(tree, ray, scratch);
     PRESCENE_CHECK(found.has_value() == nearest.has_value());
     PRESCENE_CHECK(any_hit(tree, ray, scratch) == nearest.has_value());
-    if (found) PRESCENE_CHECK(std::abs(found->t - *nearest) <= 1e-9 * std::max(1.0, std::abs(*nearest)));
+    if (found) PRESCENE_CHECK(std::abs(found->t - *nearest) <= rounding);
   }
 }
 
@@ -108,6 +110,7 @@ void check_first_contact(const TriangleTree& tree, const geometry::Pose& end, Qu
   const FirstContact found = first_contact(tree, tree, *motion, {.step_limit = 20'000}, scratch);
   PRESCENE_CHECK(found.time >= 0.0 && found.time <= 1.0);
   PRESCENE_CHECK(found.outcome != MotionOutcome::kNoContact || found.time == 1.0);
+  if (found.time == 0.0) return;
   const int last = found.outcome == MotionOutcome::kNoContact ? 8 : 7;
   for (int i = 0; i <= last; ++i) {
     const auto X_AB = to_transform(motion->pose(found.time * i / 8.0));
