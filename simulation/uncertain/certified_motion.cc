@@ -218,7 +218,7 @@ std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>&
   for (std::size_t j = 0; j < motions.size(); ++j) {
     if (j == object) continue;
     if (!disjoint_and_parting(motion.box, motions[j].box, motion.velocity - motions[j].velocity)) return std::nullopt;
-    lowest_beside = std::min(lowest_beside, motions[j].box.min().z());
+    lowest_beside = std::min(lowest_beside, motions[j].box.max().z());
   }
   const double rebound = floor + kKeptInLanding * (motion.highest - floor);
   if (!(floor < motion.box.min().z() && (std::isinf(floor) || rebound < lowest_beside + objects_[object].inner_radius)))
