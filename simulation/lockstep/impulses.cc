@@ -4,6 +4,7 @@
 // |turn|^2; impulses are per kilogram.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "lane_state.h"
 
@@ -45,8 +46,16 @@ enum Field : int {
   kBounced = 37,
   kHitTime = 38,
   kPart = 39,
+  kResponse = 40,  // of the normal row
+  kPerSlipStep = 41,
 };
-static_assert(kPart < SolverScratch::kFields);
+static_assert(kPerSlipStep < SolverScratch::kFields);
+
+constexpr int kKeptFields[] = {kImpulse, kSlip1, kSlip2, kRolling, kRolling + 1, kRolling + 2};
+
+// Most lanes settle within a few iterations and one in thirty takes all of them. After each of these many iterations
+// the lanes that have not settled are gathered into new vectors.
+constexpr int kRounds[] = {8, 20};
 
 struct Rates {
   Vec3<V> velocity, spin;
@@ -54,10 +63,12 @@ struct Rates {
 
 class LaneSolver {
  public:
-  LaneSolver(const LockstepScene& scene, LaneState& state, Real* memory)
-      : scene_(scene), settings_(scene.settings), state_(state), memory_(memory) {}
+  LaneSolver(const LockstepScene& scene, LaneState& state, SolverScratch& scratch)
+      : scene_(scene), settings_(scene.settings), state_(state), scratch_(scratch), memory_(scratch.memory()) {}
 
-  void run(const std::int32_t* slots, std::size_t filled);
+  /// Iterations [first, last) of a vector of slots. Those that are settled, or all if last is the last one at all, end
+  /// their step; the others are kept for the next round and appended to `unsettled`.
+  void run(std::span<const std::int32_t> slots, int first, int last, std::vector<std::int32_t>& unsettled);
 
  private:
   Real* field(int contact, int f) const {
@@ -88,12 +99,17 @@ class LaneSolver {
   void set_lanes(V value, Real* row) const {
     HWY_ALIGN Real values[kLaneMultiple] = {};
     hn::Store(value, D(), values);
-    for (std::size_t i = 0; i < filled_; ++i) row[slots_[i]] = values[i];
+    for (std::size_t i = 0; i < filled_; ++i) {
+      if (ends_ >> i & 1U) row[slots_[i]] = values[i];
+    }
   }
 
   void load_contact(int contact);
   void warm_start(int contact);
-  void iterate();
+  /// Returns a bit for each lane that has not settled.
+  std::uint32_t iterate(int first, int last);
+  void keep(std::uint32_t lanes);
+  void resume();
   void push_out();
   void finish();
 
@@ -108,11 +124,13 @@ class LaneSolver {
   const LockstepScene& scene_;
   const StepSettings& settings_;
   LaneState& state_;
+  SolverScratch& scratch_;
   Real* memory_;
   std::int32_t slots_[kLaneMultiple] = {};
   std::size_t filled_ = 0;
-  int count_ = 0;       // contacts of the lane that has most
-  int warm_count_ = 0;  // likewise
+  std::uint32_t ends_ = 0;  // lanes whose step ends
+  int count_ = 0;           // contacts of the lane that has most
+  int warm_count_ = 0;      // likewise
   Mat3<V> R_;
   Vec3<V> p_;
   Rates before_, flown_;  // spins scaled
@@ -179,13 +197,17 @@ void LaneSolver::load_contact(int k) {
   const Vec3<V> turn_n = put_row(kNormal, n);
   const Vec3<V> turn_1 = put_row(kTangent1, t1);
   const Vec3<V> turn_2 = put_row(kTangent2, t2);
-  put(k, kInverse, one / (one + dot(turn_n, turn_n)));
+  const V response = one + dot(turn_n, turn_n);
+  put(k, kResponse, response);
+  put(k, kInverse, one / response);
   const V k11 = one + dot(turn_1, turn_1);
   const V k22 = one + dot(turn_2, turn_2);
   const V k12 = dot(turn_1, turn_2);
   const V half = set<V>(0.5);
   const V difference = half * (k11 - k22);
-  put(k, kSlipStep, one / (half * (k11 + k22) + hn::Sqrt(difference * difference + k12 * k12)));
+  const V stiffest = half * (k11 + k22) + hn::Sqrt(difference * difference + k12 * k12);
+  put(k, kPerSlipStep, stiffest);
+  put(k, kSlipStep, one / stiffest);
 
   const V dt = set<V>(settings_.dt);
   const V per_dt = set<V>(1.0 / settings_.dt);
@@ -253,51 +275,56 @@ void LaneSolver::warm_start(int k) {
   apply(k, kTangent2, slip_2, change_);
 }
 
-void LaneSolver::iterate() {
+std::uint32_t LaneSolver::iterate(int first, int last) {
   const D d;
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   const V accuracy = set<V>(settings_.accuracy);
-  const V rolling_step =
-      one / (inverse_root_.x * inverse_root_.x + inverse_root_.y * inverse_root_.y + inverse_root_.z * inverse_root_.z);
+  const V per_rolling_step =
+      inverse_root_.x * inverse_root_.x + inverse_root_.y * inverse_root_.y + inverse_root_.z * inverse_root_.z;
+  const V rolling_step = one / per_rolling_step;
+  // Copies that no store can change.
+  Rates rates = change_;
+  const bool rolls = scene_.rolls;
+  const int count = count_;
   auto active = hn::Eq(zero, zero);
-  for (int iteration = 0; iteration < settings_.iterations; ++iteration) {
+  for (int iteration = first; iteration < last; ++iteration) {
     V largest = zero;
-    for (int k = 0; k < count_; ++k) {
+    for (int k = 0; k < count; ++k) {
       // Normal.
       const V inverse = get(k, kInverse);
       const V old = get(k, kImpulse);
-      const V wanted = hn::Max(zero, old + (get(k, kTarget) - along(k, kNormal, change_)) * inverse);
+      const V wanted = hn::Max(zero, old + (get(k, kTarget) - along(k, kNormal, rates)) * inverse);
       const V impulse = select(active, wanted, old);
       const V change = impulse - old;
       put(k, kImpulse, impulse);
-      apply(k, kNormal, change, change_);
-      largest = hn::Max(largest, hn::Abs(change) / inverse);
+      apply(k, kNormal, change, rates);
+      largest = hn::Max(largest, hn::Abs(change) * get(k, kResponse));
       // Friction: a projected gradient step with one step size for both directions. Where it stands still, friction is
       // either below its limit with no slip, or at its limit and exactly opposed to the slip.
       const V limit = get(k, kMu) * impulse;
       const V step = get(k, kSlipStep);
       const V old_1 = get(k, kSlip1);
       const V old_2 = get(k, kSlip2);
-      V slip_1 = old_1 - step * (get(k, kBase1) + along(k, kTangent1, change_));
-      V slip_2 = old_2 - step * (get(k, kBase2) + along(k, kTangent2, change_));
-      const V size = hn::Sqrt(slip_1 * slip_1 + slip_2 * slip_2);
-      const auto too_large = hn::Gt(size, limit);
-      const V scale = select(too_large, limit / select(too_large, size, one), one);
+      V slip_1 = old_1 - step * (get(k, kBase1) + along(k, kTangent1, rates));
+      V slip_2 = old_2 - step * (get(k, kBase2) + along(k, kTangent2, rates));
+      const V squared = slip_1 * slip_1 + slip_2 * slip_2;
+      const auto too_large = hn::Gt(squared, limit * limit);
+      const V scale = select(too_large, limit / hn::Sqrt(select(too_large, squared, one)), one);
       slip_1 = select(active, slip_1 * scale, old_1);
       slip_2 = select(active, slip_2 * scale, old_2);
       const V change_1 = slip_1 - old_1;
       const V change_2 = slip_2 - old_2;
       put(k, kSlip1, slip_1);
       put(k, kSlip2, slip_2);
-      apply(k, kTangent1, change_1, change_);
-      apply(k, kTangent2, change_2, change_);
-      largest = hn::Max(largest, hn::Max(hn::Abs(change_1), hn::Abs(change_2)) / step);
-      if (!scene_.rolls) continue;
+      apply(k, kTangent1, change_1, rates);
+      apply(k, kTangent2, change_2, rates);
+      largest = hn::Max(largest, hn::Max(hn::Abs(change_1), hn::Abs(change_2)) * get(k, kPerSlipStep));
+      if (!rolls) continue;
       // Rolling friction, in spins that are not scaled: impulse I^-1/2 goes into the scaled one.
       const V arm = get(k, kRollingArm);
       const Vec3<V> old_roll = get3(k, kRolling);
-      const Vec3<V> spin = times(flown_.spin + change_.spin, inverse_root_);
+      const Vec3<V> spin = times(flown_.spin + rates.spin, inverse_root_);
       Vec3<V> roll = old_roll - spin * rolling_step;
       const V roll_limit = arm * impulse;
       const V roll_size = length(roll);
@@ -306,19 +333,59 @@ void LaneSolver::iterate() {
       roll = select(hn::And(active, hn::Gt(arm, zero)), roll, old_roll);
       const Vec3<V> roll_change = roll - old_roll;
       put3(k, kRolling, roll);
-      change_.spin = change_.spin + times(roll_change, inverse_root_);
-      largest = hn::Max(largest, length(roll_change) / rolling_step * arm);
+      rates.spin = rates.spin + times(roll_change, inverse_root_);
+      largest = hn::Max(largest, length(roll_change) * per_rolling_step * arm);
     }
     active = hn::And(active, hn::Gt(largest, accuracy));
     if (hn::AllFalse(d, active)) break;
   }
+  change_ = rates;
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, active, bytes);
+  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+
+void LaneSolver::keep(std::uint32_t lanes) {
+  const D d;
+  HWY_ALIGN Real rates[6][kLaneMultiple];
+  hn::Store(change_.velocity.x, d, rates[0]);
+  hn::Store(change_.velocity.y, d, rates[1]);
+  hn::Store(change_.velocity.z, d, rates[2]);
+  hn::Store(change_.spin.x, d, rates[3]);
+  hn::Store(change_.spin.y, d, rates[4]);
+  hn::Store(change_.spin.z, d, rates[5]);
+  for (std::size_t i = 0; i < filled_; ++i) {
+    if (!(lanes >> i & 1U)) continue;
+    Real* kept = scratch_.kept(slots_[i]);
+    for (const auto& rate : rates) *kept++ = rate[i];
+    for (int k = 0; k < state_.contact_count[static_cast<std::size_t>(slots_[i])]; ++k) {
+      for (const int f : kKeptFields) *kept++ = field(k, f)[i];
+    }
+  }
+}
+
+void LaneSolver::resume() {
+  const D d;
+  HWY_ALIGN Real rates[6][kLaneMultiple] = {};
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    const Real* kept = scratch_.kept(slots_[i]);
+    for (auto& rate : rates) rate[i] = *kept++;
+    const int contacts = state_.contact_count[static_cast<std::size_t>(slots_[i])];
+    for (int k = 0; k < count_; ++k) {
+      for (const int f : kKeptFields) {
+        field(k, f)[i] = k < contacts ? *kept++ : Real(0);
+      }
+    }
+  }
+  change_.velocity = {hn::Load(d, rates[0]), hn::Load(d, rates[1]), hn::Load(d, rates[2])};
+  change_.spin = {hn::Load(d, rates[3]), hn::Load(d, rates[4]), hn::Load(d, rates[5])};
 }
 
 void LaneSolver::push_out() {
   const D d;
   const V zero = set<V>(0.0);
   const V accuracy = set<V>(settings_.accuracy);
-  push_ = {set3<V>(0.0, 0.0, 0.0), set3<V>(0.0, 0.0, 0.0)};
+  Rates rates = {set3<V>(0.0, 0.0, 0.0), set3<V>(0.0, 0.0, 0.0)};
   // Only lanes with an overlap: the others' bits do not depend on them.
   auto active = hn::Lt(zero, zero);
   for (int k = 0; k < count_; ++k) {
@@ -331,21 +398,20 @@ void LaneSolver::push_out() {
     for (int k = 0; k < count_; ++k) {
       const V inverse = get(k, kInverse);
       const V old = get(k, kPushImpulse);
-      const V wanted = hn::Max(zero, old + (get(k, kPush) - along(k, kNormal, push_)) * inverse);
+      const V wanted = hn::Max(zero, old + (get(k, kPush) - along(k, kNormal, rates)) * inverse);
       const V impulse = select(active, wanted, old);
       const V change = impulse - old;
       put(k, kPushImpulse, impulse);
-      apply(k, kNormal, change, push_);
-      largest = hn::Max(largest, hn::Abs(change) / inverse);
+      apply(k, kNormal, change, rates);
+      largest = hn::Max(largest, hn::Abs(change) * get(k, kResponse));
     }
     active = hn::And(active, hn::Gt(largest, accuracy));
   }
+  push_ = rates;
 }
 
 void LaneSolver::finish() {
-  const D d;
   const V zero = set<V>(0.0);
-  const V one = set<V>(1.0);
   const V dt = set<V>(settings_.dt);
   const V half = set<V>(0.5);
   auto touched = hn::Lt(zero, zero);
@@ -397,13 +463,15 @@ void LaneSolver::finish() {
   set_lanes(new_q.y, state_.q[2]);
   set_lanes(new_q.z, state_.q[3]);
 
-  for (std::size_t i = 0; i < filled_; ++i) state_.warm_count[static_cast<std::size_t>(slots_[i])] = 0;
+  for (std::size_t i = 0; i < filled_; ++i) {
+    if (ends_ >> i & 1U) state_.warm_count[static_cast<std::size_t>(slots_[i])] = 0;
+  }
   for (int k = 0; k < count_; ++k) {
     const Vec3<V> slip = R_ * (get3(k, kTangent1) * get(k, kSlip1) + get3(k, kTangent2) * get(k, kSlip2));
     put3(k, kTangent1, slip);
     for (std::size_t i = 0; i < filled_; ++i) {
       const std::int32_t slot = slots_[i];
-      if (k >= state_.contact_count[static_cast<std::size_t>(slot)]) continue;
+      if (!(ends_ >> i & 1U) || k >= state_.contact_count[static_cast<std::size_t>(slot)]) continue;
       LaneContact& c = state_.contacts(slot)[k];
       c.impulse = field(k, kImpulse)[i];
       c.hit = c.impulse > 0 && field(k, kHit)[i] > 0 ? 1 : 0;
@@ -417,22 +485,20 @@ void LaneSolver::finish() {
       warm.part = c.part;
     }
   }
-  static_cast<void>(d);
-  static_cast<void>(one);
 }
 
-void LaneSolver::run(const std::int32_t* slots, std::size_t filled) {
+void LaneSolver::run(std::span<const std::int32_t> slots, int first, int last, std::vector<std::int32_t>& unsettled) {
   const D d;
-  filled_ = filled;
+  filled_ = slots.size();
   count_ = 0;
   warm_count_ = 0;
   overlap_ = false;
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    slots_[i] = slots[std::min(i, filled - 1)];
+    slots_[i] = slots[std::min(i, filled_ - 1)];
     count_ = std::max(count_, state_.contact_count[static_cast<std::size_t>(slots_[i])]);
     warm_count_ = std::max(warm_count_, state_.warm_count[static_cast<std::size_t>(slots_[i])]);
   }
-  for (int j = 0; j < warm_count_; ++j) {
+  for (int j = 0; first == 0 && j < warm_count_; ++j) {
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
       const std::int32_t slot = slots_[i];
       const bool there = j < state_.warm_count[static_cast<std::size_t>(slot)];
@@ -460,18 +526,44 @@ void LaneSolver::run(const std::int32_t* slots, std::size_t filled) {
   reach2_ = reach * reach;
   change_ = {set3<V>(0.0, 0.0, 0.0), set3<V>(0.0, 0.0, 0.0)};
   for (int k = 0; k < count_; ++k) load_contact(k);
-  for (int k = 0; k < count_; ++k) warm_start(k);
-  iterate();
+  if (first == 0) {
+    for (int k = 0; k < count_; ++k) warm_start(k);
+  } else {
+    resume();
+  }
+  const std::uint32_t all = (1U << filled_) - 1U;
+  std::uint32_t left = iterate(first, last) & all;
+  if (last == settings_.iterations) left = 0;
+  if (left != 0) {
+    keep(left);
+    for (std::size_t i = 0; i < filled_; ++i) {
+      if (left >> i & 1U) unsettled.push_back(slots_[i]);
+    }
+  }
+  ends_ = all & ~left;
+  if (ends_ == 0) return;
   push_ = {set3<V>(0.0, 0.0, 0.0), set3<V>(0.0, 0.0, 0.0)};
   if (overlap_) push_out();
   finish();
 }
 
 void solve_lanes(const LockstepScene* scene, const std::int32_t* slots, std::size_t count, LaneState* state,
-                 Real* memory) {
+                 SolverScratch* scratch) {
   const std::size_t width = hn::Lanes(D());
-  LaneSolver solver(*scene, *state, memory);
-  for (std::size_t begin = 0; begin < count; begin += width) solver.run(slots + begin, std::min(width, count - begin));
+  LaneSolver solver(*scene, *state, *scratch);
+  std::span<const std::int32_t> now(slots, count);
+  int first = 0;
+  for (std::size_t round = 0; !now.empty(); ++round) {
+    const int iterations = scene->settings.iterations;
+    const int last = round < std::size(kRounds) ? std::min(kRounds[round], iterations) : iterations;
+    std::vector<std::int32_t>& next = scratch->unsettled(static_cast<int>(round % 2));
+    next.clear();
+    for (std::size_t begin = 0; begin < now.size(); begin += width) {
+      solver.run(now.subspan(begin, std::min(width, now.size() - begin)), first, last, next);
+    }
+    now = next;
+    first = last;
+  }
 }
 
 }  // namespace prescene::simulation::HWY_NAMESPACE
@@ -484,7 +576,7 @@ HWY_EXPORT(solve_lanes);
 
 void solve(const LockstepScene& scene, std::span<const std::int32_t> slots, LaneState& state, SolverScratch& scratch) {
   if (slots.empty()) return;
-  HWY_DYNAMIC_DISPATCH(solve_lanes)(&scene, slots.data(), slots.size(), &state, scratch.memory());
+  HWY_DYNAMIC_DISPATCH(solve_lanes)(&scene, slots.data(), slots.size(), &state, &scratch);
 }
 
 }  // namespace prescene::simulation

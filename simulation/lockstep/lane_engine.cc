@@ -31,7 +31,7 @@ void set_rotation(const Rows<4>& rows, int slot, const Quaterniond& q) {
 }  // namespace
 
 LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
-    : scene_(std::move(scene)), state_(slots) {
+    : scene_(std::move(scene)), state_(slots), scratch_(state_.slots()) {
   const auto most = static_cast<std::size_t>(state_.slots());
   const std::size_t fixed = scene_->lanes.fixed.size();
   pairs_.planes.reserve(most * fixed);

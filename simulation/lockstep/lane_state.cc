@@ -51,9 +51,11 @@ void ContactStage::flush(const std::int32_t* slots, LaneState& state) {
   }
 }
 
-SolverScratch::SolverScratch()
-    : memory_(static_cast<Real*>(
-          ::operator new[]((static_cast<std::size_t>(kMaxContacts) * kFields + 64) * kLaneMultiple * sizeof(Real),
-                           std::align_val_t{64}))) {}
+SolverScratch::SolverScratch(int slots)
+    : memory_(static_cast<Real*>(::operator new[](
+          static_cast<std::size_t>(kMaxContacts) * kFields * kLaneMultiple * sizeof(Real), std::align_val_t{64}))),
+      kept_(static_cast<std::size_t>(slots) * kKept) {
+  for (auto& list : unsettled_) list.reserve(static_cast<std::size_t>(slots));
+}
 
 }  // namespace prescene::simulation

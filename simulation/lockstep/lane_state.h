@@ -183,18 +183,24 @@ void touch_planes(const LockstepScene& scene, int part, std::span<const LanePair
 void touch_boxes(const LockstepScene& scene, int part, std::span<const LanePairs::Near> pairs, LaneState& state);
 void touch_hull(const LockstepScene& scene, int part, std::span<const LanePairs::Near> pairs, LaneState& state);
 
-/// Lanes' rows of contacts: scratch of `solve`.
+/// Scratch of `solve`: rows of the contacts of one vector, and what slots keep from one round of iterations to the
+/// next.
 class SolverScratch {
  public:
-  SolverScratch();
+  explicit SolverScratch(int slots);
   Real* memory() { return memory_.get(); }
-  static constexpr int kFields = 40;
+  Real* kept(int slot) { return kept_.data() + static_cast<std::size_t>(slot) * kKept; }
+  std::vector<std::int32_t>& unsettled(int round) { return unsettled_[static_cast<std::size_t>(round)]; }
+  static constexpr int kFields = 42;
 
  private:
   struct Free {
     void operator()(Real* memory) const { ::operator delete[](memory, std::align_val_t{64}); }
   };
+  static constexpr std::size_t kKept = 6 + 6 * kMaxContacts;
   std::unique_ptr<Real[], Free> memory_;
+  std::vector<Real> kept_;
+  std::array<std::vector<std::int32_t>, 2> unsettled_;
 };
 /// Steps the slots listed (all with contacts): impulses, then velocities and poses. Leaves impulses in their contacts
 /// and their warm contacts for the next step. Slots next to each other should have about as many contacts.

@@ -32,8 +32,8 @@ struct LockstepOptions {
   RestRule rest;
   DecompositionSettings decomposition;
   /// Instances that a thread has under way at once, in [1, 1024]. More fill the vectors better; memory grows by some
-  /// 8 KiB each.
-  int live_instances = 96;
+  /// 6 KiB each.
+  int live_instances = 256;
 };
 
 /// Ranges of the options: the message names the field.
