@@ -1,61 +1,118 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
+// CPU time of an instance in lockstep against Bullet's stepper, on one thread, on the uncertain scenes of one moving
+// body; and whether they end in the same class.
+//
+//   bench_lockstep [--quick] [--benchmark_out=PATH]
+#include <hwy/targets.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "prescene/benchmarks/report.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 #include "prescene/tests/support/uncertain_scenes.h"
 
-using namespace prescene;
+namespace prescene::benchmarks {
+namespace {
 
-static double cpu() {
-  timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+double cpu_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-int main(int argc, char** argv) {
-  const int n = argc > 1 ? atoi(argv[1]) : 300;
-  for (const auto& [name, scene] : tests::uncertain_scenes()) {
-    if (name == "D") continue;
-    simulation::ShapeStore shapes(simulation::hacd_decomposer());
-    auto simulator = *simulation::make_bullet_simulator(*scene, shapes, {});
-    std::vector<belief::WorldState> starts;
-    core::RandomStream stream(7, core::Purpose::kTest);
-    for (int i = 0; i < n; ++i) {
-      std::vector<double> u(static_cast<std::size_t>(belief::start_dimensions(*scene)));
-      for (double& x : u) x = stream.uniform();
-      starts.push_back(belief::draw_start(*scene, u));
-    }
-    core::ThreadPool pool(1);
-    simulation::LockstepOptions lo;
-    if (argc > 2) lo.live_instances = atoi(argv[2]);
-    auto lockstep = simulation::make_lockstep_simulator(*scene, shapes, lo);
-    if (!lockstep) {
-      std::printf("%s\n", core::to_string(lockstep.status()).c_str());
-      return 1;
-    }
-    const bool only = argc > 3;
-    for (const simulation::Simulator* s : {simulator.get(), lockstep->get()}) {
-      if (only && s == simulator.get()) continue;
-      std::vector<belief::Trajectory> runs(starts.size());
-      const double t0 = cpu();
-      s->run(starts, {}, stream, 0, pool, runs);
-      const double t = cpu() - t0;
-      double seconds = 0.0;
-      int ends[5] = {};
-      for (const auto& r : runs) seconds += r.simulated_seconds, ++ends[static_cast<int>(r.end)];
-      std::printf("%s %s: %.1f us an instance, %.1f steps, %.3f us a step; rest %d duration %d left %d diverged %d;", name.c_str(), s == simulator.get() ? "bullet" : "lockstep", 1e6 * t / n, seconds * 240 / n,
-                1e6 * t / (seconds * 240), ends[0], ends[1], ends[2], ends[3]);
-      for (const auto& o : scene->exclusive_outcomes[0].outcomes) {
-        int c = 0;
-        for (const auto& r : runs) c += belief::holds(*scene, r, o);
-        std::printf(" %s %.3f", o.name.c_str(), double(c) / n);
-      }
-      std::printf("\n");
-    }
+std::vector<belief::WorldState> drawn_starts(const belief::Scene& scene, int count) {
+  std::vector<belief::WorldState> starts;
+  core::RandomStream stream(7, core::Purpose::kEvaluation);
+  std::vector<double> uniforms(static_cast<std::size_t>(belief::start_dimensions(scene)));
+  for (int i = 0; i < count; ++i) {
+    for (double& u : uniforms) u = stream.uniform();
+    starts.push_back(belief::draw_start(scene, uniforms));
   }
+  return starts;
+}
+
+/// Runs the starts, `together` a call; returns the CPU time of an instance, s.
+double measure(const simulation::Simulator& simulator, const belief::Scene& scene,
+               const std::vector<belief::WorldState>& starts, std::size_t together,
+               std::vector<belief::Trajectory>& runs) {
+  core::ThreadPool pool(1);
+  simulation::RunRequest request;
+  request.stop.duration = scene.duration;
+  request.stop.stop_at_rest = scene.stop_at_rest;
+  runs.resize(starts.size());
+  const double begun = cpu_seconds();
+  for (std::size_t begin = 0; begin < starts.size(); begin += together) {
+    const std::size_t count = std::min(together, starts.size() - begin);
+    simulator.run({starts.data() + begin, count}, request, core::RandomStream(1, core::Purpose::kEvaluation), 0, pool,
+                  {runs.data() + begin, count});
+  }
+  return (cpu_seconds() - begun) / static_cast<double>(starts.size());
+}
+
+void compare(const std::string& name, const belief::Scene& scene, int count, Table& table, Report& report) {
+  simulation::ShapeStore shapes(simulation::hacd_decomposer());
+  const auto bullet = simulation::make_bullet_simulator(scene, shapes);
+  const auto lockstep = simulation::make_lockstep_simulator(scene, shapes);
+  if (!bullet || !lockstep) return;
+  const std::vector<belief::WorldState> starts = drawn_starts(scene, count);
+  std::vector<belief::Trajectory> reference, runs;
+  const double bullet_seconds = measure(**bullet, scene, starts, starts.size(), reference);
+  for (const std::size_t together : {starts.size(), std::size_t{64}, std::size_t{16}}) {
+    const double seconds = measure(**lockstep, scene, starts, together, runs);
+    std::int64_t same = 0;
+    double steps = 0.0;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      const belief::ExclusiveOutcomes& classes = scene.exclusive_outcomes.front();
+      same += belief::classify(scene, reference[i], classes) == belief::classify(scene, runs[i], classes) ? 1 : 0;
+      steps += 240.0 * runs[i].simulated_seconds;
+    }
+    table.rows.push_back({name, static_cast<std::int64_t>(together), 1e6 * bullet_seconds, 1e6 * seconds,
+                          bullet_seconds / seconds, steps / count, static_cast<double>(same) / count});
+    Target target;
+    target.work = "CPU time an instance, scene " + name + ", " + std::to_string(together) + " starts a call";
+    if (together == starts.size()) target.must = at_least(3.0);
+    target.reached = bullet_seconds / seconds;
+    target.unit = "x";
+    target.n = count;
+    target.baseline = "our Bullet stepper, same starts, one thread";
+    report.add(std::move(target));
+  }
+}
+
+int run(int count, const std::string& out) {
+  Report report("lockstep", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets()));
+  Table table{"instances",
+              {"scene", "starts a call", "Bullet us", "lockstep us", "ratio", "steps", "same class as Bullet"},
+              {}};
+  for (const auto& [name, scene] : tests::uncertain_scenes()) {
+    if (scene->objects.size() == 1) compare(name, *scene, count, table, report);
+  }
+  std::fputs(text_of(table).c_str(), stdout);
+  report.add(std::move(table));
+  std::fputs(report.text().c_str(), stdout);
+  if (out.empty()) return 0;
+  const core::Status status = report.write(out);
+  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
+  return status.ok() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace prescene::benchmarks
+
+int main(int argc, char** argv) {
+  int count = 2048;
+  std::string out;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument == "--quick") count = 256;
+    if (argument.starts_with("--benchmark_out=")) out = argument.substr(16);
+  }
+  return prescene::benchmarks::run(count, out);
 }

@@ -225,10 +225,19 @@ core::Status validate(const LockstepOptions& options) {
   return core::ok_status();
 }
 
-core::Status lockstep_supports(const RunRequest& request) {
-  if (request.actions.empty()) return core::ok_status();
-  return core::unsupported("the action " + belief::kind_of(request.actions.front()) +
-                           " is not simulated in lockstep; use the Bullet stepper");
+core::Status lockstep_supports(const RunRequest& request, std::span<const belief::WorldState> starts) {
+  if (!request.actions.empty()) {
+    return core::unsupported("the action " + belief::kind_of(request.actions.front()) +
+                             " is not simulated in lockstep; use the Bullet stepper");
+  }
+  for (const belief::WorldState& start : starts) {
+    for (const belief::ObjectState& object : start.objects) {
+      if (object.mode == belief::MotionMode::kHeld) {
+        return core::unsupported("a start holds the object, which is not simulated in lockstep");
+      }
+    }
+  }
+  return core::ok_status();
 }
 
 core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const belief::Scene& scene, ShapeStore& shapes,

@@ -127,6 +127,7 @@ void LaneBatch::start(Slot& slot, int at, std::size_t index, LaneQueue& queue) {
   slot.calm_steps = 0;
   slot.tested = false;
   slot.next_sample = queue.request->sample_interval;
+  slot.until_asked = queue.request->end_rule_steps;
   slot.touches.clear();
   for (Open& open : slot.open) open.open = false;
   engine_.reset(at, queue.starts[index].objects.front());
@@ -210,10 +211,19 @@ void LaneBatch::go_on(int at) {
     finish(at, belief::TrajectoryEnd::kDuration);
     return;
   }
-  const double interval = queue_->request->sample_interval;
-  if (interval <= 0.0) return;
+  const RunRequest& request = *queue_->request;
   const double dt = scene_->options.step;
   const double elapsed = static_cast<double>(slot.done) * dt;
+  if (request.end_rule && --slot.until_asked <= 0) {
+    slot.until_asked = request.end_rule_steps;
+    read(at, seen_);
+    if (request.end_rule->ends(seen_, request.stop.duration - elapsed)) {
+      finish(at, belief::TrajectoryEnd::kDecided);
+      return;
+    }
+  }
+  const double interval = request.sample_interval;
+  if (interval <= 0.0) return;
   if (elapsed < slot.next_sample - 0.5 * dt) return;
   auto& states = queue_->trajectories[slot.index].states;
   states.emplace_back();

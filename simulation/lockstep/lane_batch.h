@@ -55,6 +55,7 @@ class LaneBatch {
     int calm_steps = 0;
     bool tested = false;  // and found to balance, in this calm
     double next_sample = 0.0;
+    int until_asked = 0;  // steps until the end rule is asked
     std::vector<LaneTouch> touches;
     std::vector<Open> open;  // by body
     NudgeTest nudges;
@@ -78,6 +79,7 @@ class LaneBatch {
   std::vector<std::uint8_t> steps_;  // by slot: moves in this step
   std::vector<std::uint8_t> wanted_;
   std::vector<std::uint8_t> ended_;
+  belief::WorldState seen_;  // by the end rule
   int rest_steps_ = 0;
   std::int64_t most_steps_ = 0;
 };

@@ -155,7 +155,7 @@ class LockstepSimulator : public Simulator {
            std::uint32_t, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
     PRESCENE_CHECK(starts.size() == trajectories.size());
-    PRESCENE_CHECK(lockstep_supports(request).ok());
+    PRESCENE_CHECK(lockstep_supports(request, starts).ok());
     if (starts.empty()) return;
     LaneQueue queue;
     queue.starts = starts;

@@ -39,9 +39,9 @@ struct LockstepOptions {
 /// Ranges of the options: the message names the field.
 core::Status validate(const LockstepOptions& options);
 
-/// Whether `request` can be run: its actions must be none. kUnsupported names the action otherwise. run() and
-/// make_instance() check it.
-core::Status lockstep_supports(const RunRequest& request);
+/// Whether `starts` can be run as `request` says: no actions, and nothing held. kUnsupported says what it is otherwise.
+/// run() and make_instance() check it.
+core::Status lockstep_supports(const RunRequest& request, std::span<const belief::WorldState> starts = {});
 
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
