@@ -151,6 +151,33 @@ TEST(LockstepDeterminism, CancelledRunsEnd) {
   }
 }
 
+class Below30Centimetres : public simulation::EndRule {
+ public:
+  bool ends(const WorldState& state, double) const override { return state.objects[0].X_WO.translation.z() < 0.3; }
+};
+
+TEST(LockstepDeterminism, DecidedInstancesEndEarlyOnTheSamePath) {
+  const Scene scene = busy_scene();
+  const std::vector<WorldState> starts = drawn_starts(scene, 20, 9);
+  simulation::RunRequest request = short_request();
+  request.sample_interval = 4.0 / 240.0;
+  const std::vector<belief::Trajectory> whole = run_all(*lockstep_of(scene), starts, request);
+  const Below30Centimetres rule;
+  request.end_rule = &rule;
+  const std::vector<belief::Trajectory> decided = run_all(*lockstep_of(scene), starts, request);
+  std::size_t early = 0;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    if (decided[i].end != belief::TrajectoryEnd::kDecided) continue;
+    ++early;
+    const std::size_t last = decided[i].states.size() - 1;
+    ASSERT_LE(decided[i].simulated_seconds, whole[i].simulated_seconds);
+    EXPECT_LT(decided[i].final().objects[0].X_WO.translation.z(), 0.3);
+    EXPECT_GE(decided[i].states[last - 1].objects[0].X_WO.translation.z(), 0.3);
+    EXPECT_TRUE(decided[i].states[last] == whole[i].states[last]) << i;
+  }
+  EXPECT_GT(early, 5U);
+}
+
 core::Status refusal(const Scene& scene) {
   simulation::ShapeStore shapes(simulation::hacd_decomposer());
   const auto simulator = simulation::make_lockstep_simulator(scene, shapes);
