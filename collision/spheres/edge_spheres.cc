@@ -98,10 +98,16 @@ std::vector<Lack> lacking(const std::vector<Lack>& asked, const std::vector<Vect
 
 }  // namespace
 
-std::vector<Vector3d> hull_corners(const std::vector<Vector3f>& vertices) {
+std::vector<Vector3d> hull_corners(const std::vector<Vector3f>& vertices,
+                                   const std::vector<TriangleIndices>& triangles) {
+  std::vector<bool> used(vertices.size(), false);
+  for (const TriangleIndices& t : triangles) {
+    for (const std::uint32_t v : t) used[v] = true;
+  }
   std::vector<Vector3d> points;
-  points.reserve(vertices.size());
-  for (const Vector3f& v : vertices) points.emplace_back(v.cast<double>());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (used[i]) points.emplace_back(vertices[i].cast<double>());
+  }
   const auto hull = geometry::convex_hull(points);
   return hull.ok() ? hull->vertices : points;
 }
@@ -121,7 +127,8 @@ EdgeResult place_edge_spheres(VoidSearch& voids, const SurfaceSearch& surface, c
     for (const Lack& lack : open) {
       if (voids.spheres().size() >= before + most) break;
       const Vector3d& corner = corners[lack.corner];
-      // No sphere from before is within the fidelity of this corner: there is room, as far as the body goes.
+      // Where no sphere is within the fidelity of this corner there is room, as far as the body goes; where one is, the
+      // next round finds the corner served.
       const std::vector<PackedSphere> nearby = spheres_near(voids.spheres(), corner, 2.0 * fidelity);
       if (!spheres_near(nearby, corner, fidelity).empty()) continue;
       if (voids.spheres().size() >= max_spheres) {

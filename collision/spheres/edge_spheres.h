@@ -19,8 +19,9 @@ struct EdgeResult {
   std::size_t unserved = 0;
 };
 
-/// The corners of the convex hull of the vertices, m.
-std::vector<Eigen::Vector3d> hull_corners(const std::vector<Vector3f>& vertices);
+/// The corners of the convex hull of the triangles, m.
+std::vector<Eigen::Vector3d> hull_corners(const std::vector<Vector3f>& vertices,
+                                          const std::vector<TriangleIndices>& triangles);
 
 /// Places spheres until no corner is further than `fidelity` (m) from the convex hull of all spheres, or there are
 /// `max_spheres`. There is at least one sphere already (checked).

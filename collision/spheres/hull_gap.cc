@@ -91,6 +91,12 @@ HullGap hull_gap(const Vector3d& p, std::span<const PackedSphere> spheres, std::
   PRESCENE_CHECK(!spheres.empty());
   constexpr int kMostSteps = 200;
   constexpr double kTolerance = 1e-6;
+  // The nearest sphere bounds the gap without the roundings of what follows.
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const PackedSphere& sphere : spheres)
+    nearest = std::min(nearest, (p - sphere.centre.cast<double>()).norm() - static_cast<double>(sphere.radius));
+  nearest = std::max(nearest, 0.0);
+  if (decide && nearest <= *decide) return {0.0, nearest};
   Vector3d direction = p - spheres[0].centre.cast<double>();
   HullGap gap{0.0, std::numeric_limits<double>::infinity()};
   Simplex simplex;
@@ -117,6 +123,7 @@ HullGap hull_gap(const Vector3d& p, std::span<const PackedSphere> spheres, std::
     const bool decided = decide && (gap.high <= *decide || gap.low > *decide);
     if (decided || stuck || gap.high - gap.low <= close) break;
   }
+  gap.high = std::min(gap.high, nearest);
   return gap;
 }
 

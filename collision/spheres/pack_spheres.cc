@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <numbers>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "edge_spheres.h"
@@ -19,6 +21,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kSmallestShare = 1e-5;  // Of the body's size: the default smallest radius.
+// The search is loose about the order: it places a tenth more, and the smallest are left out.
+constexpr std::size_t kSpareShare = 10;
 
 core::Status refuse(const Mesh& mesh, const std::string& what) {
   return core::invalid_input("mesh '" + mesh.name() + "': " + what);
@@ -35,6 +39,11 @@ core::Status check(const Mesh& mesh, const PackingOptions& options) {
   if (options.max_spheres < 1 || options.max_spheres > kMostSpheres) {
     return refuse(mesh, "a packing of at most " + std::to_string(options.max_spheres) +
                             " spheres; set max_spheres to between 1 and " + std::to_string(kMostSpheres));
+  }
+  constexpr int kMostLayouts = 1000;
+  if (options.layouts < 1 || options.layouts > kMostLayouts) {
+    return refuse(mesh, std::to_string(options.layouts) + " layouts to try; set layouts to between 1 and " +
+                            std::to_string(kMostLayouts));
   }
   if (!(options.volume_share > 0.0) || !(options.volume_share <= 1.0))
     return refuse(mesh, "a volume_share of " + std::to_string(options.volume_share) + "; it is above 0 and at most 1");
@@ -71,6 +80,31 @@ core::Result<ClosedMesh> closed(const Mesh& mesh, bool close, PackingReport& rep
   return result;
 }
 
+// Towards which the spheres of a layout lie: directions spread over the sphere by the sequence that is made of powers
+// of the plastic number, which fills squares evenly.
+Vector3d downhill_of(int layout) {
+  const auto share = [&](double step) { return std::fmod(0.5 + step * layout, 1.0); };
+  const double z = 2.0 * share(0.7548776662466927) - 1.0;
+  const double angle = 2.0 * std::numbers::pi * share(0.5698402909980532);
+  const double slope = layout % 2 == 0 ? 0.05 : 0.1;
+  return slope * Vector3d(std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z);
+}
+
+Vector3d best_downhill(const SurfaceSearch& surface, double smallest, const PackingOptions& options,
+                       core::ThreadPool& pool) {
+  constexpr std::size_t kTrialSpheres = 200;
+  if (options.layouts == 1) return downhill_of(0);
+  const std::size_t count = std::min(kTrialSpheres, static_cast<std::size_t>(options.max_spheres));
+  std::vector<double> volumes(static_cast<std::size_t>(options.layouts));
+  pool.for_each_index(volumes.size(), [&](std::size_t i) {
+    VoidSearch voids(surface, smallest, downhill_of(static_cast<int>(i)), pool);
+    while (voids.spheres().size() < count && voids.grow(count - voids.spheres().size())) {
+    }
+    volumes[i] = voids.volume();
+  });
+  return downhill_of(static_cast<int>(std::max_element(volumes.begin(), volumes.end()) - volumes.begin()));
+}
+
 std::vector<SurfaceAnchor> anchors_of(const std::vector<PackedSphere>& spheres, const SurfaceSearch& surface,
                                       core::ThreadPool& pool) {
   std::vector<SurfaceAnchor> anchors(spheres.size());
@@ -87,7 +121,7 @@ std::vector<SurfaceAnchor> anchors_of(const std::vector<PackedSphere>& spheres, 
 core::Status place_edges(const Mesh& mesh, const ClosedMesh& body, const SurfaceSearch& surface,
                          const PackingOptions& options, double smallest, VoidSearch& voids, PackingReport& report,
                          core::ThreadPool& pool) {
-  const std::vector<Vector3d> corners = hull_corners(body.vertices);
+  const std::vector<Vector3d> corners = hull_corners(body.vertices, body.triangles);
   const EdgeResult result = place_edge_spheres(voids, surface, corners, options.edge_fidelity, smallest,
                                                static_cast<std::size_t>(options.max_spheres), pool);
   report.edge_spheres = result.placed;
@@ -105,7 +139,7 @@ core::Status place_edges(const Mesh& mesh, const ClosedMesh& body, const Surface
 }
 
 double largest_gap(const ClosedMesh& body, const std::vector<PackedSphere>& spheres, core::ThreadPool& pool) {
-  const std::vector<Vector3d> corners = hull_corners(body.vertices);
+  const std::vector<Vector3d> corners = hull_corners(body.vertices, body.triangles);
   return pool.reduce_blocks(
       corners.size(), 16, 0.0,
       [&](std::size_t begin, std::size_t end) {
@@ -134,7 +168,7 @@ core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& op
   const SurfaceSearch surface(body.vertices, body.triangles);
   const double smallest =
       options.smallest_radius > 0.0 ? options.smallest_radius : kSmallestShare * static_cast<double>(mesh.size());
-  VoidSearch voids(surface, smallest, pool);
+  VoidSearch voids(surface, smallest, best_downhill(surface, smallest, options, pool), pool);
   const auto most = static_cast<std::size_t>(options.max_spheres);
   const auto grow_to = [&](std::size_t count) {
     while (voids.spheres().size() < count && voids.volume() < options.volume_share * report.body_volume &&
@@ -149,14 +183,17 @@ core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& op
                       " m fits into it; it has no thickness, lies too far from its origin for single precision, or "
                       "smallest_radius is too large");
   }
-  if (edges) {
-    PRESCENE_RETURN_IF_ERROR(place_edges(mesh, body, surface, options, smallest, voids, report, pool));
-    grow_to(most);
-    report.edge_gap = largest_gap(body, voids.spheres(), pool);
-  }
-  report.packed_volume = voids.volume();
-  std::vector<SurfaceAnchor> anchors = anchors_of(voids.spheres(), surface, pool);
-  PRESCENE_TRY(packed.packing, SpherePacking::make(voids.spheres(), std::move(anchors), mesh.name()));
+  if (edges) PRESCENE_RETURN_IF_ERROR(place_edges(mesh, body, surface, options, smallest, voids, report, pool));
+  const std::size_t kept = edges ? voids.spheres().size() : 0;
+  grow_to(most + most / kSpareShare);
+  std::vector<PackedSphere> spheres = voids.spheres();
+  std::stable_sort(spheres.begin() + static_cast<std::ptrdiff_t>(kept), spheres.end(),
+                   [](const PackedSphere& a, const PackedSphere& b) { return a.radius > b.radius; });
+  if (spheres.size() > most) spheres.resize(most);
+  if (edges) report.edge_gap = largest_gap(body, spheres, pool);
+  std::vector<SurfaceAnchor> anchors = anchors_of(spheres, surface, pool);
+  PRESCENE_TRY(packed.packing, SpherePacking::make(std::move(spheres), std::move(anchors), mesh.name()));
+  report.packed_volume = packed.packing->volume();
   return packed;
 }
 

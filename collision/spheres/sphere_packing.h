@@ -74,6 +74,9 @@ struct PackingOptions {
   /// that bodies rest and tip on edges as they should.
   double edge_fidelity = 0.0;
   bool close_holes = false;  ///< Cover the holes of an open mesh instead of refusing it.
+  /// Where the few largest spheres lie decides how well all others fill what they leave. As many layouts of them (1 to
+  /// 1000) are tried with 200 spheres, and the best is filled up.
+  int layouts = 16;
 
   friend bool operator==(const PackingOptions&, const PackingOptions&) = default;
 };

@@ -17,7 +17,8 @@ enum Section : std::size_t { kSpheres, kAnchors, kNodes, kLanes, kOrder, kRoot, 
 TreeFileKey key_of(const Mesh& mesh, const PackingOptions& packing, const SphereTreeOptions& tree) {
   core::Hasher hasher;
   hasher.value(packing.max_spheres).value(packing.volume_share).value(packing.smallest_radius);
-  hasher.value(packing.edge_fidelity).value(packing.close_holes).value(tree.branching).value(tree.builder);
+  hasher.value(packing.edge_fidelity).value(packing.close_holes).value(packing.layouts);
+  hasher.value(tree.branching).value(tree.builder);
   return {.kind = "spheres", .layout = 1, .mesh_hash = mesh.content_hash(), .settings_hash = hasher.digest()};
 }
 

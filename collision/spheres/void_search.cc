@@ -2,6 +2,7 @@
 #include "void_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <tuple>
@@ -13,32 +14,50 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kRound = 48;    // Entries worked on together; fixed, for the order of insertion hangs on it.
-constexpr double kRoundShare = 0.6;   // An entry of a round has at least this share of the largest bound.
-constexpr double kAcceptShare = 0.6;  // A sphere is taken when its radius is this share of what may be left.
-constexpr double kClimbShare = 1.0;   // A prototype sets out where the cell's half diagonal is below this share.
-// A prototype gives up this share of what it moves downhill, so that among equal places it ends in a corner or beside
-// another sphere, and not in the middle of a plate or a rod where it would leave two gaps.
-constexpr double kSlope = 0.05;
+constexpr double kRoundShare = 0.8;    // An entry of a round has at least this share of the largest bound.
+constexpr double kAcceptShare = 0.8;   // A sphere is taken when its radius is this share of what may be left.
+constexpr double kClimbShare = 1.0;    // A prototype sets out where the cell's half diagonal is below this share.
+constexpr std::size_t kMostObstacles = 12;  // That a climbing prototype keeps in mind.
 constexpr double kSqrt3 = std::numbers::sqrt3;
 
 double distance_to(const PackedSphere& sphere, const Vector3d& x) {
   return (sphere.centre.cast<double>() - x).norm() - static_cast<double>(sphere.radius);
 }
 
-// The shortest vector in the convex hull of unit vectors, about [Gilbert 1966].
-Vector3d shortest_combination(std::span<const Vector3d> vectors) {
-  Vector3d shortest = vectors[0];
-  for (int i = 0; i < 24; ++i) {
-    const Vector3d* lowest = &vectors[0];
-    for (const Vector3d& v : vectors) {
-      if (v.dot(shortest) < lowest->dot(shortest)) lowest = &v;
+// The room near a place, as one obstacle bounds it: `room` there, and more by as much as one moves along `away`.
+struct Bound {
+  Vector3d away;
+  double room;
+};
+
+// The step after which the lowest of the bounds is highest, less the step's square over twice `reach`: from the weights
+// of the dual problem, two of them changed at a time.
+Vector3d best_step(std::span<const Bound> bounds, double reach) {
+  constexpr int kMostChanges = 40;
+  std::array<double, kMostObstacles> weights{};
+  const auto lowest = std::min_element(bounds.begin(), bounds.end(),
+                                       [](const Bound& a, const Bound& b) { return a.room < b.room; });
+  weights[static_cast<std::size_t>(lowest - bounds.begin())] = 1.0;
+  Vector3d sum = lowest->away;
+  for (int i = 0; i < kMostChanges; ++i) {
+    std::size_t least = 0;
+    std::size_t most = 0;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (std::size_t k = 0; k < bounds.size(); ++k) {
+      const double after = reach * bounds[k].away.dot(sum) + bounds[k].room;
+      if (after < low) std::tie(low, least) = std::tuple(after, k);
+      if (weights[k] > 0.0 && after > high) std::tie(high, most) = std::tuple(after, k);
     }
-    const Vector3d along = *lowest - shortest;
-    const double squared = along.squaredNorm();
-    if (squared < 1e-12 || -shortest.dot(along) <= 1e-4) break;
-    shortest += std::min(1.0, -shortest.dot(along) / squared) * along;
+    const Vector3d change = bounds[least].away - bounds[most].away;
+    const double curvature = reach * change.squaredNorm();
+    if (high - low <= 1e-7 * reach || curvature <= 0.0) break;
+    const double moved = std::min(weights[most], (high - low) / curvature);
+    weights[least] += moved;
+    weights[most] -= moved;
+    sum += moved * change;
   }
-  return shortest;
+  return reach * sum;
 }
 
 // Far from the origin centres can only lie on the coarse grid of single precision; smaller spheres than that are in
@@ -54,8 +73,8 @@ bool VoidSearch::Before::operator()(const Entry& a, const Entry& b) const {
   return std::tuple(a.key, b.candidate, b.cell) < std::tuple(b.key, a.candidate, a.cell);
 }
 
-VoidSearch::VoidSearch(const SurfaceSearch& surface, double smallest, core::ThreadPool& pool)
-    : surface_(surface), smallest_(std::max(smallest, resolution(surface.box()))), pool_(pool) {
+VoidSearch::VoidSearch(const SurfaceSearch& surface, double smallest, const Vector3d& downhill, core::ThreadPool& pool)
+    : surface_(surface), smallest_(std::max(smallest, resolution(surface.box()))), downhill_(downhill), pool_(pool) {
   Cell root;
   root.centre = surface.box().center();
   root.half = 0.5 * surface.box().sizes().maxCoeff() * (1.0 + 1e-9);
@@ -134,41 +153,65 @@ VoidSearch::Limit VoidSearch::limit_at(const Vector3d& x, double room_below) con
   return limit;
 }
 
+// Maximises the room and the way downhill by a proximal bundle of the obstacles that were met [Kiwiel 1990]. First
+// those of the surface count as planes, which lets prototypes slide along walls in few steps; then as the points that
+// they are, which is right beside edges and corners that stick into the body.
 VoidSearch::Candidate VoidSearch::climb(const Vector3d& start) const {
-  constexpr int kMostSteps = 80;
-  constexpr std::size_t kMemory = 8;
-  const Vector3d downhill = kSlope * Vector3d(-0.82, -0.49, -0.3);
-  Limit here = limit_at(start, std::numeric_limits<double>::max());
-  Candidate best{start, here.room};
-  if (here.room <= 0.0) return best;
-  std::array<Limit, kMemory> seen;  // The latest obstacles, in a ring.
-  std::size_t count = 0;
-  seen[count++] = here;
-  double step = 0.5 * here.room;
-  for (int i = 0; i < kMostSteps && step > 2e-3 * best.room; ++i) {
-    // Away from all obstacles that come within a step.
-    std::array<Vector3d, kMemory> away;
-    std::size_t active = 0;
-    for (std::size_t k = 0; k < std::min(count, kMemory); ++k) {
+  constexpr int kMostSteps = 100;
+  constexpr double kEnough = 1e-5;  // Gains below this share of the room aren't worth a step.
+  constexpr double kKept = 0.9;     // Of the room: where a body tapers, the way downhill ends here.
+  Limit limit = limit_at(start, std::numeric_limits<double>::max());
+  Candidate best{start, limit.room};
+  if (limit.room <= 0.0) return best;
+  std::array<Limit, kMostObstacles> seen;
+  std::array<Bound, kMostObstacles> bounds;
+  seen[0] = limit;
+  std::size_t count = 1;
+  double highest = limit.room;
+  double reach = 0.5 * limit.room;
+  bool planes = true;
+  for (int i = 0; i < kMostSteps; ++i) {
+    for (std::size_t k = 0; k < count; ++k) {
       const Vector3d from = best.centre - seen[k].obstacle;
-      const double distance = from.norm();
-      if (distance > 0.0 && distance - seen[k].obstacle_radius <= best.room + step)
-        away[active++] = from / distance + downhill;
+      if (planes && seen[k].obstacle_radius == 0.0) {
+        bounds[k] = {seen[k].away + downhill_, std::max(seen[k].away.dot(from), 0.0)};
+      } else {
+        bounds[k] = {from.normalized() + downhill_, from.norm() - seen[k].obstacle_radius};
+      }
     }
-    const Vector3d direction = shortest_combination(std::span(away).first(active));
-    const double length = direction.norm();
-    if (length < 0.3 * kSlope) {
-      step *= 0.4;
+    Vector3d step = best_step(std::span(bounds).first(count), reach);
+    double gain = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < count; ++k)
+      gain = std::min(gain, bounds[k].room + bounds[k].away.dot(step) - best.room);
+    if (gain <= kEnough * best.room) {
+      if (!planes) break;
+      planes = false;
       continue;
     }
-    const Vector3d to = best.centre + direction * (step / length);
-    const Limit there = limit_at(to, best.room + 1.001 * step);
-    if (there.room > 0.0) seen[count++ % kMemory] = there;
-    if (there.room > 0.0 && there.room + downhill.dot(to - best.centre) > best.room) {
-      best = {to, there.room};
-      step *= 1.2;
+    // Within the sphere about the present place, and so within the body.
+    const double shortened = std::min(1.0, 0.99 * best.room / step.norm());
+    step *= shortened;
+    limit = limit_at(best.centre + step, best.room + 1.001 * step.norm());
+    highest = std::max(highest, limit.room);
+    if (limit.room < kKept * highest) {
+      reach *= 0.5;
+      continue;
+    }
+    const double won = limit.room + downhill_.dot(step) - best.room;
+    std::size_t slot = count;
+    if (count < kMostObstacles) {
+      ++count;
+    } else {  // The one that matters least is forgotten.
+      slot = static_cast<std::size_t>(
+          std::max_element(bounds.begin(), bounds.end(), [](const Bound& a, const Bound& b) { return a.room < b.room; }) -
+          bounds.begin());
+    }
+    seen[slot] = limit;
+    if (won > 0.1 * shortened * gain) {
+      best = {best.centre + step, limit.room};
+      reach = std::min(2.0 * reach, 100.0 * best.room);
     } else {
-      step *= 0.5;
+      reach *= won > -gain ? 0.7 : 0.3;
     }
   }
   return best;
@@ -250,8 +293,9 @@ bool VoidSearch::grow(std::size_t most) {
 
 // Inserts those candidates that nothing larger can be left beside; the others wait.
 bool VoidSearch::settle(std::vector<Candidate>& candidates, std::size_t most) {
+  const auto merit = [&](const Candidate& c) { return c.room + downhill_.dot(c.centre); };
   std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.room > b.room; });
+                   [&](const Candidate& a, const Candidate& b) { return merit(a) > merit(b); });
   while (!queue_.empty() && queue_.top().cell != kNone && queue_.top().key > cells_[queue_.top().cell].bound) {
     const std::uint32_t cell = queue_.top().cell;
     queue_.pop();

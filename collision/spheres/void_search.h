@@ -21,8 +21,10 @@ namespace prescene::collision {
 class VoidSearch {
  public:
   /// Spheres with a radius below `smallest`, or too small for single precision so far from the origin, are not looked
-  /// for. `surface` outlives the search.
-  VoidSearch(const SurfaceSearch& surface, double smallest, core::ThreadPool& pool);
+  /// for. A prototype gives up the share |downhill| (well below 1) of what it moves that way, so that among equal
+  /// places it ends in a corner or beside another sphere, and not in the middle of a plate or a rod where it would
+  /// leave two gaps. `surface` outlives the search.
+  VoidSearch(const SurfaceSearch& surface, double smallest, const Eigen::Vector3d& downhill, core::ThreadPool& pool);
 
   /// Inserts at least one and at most `most` (>= 1) of the largest spheres that fit, or none, and says so, when all
   /// voids are smaller than the smallest radius. The same for any number of threads.
@@ -92,6 +94,7 @@ class VoidSearch {
 
   const SurfaceSearch& surface_;
   double smallest_;
+  Eigen::Vector3d downhill_;
   core::ThreadPool& pool_;
   std::vector<Cell> cells_;  // The root first.
   std::vector<Candidate> candidates_;

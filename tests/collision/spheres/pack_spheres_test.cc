@@ -63,7 +63,7 @@ TEST(PackSpheres, SpheresLieInsideAndApart) {
   core::ThreadPool pool(2);
   EXPECT_TRUE(rc::check([&] {
     const auto mesh = to_mesh(*tests::closed_meshes());
-    const auto packed = pack_spheres(*mesh, {.max_spheres = 12}, pool);
+    const auto packed = pack_spheres(*mesh, {.max_spheres = 12, .layouts = 2}, pool);
     RC_ASSERT(packed.ok());
     const SpherePacking& packing = *packed->packing;
     RC_ASSERT(packing.size() <= 12U);
@@ -142,6 +142,50 @@ TEST(PackSpheres, FillsHouseholdObjects) {
   }
 }
 
+TEST(PackSpheres, FillsConvexHouseholdObjectsByDefault) {
+  const auto data = tests::data_dir("meshes");
+  if (!data) GTEST_SKIP() << tests::missing_data_message("meshes");
+  core::ThreadPool pool;
+  for (const char* name : {"ycb_tomato_soup_can", "ycb_bleach_cleanser", "ycb_foam_brick"}) {
+    const auto file = interfaces::read_mesh(*data / "household" / (std::string(name) + ".ply"));
+    ASSERT_TRUE(file.ok());
+    const auto packed = pack_spheres(**Mesh::make(file->mesh, name), {}, pool);
+    ASSERT_TRUE(packed.ok()) << packed.status().message();
+    EXPECT_EQ(packed->packing->size(), 5000U);
+    EXPECT_GE(packed->report.share(), 0.85) << name;
+  }
+}
+
+TEST(PackSpheres, FillsBoxesFromTheirCorners) {
+  core::ThreadPool pool(2);
+  const auto mesh = to_mesh(geometry::make_mesh(geometry::BoxShape{{0.039, 0.054, 0.075}}));
+  const auto packed = pack_spheres(*mesh, {.max_spheres = 2000}, pool);
+  EXPECT_GE(packed->report.share(), 0.83);
+  // The largest sphere touches five walls: all but two opposite ones, between which it fits once, have a gap to share.
+  const Vector3f& centre = packed->packing->spheres()[0].centre;
+  EXPECT_NEAR(std::abs(centre.y()), 0.027 - 0.0195, 1e-5);
+  EXPECT_NEAR(std::abs(centre.z()), 0.0375 - 0.0195, 1e-5);
+}
+
+TEST(PackSpheres, TriesLayoutsForAFullerOne) {
+  core::ThreadPool pool(2);
+  const auto mesh = to_mesh(geometry::make_mesh(geometry::BoxShape{{0.06, 0.16, 0.21}}));
+  const auto plain = pack_spheres(*mesh, {.max_spheres = 1000, .layouts = 1}, pool);
+  const auto best = pack_spheres(*mesh, {.max_spheres = 1000, .layouts = 16}, pool);
+  EXPECT_GT(best->report.share(), plain->report.share() + 0.005);
+}
+
+// Where a body tapers, spheres that are pulled towards its thin end must not all end there.
+TEST(PackSpheres, FillsBodiesThatTaper) {
+  core::ThreadPool pool(2);
+  for (const double radius : {0.3, 0.1, 0.03}) {
+    const auto mesh = to_mesh(geometry::make_mesh(geometry::Cone{radius, 1.0}));
+    const auto packed = pack_spheres(*mesh, {.max_spheres = 300, .layouts = 6}, pool);
+    ASSERT_TRUE(packed.ok());
+    EXPECT_GT(packed->report.share(), 0.7) << radius;
+  }
+}
+
 TEST(PackSpheres, RefusesOpenMeshesWithTheHolesPlace) {
   core::ThreadPool pool(2);
   geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{2.0, 2.0, 2.0}});
@@ -188,6 +232,7 @@ TEST(PackSpheres, RefusesBadOptions) {
   };
   EXPECT_THAT(message({.max_spheres = 0}), HasSubstr("max_spheres"));
   EXPECT_THAT(message({.volume_share = 0.0}), HasSubstr("volume_share"));
+  EXPECT_THAT(message({.layouts = 0}), HasSubstr("layouts"));
   EXPECT_THAT(message({.smallest_radius = -1.0}), HasSubstr("smallest_radius"));
   EXPECT_THAT(message({.edge_fidelity = std::nan("")}), HasSubstr("edge_fidelity"));
   EXPECT_THAT(message({.smallest_radius = 2.0}), HasSubstr("no sphere with a radius of 2"));
@@ -248,6 +293,36 @@ TEST(PackSpheresWithEdges, HullReachesAsFarAsTheBody) {
     EXPECT_GE(packed->report.edge_gap, largest_lack(*mesh, *packed->packing) * (1.0 - 1e-6));
     EXPECT_GT(packed->report.share(), 0.7);
     expect_apart(*packed->packing);
+  }
+}
+
+TEST(PackSpheresWithEdges, VerticesWithoutTrianglesDoNotCount) {
+  core::ThreadPool pool(2);
+  geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{0.06, 0.16, 0.21}});
+  const PackingOptions options{.max_spheres = 400, .edge_fidelity = 0.001, .layouts = 1};
+  const auto plain = pack_spheres(*to_mesh(box), options, pool);
+  box.vertices.emplace_back(1.0, 1.0, 1.0);
+  const auto packed = pack_spheres(*to_mesh(box), options, pool);
+  ASSERT_TRUE(packed.ok()) << packed.status().message();
+  EXPECT_LE(packed->report.edge_gap, 0.001);
+  EXPECT_EQ(packed->report.edge_spheres, plain->report.edge_spheres);
+}
+
+// Finer than the hull's distance is computed.
+TEST(PackSpheresWithEdges, EndsWithTheFinestFidelity) {
+  core::ThreadPool pool(2);
+  for (const geometry::Primitive& shape :
+       std::vector<geometry::Primitive>{geometry::BoxShape{{1.0, 0.7, 0.9}}, geometry::Cone{0.5, 1.0}}) {
+    for (const double fidelity : {3e-6, 1e-6, 4e-7, 1e-7}) {
+      const auto packed = pack_spheres(
+          *to_mesh(geometry::make_mesh(shape)),
+          {.max_spheres = 600, .smallest_radius = 1e-9, .edge_fidelity = fidelity, .layouts = 1}, pool);
+      if (packed.ok()) {
+        EXPECT_LE(packed->report.edge_gap, fidelity);
+      } else {
+        EXPECT_THAT(packed.status().message(), HasSubstr("it is thinner"));
+      }
+    }
   }
 }
 
