@@ -90,10 +90,13 @@ Vector3d downhill_of(int layout) {
   return slope * Vector3d(std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z);
 }
 
-Vector3d best_downhill(const SurfaceSearch& surface, double smallest, const PackingOptions& options,
+Vector3d best_downhill(const SurfaceSearch& surface, double smallest, const PackingOptions& options, double body_volume,
                        core::ThreadPool& pool) {
   constexpr std::size_t kTrialSpheres = 200;
+  constexpr double kAlmostAll = 0.6;  // Of the body, filled by a single sphere: there is no choice.
   if (options.layouts == 1) return downhill_of(0);
+  VoidSearch first(surface, smallest, downhill_of(0), pool);
+  if (first.grow(1) && first.volume() > kAlmostAll * body_volume) return downhill_of(0);
   const std::size_t count = std::min(kTrialSpheres, static_cast<std::size_t>(options.max_spheres));
   std::vector<double> volumes(static_cast<std::size_t>(options.layouts));
   pool.for_each_index(volumes.size(), [&](std::size_t i) {
@@ -103,6 +106,15 @@ Vector3d best_downhill(const SurfaceSearch& surface, double smallest, const Pack
     volumes[i] = voids.volume();
   });
   return downhill_of(static_cast<int>(std::max_element(volumes.begin(), volumes.end()) - volumes.begin()));
+}
+
+// Drops the last spheres, but for the first `kept`, that aren't needed for a volume.
+void drop_beyond(double volume, std::size_t kept, std::vector<PackedSphere>& spheres) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (; count < spheres.size() && (count < kept || sum < volume); ++count)
+    sum += 4.0 / 3.0 * std::numbers::pi * std::pow(static_cast<double>(spheres[count].radius), 3);
+  spheres.resize(count);
 }
 
 std::vector<SurfaceAnchor> anchors_of(const std::vector<PackedSphere>& spheres, const SurfaceSearch& surface,
@@ -167,8 +179,8 @@ core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& op
   PRESCENE_TRY(const ClosedMesh body, closed(mesh, options.close_holes, report));
   const SurfaceSearch surface(body.vertices, body.triangles);
   const double smallest =
-      options.smallest_radius > 0.0 ? options.smallest_radius : kSmallestShare * static_cast<double>(mesh.size());
-  VoidSearch voids(surface, smallest, best_downhill(surface, smallest, options, pool), pool);
+      options.smallest_radius > 0.0 ? options.smallest_radius : kSmallestShare * surface.box().diagonal().norm();
+  VoidSearch voids(surface, smallest, best_downhill(surface, smallest, options, report.body_volume, pool), pool);
   const auto most = static_cast<std::size_t>(options.max_spheres);
   const auto grow_to = [&](std::size_t count) {
     while (voids.spheres().size() < count && voids.volume() < options.volume_share * report.body_volume &&
@@ -190,6 +202,7 @@ core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& op
   std::stable_sort(spheres.begin() + static_cast<std::ptrdiff_t>(kept), spheres.end(),
                    [](const PackedSphere& a, const PackedSphere& b) { return a.radius > b.radius; });
   if (spheres.size() > most) spheres.resize(most);
+  drop_beyond(options.volume_share * report.body_volume, kept, spheres);
   if (edges) report.edge_gap = largest_gap(body, spheres, pool);
   std::vector<SurfaceAnchor> anchors = anchors_of(spheres, surface, pool);
   PRESCENE_TRY(packed.packing, SpherePacking::make(std::move(spheres), std::move(anchors), mesh.name()));

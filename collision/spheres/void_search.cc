@@ -13,10 +13,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kRound = 48;    // Entries worked on together; fixed, for the order of insertion hangs on it.
-constexpr double kRoundShare = 0.8;    // An entry of a round has at least this share of the largest bound.
-constexpr double kAcceptShare = 0.8;   // A sphere is taken when its radius is this share of what may be left.
-constexpr double kClimbShare = 1.0;    // A prototype sets out where the cell's half diagonal is below this share.
+constexpr std::size_t kRound = 48;   // Entries worked on together; fixed, for the order of insertion hangs on it.
+constexpr double kRoundShare = 0.6;  // An entry of a round has at least this share of the largest bound.
+// A sphere is taken when its radius is this share of what may be left: less after many rounds without one, for plates
+// of even thickness show only in small cells everywhere that nothing much larger is left.
+constexpr double kAcceptShare = 0.8;
+constexpr double kLeastAcceptShare = 0.55;
+constexpr double kImpatience = 0.04;  // A round.
+// Of the smallest radius. A cell whose half diagonal is less is given up: spheres that just reach the smallest radius
+// may fall short of it by the rounding of their centres, in every cell of whatever size.
+constexpr double kFinestCell = 0.05;
+constexpr double kClimbShare = 1.0;         // A prototype sets out where the cell's half diagonal is below this share.
 constexpr std::size_t kMostObstacles = 12;  // That a climbing prototype keeps in mind.
 constexpr double kSqrt3 = std::numbers::sqrt3;
 
@@ -35,8 +42,8 @@ struct Bound {
 Vector3d best_step(std::span<const Bound> bounds, double reach) {
   constexpr int kMostChanges = 40;
   std::array<double, kMostObstacles> weights{};
-  const auto lowest = std::min_element(bounds.begin(), bounds.end(),
-                                       [](const Bound& a, const Bound& b) { return a.room < b.room; });
+  const auto lowest =
+      std::min_element(bounds.begin(), bounds.end(), [](const Bound& a, const Bound& b) { return a.room < b.room; });
   weights[static_cast<std::size_t>(lowest - bounds.begin())] = 1.0;
   Vector3d sum = lowest->away;
   for (int i = 0; i < kMostChanges; ++i) {
@@ -202,9 +209,9 @@ VoidSearch::Candidate VoidSearch::climb(const Vector3d& start) const {
     if (count < kMostObstacles) {
       ++count;
     } else {  // The one that matters least is forgotten.
-      slot = static_cast<std::size_t>(
-          std::max_element(bounds.begin(), bounds.end(), [](const Bound& a, const Bound& b) { return a.room < b.room; }) -
-          bounds.begin());
+      slot = static_cast<std::size_t>(std::max_element(bounds.begin(), bounds.end(),
+                                                       [](const Bound& a, const Bound& b) { return a.room < b.room; }) -
+                                      bounds.begin());
     }
     seen[slot] = limit;
     if (won > 0.1 * shortened * gain) {
@@ -251,6 +258,10 @@ VoidSearch::Outcome VoidSearch::work_on(const Entry& entry) const {
     outcome.candidate = climb(cell.centre);
     return outcome;
   }
+  if (kSqrt3 * cell.half < kFinestCell * smallest_) {
+    outcome.given_up = true;
+    return outcome;
+  }
   outcome.split = true;
   for (int octant = 0; octant < 8; ++octant)
     outcome.children[static_cast<std::size_t>(octant)] = make_child(cell, octant);
@@ -258,7 +269,7 @@ VoidSearch::Outcome VoidSearch::work_on(const Entry& entry) const {
 }
 
 bool VoidSearch::grow(std::size_t most) {
-  while (true) {
+  for (double share = kAcceptShare;; share = std::max(share - kImpatience, kLeastAcceptShare)) {
     const std::vector<Entry> round = take_round();
     if (round.empty()) return false;
     std::vector<Outcome> outcomes(round.size());
@@ -274,13 +285,15 @@ bool VoidSearch::grow(std::size_t most) {
         cells_[round[i].cell].nearby = {};
         for (Cell& child : outcome.children) cells_.push_back(std::move(child));
         for (std::uint32_t k = 0; k < 8; ++k) push_cell(first + k);
+      } else if (outcome.given_up) {
+        cells_[round[i].cell].bound = 0.0;
       } else if (round[i].cell != kNone) {
         cells_[round[i].cell].climbed = true;
         push_cell(round[i].cell);
       }
       if (outcome.candidate.room >= smallest_) candidates.push_back(outcome.candidate);
     }
-    if (settle(candidates, most)) return true;
+    if (settle(candidates, most, share)) return true;
   }
 }
 
@@ -292,7 +305,7 @@ bool VoidSearch::grow(std::size_t most) {
 }
 
 // Inserts those candidates that nothing larger can be left beside; the others wait.
-bool VoidSearch::settle(std::vector<Candidate>& candidates, std::size_t most) {
+bool VoidSearch::settle(std::vector<Candidate>& candidates, std::size_t most, double share) {
   const auto merit = [&](const Candidate& c) { return c.room + downhill_.dot(c.centre); };
   std::stable_sort(candidates.begin(), candidates.end(),
                    [&](const Candidate& a, const Candidate& b) { return merit(a) > merit(b); });
@@ -307,7 +320,7 @@ bool VoidSearch::settle(std::vector<Candidate>& candidates, std::size_t most) {
     double room = candidate.room;
     for (std::size_t i = before; i < spheres_.size(); ++i)
       room = std::min(room, distance_to(spheres_[i], candidate.centre));
-    if (room >= candidate.room && room >= kAcceptShare * left && spheres_.size() < before + most) {
+    if (room >= candidate.room && room >= share * left && spheres_.size() < before + most) {
       const PackedSphere sphere = fitted(candidate.centre.cast<float>(), 1.01 * candidate.room);
       if (static_cast<double>(sphere.radius) >= smallest_) insert(sphere);
     } else if (room > 0.5 * candidate.room) {

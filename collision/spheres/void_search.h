@@ -74,6 +74,7 @@ class VoidSearch {
   // What one entry of a round has become.
   struct Outcome {
     bool split = false;
+    bool given_up = false;
     std::array<Cell, 8> children;
     Candidate candidate;
   };
@@ -87,7 +88,7 @@ class VoidSearch {
   void measure(Cell& cell, std::span<const std::uint32_t> nearby) const;
   std::vector<Entry> take_round();
   Outcome work_on(const Entry& entry) const;
-  bool settle(std::vector<Candidate>& candidates, std::size_t most);
+  bool settle(std::vector<Candidate>& candidates, std::size_t most, double share);
   double update(std::uint32_t cell, std::uint32_t sphere);
   void push_cell(std::uint32_t cell);
   void push_candidate(const Candidate& candidate, double key);
