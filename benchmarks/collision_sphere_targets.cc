@@ -187,7 +187,7 @@ std::array<Compared, 8> uncertain_to_certain(const std::vector<PackedPair>& pair
         overlap.emplace_back([&] { collision::uncertain_overlap(a, b, one, uncertain_scratch); });
         boolean.emplace_back([&] { collision::overlap(a, b, one.X_AB(), scratch); });
         volume.emplace_back([&] { collision::overlap_volume(a, b, one.X_AB(), scratch); });
-        wrench.emplace_back([&] { collision::uncertain_wrench(a, b, one, 1.0, uncertain_scratch); });
+        wrench.emplace_back([&] { collision::uncertain_wrench(a, b, one, {}, uncertain_scratch); });
         force.emplace_back([&] { collision::restitution(a, b, one.X_AB(), {}, scratch); });
       }
       const std::size_t first = apart ? 4 : 0;

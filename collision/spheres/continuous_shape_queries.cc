@@ -224,8 +224,7 @@ std::optional<ShapeImpact> time_of_impact(const SphereTree& a, const StaticShape
 
 std::optional<ShapeImpact> time_of_impact(const SphereTree& a, const StaticShape& b, const ScrewMotion& motion,
                                           const ImpactOptions& options, SweepScratch& scratch) {
-  PRESCENE_CHECK(options.tolerance >= 1e-9);
-  TurningMotion turning(b, motion, options.tolerance);
+  TurningMotion turning(b, motion, std::max(kLeastImpactTolerance, options.tolerance));
   const int count = pieces_of(a, motion);
   for (int i = 0; i < count && !turning.earliest.found; ++i) {
     turning.set_piece(static_cast<double>(i) / count, i + 1 == count ? 1.0 : static_cast<double>(i + 1) / count);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "prescene/core/check.h"
 #include "sweep_lanes.h"
 
 namespace prescene::collision {
@@ -200,9 +199,8 @@ std::optional<Impact> time_of_impact(const SphereTree& a, const SphereTree& b, c
 
 std::optional<Impact> time_of_impact(const SphereTree& a, const SphereTree& b, const ScrewMotion& motion,
                                      const ImpactOptions& options, SweepScratch& scratch) {
-  PRESCENE_CHECK(options.tolerance >= 1e-9);
   const Pairs pairs(a, b);
-  TurningPairs turning(pairs, motion, options.tolerance);
+  TurningPairs turning(pairs, motion, std::max(kLeastImpactTolerance, options.tolerance));
   const int count = pieces_of(a, b, motion);
   Sweep piece;
   piece.end = rounded(motion.pose(0.0));

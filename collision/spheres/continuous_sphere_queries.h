@@ -49,8 +49,11 @@ class SweepScratch {
 std::optional<Impact> time_of_impact(const SphereTree& a, const SphereTree& b, const Transform& X_AB_start,
                                      const Transform& X_AB_end, SweepScratch& scratch);
 
+inline constexpr double kLeastImpactTolerance = 1e-9;  // m
+
 struct ImpactOptions {
-  double tolerance = 1e-5;  ///< Gap that may be left at the time that is returned, m; at least 1e-9 (checked).
+  /// Gap that may be left at the time that is returned, m. kLeastImpactTolerance is taken where less is asked for.
+  double tolerance = 1e-5;
 };
 
 /// B moves along a screw. The time is never later than the first contact, and then the gap is at most the tolerance: a

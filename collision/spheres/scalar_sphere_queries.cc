@@ -3,7 +3,6 @@
 
 #include <array>
 
-#include "prescene/core/check.h"
 #include "sphere_pairs.h"
 
 namespace prescene::collision {
@@ -116,11 +115,11 @@ SphereOverlap overlap_volume(const SphereTree& a, const SphereTree& b, const Tra
 }
 
 bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, std::size_t limit,
-              std::vector<SphereContact>& contacts, SphereScratch& scratch) {
-  const std::size_t most = contacts.size() + limit;
+              std::vector<SphereContact>* contacts, SphereScratch& scratch) {
+  const std::size_t most = contacts->size() + limit;
   const auto found = [&](const PackedSphere& sphere_a, const PackedSphere& sphere_b, SpherePair places) {
-    if (contacts.size() == most) return true;
-    contacts.push_back(make_contact(a, b, sphere_a, sphere_b, places));
+    if (contacts->size() == most) return true;
+    contacts->push_back(make_contact(a, b, sphere_a, sphere_b, places));
     return false;
   };
   return !for_overlapping(a, b, X_AB, scratch, found);
@@ -154,10 +153,7 @@ std::optional<SphereDistance> distance(const SphereTree& a, const SphereTree& b,
   const auto take = [&](const SphereDistance& found) {
     if (found.distance < (best ? best->distance : below)) best = found;
   };
-  if (seed) {
-    PRESCENE_CHECK(seed->a < a.packing().size() && seed->b < b.packing().size());
-    take(distance_of(a, b, X_AB, *seed));
-  }
+  if (seed && is_pair_of(a, b, *seed)) take(distance_of(a, b, X_AB, *seed));
   const float slack = slack_of(a, b, X_AB);
   const PackedSphere root_b = placed(X_AB, b.root());
   scratch.pairs.clear();

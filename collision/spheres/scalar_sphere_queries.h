@@ -13,7 +13,7 @@ std::optional<SphereDistance> distance(const SphereTree& a, const SphereTree& b,
                                        std::optional<SpherePair> seed = std::nullopt);
 SphereOverlap overlap_volume(const SphereTree& a, const SphereTree& b, const Transform& X_AB, SphereScratch& scratch);
 bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, std::size_t limit,
-              std::vector<SphereContact>& contacts, SphereScratch& scratch);
+              std::vector<SphereContact>* contacts, SphereScratch& scratch);
 Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
                         const RestitutionOptions& options, SphereScratch& scratch);
 

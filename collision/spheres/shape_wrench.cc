@@ -146,11 +146,11 @@ class ShapeWrench {
 }  // namespace
 
 UncertainWrench uncertain_wrench(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
-                                 double stiffness, UncertainScratch& scratch) {
+                                 const RestitutionOptions& options, UncertainScratch& scratch) {
   const UncertainShape pair(a, b, between);
   ShapeWrench sums(between);
   pair.for_near(kReach, &scratch.memory().nodes, [&](const CriticalSphere& sphere) { sums.add(sphere); });
-  return sums.wrench(between, stiffness);
+  return about_point(sums.wrench(between, options.stiffness), options.p_AP);
 }
 
 }  // namespace prescene::collision

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/spheres/sphere_queries.h"
-#include "prescene/core/check.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sphere_distance.cc"
@@ -172,10 +171,7 @@ std::optional<SphereDistance> distance(const SphereTree& a, const SphereTree& b,
   if (a.branching() != b.branching()) return scalar::distance(a, b, X_AB, scratch, below, seed);
   NearestSpheres nearest;
   nearest.lower_to(below);
-  if (seed) {
-    PRESCENE_CHECK(seed->a < a.packing().size() && seed->b < b.packing().size());
-    nearest.take(distance_of(a, b, X_AB, *seed));
-  }
+  if (seed && is_pair_of(a, b, *seed)) nearest.take(distance_of(a, b, X_AB, *seed));
   HWY_DYNAMIC_DISPATCH(distance_lanes)(a, b, X_AB, &scratch, &nearest);
   return nearest.found;
 }

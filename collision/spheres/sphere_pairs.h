@@ -49,16 +49,20 @@ inline SphereContact make_contact(const SphereTree& a, const SphereTree& b, cons
   contact.pair = {a.order()[places.a], b.order()[places.b]};
   const auto radius_a = static_cast<double>(sphere_a.radius);
   const auto radius_b = static_cast<double>(sphere_b.radius);
-  const Vector3d apart = sphere_a.centre.cast<double>() - sphere_b.centre.cast<double>();
-  const double d = apart.norm();
+  const Vector3d between = sphere_b.centre.cast<double>() - sphere_a.centre.cast<double>();
+  const double d = between.norm();
   const double depth = std::max(0.0, radius_a + radius_b - d);
   const Vector3d normal =
-      d > 0.0 ? Vector3d(apart / d) : Vector3d(-a.packing().anchors()[contact.pair.a].normal.cast<double>());
+      d > 0.0 ? Vector3d(between / d) : Vector3d(a.packing().anchors()[contact.pair.a].normal.cast<double>());
   contact.normal = normal.cast<float>();
-  contact.position = (sphere_a.centre.cast<double>() - (radius_a - 0.5 * depth) * normal).cast<float>();
+  contact.position = (sphere_a.centre.cast<double>() + (radius_a - 0.5 * depth) * normal).cast<float>();
   contact.depth = static_cast<float>(depth);
   contact.volume = static_cast<float>(lens_volume(radius_a, radius_b, d));
   return contact;
+}
+
+inline bool is_pair_of(const SphereTree& a, const SphereTree& b, SpherePair pair) {
+  return pair.a < a.packing().size() && pair.b < b.packing().size();
 }
 
 /// Distance of two spheres of the packings, in double precision of the placed centres.

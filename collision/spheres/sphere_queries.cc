@@ -121,9 +121,9 @@ Restitution restitution(const SphereTree& a, const SphereTree& b, const Transfor
 }
 
 bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, std::size_t limit,
-              std::vector<SphereContact>& contacts, SphereScratch& scratch) {
+              std::vector<SphereContact>* contacts, SphereScratch& scratch) {
   if (a.branching() != b.branching()) return scalar::contacts(a, b, X_AB, limit, contacts, scratch);
-  return HWY_DYNAMIC_DISPATCH(contacts_lanes)(a, b, X_AB, limit, &contacts, &scratch);
+  return HWY_DYNAMIC_DISPATCH(contacts_lanes)(a, b, X_AB, limit, contacts, &scratch);
 }
 
 }  // namespace prescene::collision

@@ -62,7 +62,7 @@ struct SphereDistance {
 };
 /// The smallest distance of a sphere of A from one of B, less than `below` (m), or nothing. It is an upper bound of the
 /// bodies' distance. Among pairs whose distances agree within rounding, which one is found is not promised. `seed`,
-/// such as the pair of the last answer, speeds up coherent motion.
+/// such as the pair of the last answer, speeds up coherent motion; a pair that is not there is left out of account.
 std::optional<SphereDistance> distance(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
                                        SphereScratch& scratch, double below = std::numeric_limits<double>::infinity(),
                                        std::optional<SpherePair> seed = std::nullopt);
@@ -78,8 +78,8 @@ SphereOverlap overlap_volume(const SphereTree& a, const SphereTree& b, const Tra
 /// Two spheres that overlap. In A's frame.
 struct SphereContact {
   Vector3f position;  ///< On the line of the centres, in the middle of the overlap, m.
-  Vector3f normal;    ///< The direction in which A is pushed: from B's centre to A's, of unit length. Where the centres
-                      ///< fall together, against the normal of the anchor of A's sphere.
+  Vector3f normal;    ///< From A's centre to B's, of unit length: A is pushed the other way. Where the centres fall
+                      ///< together, the normal of the anchor of A's sphere.
   float depth;        ///< How far the spheres have to be moved apart, m.
   float volume;       ///< Of the intersection, m^3.
   SpherePair pair;
@@ -87,7 +87,7 @@ struct SphereContact {
 /// All pairs of spheres that overlap, appended to `contacts` in an order that is the same for every instruction set, at
 /// most `limit`. Returns whether these are all.
 bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, std::size_t limit,
-              std::vector<SphereContact>& contacts, SphereScratch& scratch);
+              std::vector<SphereContact>* contacts, SphereScratch& scratch);
 
 struct RestitutionOptions {
   double stiffness = 1.0;                          ///< N/m.

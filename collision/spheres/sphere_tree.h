@@ -65,7 +65,6 @@ class SphereTree {
                                                                  const SphereTreeOptions& options, Parts parts);
 
   const SpherePacking& packing() const { return *packing_; }
-  const std::shared_ptr<const SpherePacking>& shared_packing() const { return packing_; }
   std::size_t branching() const { return static_cast<std::size_t>(options_.branching); }
   const SphereTreeOptions& options() const { return options_; }
   const Array<Node>& nodes() const { return nodes_; }

@@ -65,21 +65,21 @@ SphereOverlap overlap_volume(const SphereTree& a, const StaticShape& b, const Tr
 }
 
 bool contacts(const SphereTree& a, const StaticShape& b, const Transform& X_AB, std::size_t limit,
-              std::vector<ShapeContact>& contacts, SphereScratch& scratch) {
-  const std::size_t most = contacts.size() + limit;
+              std::vector<ShapeContact>* contacts, SphereScratch& scratch) {
+  const std::size_t most = contacts->size() + limit;
   const ShapePlacement placement(a, X_AB);
   const auto found = [&](const PackedSphere& sphere, const StaticShape::Nearest& nearest, std::uint32_t place) {
-    if (contacts.size() == most) return true;
+    if (contacts->size() == most) return true;
     const auto radius = static_cast<double>(sphere.radius);
     const double depth = std::max(0.0, radius - nearest.distance);
-    const Vector3d normal = placement.R_AB * nearest.normal;
+    const Vector3d normal = -(placement.R_AB * nearest.normal);
     ShapeContact contact;
-    contact.position = (sphere.centre.cast<double>() - (radius - 0.5 * depth) * normal).cast<float>();
+    contact.position = (sphere.centre.cast<double>() + (radius - 0.5 * depth) * normal).cast<float>();
     contact.normal = normal.cast<float>();
     contact.depth = static_cast<float>(depth);
     contact.volume = static_cast<float>(cap_volume(radius, depth));
     contact.sphere = a.order()[place];
-    contacts.push_back(contact);
+    contacts->push_back(contact);
     return false;
   };
   return !for_overlapping(a, b, placement, scratch, found);

@@ -40,7 +40,7 @@ SphereOverlap overlap_volume(const SphereTree& a, const StaticShape& b, const Tr
 /// A sphere that overlaps the shape. In A's frame.
 struct ShapeContact {
   Vector3f position;  ///< In the middle of the overlap, m.
-  Vector3f normal;    ///< The direction in which A is pushed, of unit length.
+  Vector3f normal;    ///< From A into the shape, of unit length: A is pushed the other way.
   float depth;        ///< How far the sphere has to be moved to be free of the surface there, m.
   float volume;  ///< Of the sphere's part behind the plane that touches the surface at the nearest place, m^3: exact
                  ///< for half-spaces.
@@ -48,7 +48,7 @@ struct ShapeContact {
 };
 /// All spheres that overlap the shape, appended to `contacts`, at most `limit`. Returns whether these are all.
 bool contacts(const SphereTree& a, const StaticShape& b, const Transform& X_AB, std::size_t limit,
-              std::vector<ShapeContact>& contacts, SphereScratch& scratch);
+              std::vector<ShapeContact>* contacts, SphereScratch& scratch);
 
 /// Each sphere that overlaps is pushed with stiffness * depth / 2 along its normal, as by the packing of a body of the
 /// same stiffness.

@@ -16,7 +16,7 @@
 namespace prescene::collision {
 
 inline constexpr std::size_t kPairLanes = 16;
-using PairVector = std::array<float, kPairLanes>;
+using PairNumbers = std::array<float, kPairLanes>;
 
 /// RelativeUncertainty in single precision, rounded to the safe side. The bounds of deviation and remainder are concave
 /// in the squared distance w from the pivot: tangents of them, which take no root, are bounds, too.
@@ -133,6 +133,8 @@ struct WrenchSums {
 };
 /// Covariance of the wrench (force, torque) for unit stiffness, the error being factor * z with z standard normal.
 geometry::Matrix6d wrench_covariance(const WrenchSums& sums, const geometry::Matrix6d& factor);
+/// The wrench about A's origin as one about the point P of A.
+UncertainWrench about_point(const UncertainWrench& wrench, const Eigen::Vector3d& p_AP);
 /// Pairs further apart than `reach` standard deviations are left out.
 void sum_wrenches(const SphereTree& a, const SphereTree& b, const Swelling& swelling, float reach, DescentStack* stack,
                   WrenchSums* sums);

@@ -5,7 +5,7 @@
 //   PRESCENE_TRY(const RelativeUncertainty between, RelativeUncertainty::make({X_WC, C_C}, {X_WT}));  // carton, table
 //   UncertainScratch scratch;
 //   const UncertainOverlap overlap = uncertain_overlap(carton, table, between, scratch);
-//   const UncertainWrench wrench = uncertain_wrench(carton, table, between, 1e4, scratch);
+//   const UncertainWrench wrench = uncertain_wrench(carton, table, between, {.stiffness = 1e4}, scratch);
 //
 // The distance of a sphere from the shape changes by at most as much as its centre moves, and with a half-space by just
 // its part along the normal. So bounds rest on distances alone; they hold for every shape, also for large rotations.
@@ -32,10 +32,10 @@ namespace prescene::collision {
 UncertainOverlap uncertain_overlap(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch);
 
-/// Mean and covariance of restitution(): the force on A and its torque about A's origin, in A's frame. Moments to
+/// Mean and covariance of restitution(): the force on A and its torque, in A's frame. Moments to
 /// second order in the error, with the kink where contact begins taken in full, of a shape that is flat at its place
 /// nearest to each sphere: good for half-spaces, and where the normal changes little over the error.
 UncertainWrench uncertain_wrench(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
-                                 double stiffness, UncertainScratch& scratch);
+                                 const RestitutionOptions& options, UncertainScratch& scratch);
 
 }  // namespace prescene::collision

@@ -112,18 +112,18 @@ UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, con
 }
 
 UncertainWrench uncertain_wrench(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
-                                 double stiffness, UncertainScratch& scratch) {
+                                 const RestitutionOptions& options, UncertainScratch& scratch) {
   WrenchSums sums;
   sum_wrenches(a, b, Swelling(between, b), kWrenchReach, &scratch.memory().stack, &sums);
 
   UncertainWrench wrench;
   if (sums.pairs == 0.0) return wrench;
   const Eigen::Map<const Vector6d> mean(sums.sums.data() + WrenchSums::kMean);
-  wrench.force = -stiffness * mean.head<3>();  // n points to B
-  wrench.torque = -stiffness * mean.tail<3>();
+  wrench.force = -options.stiffness * mean.head<3>();  // n points to B
+  wrench.torque = -options.stiffness * mean.tail<3>();
   wrench.expected_pairs = sums.pairs;
-  wrench.covariance = stiffness * stiffness * wrench_covariance(sums, between.factor());
-  return wrench;
+  wrench.covariance = options.stiffness * options.stiffness * wrench_covariance(sums, between.factor());
+  return about_point(wrench, options.p_AP);
 }
 
 }  // namespace prescene::collision

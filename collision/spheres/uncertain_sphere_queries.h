@@ -6,7 +6,7 @@
 //   UncertainScratch scratch;
 //   if (overlap_state(cup, table, between, scratch) == OverlapState::kNone) ...       // surely apart
 //   const UncertainOverlap overlap = uncertain_overlap(cup, table, between, scratch);
-//   const UncertainWrench wrench = uncertain_wrench(cup, table, between, 1e4, scratch);
+//   const UncertainWrench wrench = uncertain_wrench(cup, table, between, {.stiffness = 1e4}, scratch);
 //
 // A sphere with an uncertain centre has a smallest and a largest radius: what it covers wherever its centre is, within
 // a region of confidence, and all that it may reach. "No overlap" is said of all pairs at once: since they move with
@@ -18,6 +18,7 @@
 #include <memory>
 
 #include "prescene/collision/spheres/relative_uncertainty.h"
+#include "prescene/collision/spheres/sphere_queries.h"
 #include "prescene/collision/spheres/sphere_tree.h"
 #include "prescene/geometry/pose.h"
 
@@ -43,7 +44,7 @@ struct UncertainOverlap {
   bool complete = true;
 };
 
-/// Force on A and torque about A's origin, both in A's frame, N and N m: moments over the error of the poses.
+/// Force on A and torque about a point P fixed to A, both in A's frame, N and N m: moments over the error of the poses.
 struct UncertainWrench {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< Mean.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
@@ -81,11 +82,11 @@ OverlapState overlap_state(const SphereTree& a, const SphereTree& b, const Relat
 UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch);
 
-/// Mean and covariance of the restitution force: each pair that touches pushes with `stiffness` (N/m) times half its
-/// depth along the line of centres [Weller and Zachmann 2011]. Moments to second order in the error, with the kink
-/// where contact begins taken in full; pairs are correlated through the error that they share. Good while the error is
-/// small against the distances of centres (a tenth).
+/// Mean and covariance of restitution(): each pair that touches pushes with the stiffness times half its depth along
+/// the line of centres [Weller and Zachmann 2011]. Moments to second order in the error, with the kink where contact
+/// begins taken in full; pairs are correlated through the error that they share. Good while the error is small against
+/// the distances of centres (a tenth).
 UncertainWrench uncertain_wrench(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
-                                 double stiffness, UncertainScratch& scratch);
+                                 const RestitutionOptions& options, UncertainScratch& scratch);
 
 }  // namespace prescene::collision

@@ -106,4 +106,15 @@ Matrix6d wrench_covariance(const WrenchSums& sums, const Matrix6d& factor) {
   return covariance;
 }
 
+UncertainWrench about_point(const UncertainWrench& wrench, const Eigen::Vector3d& p_AP) {
+  Matrix3d cross;
+  cross << 0.0, -p_AP.z(), p_AP.y(), p_AP.z(), 0.0, -p_AP.x(), -p_AP.y(), p_AP.x(), 0.0;
+  geometry::Matrix6d shift = geometry::Matrix6d::Identity();
+  shift.bottomLeftCorner<3, 3>() = -cross;
+  UncertainWrench about = wrench;
+  about.torque -= p_AP.cross(wrench.force);
+  about.covariance = shift * wrench.covariance * shift.transpose();
+  return about;
+}
+
 }  // namespace prescene::collision

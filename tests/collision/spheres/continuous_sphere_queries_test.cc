@@ -169,6 +169,22 @@ TEST(ContinuousSphereQueries, StraightMotionsMeetWhenTheFirstPairDoes) {
   EXPECT_LT(hits, 299);
 }
 
+TEST(ContinuousSphereQueries, TooSmallTolerancesAreReplaced) {
+  RandomStream stream(7, core::Purpose::kTest);
+  SweepScratch scratch;
+  const std::vector<PackedSphere> spheres = cloud(stream, 30);
+  const auto a = tree_of(spheres, 4);
+  const auto b = a;
+  const Vector3d way = 20.0 * Vector3d::UnitX();
+  const auto motion = ScrewMotion::make({geometry::Quaterniond::Identity(), way},
+                                        {geometry::exp_rotation(Vector3d(0.0, 0.0, 0.01)), -way});
+  ASSERT_TRUE(motion.ok());
+  const auto expected = time_of_impact(*a, *b, *motion, {.tolerance = kLeastImpactTolerance}, scratch);
+  ASSERT_TRUE(expected.has_value());
+  for (const double tolerance : {0.0, -1.0, std::nan("")})
+    EXPECT_EQ(time_of_impact(*a, *b, *motion, {.tolerance = tolerance}, scratch)->time, expected->time);
+}
+
 TEST(ContinuousSphereQueries, ScrewsStopBeforeTheFirstContactAndAtIt) {
   RandomStream stream(6, core::Purpose::kTest);
   SweepScratch scratch;

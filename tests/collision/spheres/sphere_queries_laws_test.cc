@@ -65,19 +65,41 @@ TEST(SphereQueriesLaw, SymmetricInTheBodies) {
   }));
 }
 
-TEST(SphereQueriesLaw, InvariantUnderACommonMotion) {
+// The same spheres, described in another frame.
+Tree moved(const Tree& tree, const Pose& X_MB) {
+  std::vector<PackedSphere> spheres(tree->packing().spheres().begin(), tree->packing().spheres().end());
+  for (PackedSphere& sphere : spheres) sphere.centre = (X_MB * Vector3d(sphere.centre.cast<double>())).cast<float>();
+  std::vector<SurfaceAnchor> anchors(tree->packing().anchors().begin(), tree->packing().anchors().end());
+  for (SurfaceAnchor& anchor : anchors) {
+    anchor.point = (X_MB * Vector3d(anchor.point.cast<double>())).cast<float>();
+    anchor.normal = (X_MB.rotation * Vector3d(anchor.normal.cast<double>())).cast<float>();
+  }
+  return *SphereTree::make(*SpherePacking::make(std::move(spheres), std::move(anchors), "moved"), {}, pool());
+}
+
+TEST(SphereQueriesLaw, FramesOfTheBodiesDoNotMatter) {
   EXPECT_TRUE(rc::check([] {
     const auto& [a, b] = bodies();
     SphereScratch scratch;
-    const Pose X_WA = *tests::poses(0.5);
+    const Pose X_MA = *tests::poses(0.1);
+    const Pose X_NB = *tests::poses(0.1);
+    const Tree other_a = moved(a, X_MA);
+    const Tree other_b = moved(b, X_NB);
     const Pose X_AB = near_pose();
-    const Pose X_VW = *tests::poses(0.5);
-    const Transform here = *relative_transform(X_WA, X_WA * X_AB);
-    const Transform moved = *relative_transform(X_VW * X_WA, X_VW * X_WA * X_AB);
-    RC_ASSERT(std::abs(distance(*a, *b, here, scratch)->distance - distance(*a, *b, moved, scratch)->distance) <
-              kRounding);
+    const Transform here = *to_transform(X_AB);
+    const Transform there = *to_transform(X_MA * X_AB * X_NB.inverse());
+    RC_ASSERT(std::abs(distance(*a, *b, here, scratch)->distance -
+                       distance(*other_a, *other_b, there, scratch)->distance) < kRounding);
     const double volume = overlap_volume(*a, *b, here, scratch).volume;
-    RC_ASSERT(std::abs(volume - overlap_volume(*a, *b, moved, scratch).volume) < 1e-3 * volume + 1e-10);
+    RC_ASSERT(std::abs(volume - overlap_volume(*other_a, *other_b, there, scratch).volume) < 1e-3 * volume + 1e-10);
+    const Vector3d p_AP = *tests::vectors(0.05);
+    const Restitution push = restitution(*a, *b, here, {.p_AP = p_AP}, scratch);
+    const Restitution other = restitution(*other_a, *other_b, there, {.p_AP = X_MA * p_AP}, scratch);
+    const double scale = 1e-3 * std::sqrt(push.energy) + 1e-4;
+    RC_ASSERT((X_MA.rotation * push.force - other.force).norm() < scale);
+    RC_ASSERT((X_MA.rotation * push.torque - other.torque).norm() < scale);
+    if (std::abs(distance(*a, *b, here, scratch)->distance) > kRounding)
+      RC_ASSERT(overlap(*a, *b, here, scratch) == overlap(*other_a, *other_b, there, scratch));
   }));
 }
 

@@ -142,8 +142,8 @@ void expect_agreement(const SphereTree& a, const SphereTree& b, const Transform&
     EXPECT_NEAR(push.energy, 10.0 * expected.energy, 2e-5 * push.energy + 1e-12);
     EXPECT_EQ(push.pairs, expected.pairs.size());
     std::vector<SphereContact> all;
-    EXPECT_TRUE(vectors ? contacts(a, b, X_AB, 1'000'000, all, scratch)
-                        : scalar::contacts(a, b, X_AB, 1'000'000, all, scratch));
+    EXPECT_TRUE(vectors ? contacts(a, b, X_AB, 1'000'000, &all, scratch)
+                        : scalar::contacts(a, b, X_AB, 1'000'000, &all, scratch));
     EXPECT_EQ(all.size(), expected.pairs.size());
     EXPECT_EQ(pairs_of(all), expected.pairs);
     const auto nearest = vectors ? distance(a, b, X_AB, scratch) : scalar::distance(a, b, X_AB, scratch);
@@ -222,21 +222,21 @@ TEST(SphereQueries, ContactOfTwoSpheresByHand) {
   Transform X_AB;
   X_AB.translation = {2.5F, 0, 0};
   std::vector<SphereContact> found;
-  EXPECT_TRUE(contacts(*a, *b, X_AB, 5, found, scratch));
+  EXPECT_TRUE(contacts(*a, *b, X_AB, 5, &found, scratch));
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].position, Vector3f(1.75F, 0, 0));  // The overlap reaches from 1.5 to 2.
-  EXPECT_EQ(found[0].normal, Vector3f(-1, 0, 0));
+  EXPECT_EQ(found[0].normal, Vector3f(1, 0, 0));
   EXPECT_EQ(found[0].depth, 0.5F);
   const Restitution push = restitution(*a, *b, X_AB, {.stiffness = 8.0, .p_AP = Vector3d(0, -1, 0)}, scratch);
   EXPECT_TRUE(push.force.isApprox(Vector3d(-2.0, 0, 0)));
   EXPECT_TRUE(push.torque.isApprox(Vector3d(0, 0, 2.0)));
   EXPECT_NEAR(push.energy, 0.5, 1e-12);
-  // Centres that fall together: no direction, hence no force; the contact points against A's anchor.
+  // Centres that fall together: no direction, hence no force; the contact points as A's anchor does.
   X_AB.translation = {0, 0, 0};
   EXPECT_EQ(restitution(*a, *b, X_AB, {}, scratch).force, Vector3d::Zero());
   found.clear();
-  EXPECT_TRUE(contacts(*a, *b, X_AB, 5, found, scratch));
-  EXPECT_EQ(found[0].normal, Vector3f(0, 0, -1));
+  EXPECT_TRUE(contacts(*a, *b, X_AB, 5, &found, scratch));
+  EXPECT_EQ(found[0].normal, Vector3f(0, 0, 1));
 }
 
 TEST(LensVolume, ClosedForms) {
@@ -273,9 +273,9 @@ TEST(Contacts, StopAtTheLimit) {
   const Tree tree = to_tree(packed(geometry::BoxShape{{0.2, 0.2, 0.2}}, 300));
   SphereScratch scratch;
   std::vector<SphereContact> found;
-  EXPECT_FALSE(contacts(*tree, *tree, Transform(), 10, found, scratch));
+  EXPECT_FALSE(contacts(*tree, *tree, Transform(), 10, &found, scratch));
   EXPECT_EQ(found.size(), 10U);
-  EXPECT_FALSE(scalar::contacts(*tree, *tree, Transform(), 10, found, scratch));
+  EXPECT_FALSE(scalar::contacts(*tree, *tree, Transform(), 10, &found, scratch));
   EXPECT_EQ(found.size(), 20U);
 }
 
@@ -290,7 +290,9 @@ TEST(Distance, TakesASeedAndALimit) {
   EXPECT_EQ(distance(*a, *b, X_AB, scratch, nearest->distance), std::nullopt);
   EXPECT_EQ(scalar::distance(*a, *b, X_AB, scratch, nearest->distance), std::nullopt);
   EXPECT_EQ(distance(*a, *b, X_AB, scratch, nearest->distance + 1e-6)->pair, nearest->pair);
-  for (const SpherePair& seed : {nearest->pair, SpherePair{5, 7}}) {
+  // Also with one of other bodies, that these have no such spheres for.
+  for (const SpherePair& seed :
+       {nearest->pair, SpherePair{5, 7}, SpherePair{5, 1'000'000}, SpherePair{4'000'000'000, 0}}) {
     EXPECT_NEAR(distance(*a, *b, X_AB, scratch, 100.0, seed)->distance, nearest->distance, 1e-6);
     EXPECT_NEAR(scalar::distance(*a, *b, X_AB, scratch, 100.0, seed)->distance, nearest->distance, 1e-6);
   }
@@ -310,7 +312,7 @@ TEST(SphereQueries, DoNotAllocateOnceWarm) {
       restitution(*a, *b, X_AB, {}, scratch);
       distance(*a, *b, X_AB, scratch);
       found.clear();
-      contacts(*a, *b, X_AB, 1'000'000, found, scratch);
+      contacts(*a, *b, X_AB, 1'000'000, &found, scratch);
       scalar::overlap_volume(*a, *b, X_AB, scratch);
       scalar::distance(*a, *b, X_AB, scratch);
     }

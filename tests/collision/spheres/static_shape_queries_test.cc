@@ -55,7 +55,7 @@ void expect_agreement(const SphereTree& tree, const StaticShape& shape, const Po
   RC_ASSERT(found.has_value() && std::abs(found->distance - nearest) < 1e-6);
   RC_ASSERT(!distance(tree, shape, transform, scratch, nearest - 1e-6).has_value());
   std::vector<ShapeContact> all;
-  RC_ASSERT(contacts(tree, shape, transform, 100000, all, scratch));
+  RC_ASSERT(contacts(tree, shape, transform, 100000, &all, scratch));
   std::set<std::uint32_t> touched;
   for (const ShapeContact& contact : all) touched.insert(contact.sphere);
   RC_ASSERT(touched.size() == all.size());
@@ -84,11 +84,12 @@ TEST(StaticShapeQueries, VolumeBehindAHalfSpaceIsExact) {
   const auto floor = *HalfSpace::make({0, 0, 1}, centre.z());
   SphereScratch scratch;
   std::vector<ShapeContact> found;
-  EXPECT_TRUE(contacts(*tree, floor, Transform(), 10, found, scratch));
+  EXPECT_TRUE(contacts(*tree, floor, Transform(), 10, &found, scratch));
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NEAR(found[0].volume, 2.0 / 3.0 * std::numbers::pi * std::pow(radius, 3), 1e-8);
   EXPECT_NEAR(found[0].depth, radius, 1e-6);
   EXPECT_NEAR(found[0].position.z(), centre.z() - 0.5 * radius, 1e-6);
+  EXPECT_EQ(found[0].normal, Vector3f(0, 0, -1));  // Into the floor.
 }
 
 // Against points drawn in the spheres.
@@ -170,7 +171,7 @@ TEST(StaticShapeQueries, DoNotAllocateOnceWarm) {
       distance(*tree, *shape, Transform(), scratch);
       restitution(*tree, *shape, Transform(), {}, scratch);
       found.clear();
-      contacts(*tree, *shape, Transform(), 100000, found, scratch);
+      contacts(*tree, *shape, Transform(), 100000, &found, scratch);
     }
   };
   ask();

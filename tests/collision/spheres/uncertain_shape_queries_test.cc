@@ -294,7 +294,8 @@ TEST(UncertainShapeQueries, BoundsHoldAndMomentsAgreeWithDraws) {
     ASSERT_TRUE(between.ok()) << between.status().message();
     const auto tree = tree_of(setting.spheres, draws % 3 == 0 ? 4 : 16);
     const UncertainOverlap overlap = uncertain_overlap(*tree, *setting.shape, *between, scratch);
-    const UncertainWrench wrench = uncertain_wrench(*tree, *setting.shape, *between, kStiffness, scratch);
+    const UncertainWrench wrench =
+        uncertain_wrench(*tree, *setting.shape, *between, {.stiffness = kStiffness}, scratch);
     const Sampled drawn = sample(setting);
     draws += setting.draws;
     Vector6d mean;
@@ -355,7 +356,7 @@ TEST(UncertainShapeQueries, KnownPosesAnswerAsTheyAre) {
       const auto between = RelativeUncertainty::make(at, {Pose::identity(), Matrix6d::Zero()});
       ASSERT_TRUE(between.ok());
       const UncertainOverlap overlap = uncertain_overlap(*tree, *shape, *between, scratch);
-      const UncertainWrench wrench = uncertain_wrench(*tree, *shape, *between, 1.0, scratch);
+      const UncertainWrench wrench = uncertain_wrench(*tree, *shape, *between, {}, scratch);
       EXPECT_EQ(overlap.state, gap < 0.0 ? OverlapState::kCertain : OverlapState::kNone);
       EXPECT_NEAR(wrench.force.z(), 9.0 * 0.5 * std::max(0.0, -gap), 1e-7);
       EXPECT_LE(wrench.covariance.norm(), 1e-12);
@@ -427,10 +428,10 @@ TEST(UncertainShapeQueries, DoNotAllocateOnceWarm) {
     ASSERT_TRUE(between.ok());
     const auto tree = tree_of(setting.spheres, 16);
     uncertain_overlap(*tree, *setting.shape, *between, scratch);
-    uncertain_wrench(*tree, *setting.shape, *between, kStiffness, scratch);
+    uncertain_wrench(*tree, *setting.shape, *between, {.stiffness = kStiffness}, scratch);
     const auto before = tests::allocation_count();
     uncertain_overlap(*tree, *setting.shape, *between, scratch);
-    uncertain_wrench(*tree, *setting.shape, *between, kStiffness, scratch);
+    uncertain_wrench(*tree, *setting.shape, *between, {.stiffness = kStiffness}, scratch);
     EXPECT_EQ(tests::allocation_count(), before);
   }
 }

@@ -227,7 +227,7 @@ TEST(UncertainSphereQueries, BoundsHoldAndMomentsAgreeWithDraws) {
     const auto a = tree_of(setting.a);
     const auto b = tree_of(setting.b, 16);
     const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
-    const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+    const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, {.stiffness = kStiffness}, scratch);
     const Sampled drawn = sample(setting);
     Vector6d mean;
     mean << wrench.force, wrench.torque;
@@ -267,7 +267,7 @@ TEST(UncertainSphereQueries, EveryInstructionSetAnswersAlike) {
       const auto b = tree_of(setting.b, branching);
       use_target(0);
       const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
-      const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+      const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, {.stiffness = kStiffness}, scratch);
       for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
         SCOPED_TRACE(hwy::TargetName(target));
         use_target(target);
@@ -278,7 +278,7 @@ TEST(UncertainSphereQueries, EveryInstructionSetAnswersAlike) {
         EXPECT_EQ(again.lower, overlap.lower);
         EXPECT_EQ(again.upper, overlap.upper);
         EXPECT_NEAR(again.probability, overlap.probability, 1e-4);
-        const UncertainWrench other = uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+        const UncertainWrench other = uncertain_wrench(*a, *b, *between, {.stiffness = kStiffness}, scratch);
         EXPECT_LE((other.force - wrench.force).norm(), 1e-5 * wrench.force.norm() + 1e-7);
         EXPECT_LE((other.covariance - wrench.covariance).norm(), 1e-4 * wrench.covariance.norm() + 1e-9);
       }
@@ -296,7 +296,7 @@ TEST(UncertainSphereQueries, KnownPosesAnswerAsTheyAre) {
     const auto between = RelativeUncertainty::make({Pose::identity(), Matrix6d::Zero()}, at);
     ASSERT_TRUE(between.ok());
     const UncertainOverlap overlap = uncertain_overlap(*a, *b, *between, scratch);
-    const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, 1.0, scratch);
+    const UncertainWrench wrench = uncertain_wrench(*a, *b, *between, {}, scratch);
     // Each sphere of the lower layer rests between four of the upper one.
     const double distance = std::hypot(0.02 * std::sqrt(2.0), 0.04 + gap);
     const double depth = std::max(0.0, 0.04 - distance);
@@ -305,6 +305,29 @@ TEST(UncertainSphereQueries, KnownPosesAnswerAsTheyAre) {
     EXPECT_NEAR(wrench.force.norm(), 4.0 * 4.0 * 0.5 * depth * (0.04 + gap) / distance, 1e-7);
     EXPECT_LE(wrench.covariance.norm(), 1e-12);
   }
+}
+
+// Described in a frame of A whose origin is P, the same contact has the torque about A's origin.
+TEST(UncertainSphereQueries, WrenchIsAboutThePointAskedFor) {
+  const Vector3d p_AP(0.03, -0.05, 0.02);
+  std::vector<PackedSphere> spheres = grid(3, 3, 3, 0.02F);
+  const auto a = tree_of(spheres);
+  for (PackedSphere& sphere : spheres) sphere.centre -= p_AP.cast<float>();
+  const auto moved_a = tree_of(spheres);
+  const auto b = tree_of(grid(2, 2, 2, 0.02F));
+  const UncertainPose at = {Pose::from_translation({0.004, 0.0, 0.08}), Matrix6d(1e-6 * Matrix6d::Identity())};
+  UncertainPose moved_at = at;
+  moved_at.X_WB.translation -= p_AP;
+  const UncertainPose origin = {Pose::identity(), Matrix6d::Zero()};
+  UncertainScratch scratch;
+  const auto wrench =
+      uncertain_wrench(*a, *b, *RelativeUncertainty::make(origin, at), {.stiffness = 100.0, .p_AP = p_AP}, scratch);
+  const auto expected =
+      uncertain_wrench(*moved_a, *b, *RelativeUncertainty::make(origin, moved_at), {.stiffness = 100.0}, scratch);
+  EXPECT_GT(wrench.force.norm(), 0.1);
+  EXPECT_LT((wrench.force - expected.force).norm(), 1e-3 * expected.force.norm());
+  EXPECT_LT((wrench.torque - expected.torque).norm(), 1e-3 * expected.torque.norm() + 1e-5);
+  EXPECT_LT((wrench.covariance - expected.covariance).norm(), 1e-3 * expected.covariance.norm());
 }
 
 /// Least distance along the line of centres in standard deviations, and by how much some pair is sure to touch, m.
@@ -428,11 +451,11 @@ TEST(UncertainSphereQueries, DoNotAllocateOnceWarm) {
   UncertainScratch scratch;
   uncertain_overlap(*a, *b, *between, scratch);
   overlap_state(*a, *b, *between, scratch);
-  uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+  uncertain_wrench(*a, *b, *between, {.stiffness = kStiffness}, scratch);
   const auto before = tests::allocation_count();
   uncertain_overlap(*a, *b, *between, scratch);
   overlap_state(*a, *b, *between, scratch);
-  uncertain_wrench(*a, *b, *between, kStiffness, scratch);
+  uncertain_wrench(*a, *b, *between, {.stiffness = kStiffness}, scratch);
   EXPECT_EQ(tests::allocation_count(), before);
 }
 
