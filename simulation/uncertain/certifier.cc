@@ -191,11 +191,11 @@ class EnergyCertifier final : public Certifier {
       : scene_(std::move(scene)), certifier_(std::move(certifier)) {}
 
   std::optional<std::vector<int>> classes(const belief::WorldState& state, double seconds_left) const override {
-    if (duration_ - seconds_left < quiet_from_ || state.time < robot_still_from_) return std::nullopt;
+    if (duration - seconds_left < quiet_after || state.time < robot_still_after) return std::nullopt;
     std::vector<SureMotion> motions;
     if (!certifier_->assess(state, seconds_left, motions)) return std::nullopt;
     std::vector<int> found;
-    for (const std::vector<Answer>& answers : variables_) {
+    for (const std::vector<Answer>& answers : variables) {
       int which = 0;
       for (const Answer& answer : answers) {
         const Truth truth = judge(answer, motions, seconds_left);
@@ -208,10 +208,10 @@ class EnergyCertifier final : public Certifier {
     return found;
   }
 
-  std::vector<std::vector<Answer>> variables_;
-  double duration_ = 0.0;
-  double quiet_from_ = 0.0;
-  double robot_still_from_ = -std::numeric_limits<double>::infinity();
+  std::vector<std::vector<Answer>> variables;
+  double duration = 0.0;
+  double quiet_after = 0.0;
+  double robot_still_after = -std::numeric_limits<double>::infinity();
 
  private:
   Truth judge(const Answer& answer, const std::vector<SureMotion>& motions, double seconds_left) const {
@@ -249,7 +249,7 @@ Passage passage_of(const belief::InsideVolume& volume, const CertifiedObject& ob
 
 }  // namespace
 
-std::unique_ptr<const Certifier> make_certifier(std::shared_ptr<const belief::Scene> scene,
+std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const belief::Scene>& scene,
                                                 std::span<const Variable> variables, const RunRequest& request,
                                                 const CertifierOptions& options) {
   const std::optional<double> quiet_from = end_of(request.actions);
@@ -281,12 +281,12 @@ std::unique_ptr<const Certifier> make_certifier(std::shared_ptr<const belief::Sc
     }
   }
   auto certifier = std::make_unique<EnergyCertifier>(scene, std::move(motions));
-  certifier->variables_ = std::move(asked);
-  certifier->duration_ = request.stop.duration;
-  certifier->quiet_from_ = *quiet_from;
+  certifier->variables = std::move(asked);
+  certifier->duration = request.stop.duration;
+  certifier->quiet_after = *quiet_from;
   for (const belief::KinematicBody& body : scene->robot)
     if (!body.timeline.empty())
-      certifier->robot_still_from_ = std::max(certifier->robot_still_from_, body.timeline.back().time);
+      certifier->robot_still_after = std::max(certifier->robot_still_after, body.timeline.back().time);
   return certifier;
 }
 

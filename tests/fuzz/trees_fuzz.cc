@@ -66,9 +66,9 @@ void query(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB) 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size <= kHeader) return 0;
   tests::visit_tree_kind(data[0], [&]<class Tree>(const auto& options) {
-    static const std::shared_ptr<const Mesh> mesh = tests::tree_kinds_mesh();
+    static const std::shared_ptr<const Mesh> kMesh = tests::tree_kinds_mesh();
     core::ThreadPool one(1);
-    const Tree sound = Tree::build(mesh, options, one);
+    const Tree sound = Tree::build(kMesh, options, one);
     std::vector<std::uint8_t> bytes(data + 1, data + size);
     bytes.resize((bytes.size() + kTreeFileAlignment - 1) / kTreeFileAlignment * kTreeFileAlignment);
     const std::vector<std::uint8_t> good = tests::file_bytes(sound);
@@ -77,7 +77,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::uint64_t file_size = bytes.size();
     std::memcpy(bytes.data() + kFileSizeAt, &file_size, sizeof file_size);
     seal_tree_file(bytes);
-    const auto loaded = Tree::from_bytes(bytes, mesh, options);
+    const auto loaded = Tree::from_bytes(bytes, kMesh, options);
     if (!loaded) {
       PRESCENE_CHECK(loaded.status().message().starts_with("tree: "));
       return;
