@@ -1,16 +1,71 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/backends.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
+#include "prescene/simulation/lockstep/lockstep_simulator.h"
 
 namespace prescene::service {
+namespace {
+
+simulation::LockstepOptions lockstep_options(const simulation::BulletOptions& bullet) {
+  simulation::LockstepOptions options;
+  options.step = bullet.step;
+  options.solver_iterations = bullet.solver_iterations;
+  options.solver_accuracy = std::max(options.solver_accuracy, bullet.solver_accuracy);
+  options.overlap_recovery = bullet.overlap_recovery;
+  options.restitution_speed = bullet.restitution_speed;
+  options.impact_speed = bullet.impact_speed;
+  options.edge_rounding = bullet.edge_rounding;
+  options.touching_distance = bullet.touching_distance;
+  options.contact_merge_time = bullet.contact_merge_time;
+  options.rest = bullet.rest;
+  options.decomposition = bullet.decomposition;
+  return options;
+}
+
+/// Runs in lockstep what that supports; other actions, and single instances, go to Bullet.
+class EitherSimulator : public simulation::Simulator {
+ public:
+  EitherSimulator(std::unique_ptr<simulation::Simulator> lockstep, std::unique_ptr<simulation::Simulator> bullet)
+      : lockstep_(std::move(lockstep)), bullet_(std::move(bullet)) {}
+
+  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
+           const core::RandomStream& stream, std::uint32_t first_instance, core::ThreadPool& pool,
+           std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
+    const simulation::Simulator& simulator =
+        simulation::lockstep_supports(request, starts).ok() ? *lockstep_ : *bullet_;
+    simulator.run(starts, request, stream, first_instance, pool, trajectories, cancellation);
+  }
+
+  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>& actions,
+                                                      const core::RandomStream& stream) const override {
+    return bullet_->make_instance(actions, stream);
+  }
+
+ private:
+  std::unique_ptr<simulation::Simulator> lockstep_, bullet_;
+};
+
+}  // namespace
 
 Backends::Backends(core::ThreadPool& pool, const BackendSettings& settings)
     : pool_(pool), settings_(settings), shapes_(simulation::hacd_decomposer()) {}
 
 core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(const belief::Scene& scene) {
-  return simulation::make_bullet_simulator(scene, shapes_, settings_.bullet);
+  if (settings_.stepper == Stepper::kBullet) return simulation::make_bullet_simulator(scene, shapes_, settings_.bullet);
+  auto lockstep = simulation::make_lockstep_simulator(scene, shapes_, lockstep_options(settings_.bullet));
+  if (!lockstep) {
+    const bool other_stepper = settings_.stepper == Stepper::kAutomatic;
+    if (!other_stepper || lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
+    return simulation::make_bullet_simulator(scene, shapes_, settings_.bullet);
+  }
+  PRESCENE_TRY(auto bullet, simulation::make_bullet_simulator(scene, shapes_, settings_.bullet));
+  return std::unique_ptr<simulation::Simulator>(
+      std::make_unique<EitherSimulator>(*std::move(lockstep), std::move(bullet)));
 }
 
 core::Result<std::unique_ptr<rendering::Renderer>> Backends::make_renderer() {

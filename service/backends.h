@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one place that chooses: Bullet simulates, the reference renderer draws what is recorded or answered, shapes and
-// meshes are made once and kept.
+// The one place that chooses: Bullet simulates, or the lockstep stepper what it can, the reference renderer draws what
+// is recorded or answered, shapes and meshes are made once and kept.
 //
 //   Backends backends(pool);
 //   auto simulator = backends.make_simulator(scene);
@@ -20,8 +20,17 @@
 
 namespace prescene::service {
 
+/// Who simulates (docs/simulation.md).
+enum class Stepper {
+  kBullet,
+  kAutomatic,  ///< In lockstep where scene and actions allow it, else Bullet.
+  kLockstep,   ///< As before, but a scene that it can't simulate is an error.
+};
+
 struct BackendSettings {
   simulation::BulletOptions bullet;
+  /// Answers of the two differ by rounding, which chaotic scenes blow up to other draws of the same probabilities.
+  Stepper stepper = Stepper::kBullet;
 };
 
 /// Safe to use from several threads.

@@ -13,7 +13,11 @@
 namespace prescene::simulation {
 namespace {
 
-/// Instances run between two looks at the clock. Does not change results.
+// Chunks that are done sooner than this (s) are made larger: simulators may do many at once for less.
+constexpr double kShortChunk = 0.02;
+constexpr std::size_t kLargestChunk = 1024;
+
+/// Instances run between two looks at the clock, at first. Does not change results.
 std::size_t chunk_size(const core::ThreadPool& pool) {
   return std::max<std::size_t>(32, 8 * static_cast<std::size_t>(pool.threads()));
 }
@@ -267,18 +271,21 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
   Runner runner{simulator,         variables,          request, stream, pool, cancellation, samplers,
                 options.certifier, options.audit_share};
   Forecast forecast(options, progress);
+  std::size_t chunk = chunk_size(pool);
   std::optional<EstimateStop> stop;
   while (!stop) {
     plan.grow();
     const std::size_t target = std::min(limit, plan.order().size());
     while (!stop && estimate.instances.size() < target) {
       const std::size_t done = estimate.instances.size();
-      const auto planned = std::span(plan.order()).subspan(done, std::min(chunk_size(pool), target - done));
+      const auto planned = std::span(plan.order()).subspan(done, std::min(chunk, target - done));
+      const double begun = watch.seconds();
       if (!run_chunk(runner, planned, estimate.instances, estimate.certificates) ||
           (cancellation && cancellation->requested()))
         stop = EstimateStop::kCancelled;
       else if (options.max_seconds && !options.exact_instances && watch.seconds() >= *options.max_seconds)
         stop = EstimateStop::kTimeLimit;
+      if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, kLargestChunk);
       forecast.tell(static_cast<double>(estimate.instances.size()));
     }
     const CertificateUse& use = estimate.certificates;
