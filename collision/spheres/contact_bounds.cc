@@ -99,10 +99,10 @@ CriticalPair pair_at(const CriticalPairs& pairs, std::size_t i) {
 ContactBounds::ContactBounds(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                              const CriticalPairs& critical) {
   const double fails = RelativeUncertainty::kRemainderFails;
-  const double outside = 1.0 - between.confidence() + fails;
+  const double outside_region = outside(between);
   const std::size_t size = critical.pairs.size;
   if (size == 0) {
-    upper_ = outside;
+    upper_ = outside_region;
     return;
   }
   const float* margins = critical.margin.data();
@@ -124,15 +124,15 @@ ContactBounds::ContactBounds(const SphereTree& a, const SphereTree& b, const Rel
   }
   lower_ = surely_touching(leader_, between);
   if (likely != leading) lower_ = std::max(lower_, surely_touching(pair_at(critical, likely), between));
-  if (critical.certain) lower_ = std::max(lower_, 1.0 - outside);
+  if (critical.certain) lower_ = std::max(lower_, 1.0 - outside_region);
 
   // Upper: no shorter error than the least margin, or all pairs one by one, or a plane between the bodies.
   const double nearest = std::min(static_cast<double>(margins[leading]), between.region_radius());
   upper_ = std::min(1.0, six_dimensional_tail(nearest) + fails);
-  if (critical.complete) upper_ = std::min(upper_, sum + outside);
+  if (critical.complete) upper_ = std::min(upper_, sum + outside_region);
   if (nearest > 0.0) {
     const double crossing = crossing_bound(a, b, between, leader_.normal(), 0.05 * deviation);
-    upper_ = std::min(upper_, crossing + outside);
+    upper_ = std::min(upper_, crossing + outside_region);
   }
   upper_ = std::max(upper_, lower_);
 }

@@ -27,6 +27,11 @@ class ContactBounds {
   ContactBounds(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                 const CriticalPairs& critical);
 
+  /// Of an error outside the region, or of one that remainder() does not bound: the upper bound when no pair may touch.
+  static double outside(const RelativeUncertainty& between) {
+    return 1.0 - between.confidence() + RelativeUncertainty::kRemainderFails;
+  }
+
   double lower() const { return lower_; }
   double upper() const { return upper_; }
   /// The pair with the least margin, if there is one.

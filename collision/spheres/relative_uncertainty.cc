@@ -122,7 +122,9 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
     pivot_ += M.ldlt().solve(-v - M * p_AB);
   }
   const Matrix3d mixed_at_pivot = mixed - cross_matrix(pivot_) * rotation;
-  at_pivot_ = largest_eigenvalue(covariance_at(pivot_));
+  const Matrix3d least = covariance_at(pivot_);
+  least_trace_ = least.trace();
+  at_pivot_ = largest_eigenvalue(least);
   linear_ = 2.0 * std::sqrt(largest_eigenvalue(mixed_at_pivot.transpose() * mixed_at_pivot));
   quadratic_ = largest_eigenvalue(rotation);
 

@@ -107,6 +107,8 @@ class RelativeUncertainty {
     double remainder_slope = 0.0;
   };
   Growth growth() const { return {at_pivot_, linear_, quadratic_, remainder_, remainder_slope_}; }
+  /// Of covariance_at(pivot()), which is the least, m^2.
+  double least_trace() const { return least_trace_; }
 
  private:
   RelativeUncertainty() = default;
@@ -119,6 +121,7 @@ class RelativeUncertainty {
   double region_radius_ = 0.0;
   double ball_radius_ = 0.0;
   Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
+  double least_trace_ = 0.0;
   double at_pivot_ = 0.0;
   double linear_ = 0.0;
   double quadratic_ = 0.0;

@@ -25,7 +25,7 @@ Swelling::Swelling(const RelativeUncertainty& between, const SphereTree& b) : X_
   deviation_slope = up(slope);
   region_radius = up(between.region_radius());
   ball_radius = up(between.ball_radius());
-  least_trace = static_cast<float>(between.covariance_at(between.pivot()).trace());
+  least_trace = static_cast<float>(between.least_trace());
   const Eigen::Matrix3d rotation = between.covariance().topLeftCorner<3, 3>();
   const Eigen::Matrix3d growing = rotation.trace() * Eigen::Matrix3d::Identity() - rotation;
   for (int i = 0; i < 9; ++i) trace_growth[static_cast<std::size_t>(i)] = static_cast<float>(growing(i / 3, i % 3));
@@ -33,6 +33,16 @@ Swelling::Swelling(const RelativeUncertainty& between, const SphereTree& b) : X_
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j <= i; ++j) factor[index++] = static_cast<float>(between.factor()(i, j));
   }
+}
+
+bool roots_may_meet(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between, double deviations) {
+  const Vector3f centre_b = between.X_AB() * b.root().centre;
+  const auto radius_b = static_cast<double>(b.root().radius);
+  const double farthest = (centre_b.cast<double>() - between.pivot()).norm() + radius_b;
+  const double moved = deviations * between.deviation_bound(farthest) + between.remainder(farthest);
+  // Bounding spheres are rounded to floats.
+  const double reach = (static_cast<double>(a.root().radius) + radius_b + moved) * (1.0 + 1e-6);
+  return (centre_b - a.root().centre).cast<double>().squaredNorm() <= reach * reach;
 }
 
 void DescentStack::Pairs::reserve(std::size_t size) {

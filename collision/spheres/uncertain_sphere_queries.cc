@@ -80,18 +80,23 @@ void estimate(const TouchingIntervals& intervals, UncertainOverlap* overlap) {
 
 OverlapState overlap_state(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                            UncertainScratch& scratch) {
+  if (!roots_may_meet(a, b, between, between.region_radius())) return OverlapState::kNone;
   return find_state(a, b, Swelling(between, b), &scratch.memory().stack);
 }
 
 UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch) {
+  UncertainOverlap overlap;
+  if (!roots_may_meet(a, b, between, between.region_radius())) {
+    overlap.upper = ContactBounds::outside(between);
+    return overlap;
+  }
   UncertainScratch::Memory& memory = scratch.memory();
   const Swelling swelling(between, b);
   memory.critical.pairs.size = 0;
   memory.critical.certain = false;
   find_critical_pairs(a, b, swelling, &memory.stack, &memory.critical);
 
-  UncertainOverlap overlap;
   const ContactBounds bounds(a, b, between, memory.critical);
   overlap.lower = bounds.lower();
   overlap.upper = bounds.upper();
@@ -113,6 +118,7 @@ UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, con
 
 UncertainWrench uncertain_wrench(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                                  const RestitutionOptions& options, UncertainScratch& scratch) {
+  if (!roots_may_meet(a, b, between, static_cast<double>(kWrenchReach))) return {};
   WrenchSums sums;
   sum_wrenches(a, b, Swelling(between, b), kWrenchReach, &scratch.memory().stack, &sums);
 
