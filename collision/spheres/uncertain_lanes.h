@@ -37,8 +37,8 @@ struct Swelling {
   std::array<float, 21> factor;       ///< Rows of the lower triangle of RelativeUncertainty::factor().
 };
 
-/// Whether errors of so many standard deviations may bring some spheres of two trees together, by their bounding spheres
-/// alone.
+/// Whether errors of so many standard deviations may bring some spheres of two trees together, by their bounding
+/// spheres alone.
 bool roots_may_meet(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between, double deviations);
 
 /// Pairs of spheres, one array a number: the centre in A, B's centre in A, and the sum of the radii, m.

@@ -50,30 +50,29 @@ class WrenchSink {
  public:
   static constexpr bool kDeepestFirst = false;
 
-  WrenchSink(const Swelling& s, float reach) : s_(s), reach_(reach) {
-    for (auto& lanes : sums_) std::fill(std::begin(lanes), std::end(lanes), 0.0F);
-    for (geometry::Matrix6d& m : bending_) m.setZero();
-  }
+  WrenchSink(const Swelling& s, float reach) : s_(s), reach_(reach) {}
 
   Growth growth(bool) const { return growth_by(s_, reach_); }
   bool ended() const { return false; }
   std::size_t enough() const { return PairBuffer::kCapacity - 256; }
 
   void flush(PairBuffer* buffer) {
+    if (buffer->size == 0) return;
+    if (!begun_) begin();
     const Lanes d;
     kinks_ = 0;
     for (std::size_t i = 0; i < buffer->size; i += hn::Lanes(d))
       look_at(geometry_of(*buffer, s_, i), hn::FirstN(d, buffer->size - i), i);
-    if (buffer->size > 0) {
-      sum_forces(buffer->size);
-      sum_sideways(*buffer);
-      sum_bending(*buffer);
-      sum_kinks();
-    }
+    sum_forces(buffer->size);
+    sum_sideways(*buffer);
+    sum_bending(*buffer);
+    sum_kinks();
     buffer->size = 0;
   }
 
+  /// Leaves `result` as it is, which has no pairs, where none were found.
   void finish(WrenchSums* result) const {
+    if (!begun_) return;
     for (std::size_t i = 0; i < WrenchSums::kCount; ++i) result->sums[i] = total(sums_[i]);
     result->pairs = touching_;
     result->bending = bending_;
@@ -81,6 +80,13 @@ class WrenchSink {
 
  private:
   using Number = float[PairBuffer::kCapacity + kPairLanes];
+
+  /// Clearing the sums would cost bodies that are apart most of their time.
+  void begin() {
+    for (auto& lanes : sums_) std::fill(std::begin(lanes), std::end(lanes), 0.0F);
+    for (geometry::Matrix6d& m : bending_) m.setZero();
+    begun_ = true;
+  }
 
   static double total(const float* lanes) {
     double sum = 0.0;
@@ -278,6 +284,7 @@ class WrenchSink {
 
   const Swelling& s_;
   float reach_;
+  bool begun_ = false;
   HWY_ALIGN float sums_[WrenchSums::kCount][kPairLanes];
   double touching_ = 0.0;
   SymmetricTensor bending_;
