@@ -12,122 +12,25 @@
 
 #include "hierarchy_splitter.h"
 #include "principal_axes.h"
+#include "surface_area_bins.h"
 
 namespace prescene::collision {
 namespace {
 
 using Eigen::Array4f;
 using Eigen::Array4i;
+using surface_area::Binning;
+using surface_area::Bins;
+using surface_area::Box;
+using surface_area::improve;
+using surface_area::kMostBins;
+using surface_area::Part;
+using surface_area::Plane;
+using surface_area::Record;
 
-constexpr int kMostBins = 32;
 // From here on a range is binned and partitioned by several threads, in blocks of a fixed size.
 constexpr std::uint32_t kParallelItems = 1U << 15U;
 constexpr std::uint32_t kBlock = 1U << 13U;
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-// An item's box in units of about the size of all; the fourth lane of `low` holds the item's number.
-struct Record {
-  Array4f low;
-  Array4f high;
-
-  Array4f centre() const { return low + high; }
-};
-
-struct Box {
-  Array4f low = Array4f::Constant(kInfinity);
-  Array4f high = Array4f::Constant(-kInfinity);
-
-  void add(const Array4f& a, const Array4f& b) {
-    low = low.min(a);
-    high = high.max(b);
-  }
-  void add(const Box& box) { add(box.low, box.high); }
-  float half_area() const {
-    const Array4f e = high - low;
-    return e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
-  }
-};
-
-struct Part {
-  std::uint32_t begin = 0;
-  std::uint32_t end = 0;
-  float cost = 0.0F;
-  Box centres;
-
-  std::uint32_t size() const { return end - begin; }
-};
-
-// Which bin a centre belongs to. Axes along which all centres are equal have one bin.
-struct Binning {
-  Binning(const Box& centres, int bin_count) : bins(bin_count), low(centres.low) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const float extent = centres.high[axis] - centres.low[axis];
-      scale[axis] = extent > 1e-30F ? static_cast<float>(bins) * (1.0F - 1e-6F) / extent : 0.0F;
-    }
-  }
-  Array4i of(const Array4f& centre) const { return ((centre - low) * scale).cast<int>().max(0).min(bins - 1); }
-  int of(const Array4f& centre, int axis) const {
-    return std::clamp(static_cast<int>((centre[axis] - low[axis]) * scale[axis]), 0, bins - 1);
-  }
-
-  int bins;
-  Array4f low;
-  Array4f scale = Array4f::Zero();
-};
-
-struct Bins {
-  std::array<std::array<Box, kMostBins>, 3> boxes;
-  std::array<std::array<std::uint32_t, kMostBins>, 3> counts = {};
-
-  void add(const Record& record, const Binning& binning) {
-    const Array4i bin = binning.of(record.centre());
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(bin[static_cast<int>(axis)]);
-      boxes[axis][i].add(record.low, record.high);
-      ++counts[axis][i];
-    }
-  }
-  void add(const Bins& other, int bins) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < static_cast<std::size_t>(bins); ++i) {
-        boxes[axis][i].add(other.boxes[axis][i]);
-        counts[axis][i] += other.counts[axis][i];
-      }
-    }
-  }
-};
-
-struct Plane {
-  float cost = kInfinity;
-  int axis = -1;
-  int bin = 0;  // The first bin on the right.
-  float left_cost = 0.0F;
-  float right_cost = 0.0F;
-};
-
-void improve(Plane& best, const Bins& bins, int bin_count, int axis) {
-  const auto& boxes = bins.boxes[static_cast<std::size_t>(axis)];
-  const auto& counts = bins.counts[static_cast<std::size_t>(axis)];
-  std::array<float, kMostBins> right_costs = {};
-  Box box;
-  std::uint32_t count = 0;
-  for (int i = bin_count - 1; i > 0; --i) {
-    const auto k = static_cast<std::size_t>(i);
-    box.add(boxes[k]);
-    count += counts[k];
-    right_costs[k] = count > 0 ? box.half_area() * static_cast<float>(count) : kInfinity;
-  }
-  box = {};
-  count = 0;
-  for (int i = 1; i < bin_count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    box.add(boxes[k - 1]);
-    count += counts[k - 1];
-    if (count == 0) continue;
-    const float left_cost = box.half_area() * static_cast<float>(count);
-    if (left_cost + right_costs[k] < best.cost) best = {left_cost + right_costs[k], axis, i, left_cost, right_costs[k]};
-  }
-}
 
 class SurfaceAreaSplitter : public Splitter {
  public:

@@ -254,6 +254,19 @@ TEST_P(ContinuousQueries, FollowTurns) {
             MotionOutcome::kNoContact);
 }
 
+TEST_P(ContinuousQueries, StayWithinTheToleranceHoweverFastTheTurns) {
+  // A bar that turns about z up to 950 times while it sinks, until its side hits the top of a post.
+  const TriangleTree post = box_tree(0.1, 0.1, 1.0);
+  const TriangleTree bar = box_tree(2.0, 0.1, 0.1);
+  constexpr double kTolerance = 1e-4;
+  for (const double turn : {100.0, 300.0, 1000.0, 2500.0, 6000.0}) {
+    const RigidMotion motion = thrown(Pose::from_translation({0.0, -0.8, 1.4}), {{0.0, 0.0, turn}, {0.0, 0.0, -1.0}});
+    const FirstContact contact = first_contact(post, bar, motion, {.tolerance = kTolerance}, scratch_);
+    ASSERT_EQ(contact.outcome, MotionOutcome::kContact);
+    EXPECT_LE(contact.distance, kTolerance) << turn;
+  }
+}
+
 TEST_P(ContinuousQueries, CountTouchingAndNotPassing) {
   const TriangleTree a = box_tree(2.0, 2.0, 1.0);
   const TriangleTree b = box_tree(0.5, 0.5, 0.5);
