@@ -14,6 +14,7 @@ find_package(JPEG REQUIRED)                    # JPEG::JPEG
 find_package(ZLIB REQUIRED)                    # ZLIB::ZLIB
 find_package(LZ4 REQUIRED)                     # LZ4::lz4
 find_package(Zstd REQUIRED)                    # Zstd::zstd
+find_package(Ceres REQUIRED)                   # Ceres::ceres
 find_package(assimp REQUIRED)                  # assimp::assimp
 find_package(Bullet64 REQUIRED)                # Bullet::float64, Bullet::hacd
 find_package(CycloneDDS REQUIRED)              # CycloneDDS::ddsc, idlc_generate()
