@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "action_player.h"
 #include "compiled_scene.h"
 #include "contact_finder.h"
 #include "contact_solver.h"
+#include "prescene/simulation/action_player.h"
 
 namespace prescene::simulation {
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "action_player.h"
+#include "prescene/simulation/action_player.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace prescene::simulation {
 namespace {
@@ -59,14 +60,14 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
       pushers_.push_back({push->from + shift, push->to + shift, action.time, push->duration, push->radius});
     }
   }
-  hands_.assign(static_cast<std::size_t>(scene_->robot_count), Hand{});
-  objects_.assign(static_cast<std::size_t>(scene_->object_count), Hold{});
+  hands_.assign(scene_->robot.size(), Hand{});
+  objects_.assign(scene_->objects.size(), Hold{});
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     if (start.objects[i].mode != belief::MotionMode::kHeld) continue;
     Hold& hold = objects_[i];
     hold.control = Control::kHeld;
-    const std::optional<std::string>& holder = scene_->scene.objects[i].held_by;
-    const std::optional<int> hand = holder ? belief::find_robot_body(scene_->scene, *holder) : std::nullopt;
+    const std::optional<std::string>& holder = scene_->objects[i].held_by;
+    const std::optional<int> hand = holder ? belief::find_robot_body(*scene_, *holder) : std::nullopt;
     hold.hand = hand.value_or(-1);
     const Pose& X_WO = start.objects[i].X_WO;
     hold.X_GO = hand ? timeline_pose(*hand, start_).inverse() * X_WO : X_WO;
@@ -74,7 +75,7 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
 }
 
 Pose ActionPlayer::timeline_pose(int robot, double time) const {
-  const belief::KinematicBody& body = scene_->scene.robot[static_cast<std::size_t>(robot)];
+  const belief::KinematicBody& body = scene_->robot[static_cast<std::size_t>(robot)];
   return body.timeline.empty() ? Pose{} : belief::pose_at(body, time);
 }
 
@@ -121,14 +122,27 @@ Vector3d ActionPlayer::pusher_position(int pusher, double time) const {
   return p.from + share_done(start_ + p.begin, p.duration, time) * (p.to - p.from);
 }
 
-bool ActionPlayer::finished(double time) const {
+bool ActionPlayer::finished(double time) const { return time >= finish_time(); }
+
+double ActionPlayer::finish_time() const {
+  double last = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < actions_.size(); ++i) last = std::max(last, begin_of(i) + duration_of(actions_[i]));
+  for (const belief::KinematicBody& body : scene_->robot) {
+    if (body.timeline.size() > 1) last = std::max(last, body.timeline.back().time);
+  }
+  return last;
+}
+
+double ActionPlayer::next_due() const {
+  double next = std::numeric_limits<double>::infinity();
+  for (const Hold& hold : objects_) {
+    if (hold.control != Control::kCarried && hold.control != Control::kPoured) continue;
+    next = std::min(next, hold.begin + duration_of(actions_[static_cast<std::size_t>(hold.action)]));
+  }
   for (std::size_t i = 0; i < actions_.size(); ++i) {
-    if (time < begin_of(i) + duration_of(actions_[i])) return false;
+    if (!steps_[i].done) next = std::min(next, begin_of(i));
   }
-  for (const belief::KinematicBody& body : scene_->scene.robot) {
-    if (body.timeline.size() > 1 && time < body.timeline.back().time) return false;
-  }
-  return true;
+  return next;
 }
 
 bool ActionPlayer::over(double time) const {
@@ -182,7 +196,7 @@ void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
 void ActionPlayer::execute(std::size_t index, double time, double dt, const std::vector<Pose>& poses,
                            std::vector<Released>& released) {
   const belief::Action& action = actions_[index];
-  const auto object_of = [&](const std::string& name) { return belief::find_object(scene_->scene, name); };
+  const auto object_of = [&](const std::string& name) { return belief::find_object(*scene_, name); };
 
   if (const auto* release = std::get_if<belief::Release>(&action.what)) {
     const std::optional<int> object = object_of(release->object);
@@ -211,7 +225,7 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
   }
   if (const auto* grasp = std::get_if<belief::Grasp>(&action.what)) {
     const std::optional<int> object = object_of(grasp->object);
-    const std::optional<int> hand = belief::find_robot_body(scene_->scene, grasp->hand);
+    const std::optional<int> hand = belief::find_robot_body(*scene_, grasp->hand);
     if (!object || !hand) return;
     Hold& hold = objects_[static_cast<std::size_t>(*object)];
     hold = Hold{};

@@ -5,18 +5,21 @@
 
 #include <vector>
 
-#include "byte_stream.h"
-#include "compiled_scene.h"
-#include "prescene/belief/action.h"
-#include "prescene/belief/world_state.h"
+#include "prescene/belief/scene.h"
 #include "prescene/core/random.h"
+#include "prescene/simulation/byte_stream.h"
 
 namespace prescene::simulation {
+
+using geometry::Pose;
+using geometry::Twist;
+using geometry::Vector3d;
 
 /// One instance's actions and how far they are.
 class ActionPlayer {
  public:
-  explicit ActionPlayer(const CompiledScene& scene) : scene_(&scene) {}
+  /// `scene` must outlive it.
+  explicit ActionPlayer(const belief::Scene& scene) : scene_(&scene) {}
 
   /// Starts over: actions' times count from start.time; `stream` is what their errors are drawn from.
   void reset(const std::vector<belief::Action>& actions, const belief::WorldState& start, core::RandomStream stream);
@@ -39,6 +42,10 @@ class ActionPlayer {
   Vector3d pusher_position(int pusher, double time) const;
   /// No action is due or under way, and no timeline has a waypoint to come.
   bool finished(double time) const;
+  /// From when on finished() holds, s.
+  double finish_time() const;
+  /// When something is to be done by advance() next, s; infinite when nothing is.
+  double next_due() const;
   /// Everything that was to come has been done, so that no kinematic body moves from `time` on.
   bool over(double time) const;
 
@@ -79,7 +86,7 @@ class ActionPlayer {
   double begin_of(std::size_t action) const { return start_ + actions_[action].time; }
   Pose timeline_pose(int robot, double time) const;
 
-  const CompiledScene* scene_;
+  const belief::Scene* scene_;
   double start_ = 0.0;
   std::vector<belief::Action> actions_;  // times from start_
   std::vector<Pose> goals_;              // of place and transport, by action

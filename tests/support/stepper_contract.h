@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every stepper does alike: actions (holding, releasing, placing, pushing, pouring, grasping, carrying), contacts
+// and how runs end. A stepper's tests include this and instantiate StepperContract with it.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "prescene/tests/support/simple_scenes.h"
+
+namespace prescene::tests {
+
+struct Stepper {
+  std::string name;
+  std::function<std::unique_ptr<simulation::Simulator>(const Scene&)> make;
+  double precision;  ///< m and m/s: as close as it gets to what is exact.
+};
+
+class StepperContract : public testing::TestWithParam<Stepper> {
+ protected:
+  std::unique_ptr<simulation::Simulator> simulator_of(const Scene& scene) const { return GetParam().make(scene); }
+  /// An error that exact arithmetic would not exceed.
+  double fine(double error) const { return std::max(error, GetParam().precision); }
+  belief::Trajectory run_actions(const Scene& scene, std::vector<belief::Action> actions, double duration,
+                                 double sample_interval = 0.0) const {
+    simulation::RunRequest request;
+    request.actions = std::move(actions);
+    request.stop.duration = duration;
+    request.sample_interval = sample_interval;
+    return run_one(*simulator_of(scene), start_of(scene), request);
+  }
+};
+
+using belief::MotionMode;
+using belief::TrajectoryEnd;
+using geometry::BoxShape;
+
+/// A hand (a plate above the object, overlapping it by 2 mm) that moves along x at 0.5 m/s for two seconds.
+inline Scene held_scene() {
+  Scene scene = floor_scene(primitive_model("box", BoxShape{{0.1, 0.1, 0.1}}));
+  belief::KinematicBody hand;
+  hand.name = "hand";
+  hand.collision = {belief::PrimitiveShape{BoxShape{{0.12, 0.12, 0.02}}, Pose{}}};
+  hand.timeline = {{0.0, Pose::from_translation({0.0, 0.0, 0.558})}, {2.0, Pose::from_translation({1.0, 0.0, 0.558})}};
+  scene.robot.push_back(hand);
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.5})};
+  scene.objects[0].held_by = "hand";
+  return scene;
+}
+
+inline belief::Release release_of(const std::string& object) {
+  belief::Release release;
+  release.object = object;
+  release.retreat = {0.0, 0.0, 0.1};
+  release.retreat_duration = 0.1;
+  return release;
+}
+
+TEST_P(StepperContract, HeldObjectMovesWithItsHand) {
+  const belief::Trajectory run = run_actions(held_scene(), {}, 1.0);
+  const belief::ObjectState end = run.final().objects[0];
+  EXPECT_EQ(end.mode, MotionMode::kHeld);
+  EXPECT_LT((end.X_WO.translation - Vector3d(0.5, 0.0, 0.5)).norm(), fine(1e-9));
+  EXPECT_LT((end.V_WO.linear - Vector3d(0.5, 0.0, 0.0)).norm(), fine(1e-9));
+  EXPECT_TRUE(run.contacts.empty());
+}
+
+TEST_P(StepperContract, ReleasedObjectLeavesWithTheHandsVelocityAndIsNotThrownByTheGrip) {
+  const belief::Trajectory run = run_actions(held_scene(), {{0.5, release_of("object")}}, 0.75);
+  const belief::ObjectState end = run.final().objects[0];
+  const double fall = 0.25;
+  EXPECT_EQ(end.mode, MotionMode::kMoving);
+  EXPECT_LT((end.X_WO.translation - Vector3d(0.375, 0.0, 0.5 - 0.5 * kG * fall * fall)).norm(), fine(1e-6));
+  EXPECT_LT((end.V_WO.linear - Vector3d(0.5, 0.0, -kG * fall)).norm(), fine(1e-9));
+}
+
+TEST_P(StepperContract, DisturbanceOfAReleaseIsAddedToTheVelocity) {
+  belief::Release release = release_of("object");
+  release.disturbance.linear.y = belief::FixedScalar{0.2};
+  release.disturbance.angular.z = belief::FixedScalar{1.5};
+  const belief::Trajectory run = run_actions(held_scene(), {{0.5, release}}, 0.75);
+  const belief::ObjectState end = run.final().objects[0];
+  EXPECT_NEAR(end.X_WO.translation.y(), 0.2 * 0.25, fine(1e-6));
+  EXPECT_LT(geometry::angle_between(end.X_WO.rotation, about(Vector3d::UnitZ(), 1.5 * 0.25)), fine(1e-6));
+}
+
+TEST_P(StepperContract, HandThatHasStoppedReleasesAtRest) {
+  const belief::Trajectory run = run_actions(held_scene(), {{2.0, release_of("object")}}, 4.0);
+  EXPECT_EQ(run.end, TrajectoryEnd::kAtRest);
+  EXPECT_LT((run.final().objects[0].X_WO.translation - Vector3d(1.0, 0.0, 0.05)).norm(), 1e-3);
+  EXPECT_EQ(run.final().objects[0].mode, MotionMode::kResting);
+}
+
+TEST_P(StepperContract, PlacedObjectEndsWhereItWasPut) {
+  belief::Place place;
+  place.object = "object";
+  const Pose goal{about(Vector3d::UnitZ(), 0.5), {0.3, 0.2, 0.05}};
+  place.X_WO = belief::FixedPose{goal};
+  place.duration = 0.5;
+  const belief::Trajectory run = run_actions(held_scene(), {{0.25, place}}, 3.0, 0.1);
+  EXPECT_EQ(run.end, TrajectoryEnd::kAtRest);
+  EXPECT_LT((run.final().objects[0].X_WO.translation - goal.translation).norm(), 1e-4);
+  EXPECT_LT(geometry::angle_between(run.final().objects[0].X_WO.rotation, goal.rotation), 1e-3);
+  // Half way it is half way.
+  for (const WorldState& state : run.states) {
+    if (std::abs(state.time - 0.5) > 1e-6) continue;
+    EXPECT_LT((state.objects[0].X_WO.translation - 0.5 * (Vector3d(0.125, 0, 0.5) + goal.translation)).norm(), 5e-3);
+  }
+}
+
+TEST_P(StepperContract, PoseErrorsOfPlacingAreDrawnPerInstance) {
+  const Scene scene = held_scene();
+  belief::Place place;
+  place.object = "object";
+  belief::BoxPose goal;
+  goal.position = {belief::UniformScalar{0.0, 0.4}, belief::FixedScalar{0.0}, belief::FixedScalar{0.05}};
+  place.X_WO = goal;
+  simulation::RunRequest request;
+  request.actions = {{0.0, place}};
+  const std::vector<WorldState> starts(20, start_of(scene));
+  std::vector<belief::Trajectory> runs(starts.size());
+  core::ThreadPool pool(1);
+  simulator_of(scene)->run(starts, request, core::RandomStream(3, core::Purpose::kAction), 0, pool, runs);
+  double low = 1.0;
+  double high = 0.0;
+  for (const belief::Trajectory& run : runs) {
+    low = std::min(low, run.final().objects[0].X_WO.translation.x());
+    high = std::max(high, run.final().objects[0].X_WO.translation.x());
+  }
+  EXPECT_LT(low, 0.1);
+  EXPECT_GT(high, 0.3);
+}
+
+TEST_P(StepperContract, PusherPushesAndIsNumberedAfterAllOthers) {
+  Scene scene = held_scene();
+  scene.objects[0].held_by.reset();
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.05})};
+  belief::Push push;
+  push.from = {-0.2, 0.0, 0.05};
+  push.to = {0.1, 0.0, 0.05};
+  push.radius = 0.02;
+  const belief::Trajectory run = run_actions(scene, {{0.1, push}}, 3.0);
+  const double x = run.final().objects[0].X_WO.translation.x();
+  EXPECT_NEAR(x, 0.17, 0.02);  // face where the finger's tip stopped, or a little on
+  const auto touched = [&](int other) {
+    for (const belief::ContactInterval& c : run.contacts) {
+      if (c.first == 0 && c.second == other) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(touched(3));  // object 0, floor 1, hand 2, pusher 3
+  EXPECT_FALSE(touched(2));
+}
+
+TEST_P(StepperContract, LateralErrorShiftsThePushToItsLeft) {
+  Scene scene = floor_scene(primitive_model("ball", geometry::Sphere{0.05}));
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.05})};
+  belief::Push push;
+  push.from = {-0.2, 0.0, 0.05};
+  push.to = {0.2, 0.0, 0.05};
+  push.lateral_error = belief::FixedScalar{0.02};
+  const belief::Trajectory run = run_actions(scene, {{0.0, push}}, 1.0);
+  // Pushed on its left side (+y), the ball leaves to the right.
+  EXPECT_LT(run.final().objects[0].X_WO.translation.y(), -0.01);
+}
+
+TEST_P(StepperContract, PourTurnsGraspTakesAndTransportCarries) {
+  Scene scene = held_scene();
+  scene.objects[0].held_by.reset();
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.05})};
+  scene.robot[0].timeline = {{0.0, Pose::from_translation({0.0, 0.0, 0.11})}};
+  belief::Transport transport;
+  transport.object = "object";
+  transport.X_WO = belief::FixedPose{Pose::from_translation({0.2, 0.1, 0.4})};
+  belief::Pour pour;
+  pour.container = "object";
+  pour.axis_W = Vector3d::UnitX();
+  pour.angle = 2.0;
+  const belief::Trajectory run =
+      run_actions(scene, {{0.5, belief::Grasp{"object", "hand"}}, {0.6, transport}, {1.7, pour}}, 4.0);
+  const belief::ObjectState end = run.final().objects[0];
+  EXPECT_EQ(end.mode, MotionMode::kHeld);
+  EXPECT_LT((end.X_WO.translation - Vector3d(0.2, 0.1, 0.4)).norm(), fine(1e-9));
+  EXPECT_LT(geometry::angle_between(end.X_WO.rotation, about(Vector3d::UnitX(), 2.0)), fine(1e-6));
+}
+
+TEST_P(StepperContract, HeldObjectsPushOthers) {
+  Scene scene = held_scene();
+  scene.supports.clear();
+  scene.gravity_W.setZero();
+  add_object(scene, primitive_model("free", geometry::Sphere{0.05}), "free");
+  scene.objects[1].pose = belief::FixedPose{Pose::from_translation({0.3, 0.0, 0.5})};
+  const belief::Trajectory run = run_actions(scene, {}, 1.0);
+  EXPECT_GE(run.final().objects[1].X_WO.translation.x(), 0.6 - 1e-3);
+  ASSERT_FALSE(run.contacts.empty());
+  EXPECT_EQ(run.contacts[0].first, 0);
+  EXPECT_EQ(run.contacts[0].second, 1);
+  EXPECT_NEAR(run.contacts[0].begin, 0.4, 0.02);
+}
+
+TEST_P(StepperContract, FallingOffTheWorldIsNoticedAndFrozen) {
+  Scene scene;
+  scene.name = "void";
+  add_object(scene, primitive_model("ball", geometry::Sphere{0.05}), "ball");
+  WorldState start = start_of(scene);
+  simulation::RunRequest request;
+  request.stop.duration = 10.0;
+  request.stop.world_radius = 5.0;
+  const belief::Trajectory run = run_one(*simulator_of(scene), start, request);
+  EXPECT_EQ(run.end, TrajectoryEnd::kLeftTheWorld);
+  EXPECT_NEAR(run.final().objects[0].X_WO.translation.z(), -5.0, 0.1);
+  EXPECT_NEAR(run.simulated_seconds, std::sqrt(2.0 * 5.0 / kG), 0.01);
+}
+
+TEST_P(StepperContract, NotANumberIsDivergenceNotAnAnswer) {
+  Scene scene = floor_scene(primitive_model("ball", geometry::Sphere{0.05}));
+  WorldState start = start_of(scene);
+  start.objects[0].X_WO.translation.z() = 1.0;
+  start.objects[0].V_WO.linear.x() = std::nan("");
+  simulation::RunRequest request;
+  const belief::Trajectory run = run_one(*simulator_of(scene), start, request);
+  EXPECT_EQ(run.end, TrajectoryEnd::kDiverged);
+}
+
+TEST_P(StepperContract, CancelledRunsSaySo) {
+  const Scene scene = floor_scene(primitive_model("ball", geometry::Sphere{0.05}));
+  const std::vector<WorldState> starts(3, start_of(scene));
+  std::vector<belief::Trajectory> runs(3);
+  core::ThreadPool pool(1);
+  core::Cancellation cancellation;
+  cancellation.request();
+  simulator_of(scene)->run(starts, {}, core::RandomStream(3, core::Purpose::kAction), 0, pool, runs, &cancellation);
+  for (const belief::Trajectory& run : runs) EXPECT_EQ(run.end, TrajectoryEnd::kCancelled);
+}
+
+TEST_P(StepperContract, StatesAreKeptAtTheSampleInterval) {
+  Scene scene = floor_scene(primitive_model("ball", geometry::Sphere{0.05}));
+  WorldState start = start_of(scene);
+  start.time = 2.0;
+  start.objects[0].X_WO.translation.z() = 3.0;
+  simulation::RunRequest request;
+  request.stop.duration = 0.55;
+  request.sample_interval = 0.1;
+  const belief::Trajectory run = run_one(*simulator_of(scene), start, request);
+  ASSERT_EQ(run.states.size(), 7u);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(run.states[i].time, 2.0 + 0.1 * static_cast<double>(i), 0.5 / 240.0);
+  EXPECT_NEAR(run.states[6].time, 2.55, 1e-9);
+  EXPECT_EQ(run.end, TrajectoryEnd::kDuration);
+}
+
+TEST_P(StepperContract, IntervalsBeginAtTheImpactAndCarryItsImpulse) {
+  ObjectModel box = primitive_model("box", BoxShape{{0.1, 0.1, 0.1}}, 2.0);
+  Scene scene = floor_scene(box);
+  WorldState start = start_of(scene);
+  const double fall = 0.3;
+  start.objects[0].X_WO.translation.z() = 0.05 + fall;
+  simulation::RunRequest request;
+  const belief::Trajectory run = run_one(*simulator_of(scene), start, request);
+  ASSERT_EQ(run.contacts.size(), 1u);
+  const belief::ContactInterval& c = run.contacts[0];
+  EXPECT_EQ(c.first, 0);
+  EXPECT_EQ(c.second, 1);
+  EXPECT_NEAR(c.begin, std::sqrt(2.0 * fall / kG), 1.5 / 240.0);
+  EXPECT_NEAR(c.end, run.final().time, 1e-9);
+  EXPECT_NEAR(c.largest_impulse, 2.0 * std::sqrt(2.0 * kG * fall), 0.1);
+  EXPECT_NEAR(c.normal_z, 1.0, fine(1e-9));
+}
+
+}  // namespace prescene::tests
