@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "lane_state.h"
 #include "prescene/belief/scene.h"
@@ -14,8 +15,17 @@ struct CompiledLockstep {
   belief::Scene scene;
   LockstepOptions options;
   LockstepScene lanes;
-  geometry::Quaterniond R_OP;  ///< Principal axes of the object.
+  std::vector<geometry::Quaterniond> R_OP;  ///< Principal axes, by object.
+  std::vector<int> robot_bodies;            ///< In lanes.bodies, by robot body; -1: it has no shape.
+  std::vector<double> pushers;              ///< Their radii; the last of lanes.bodies.
+
+  int pusher_body(std::size_t pusher) const { return static_cast<int>(lanes.bodies.size() - pushers.size() + pusher); }
 };
+
+std::vector<double> pusher_radii(const std::vector<belief::Action>& actions);
+/// A copy that has the balls of push actions, too.
+std::shared_ptr<const CompiledLockstep> with_pushers(const CompiledLockstep& compiled,
+                                                     const std::vector<double>& radii);
 
 core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const belief::Scene& scene, ShapeStore& shapes,
                                                                        const LockstepOptions& options);

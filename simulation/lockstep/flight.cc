@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Free flight of all live instances, and which of them come near what.
+// Free flight of all live instances, and which of their objects come near what.
 #include <cmath>
 
 #include "lane_state.h"
@@ -51,16 +51,17 @@ HWY_INLINE void store(const Mat3<V>& m, const Rows<9>& rows, int at) {
   store(m.r2, Rows<3>{rows[6], rows[7], rows[8]}, at);
 }
 
-void fly_lanes(const LockstepScene* scene, int count, LaneState* state) {
+void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* state) {
   const D d;
+  const LaneBody& body = scene->bodies[static_cast<std::size_t>(object)];
   const V dt = set<V>(scene->settings.dt);
   const V half_dt = set<V>(0.5 * scene->settings.dt);
   const Vec3<V> gravity = set3<V>(scene->settings.gravity);
-  const Vec3<V> moments = set3<V>(scene->unit_moments);
-  const Vec3<V> inverse =
-      set3<V>(1.0 / scene->unit_moments[0], 1.0 / scene->unit_moments[1], 1.0 / scene->unit_moments[2]);
-  const V radius = set<V>(scene->radius);
-  for (int at = 0; at < count; at += static_cast<int>(hn::Lanes(d))) {
+  const Vec3<V> moments = set3<V>(body.unit_moments);
+  const Vec3<V> inverse = set3<V>(1.0 / body.unit_moments[0], 1.0 / body.unit_moments[1], 1.0 / body.unit_moments[2]);
+  const V radius = set<V>(body.radius);
+  const int first = state->at(object, 0);
+  for (int at = first; at < first + count; at += static_cast<int>(hn::Lanes(d))) {
     const Vec3<V> p = load(state->p, at);
     const Vec3<V> v = load(state->v, at);
     const Vec3<V> w = load(state->w, at);
@@ -86,17 +87,35 @@ void fly_lanes(const LockstepScene* scene, int count, LaneState* state) {
   }
 }
 
-void find_pairs_lanes(const LockstepScene* scene, int part_index, const std::uint8_t* wanted, int count,
-                      LaneState* state, LanePairs* pairs) {
+HWY_INLINE std::uint32_t bits_of(hn::Mask<D> mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(D(), mask, bytes);
+  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+
+HWY_INLINE std::uint32_t wanted_of(const PartQuery& query, int slot) {
+  const auto count = static_cast<int>(query.wanted.size());
+  std::uint32_t bits = 0;
+  for (int i = 0; i < static_cast<int>(hn::Lanes(D())) && slot + i < count; ++i) {
+    bits |= static_cast<std::uint32_t>(query.wanted[static_cast<std::size_t>(slot + i)] != 0) << i;
+  }
+  return bits;
+}
+
+HWY_INLINE const ConvexPart& part_of(const LockstepScene& scene, const PartQuery& query) {
+  return scene.bodies[static_cast<std::size_t>(query.object)].parts[static_cast<std::size_t>(query.part)];
+}
+
+void find_pairs_lanes(const LockstepScene* scene, const PartQuery* query, LaneState* state, LanePairs* pairs) {
   const D d;
-  const ConvexPart& part = scene->parts[static_cast<std::size_t>(part_index)];
+  const ConvexPart& part = part_of(*scene, *query);
   const V zero = set<V>(0.0);
   const V ball = set<V>(part.ball);
   const auto lanes = static_cast<int>(hn::Lanes(d));
-  for (int at = 0; at < count; at += lanes) {
-    std::uint32_t allowed = 0;
-    for (int i = 0; i < lanes && at + i < count; ++i) allowed |= static_cast<std::uint32_t>(wanted[at + i] != 0) << i;
+  for (int slot = 0; slot < static_cast<int>(query->wanted.size()); slot += lanes) {
+    const std::uint32_t allowed = wanted_of(*query, slot);
     if (allowed == 0) continue;
+    const int at = state->at(query->object, slot);
     const Mat3<V> R = load(state->R, at);
     const Vec3<V> center = load(state->p, at) + R * (set3<V>(part.center) - load(state->com, at));
     const V range = hn::Load(d, state->travel + at) + set<V>(kLaneMargin);
@@ -107,17 +126,15 @@ void find_pairs_lanes(const LockstepScene* scene, int part_index, const std::uin
       const Vec3<V> reach = half + set3<V>(fixed.shape.box_half);
       const auto overlap = hn::And(hn::Le(hn::Abs(apart.x), reach.x),
                                    hn::And(hn::Le(hn::Abs(apart.y), reach.y), hn::Le(hn::Abs(apart.z), reach.z)));
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, overlap, bits);
-      std::uint32_t near = (bits[0] | static_cast<std::uint32_t>(bits[1]) << 8) & allowed;
+      std::uint32_t near = bits_of(overlap) & allowed;
       if (near == 0) continue;
-      if (fixed.shape.kind == CoreKind::kHull) {
+      if (fixed.shape.kind != CoreKind::kBox) {
         for (int i = 0; i < lanes; ++i) {
-          if (near >> i & 1U) pairs->hulls[f].push_back({at + i, static_cast<std::int32_t>(f)});
+          if (near >> i & 1U) pairs->shapes[f].push_back({at + i, static_cast<std::int32_t>(f)});
         }
         continue;
       }
-      const Vec3<V> c = transposed(set_matrix<V>(fixed.R_WB), apart);
+      const Vec3<V> c = transposed(set_matrix<V>(fixed.shape.R_PS), apart);
       const Vec3<V> a{hn::Abs(c.x), hn::Abs(c.y), hn::Abs(c.z)};
       const Vec3<V> box = set3<V>(fixed.full_half);
       const Vec3<V> out{hn::Max(a.x - box.x, zero), hn::Max(a.y - box.y, zero), hn::Max(a.z - box.z, zero)};
@@ -130,11 +147,6 @@ void find_pairs_lanes(const LockstepScene* scene, int part_index, const std::uin
       const auto over_x = hn::And(hn::Ge(a.x, box.x), hn::And(inner_y, inner_z));
       const auto over_y = hn::And(hn::Ge(a.y, box.y), hn::And(inner_z, inner_x));
       const auto over_z = hn::And(hn::Ge(a.z, box.z), hn::And(inner_x, inner_y));
-      const auto bits_of = [&](auto mask) HWY_ATTR {
-        std::uint8_t b[8] = {};
-        hn::StoreMaskBits(d, mask, b);
-        return b[0] | static_cast<std::uint32_t>(b[1]) << 8;
-      };
       near &= bits_of(in_ball);
       if (near == 0) continue;
       const std::uint32_t over[3] = {bits_of(over_x), bits_of(over_y), bits_of(over_z)};
@@ -156,11 +168,47 @@ void find_pairs_lanes(const LockstepScene* scene, int part_index, const std::uin
   }
 }
 
-void measure_lanes(const LockstepScene* scene, int count, LaneState* state) {
+void find_body_pairs_lanes(const LockstepScene* scene, const PartQuery* query, int body, LaneState* state,
+                           LanePairs* pairs) {
   const D d;
-  const Vec3<V> moments = set3<V>(scene->unit_moments);
+  const ConvexPart& part = part_of(*scene, *query);
+  const std::vector<ConvexPart>& others = scene->bodies[static_cast<std::size_t>(body)].parts;
+  const auto first_part = static_cast<std::size_t>(scene->first_part[static_cast<std::size_t>(body)]);
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  for (int slot = 0; slot < static_cast<int>(query->wanted.size()); slot += lanes) {
+    const std::uint32_t allowed = wanted_of(*query, slot);
+    if (allowed == 0) continue;
+    const int at = state->at(query->object, slot);
+    const int at_other = state->at(body, slot);
+    const Mat3<V> R = load(state->R, at);
+    const Vec3<V> center = load(state->p, at) + R * (set3<V>(part.center) - load(state->com, at));
+    const V range = hn::Load(d, state->travel + at) + hn::Load(d, state->travel + at_other) + set<V>(kLaneMargin);
+    const Vec3<V> half = abs(R) * set3<V>(part.box_half) + Vec3<V>{range, range, range};
+    const Mat3<V> R_other = load(state->R, at_other);
+    const Vec3<V> p_other = load(state->p, at_other);
+    const Vec3<V> com_other = load(state->com, at_other);
+    for (std::size_t j = 0; j < others.size(); ++j) {
+      const Vec3<V> apart = center - p_other - R_other * (set3<V>(others[j].center) - com_other);
+      const Vec3<V> reach = half + abs(R_other) * set3<V>(others[j].box_half);
+      const V ball = set<V>(part.ball + others[j].ball) + range;
+      const auto overlap =
+          hn::And(hn::Le(dot(apart, apart), ball * ball),
+                  hn::And(hn::Le(hn::Abs(apart.x), reach.x),
+                          hn::And(hn::Le(hn::Abs(apart.y), reach.y), hn::Le(hn::Abs(apart.z), reach.z))));
+      const std::uint32_t near = bits_of(overlap) & allowed;
+      for (int i = 0; near >> i != 0; ++i) {
+        if (near >> i & 1U) pairs->shapes[first_part + j].push_back({at + i, at_other + i});
+      }
+    }
+  }
+}
+
+void measure_lanes(const LockstepScene* scene, int object, int count, LaneState* state) {
+  const D d;
+  const Vec3<V> moments = set3<V>(scene->bodies[static_cast<std::size_t>(object)].unit_moments);
   const Vec3<V> origin = set3<V>(scene->origin);
-  for (int at = 0; at < count; at += static_cast<int>(hn::Lanes(d))) {
+  const int first = state->at(object, 0);
+  for (int at = first; at < first + count; at += static_cast<int>(hn::Lanes(d))) {
     const Vec3<V> v = load(state->v, at);
     const Vec3<V> w = load(state->w, at);
     const Vec3<V> w_P = transposed(matrix_of(load(state->q, at)), w);
@@ -181,30 +229,33 @@ namespace prescene::simulation {
 
 HWY_EXPORT(fly_lanes);
 HWY_EXPORT(find_pairs_lanes);
+HWY_EXPORT(find_body_pairs_lanes);
 HWY_EXPORT(measure_lanes);
 
-void fly(const LockstepScene& scene, int count, LaneState& state) {
-  HWY_DYNAMIC_DISPATCH(fly_lanes)(&scene, count, &state);
+void fly(const LockstepScene& scene, int object, int count, LaneState& state) {
+  HWY_DYNAMIC_DISPATCH(fly_lanes)(&scene, object, count, &state);
 }
 
-void find_pairs(const LockstepScene& scene, int part, std::span<const std::uint8_t> wanted, LaneState& state,
-                LanePairs& pairs) {
-  HWY_DYNAMIC_DISPATCH(find_pairs_lanes)
-  (&scene, part, wanted.data(), static_cast<int>(wanted.size()), &state, &pairs);
+void find_pairs(const LockstepScene& scene, const PartQuery& query, LaneState& state, LanePairs& pairs) {
+  HWY_DYNAMIC_DISPATCH(find_pairs_lanes)(&scene, &query, &state, &pairs);
 }
 
-void measure(const LockstepScene& scene, int count, LaneState& state) {
-  HWY_DYNAMIC_DISPATCH(measure_lanes)(&scene, count, &state);
+void find_body_pairs(const LockstepScene& scene, const PartQuery& query, int body, LaneState& state, LanePairs& pairs) {
+  HWY_DYNAMIC_DISPATCH(find_body_pairs_lanes)(&scene, &query, body, &state, &pairs);
 }
 
-void land(std::span<const std::int32_t> slots, LaneState& state) {
-  for (const std::int32_t slot : slots) {
+void measure(const LockstepScene& scene, int object, int count, LaneState& state) {
+  HWY_DYNAMIC_DISPATCH(measure_lanes)(&scene, object, count, &state);
+}
+
+void land(std::span<const std::int32_t> objects, LaneState& state) {
+  for (const std::int32_t at : objects) {
     for (std::size_t i = 0; i < 3; ++i) {
-      state.p[i][slot] = state.flown_p[i][slot];
-      state.v[i][slot] = state.flown_v[i][slot];
-      state.w[i][slot] = state.flown_w[i][slot];
+      state.p[i][at] = state.flown_p[i][at];
+      state.v[i][at] = state.flown_v[i][at];
+      state.w[i][at] = state.flown_w[i][at];
     }
-    for (std::size_t i = 0; i < 4; ++i) state.q[i][slot] = state.flown_q[i][slot];
+    for (std::size_t i = 0; i < 4; ++i) state.q[i][at] = state.flown_q[i][at];
   }
 }
 

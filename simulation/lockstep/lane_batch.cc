@@ -14,53 +14,62 @@ constexpr std::int64_t kCancellationSteps = 16;
 
 }  // namespace
 
-void touches_of(LaneEngine& engine, int slot, double mass, std::vector<LaneTouch>& touches) {
+void touches_of(LaneEngine& engine, int slot, const LaneInstance& instance, std::vector<LaneTouch>& touches) {
   touches.clear();
   const CompiledLockstep& scene = engine.scene();
-  const auto contacts = engine.contacts(slot);
-  if (contacts.empty()) return;
   const auto counts = [&](const LaneContact& c) {
     return c.impulse > 0 || static_cast<double>(c.gap) <= scene.options.touching_distance;
   };
-  const auto body_of = [&](const LaneContact& c) { return scene.lanes.fixed[static_cast<std::size_t>(c.part)].body; };
-  for (const LaneContact& c : contacts) {
-    if (!counts(c)) continue;
-    const int body = body_of(c);
-    const bool known = std::any_of(touches.begin(), touches.end(), [&](const LaneTouch& t) { return t.body == body; });
-    if (!known) touches.push_back({body, 0.0, 0.0});
-  }
-  std::sort(touches.begin(), touches.end(), [](const LaneTouch& a, const LaneTouch& b) { return a.body < b.body; });
-  if (touches.empty()) return;
-  const Vector3d up = engine.rotation(slot).conjugate() * Vector3d::UnitZ();
-  for (LaneTouch& touch : touches) {
-    Vector3d normal = Vector3d::Zero();
+  const auto body_of = [&](const LaneContact& c) { return scene.lanes.parts[static_cast<std::size_t>(c.part)].number; };
+  for (int object = 0; object < engine.objects(); ++object) {
+    const auto contacts = engine.contacts(slot, object);
+    if (contacts.empty()) continue;
+    const std::size_t begin = touches.size();
     for (const LaneContact& c : contacts) {
-      if (!counts(c) || body_of(c) != touch.body) continue;
-      const double impulse = static_cast<double>(c.impulse) * mass;
-      touch.impulse += impulse;
-      // The mean is weighted by impulse; touching without pressing counts only where nothing presses.
-      normal += std::max(impulse, 1e-12) * Vector3d(static_cast<double>(c.normal[0]), static_cast<double>(c.normal[1]),
-                                                    static_cast<double>(c.normal[2]));
+      if (!counts(c)) continue;
+      const int body = body_of(c);
+      const bool known = std::any_of(touches.begin() + static_cast<std::ptrdiff_t>(begin), touches.end(),
+                                     [&](const LaneTouch& t) { return t.second == body; });
+      if (!known) touches.push_back({object, body, 0.0, 0.0});
     }
-    const double norm = normal.norm();
-    touch.normal_z = norm > 0.0 ? up.dot(normal) / norm : 0.0;
+    std::sort(touches.begin() + static_cast<std::ptrdiff_t>(begin), touches.end(),
+              [](const LaneTouch& a, const LaneTouch& b) { return a.second < b.second; });
+    if (touches.size() == begin) continue;
+    const double unit = engine.objects() == 1 ? instance.mass(0) : 1.0;
+    const Vector3d up = engine.rotation(slot, object).conjugate() * Vector3d::UnitZ();
+    for (std::size_t i = begin; i < touches.size(); ++i) {
+      LaneTouch& touch = touches[i];
+      Vector3d normal = Vector3d::Zero();
+      for (const LaneContact& c : contacts) {
+        if (!counts(c) || body_of(c) != touch.second) continue;
+        const double impulse = static_cast<double>(c.impulse) * unit;
+        touch.impulse += impulse;
+        // The mean is weighted by impulse; touching without pressing counts only where nothing presses.
+        normal +=
+            std::max(impulse, 1e-12) * Vector3d(static_cast<double>(c.normal[0]), static_cast<double>(c.normal[1]),
+                                                static_cast<double>(c.normal[2]));
+      }
+      const double norm = normal.norm();
+      touch.normal_z = norm > 0.0 ? up.dot(normal) / norm : 0.0;
+    }
   }
 }
 
 LaneBatch::LaneBatch(std::shared_ptr<const CompiledLockstep> scene)
     : scene_(std::move(scene)), engine_(scene_, scene_->options.live_instances) {
-  const std::size_t bodies = 1 + scene_->scene.supports.size();
+  bodies_ = static_cast<int>(scene_->scene.objects.size() + scene_->scene.supports.size() + scene_->scene.robot.size() +
+                             scene_->pushers.size());
+  const std::size_t pairs = scene_->scene.objects.size() * static_cast<std::size_t>(bodies_);
   for (int i = 0; i < engine_.slots(); ++i) {
-    auto slot = std::make_unique<Slot>();
-    slot->open.resize(bodies);
-    slot->touches.reserve(bodies);
+    auto slot = std::make_unique<Slot>(*scene_);
+    slot->open.resize(pairs);
+    slot->touches.reserve(pairs);
     slots_.push_back(std::move(slot));
   }
   const auto count = slots_.size();
   steps_.reserve(count);
   wanted_.reserve(count);
   ended_.reserve(count);
-  rest_steps_ = static_cast<int>(std::ceil(scene_->options.rest.time / scene_->options.step));
 }
 
 void LaneBatch::run(LaneQueue& queue, int live) {
@@ -85,26 +94,32 @@ void LaneBatch::run(LaneQueue& queue, int live) {
       remove_ended();
       continue;
     }
+    for (int at = 0; at < live_; ++at) {
+      Slot& slot = *slots_[static_cast<std::size_t>(at)];
+      if (slot.mode != Mode::kNudged) slot.instance.before_step(engine_, at);
+    }
     wanted_.assign(static_cast<std::size_t>(live_), 1);
     steps_.assign(static_cast<std::size_t>(live_), 1);
     engine_.find_contacts(wanted_);
-    for (int at = 0; at < live_; ++at) {
-      Slot& slot = *slots_[static_cast<std::size_t>(at)];
-      if (slot.mode != Mode::kCalm) continue;
-      steps_[static_cast<std::size_t>(at)] = 0;
-      const LaneFooting footing = footing_of(engine_, at);
-      if (footing.firm) {
-        finish(at, belief::TrajectoryEnd::kAtRest);
-      } else {
-        slot.mode = Mode::kNudged;
-        slot.nudges.begin(engine_, at, footing.height);
-      }
-    }
+    test_balance();
     engine_.advance(steps_);
     for (int at = 0; at < live_; ++at) {
       if (steps_[static_cast<std::size_t>(at)]) after_step(at);
     }
     remove_ended();
+  }
+}
+
+void LaneBatch::test_balance() {
+  for (int at = 0; at < live_; ++at) {
+    Slot& slot = *slots_[static_cast<std::size_t>(at)];
+    if (slot.mode != Mode::kCalm) continue;
+    steps_[static_cast<std::size_t>(at)] = 0;
+    if (slot.nudges.stands_or_begins(engine_, at)) {
+      finish_at_rest(at);
+    } else {
+      slot.mode = Mode::kNudged;
+    }
   }
 }
 
@@ -123,37 +138,42 @@ bool LaneBatch::take(LaneQueue& queue) {
 void LaneBatch::start(Slot& slot, int at, std::size_t index, LaneQueue& queue) {
   slot.index = index;
   slot.mode = Mode::kRuns;
-  slot.done = 0;
-  slot.calm_steps = 0;
   slot.tested = false;
   slot.next_sample = queue.request->sample_interval;
   slot.until_asked = queue.request->end_rule_steps;
   slot.touches.clear();
   for (Open& open : slot.open) open.open = false;
-  engine_.reset(at, queue.starts[index].objects.front());
+  const auto particle = static_cast<std::uint32_t>(queue.first_instance + index);
+  slot.instance.start(engine_, at, queue.starts[index], queue.request->actions, queue.stream->at(0, particle));
   belief::Trajectory& trajectory = queue.trajectories[index];
   trajectory = belief::Trajectory{};
   trajectory.states.push_back(queue.starts[index]);
+  skip_held(at);
 }
 
-void LaneBatch::read(int at, belief::WorldState& state) const {
-  const Slot& slot = *slots_[static_cast<std::size_t>(at)];
-  const belief::WorldState& begin = queue_->starts[slot.index];
-  state = begin;
-  state.time = begin.time + static_cast<double>(slot.done) * scene_->options.step;
-  belief::ObjectState& object = state.objects.front();
-  engine_.read(at, object);
-  object.mode = slot.calm_steps >= rest_steps_ ? belief::MotionMode::kResting : belief::MotionMode::kMoving;
+void LaneBatch::skip_held(int at) {
+  Slot& slot = *slots_[static_cast<std::size_t>(at)];
+  const double dt = scene_->options.step;
+  // Up to the step before the next that is kept or the last, which are taken as any other.
+  double until = static_cast<double>(most_steps_) - 1.0;
+  if (queue_->request->sample_interval > 0.0) until = std::min(until, slot.next_sample / dt - 1.5);
+  const auto most = static_cast<std::int64_t>(until - static_cast<double>(slot.instance.steps()));
+  const std::int64_t skipped = slot.instance.skip_held(engine_, at, most);
+  if (skipped == 0 || !queue_->request->end_rule) return;
+  // What is held is not decided: the rule is asked when it would be next.
+  const int each = std::max(queue_->request->end_rule_steps, 1);
+  slot.until_asked = static_cast<int>((slot.until_asked - skipped) % each);
+  if (slot.until_asked <= 0) slot.until_asked += each;
 }
 
 void LaneBatch::note_touches(int at) {
   Slot& slot = *slots_[static_cast<std::size_t>(at)];
   const belief::WorldState& begin = queue_->starts[slot.index];
-  touches_of(engine_, at, begin.objects.front().physical.mass, slot.touches);
-  const double end_time = begin.time + static_cast<double>(slot.done) * scene_->options.step;
-  const double begin_time = begin.time + static_cast<double>(slot.done - 1) * scene_->options.step;
+  touches_of(engine_, at, slot.instance, slot.touches);
+  const double end_time = slot.instance.time();
+  const double begin_time = begin.time + static_cast<double>(slot.instance.steps() - 1) * scene_->options.step;
   for (const LaneTouch& touch : slot.touches) {
-    Open& open = slot.open[static_cast<std::size_t>(touch.body)];
+    Open& open = open_of(slot, touch);
     if (open.open && begin_time - open.interval.end > scene_->options.contact_merge_time) {
       queue_->trajectories[slot.index].contacts.push_back(open.interval);
       open.open = false;
@@ -161,7 +181,8 @@ void LaneBatch::note_touches(int at) {
     if (!open.open) {
       open.open = true;
       open.interval = {};
-      open.interval.second = touch.body;
+      open.interval.first = touch.first;
+      open.interval.second = touch.second;
       open.interval.begin = begin_time;
     }
     open.interval.end = end_time;
@@ -176,7 +197,7 @@ void LaneBatch::after_step(int at) {
     const NudgeTest::Verdict verdict = slot.nudges.after_step(engine_, at);
     if (verdict == NudgeTest::Verdict::kGoesOn) return;
     if (verdict == NudgeTest::Verdict::kReturns) {
-      finish(at, belief::TrajectoryEnd::kAtRest);
+      finish_at_rest(at);
       return;
     }
     slot.mode = Mode::kRuns;
@@ -184,51 +205,67 @@ void LaneBatch::after_step(int at) {
     go_on(at);
     return;
   }
-  ++slot.done;
+  slot.instance.after_step(engine_, at);
   if (engine_.diverged(at)) {
     finish(at, belief::TrajectoryEnd::kDiverged);
     return;
   }
-  slot.calm_steps = engine_.energy(at) < scene_->options.rest.energy ? slot.calm_steps + 1 : 0;
   note_touches(at);
-  const StopRule& stop = queue_->request->stop;
-  if (engine_.distance_squared(at) > stop.world_radius * stop.world_radius) {
-    engine_.stop(at);
-    finish(at, belief::TrajectoryEnd::kLeftTheWorld);
-    return;
-  }
-  if (slot.calm_steps < rest_steps_) slot.tested = false;
-  if (stop.stop_at_rest && slot.calm_steps >= rest_steps_ && !slot.tested) {
+  freeze_beyond(at);
+  const bool calm = slot.instance.calm(engine_, at);
+  if (!calm) slot.tested = false;
+  if (!queue_->request->stop.stop_at_rest) {
+    if (slot.instance.all_frozen(engine_, at)) {
+      finish_at_rest(at);
+      return;
+    }
+  } else if (calm && !slot.tested) {
     slot.mode = Mode::kCalm;
     return;
   }
   go_on(at);
 }
 
+void LaneBatch::freeze_beyond(int at) {
+  const double radius = queue_->request->stop.world_radius;
+  for (int object = 0; object < engine_.objects(); ++object) {
+    if (engine_.free(at, object) && engine_.distance_squared(at, object) > radius * radius) engine_.freeze(at, object);
+  }
+}
+
+void LaneBatch::finish_at_rest(int at) {
+  bool left = false;
+  for (int object = 0; object < engine_.objects(); ++object) {
+    left = left || engine_.motion(at, object) == LaneMotion::kFrozen;
+  }
+  finish(at, left ? belief::TrajectoryEnd::kLeftTheWorld : belief::TrajectoryEnd::kAtRest);
+}
+
 void LaneBatch::go_on(int at) {
   Slot& slot = *slots_[static_cast<std::size_t>(at)];
-  if (slot.done >= most_steps_) {
+  if (slot.instance.steps() >= most_steps_) {
     finish(at, belief::TrajectoryEnd::kDuration);
     return;
   }
   const RunRequest& request = *queue_->request;
   const double dt = scene_->options.step;
-  const double elapsed = static_cast<double>(slot.done) * dt;
+  const double elapsed = static_cast<double>(slot.instance.steps()) * dt;
   if (request.end_rule && --slot.until_asked <= 0) {
     slot.until_asked = request.end_rule_steps;
-    read(at, seen_);
+    slot.instance.read(engine_, at, seen_);
     if (request.end_rule->ends(seen_, request.stop.duration - elapsed)) {
       finish(at, belief::TrajectoryEnd::kDecided);
       return;
     }
   }
   const double interval = request.sample_interval;
-  if (interval <= 0.0) return;
-  if (elapsed < slot.next_sample - 0.5 * dt) return;
-  auto& states = queue_->trajectories[slot.index].states;
-  states.emplace_back();
-  read(at, states.back());
-  while (slot.next_sample - 0.5 * dt <= elapsed) slot.next_sample += interval;
+  if (interval > 0.0 && elapsed >= slot.next_sample - 0.5 * dt) {
+    auto& states = queue_->trajectories[slot.index].states;
+    states.emplace_back();
+    slot.instance.read(engine_, at, states.back());
+    while (slot.next_sample - 0.5 * dt <= elapsed) slot.next_sample += interval;
+  }
+  skip_held(at);
 }
 
 void LaneBatch::finish(int at, belief::TrajectoryEnd end) {
@@ -237,9 +274,9 @@ void LaneBatch::finish(int at, belief::TrajectoryEnd end) {
   trajectory.end = end;
   if (end != belief::TrajectoryEnd::kDiverged) {
     belief::WorldState final_state;
-    read(at, final_state);
+    slot.instance.read(engine_, at, final_state);
     trajectory.states.push_back(std::move(final_state));
-    for (const LaneTouch& touch : slot.touches) trajectory.final_contacts.emplace_back(0, touch.body);
+    for (const LaneTouch& touch : slot.touches) trajectory.final_contacts.emplace_back(touch.first, touch.second);
   } else {
     // The last state that was kept is the last that means something.
     trajectory.states.push_back(trajectory.states.back());
@@ -251,7 +288,7 @@ void LaneBatch::finish(int at, belief::TrajectoryEnd end) {
             [](const belief::ContactInterval& a, const belief::ContactInterval& b) {
               return std::tie(a.begin, a.first, a.second) < std::tie(b.begin, b.first, b.second);
             });
-  trajectory.simulated_seconds = static_cast<double>(slot.done) * scene_->options.step;
+  trajectory.simulated_seconds = static_cast<double>(slot.instance.steps()) * scene_->options.step;
   ended_[static_cast<std::size_t>(at)] = 1;
 }
 

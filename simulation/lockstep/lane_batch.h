@@ -8,25 +8,28 @@
 #include <vector>
 
 #include "lane_engine.h"
+#include "lane_instance.h"
 #include "lane_rest.h"
 #include "prescene/core/progress.h"
 
 namespace prescene::simulation {
 
-/// What the object did to a support in a step. Bodies as in belief::ContactInterval; the first is the object, 0.
+/// What two bodies did to each other in a step, numbered as in belief::ContactInterval.
 struct LaneTouch {
-  int body = 0;
+  int first = 0, second = 0;
   double impulse = 0.0;   ///< N s
-  double normal_z = 0.0;  ///< Of the mean normal.
+  double normal_z = 0.0;  ///< Of the mean normal, from the second to the first.
 };
 /// Touching bodies of a slot's last step, ascending, into `touches` (scratch reused).
-void touches_of(LaneEngine& engine, int slot, double mass, std::vector<LaneTouch>& touches);
+void touches_of(LaneEngine& engine, int slot, const LaneInstance& instance, std::vector<LaneTouch>& touches);
 
 /// The instances of one call of Simulator::run, shared by its threads.
 struct LaneQueue {
   std::span<const belief::WorldState> starts;
   const RunRequest* request = nullptr;
   std::span<belief::Trajectory> trajectories;
+  const core::RandomStream* stream = nullptr;
+  std::uint32_t first_instance = 0;
   const core::Cancellation* cancellation = nullptr;
   std::atomic<std::size_t> next{0};
 };
@@ -34,6 +37,8 @@ struct LaneQueue {
 class LaneBatch {
  public:
   explicit LaneBatch(std::shared_ptr<const CompiledLockstep> scene);
+
+  const std::shared_ptr<const CompiledLockstep>& scene() const { return scene_; }
 
   /// Takes instances from the queue until it is empty and all taken are done; at most `live` at once.
   void run(LaneQueue& queue, int live);
@@ -49,26 +54,34 @@ class LaneBatch {
     bool open = false;
   };
   struct Slot {
+    explicit Slot(const CompiledLockstep& scene) : instance(scene), nudges(scene.lanes.objects) {}
+
     std::size_t index = 0;
     Mode mode = Mode::kRuns;
-    std::int64_t done = 0;
-    int calm_steps = 0;
+    LaneInstance instance;
     bool tested = false;  // and found to balance, in this calm
     double next_sample = 0.0;
     int until_asked = 0;  // steps until the end rule is asked
     std::vector<LaneTouch> touches;
-    std::vector<Open> open;  // by body
+    std::vector<Open> open;  // by pair
     NudgeTest nudges;
   };
 
   bool take(LaneQueue& queue);
   void start(Slot& slot, int at, std::size_t index, LaneQueue& queue);
+  void test_balance();
   void after_step(int at);
   void note_touches(int at);
   /// Samples or ends a slot that goes on; the part of a step that a test of balance delays.
   void go_on(int at);
   void finish(int at, belief::TrajectoryEnd end);
-  void read(int at, belief::WorldState& state) const;
+  void skip_held(int at);
+  void finish_at_rest(int at);
+  /// Freezes what has left the world.
+  void freeze_beyond(int at);
+  Open& open_of(Slot& slot, const LaneTouch& touch) const {
+    return slot.open[static_cast<std::size_t>(touch.first * bodies_ + touch.second)];
+  }
   void remove_ended();
 
   std::shared_ptr<const CompiledLockstep> scene_;
@@ -80,7 +93,7 @@ class LaneBatch {
   std::vector<std::uint8_t> wanted_;
   std::vector<std::uint8_t> ended_;
   belief::WorldState seen_;  // by the end rule
-  int rest_steps_ = 0;
+  int bodies_ = 0;           // as belief::ContactInterval numbers them
   std::int64_t most_steps_ = 0;
 };
 

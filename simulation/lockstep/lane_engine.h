@@ -11,13 +11,19 @@
 
 namespace prescene::simulation {
 
-/// A slot's state apart from the others': plain numbers.
-struct SlotState {
+/// How an object moves: by itself, as something else says, or not at all, beyond the world.
+enum class LaneMotion : std::uint8_t { kFree, kHeld, kFrozen };
+
+/// What the next step depends on of an object in a slot: plain numbers.
+struct ObjectSlot {
   Real p[3], v[3], w[3];
   Real q[4];
+  LaneMotion motion;
+  std::uint64_t parting;  ///< See LaneEngine::release.
   int warm_count;
   WarmContact warm[kMaxContacts];
 };
+using SlotState = std::vector<ObjectSlot>;  // by object
 
 class LaneEngine {
  public:
@@ -25,42 +31,85 @@ class LaneEngine {
 
   const CompiledLockstep& scene() const { return *scene_; }
   int slots() const { return state_.slots(); }
+  int objects() const { return scene_->lanes.objects; }
 
-  void reset(int slot, const belief::ObjectState& start);
-  /// Pose and velocities into `object`; what else it holds stays.
-  void read(int slot, belief::ObjectState& object) const;
+  /// All objects free, kinematic bodies absent.
+  void reset(int slot, const belief::WorldState& start);
+  /// Pose and velocities into `state`; what else it holds stays.
+  void read(int slot, int object, belief::ObjectState& state) const;
   /// The whole of slot `from`, parameters included, into slot `to`.
   void move(int from, int to);
   void save(int slot, SlotState& saved) const;
   void restore(int slot, const SlotState& saved);
+
+  LaneMotion motion(int slot, int object) const { return moved_[place_of(object, slot)].motion; }
+  bool free(int slot, int object) const { return motion(slot, object) == LaneMotion::kFree; }
+  /// The object goes from X_now to X_next in the next steps, until it is told otherwise.
+  void hold(int slot, int object, const geometry::Pose& X_now, const geometry::Pose& X_next);
+  /// To where hold() said, without a step.
+  void arrive(int slot, int object);
+  /// Free from now on. It does not touch kinematic bodies that it overlaps before they have parted.
+  void release(int slot, int object, const geometry::Pose& X_WO, const geometry::Twist& V_WO);
+  /// Has left the world: stays where it is and touches nothing.
+  void freeze(int slot, int object);
+  /// Where a kinematic body (of lanes.bodies) is in the next step.
+  void place(int slot, int body, const geometry::Pose& X_now, const geometry::Pose& X_next);
+  void remove(int slot, int body) { present_[kinematic_of(body, slot)] = 0; }
 
   /// Flies slots [0, wanted.size()) and finds the contacts of those with wanted[slot] != 0.
   void find_contacts(std::span<const std::uint8_t> wanted);
   /// Ends the step of those with wanted[slot] != 0: impulses and poses. After find_contacts.
   void advance(std::span<const std::uint8_t> wanted);
 
-  // Of a slot after a step.
-  double energy(int slot) const { return static_cast<double>(state_.energy[slot]); }
-  double distance_squared(int slot) const { return static_cast<double>(state_.distance2[slot]); }
-  /// Some number is not finite or some speed beyond 1e4.
+  // Of an object after a step.
+  double energy(int slot, int object) const { return static_cast<double>(state_.energy[state_.at(object, slot)]); }
+  double distance_squared(int slot, int object) const {
+    return static_cast<double>(state_.distance2[state_.at(object, slot)]);
+  }
+  /// Some number of the slot is not finite or some speed beyond 1e4.
   bool diverged(int slot) const;
-  void stop(int slot);
-  std::span<const LaneContact> contacts(int slot) {
-    return {state_.contacts(slot), static_cast<std::size_t>(state_.contact_count[static_cast<std::size_t>(slot)])};
+  /// With the objects after it and with what is not an object.
+  std::span<const LaneContact> contacts(int slot, int object) {
+    return {state_.contacts(state_.at(object, slot)),
+            static_cast<std::size_t>(state_.contact_count[place_of(object, slot)])};
   }
 
   /// From the local origin.
-  Vector3d center_of_mass(int slot) const;
-  geometry::Quaterniond rotation(int slot) const;
-  /// Turns the object about an axis through its centre of mass and stops it.
-  void nudge(int slot, const Vector3d& axis_W, double angle);
+  Vector3d center_of_mass(int slot, int object) const;
+  geometry::Quaterniond rotation(int slot, int object) const;
+  /// Turns an object about an axis through its centre of mass and stops it.
+  void nudge(int slot, int object, const Vector3d& axis_W, double angle);
 
  private:
+  /// What moves an object that is not free.
+  struct Moved {
+    LaneMotion motion = LaneMotion::kFree;
+    std::uint64_t parting = 0;  // by body
+    Real inverse_mass = 0;
+    Real next_p[3] = {}, next_q[4] = {};
+  };
+
+  std::size_t place_of(int object, int slot) const { return static_cast<std::size_t>(state_.at(object, slot)); }
+  std::size_t kinematic_of(int body, int slot) const {
+    return static_cast<std::size_t>(state_.at(body - objects(), slot));
+  }
+  void set_pose(int slot, int object, const geometry::Pose& X_WO);
+  void set_motion(int slot, int object, LaneMotion motion);
+  void guide(int count);
+  bool list_pair(int object, int body, std::span<const std::uint8_t> wanted);
+  void touch_objects(int object, std::span<const std::uint8_t> wanted);
+  void touch_surroundings(int object, std::span<const std::uint8_t> wanted);
+  void part(int object, std::span<const std::uint8_t> wanted);
+
   std::shared_ptr<const CompiledLockstep> scene_;
   LaneState state_;
+  std::vector<Moved> moved_;           // by object
+  std::vector<std::uint8_t> present_;  // of kinematic bodies
   LanePairs pairs_;
   SolverScratch scratch_;
+  std::vector<std::uint8_t> listed_;
   std::vector<std::int32_t> touching_, flying_;
+  std::vector<int> totals_;  // contacts by slot
   std::vector<int> starts_;  // of counting sort
 };
 

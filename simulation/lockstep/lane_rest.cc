@@ -57,7 +57,7 @@ double margin_inside(std::span<Point> points) {
 
 }  // namespace
 
-LaneFooting footing_of(LaneEngine& engine, int slot) {
+LaneFooting footing_of(LaneEngine& engine, int slot, int object) {
   LaneFooting footing;
   const Vector3d& gravity = engine.scene().scene.gravity_W;
   if (gravity.isZero(0.0)) {
@@ -67,56 +67,86 @@ LaneFooting footing_of(LaneEngine& engine, int slot) {
   const Vector3d down = gravity.normalized();
   const Vector3d u = down.unitOrthogonal();
   const Vector3d v = down.cross(u);
-  const geometry::Matrix3d R = engine.rotation(slot).toRotationMatrix();
   std::array<Point, kMaxContacts> points;
   std::size_t count = 0;
-  for (const LaneContact& c : engine.contacts(slot)) {
-    if (static_cast<double>(c.gap) > engine.scene().options.touching_distance) continue;
-    const Vector3d r = R * Vector3d(static_cast<double>(c.position[0]), static_cast<double>(c.position[1]),
-                                    static_cast<double>(c.position[2]));
-    footing.height = std::max(footing.height, down.dot(r));
-    points[count++] = {u.dot(r), v.dot(r)};
+  bool others = false;
+  const Vector3d center = engine.center_of_mass(slot, object);
+  // Contacts are kept with the first of two objects.
+  for (int first = 0; first <= object; ++first) {
+    const geometry::Matrix3d R = engine.rotation(slot, first).toRotationMatrix();
+    const Vector3d from_center = engine.center_of_mass(slot, first) - center;
+    for (const LaneContact& c : engine.contacts(slot, first)) {
+      const int other = engine.scene().lanes.parts[static_cast<std::size_t>(c.part)].body;
+      if (first != object && other != object) continue;
+      if (static_cast<double>(c.gap) > engine.scene().options.touching_distance) continue;
+      const Vector3d r =
+          from_center + R * Vector3d(static_cast<double>(c.position[0]), static_cast<double>(c.position[1]),
+                                     static_cast<double>(c.position[2]));
+      footing.height = std::max(footing.height, down.dot(r));
+      others = others || first != object || (other >= 0 && other < engine.objects());
+      if (!others) points[count++] = {u.dot(r), v.dot(r)};
+    }
   }
-  footing.firm = margin_inside({points.data(), count}) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
+  footing.firm =
+      !others && margin_inside({points.data(), count}) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
   return footing;
 }
 
-void NudgeTest::begin(LaneEngine& engine, int slot, double height) {
+bool NudgeTest::stands_or_begins(LaneEngine& engine, int slot) {
+  for (int object = 0; object < engine.objects(); ++object) {
+    before_[static_cast<std::size_t>(object)] = {engine.center_of_mass(slot, object), engine.rotation(slot, object),
+                                                 footing_of(engine, slot, object)};
+  }
+  object_ = -1;
+  if (!next_object(engine, slot)) return true;
   engine.save(slot, saved_);
   down_ = engine.scene().scene.gravity_W.normalized();
-  center_ = engine.center_of_mass(slot);
-  rotation_ = engine.rotation(slot);
-  height_ = height;
   axis_ = 0;
   nudge(engine, slot);
+  return false;
+}
+
+bool NudgeTest::next_object(const LaneEngine& engine, int slot) {
+  for (++object_; object_ < engine.objects(); ++object_) {
+    if (engine.free(slot, object_) && !before_[static_cast<std::size_t>(object_)].footing.firm) return true;
+  }
+  return false;
 }
 
 void NudgeTest::nudge(LaneEngine& engine, int slot) {
   const Vector3d u = down_.unitOrthogonal();
   const Vector3d v = down_.cross(u);
   const double angle = (0.125 + 0.25 * axis_) * 2.0 * std::numbers::pi;
-  engine.nudge(slot, std::cos(angle) * u + std::sin(angle) * v, kNudge);
-  const double time_constant = std::sqrt(4.0 / 3.0 * height_ / engine.scene().scene.gravity_W.norm());
+  engine.nudge(slot, object_, std::cos(angle) * u + std::sin(angle) * v, kNudge);
+  const double height = before_[static_cast<std::size_t>(object_)].footing.height;
+  const double time_constant = std::sqrt(4.0 / 3.0 * height / engine.scene().scene.gravity_W.norm());
   const double time = std::clamp(kTimeConstants * time_constant, kShortest, kLongest);
   left_ = static_cast<int>(std::ceil(time / engine.scene().options.step));
 }
 
+bool NudgeTest::runs_away(const LaneEngine& engine, int slot, int object) const {
+  const Before& before = before_[static_cast<std::size_t>(object)];
+  const double drop = down_.dot(engine.center_of_mass(slot, object) - before.center);
+  if (drop > kSunk) return true;
+  if (drop <= 0.0) return false;
+  const Vector3d turn = geometry::log_rotation(engine.rotation(slot, object) * before.rotation.conjugate());
+  // Turning about the vertical is no toppling.
+  const double toppled = (turn - down_ * down_.dot(turn)).norm();
+  return toppled > kRunAway * kNudge && drop > kLeastDrop * 0.5 * before.footing.height * toppled * toppled;
+}
+
 NudgeTest::Verdict NudgeTest::after_step(LaneEngine& engine, int slot) {
-  const double drop = down_.dot(engine.center_of_mass(slot) - center_);
-  bool runs_away = drop > kSunk;
-  if (!runs_away && drop > 0.0) {
-    const Vector3d turn = geometry::log_rotation(engine.rotation(slot) * rotation_.conjugate());
-    // Turning about the vertical is no toppling.
-    const double toppled = (turn - down_ * down_.dot(turn)).norm();
-    runs_away = toppled > kRunAway * kNudge && drop > kLeastDrop * 0.5 * height_ * toppled * toppled;
-  }
-  if (runs_away) {
+  for (int object = 0; object < engine.objects(); ++object) {
+    if (!engine.free(slot, object) || !runs_away(engine, slot, object)) continue;
     engine.restore(slot, saved_);
     return Verdict::kRunsAway;
   }
   if (--left_ > 0) return Verdict::kGoesOn;
   engine.restore(slot, saved_);
-  if (++axis_ == kNudgeAxes) return Verdict::kReturns;
+  if (++axis_ == kNudgeAxes) {
+    if (!next_object(engine, slot)) return Verdict::kReturns;
+    axis_ = 0;
+  }
   nudge(engine, slot);
   return Verdict::kGoesOn;
 }

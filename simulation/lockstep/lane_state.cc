@@ -5,9 +5,10 @@
 
 namespace prescene::simulation {
 
-LaneState::LaneState(int slots) : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple) {
-  constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 3 + 3 * 3 + 4 + 9 + 1 + 3;
-  const auto size = static_cast<std::size_t>(slots_);
+LaneState::LaneState(int slots, int bodies, int objects)
+    : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple) {
+  constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 4 + 3 * 3 + 4 + 9 + 1 + 3;
+  const auto size = static_cast<std::size_t>(slots_ * bodies);
   memory_.reset(static_cast<Real*>(::operator new[](kRows* size * sizeof(Real), std::align_val_t{64})));
   std::fill_n(memory_.get(), kRows * size, Real(0));
   Real* next = memory_.get();
@@ -24,7 +25,7 @@ LaneState::LaneState(int slots) : slots_((slots + kLaneMultiple - 1) / kLaneMult
   rows(w);
   rows(q);
   rows(com);
-  for (Real** one : {&friction, &impact_friction, &restitution}) *one = row();
+  for (Real** one : {&friction, &impact_friction, &restitution, &inverse_mass}) *one = row();
   rows(flown_p);
   rows(flown_v);
   rows(flown_w);
@@ -33,28 +34,34 @@ LaneState::LaneState(int slots) : slots_((slots + kLaneMultiple - 1) / kLaneMult
   for (Real** one : {&travel, &energy, &distance2, &speed2}) *one = row();
   // Slots that hold nothing are computed with the others.
   std::fill_n(q[0], size, Real(1));
-  contact_count.assign(size, 0);
-  warm_count.assign(size, 0);
-  contacts_.resize(size * kMaxContacts);
-  warm_.resize(size * kMaxContacts);
+  const auto of_objects = static_cast<std::size_t>(slots_ * objects);
+  contact_count.assign(of_objects, 0);
+  warm_count.assign(of_objects, 0);
+  contacts_.resize(of_objects * kMaxContacts);
+  warm_.resize(of_objects * kMaxContacts);
 }
 
-void ContactStage::flush(const std::int32_t* slots, LaneState& state) {
+void ContactStage::flush(const std::int32_t* objects, LaneState& state) {
   for (std::size_t lane = 0; lane < counts_.size(); ++lane) {
     if (counts_[lane] == 0) continue;
-    const std::int32_t slot = slots[lane];
-    int& count = state.contact_count[static_cast<std::size_t>(slot)];
+    const std::int32_t object = objects[lane];
+    int& count = state.contact_count[static_cast<std::size_t>(object)];
     const int room = std::min(counts_[lane], kMaxContacts - count);
-    std::copy_n(contacts_[lane].data(), room, state.contacts(slot) + count);
+    std::copy_n(contacts_[lane].data(), room, state.contacts(object) + count);
     count += room;
     counts_[lane] = 0;
   }
 }
 
-SolverScratch::SolverScratch(int slots)
-    : memory_(static_cast<Real*>(::operator new[](
-          static_cast<std::size_t>(kMaxContacts) * kFields * kLaneMultiple * sizeof(Real), std::align_val_t{64}))),
-      kept_(static_cast<std::size_t>(slots) * kKept) {
+SolverScratch::SolverScratch(int slots, int objects)
+    : kept_each_(static_cast<std::size_t>(objects) * (6 + 6 * kMaxContacts)),
+      kept_(static_cast<std::size_t>(slots) * kept_each_) {
+  // Lanes differ in how many contacts each pair of bodies has, and each pair gets what the lane with most needs.
+  const auto groups = static_cast<std::size_t>(objects * (objects + 1) / 2);
+  const std::size_t rows = groups * kMaxContacts;
+  memory_.reset(
+      static_cast<Real*>(::operator new[](rows* kFields* kLaneMultiple * sizeof(Real), std::align_val_t{64})));
+  contacts_.resize(rows * kLaneMultiple);
   for (auto& list : unsettled_) list.reserve(static_cast<std::size_t>(slots));
 }
 

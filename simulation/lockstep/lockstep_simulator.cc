@@ -2,9 +2,8 @@
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <mutex>
+#include <type_traits>
 #include <utility>
 
 #include "compile_scene.h"
@@ -14,136 +13,171 @@
 namespace prescene::simulation {
 namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 0x4c4b0001;
+constexpr std::uint32_t kSnapshotVersion = 0x4c4b0002;
 
 class LockstepInstance : public Instance {
  public:
-  explicit LockstepInstance(std::shared_ptr<const CompiledLockstep> scene)
-      : scene_(std::move(scene)), engine_(scene_, 1) {
+  LockstepInstance(std::shared_ptr<const CompiledLockstep> scene, std::vector<belief::Action> actions,
+                   const core::RandomStream& stream)
+      : scene_(std::move(scene)),
+        actions_(std::move(actions)),
+        stream_(stream),
+        engine_(scene_, 1),
+        instance_(*scene_),
+        nudges_(scene_->lanes.objects) {
     set_state(belief::mean_start(scene_->scene));
   }
 
   void set_state(const belief::WorldState& state) override {
-    PRESCENE_CHECK(state.objects.size() == 1);
-    kept_ = {};
+    PRESCENE_CHECK(state.objects.size() == scene_->scene.objects.size());
     start_ = state;
-    engine_.reset(0, state.objects.front());
+    tested_ = false;
+    instance_.start(engine_, 0, start_, actions_, stream_);
   }
 
   belief::WorldState state() const override {
-    belief::WorldState state = start_;
-    state.time = start_.time + static_cast<double>(kept_.steps) * step_size();
-    engine_.read(0, state.objects.front());
-    state.objects.front().mode =
-        kept_.calm_steps >= rest_steps() ? belief::MotionMode::kResting : belief::MotionMode::kMoving;
+    belief::WorldState state;
+    instance_.read(engine_, 0, state);
     return state;
   }
 
   void step() override {
+    instance_.before_step(engine_, 0);
     engine_.find_contacts(one_);
     engine_.advance(one_);
-    ++kept_.steps;
-    kept_.calm_steps = engine_.energy(0) < scene_->options.rest.energy ? kept_.calm_steps + 1 : 0;
-    if (kept_.calm_steps < rest_steps()) kept_.tested = kept_.stable = false;
+    instance_.after_step(engine_, 0);
+    if (!instance_.calm(engine_, 0)) tested_ = false;
   }
 
   double step_size() const override { return scene_->options.step; }
 
   bool at_rest() const override {
-    if (kept_.calm_steps < rest_steps()) return false;
-    if (!kept_.tested) {
-      kept_.tested = true;
-      kept_.stable = balances();
+    if (!instance_.calm(engine_, 0)) return false;
+    if (!tested_) {
+      tested_ = true;
+      stable_ = balances();
     }
-    return kept_.stable;
+    return stable_;
   }
 
   Snapshot save() const override {
-    SlotState slot{};
-    engine_.save(0, slot);
     Snapshot snapshot;
-    const auto put = [&](const auto& value) {
-      const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
-      snapshot.bytes.insert(snapshot.bytes.end(), bytes, bytes + sizeof(value));
-    };
-    put(kSnapshotVersion);
-    put(kept_.steps);
-    put(kept_.calm_steps);
-    put(start_.time);
-    const belief::PhysicalParameters& physical = start_.objects.front().physical;
-    put(physical.mass);
-    for (int i = 0; i < 3; ++i) put(physical.center_of_mass[i]);
-    put(physical.friction);
-    put(physical.impact_friction);
-    put(physical.restitution);
-    put(slot);
+    ByteWriter out(snapshot.bytes);
+    out.value(kSnapshotVersion);
+    out.value(static_cast<std::uint32_t>(start_.objects.size()));
+    out.value(start_.time);
+    for (const belief::ObjectState& object : start_.objects) {
+      out.value(object.physical.mass);
+      out.vector(object.physical.center_of_mass);
+      out.value(object.physical.friction);
+      out.value(object.physical.impact_friction);
+      out.value(object.physical.restitution);
+    }
+    SlotState slot;
+    engine_.save(0, slot);
+    for (const ObjectSlot& object : slot) write(out, object);
+    instance_.save(out);
     return snapshot;
   }
 
   core::Status restore(const Snapshot& snapshot) override {
-    std::size_t at = 0;
-    bool whole = true;
-    const auto get = [&](auto& value) {
-      whole = whole && at + sizeof(value) <= snapshot.bytes.size();
-      if (whole) std::memcpy(&value, snapshot.bytes.data() + at, sizeof(value));
-      at += sizeof(value);
-    };
-    std::uint32_t version = 0;
-    Kept kept;
+    const core::Status wrong = core::invalid_input(
+        "the snapshot is of another simulator, scene or list of actions; restore it where it was saved");
+    ByteReader in(snapshot.bytes);
+    if (in.value<std::uint32_t>() != kSnapshotVersion) return wrong;
+    if (in.value<std::uint32_t>() != start_.objects.size()) return wrong;
     belief::WorldState start = start_;
-    SlotState slot{};
-    get(version);
-    get(kept.steps);
-    get(kept.calm_steps);
-    get(start.time);
-    belief::PhysicalParameters& physical = start.objects.front().physical;
-    get(physical.mass);
-    for (int i = 0; i < 3; ++i) get(physical.center_of_mass[i]);
-    get(physical.friction);
-    get(physical.impact_friction);
-    get(physical.restitution);
-    get(slot);
-    if (!whole || at != snapshot.bytes.size() || version != kSnapshotVersion || slot.warm_count < 0 ||
-        slot.warm_count > kMaxContacts) {
-      return core::invalid_input("the snapshot is of another simulator or scene; restore it where it was saved");
+    start.time = in.value<double>();
+    for (belief::ObjectState& object : start.objects) {
+      object.physical.mass = in.value<double>();
+      object.physical.center_of_mass = in.vector();
+      object.physical.friction = in.value<double>();
+      object.physical.impact_friction = in.value<double>();
+      object.physical.restitution = in.value<double>();
     }
-    kept_ = kept;
-    start_ = std::move(start);
-    engine_.reset(0, start_.objects.front());
+    SlotState slot(start.objects.size());
+    bool sound = true;
+    for (ObjectSlot& object : slot) sound = sound && read(in, object);
+    if (!sound || !in.ok()) return wrong;
+    const Snapshot now = save();
+    std::swap(start_, start);
+    instance_.start(engine_, 0, start_, actions_, stream_);
+    instance_.restore(in);
+    tested_ = false;
+    if (!in.ok() || !in.at_end()) {
+      PRESCENE_CHECK(restore(now).ok());
+      return wrong;
+    }
     engine_.restore(0, slot);
     return core::ok_status();
   }
 
  private:
-  struct Kept {
-    std::int64_t steps = 0;
-    int calm_steps = 0;
-    bool tested = false;
-    bool stable = false;
-  };
+  static void write(ByteWriter& out, const ObjectSlot& object) {
+    const auto all = [&](const auto& values) {
+      for (const auto& value : values) out.value(value);
+    };
+    all(object.p);
+    all(object.v);
+    all(object.w);
+    all(object.q);
+    out.value(object.motion);
+    out.value(object.parting);
+    out.value(object.warm_count);
+    for (int i = 0; i < object.warm_count; ++i) {
+      all(object.warm[i].position);
+      out.value(object.warm[i].impulse);
+      all(object.warm[i].friction);
+      out.value(object.warm[i].upward);
+      out.value(object.warm[i].part);
+    }
+  }
 
-  int rest_steps() const { return static_cast<int>(std::ceil(scene_->options.rest.time / scene_->options.step)); }
+  static bool read(ByteReader& in, ObjectSlot& object) {
+    const auto all = [&](auto& values) {
+      for (auto& value : values) value = in.value<std::decay_t<decltype(value)>>();
+    };
+    all(object.p);
+    all(object.v);
+    all(object.w);
+    all(object.q);
+    object.motion = in.value<LaneMotion>();
+    object.parting = in.value<std::uint64_t>();
+    object.warm_count = in.value<int>();
+    if (object.motion > LaneMotion::kFrozen || object.warm_count < 0 || object.warm_count > kMaxContacts) return false;
+    for (int i = 0; i < object.warm_count; ++i) {
+      all(object.warm[i].position);
+      object.warm[i].impulse = in.value<Real>();
+      all(object.warm[i].friction);
+      object.warm[i].upward = in.value<Real>();
+      object.warm[i].part = in.value<std::int32_t>();
+    }
+    return true;
+  }
 
-  /// Moves the object and puts it back.
+  /// Moves objects and puts them back.
   bool balances() const {
+    instance_.before_step(engine_, 0);
     engine_.find_contacts(one_);
-    const LaneFooting footing = footing_of(engine_, 0);
-    if (footing.firm) return true;
-    NudgeTest nudges;
-    nudges.begin(engine_, 0, footing.height);
+    if (nudges_.stands_or_begins(engine_, 0)) return true;
     for (;;) {
       engine_.find_contacts(one_);
       engine_.advance(one_);
-      const NudgeTest::Verdict verdict = nudges.after_step(engine_, 0);
+      const NudgeTest::Verdict verdict = nudges_.after_step(engine_, 0);
       if (verdict != NudgeTest::Verdict::kGoesOn) return verdict == NudgeTest::Verdict::kReturns;
     }
   }
 
   std::shared_ptr<const CompiledLockstep> scene_;
-  // Asking whether it rests nudges the object and puts it back, which leaves it as it was.
-  mutable LaneEngine engine_;
-  mutable Kept kept_;
+  std::vector<belief::Action> actions_;
+  core::RandomStream stream_;
   belief::WorldState start_;
+  // Asking whether it rests nudges objects and puts them back, which leaves all as it was.
+  mutable LaneEngine engine_;
+  mutable LaneInstance instance_;
+  mutable NudgeTest nudges_;
+  mutable bool tested_ = false;
+  mutable bool stable_ = false;
   std::vector<std::uint8_t> one_ = {1};
 };
 
@@ -151,8 +185,8 @@ class LockstepSimulator : public Simulator {
  public:
   explicit LockstepSimulator(std::shared_ptr<const CompiledLockstep> scene) : scene_(std::move(scene)) {}
 
-  void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream&,
-           std::uint32_t, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+  void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
+           std::uint32_t first_instance, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
     PRESCENE_CHECK(starts.size() == trajectories.size());
     PRESCENE_CHECK(lockstep_supports(request, starts).ok());
@@ -161,44 +195,61 @@ class LockstepSimulator : public Simulator {
     queue.starts = starts;
     queue.request = &request;
     queue.trajectories = trajectories;
+    queue.stream = &stream;
+    queue.first_instance = first_instance;
     queue.cancellation = cancellation;
+    const auto scene = scene_for(request.actions);
     // Each thread gets its share of the instances at once, so that none waits for another's.
     const auto threads = std::min(static_cast<std::size_t>(pool.threads()), starts.size());
     const auto share = static_cast<int>((starts.size() + threads - 1) / threads);
     pool.for_each_index(threads, [&](std::size_t) {
-      std::unique_ptr<LaneBatch> batch = take_batch();
-      batch->run(queue, std::min(share, scene_->options.live_instances));
+      std::unique_ptr<LaneBatch> batch = take_batch(scene);
+      batch->run(queue, std::min(share, scene->options.live_instances));
       give_back(std::move(batch));
     });
   }
 
   std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
-                                          const core::RandomStream&) const override {
+                                          const core::RandomStream& stream) const override {
     RunRequest request;
     request.actions = actions;
     PRESCENE_CHECK(lockstep_supports(request).ok());
-    return std::make_unique<LockstepInstance>(scene_);
+    return std::make_unique<LockstepInstance>(scene_for(actions), actions, stream);
   }
 
  private:
-  std::unique_ptr<LaneBatch> take_batch() const {
+  /// The scene with the balls of these actions; the last one asked for is kept.
+  std::shared_ptr<const CompiledLockstep> scene_for(const std::vector<belief::Action>& actions) const {
+    const std::vector<double> radii = pusher_radii(actions);
+    if (radii.empty()) return scene_;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!pushed_ || pushed_->pushers != radii) {
+      pushed_ = with_pushers(*scene_, radii);
+      idle_.clear();
+    }
+    return pushed_;
+  }
+  std::unique_ptr<LaneBatch> take_batch(const std::shared_ptr<const CompiledLockstep>& scene) const {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (!idle_.empty()) {
-        std::unique_ptr<LaneBatch> batch = std::move(idle_.back());
-        idle_.pop_back();
+      const auto fits = [&](const std::unique_ptr<LaneBatch>& batch) { return batch->scene() == scene; };
+      const auto found = std::find_if(idle_.begin(), idle_.end(), fits);
+      if (found != idle_.end()) {
+        std::unique_ptr<LaneBatch> batch = std::move(*found);
+        idle_.erase(found);
         return batch;
       }
     }
-    return std::make_unique<LaneBatch>(scene_);
+    return std::make_unique<LaneBatch>(scene);
   }
   void give_back(std::unique_ptr<LaneBatch> batch) const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    idle_.push_back(std::move(batch));
+    if (batch->scene() == scene_ || batch->scene() == pushed_) idle_.push_back(std::move(batch));
   }
 
   std::shared_ptr<const CompiledLockstep> scene_;
   mutable std::mutex mutex_;
+  mutable std::shared_ptr<const CompiledLockstep> pushed_;
   mutable std::vector<std::unique_ptr<LaneBatch>> idle_;
 };
 

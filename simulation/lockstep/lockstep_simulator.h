@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A simulator for many instances of one scene in which one rigid body meets fixed surroundings: 8 to 16 instances at
-// once in the lanes of vectors. Physics as in prescene/simulation/bullet (docs/simulation.md), restated; what a scene
-// has beyond it the factory refuses, so that callers take that simulator.
+// A simulator for many instances of one scene in which one to four rigid bodies meet each other, fixed surroundings and
+// what a robot moves: 8 to 16 instances at once in the lanes of vectors. Physics as in prescene/simulation/bullet
+// (docs/simulation.md), restated; what a scene has beyond it the factory refuses, so that callers take that simulator.
 //
 //   PRESCENE_TRY(auto simulator, make_lockstep_simulator(scene, shapes, LockstepOptions{}));
 //
@@ -39,16 +39,17 @@ struct LockstepOptions {
 /// Ranges of the options: the message names the field.
 core::Status validate(const LockstepOptions& options);
 
-/// Whether `starts` can be run as `request` says: no actions, and nothing held. kUnsupported says what it is otherwise.
+/// Whether `starts` can be run as `request` says: no more than 16 push actions. kUnsupported says what it is otherwise.
 /// run() and make_instance() check it.
 core::Status lockstep_supports(const RunRequest& request, std::span<const belief::WorldState> starts = {});
 
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
-///   - one object, not held, of boxes, spheres, cylinders, capsules and hulls (convex_hull, convex_parts, decompose) of
-///     at most 64 vertices, sides of at most 16, and at most 16 parts;
-///   - supports of boxes and such hulls, at most 256 parts together;
-///   - no robot body with a shape, and no actions.
+///   - one to four objects of boxes, spheres, cylinders, capsules and hulls (convex_hull, convex_parts, decompose) of
+///   at
+///     most 64 vertices, sides of at most 16, and at most 16 parts each;
+///   - supports of the same shapes, at most 256 parts together;
+///   - robot bodies of the same shapes, at most 16 parts each and 32 bodies with a shape.
 core::Result<std::unique_ptr<Simulator>> make_lockstep_simulator(const belief::Scene& scene, ShapeStore& shapes,
                                                                  const LockstepOptions& options = {});
 

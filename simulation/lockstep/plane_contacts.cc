@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts of the object with faces that it is over the inner part of: there the nearest point is the lowest one and
+// Contacts of an object with faces that it is over the inner part of: there the nearest point is the lowest one and
 // the normal the face's, whatever else the fixed part has.
 #include <algorithm>
 
@@ -19,7 +19,7 @@ namespace prescene::simulation::HWY_NAMESPACE {
 using D = hn::CappedTag<Real, kLaneMultiple>;
 using V = hn::Vec<D>;
 
-/// What a vector of pairs needs of its slots.
+/// What a vector of pairs needs of its objects.
 struct PlaneLanes {
   HWY_ALIGN Real R[9][kLaneMultiple];
   HWY_ALIGN Real p[3][kLaneMultiple];
@@ -27,11 +27,11 @@ struct PlaneLanes {
   HWY_ALIGN Real normal[3][kLaneMultiple];
   HWY_ALIGN Real offset[kLaneMultiple];
   HWY_ALIGN Real range[kLaneMultiple];
-  std::int32_t slot[kLaneMultiple];
+  std::int32_t object[kLaneMultiple];
   std::int32_t part[kLaneMultiple];
 };
 
-/// Appends points to the contacts of their slots.
+/// Appends points to the contacts of their objects.
 class PlaneWriter {
  public:
   PlaneWriter(const PlaneLanes& lanes, std::uint32_t valid, const Vec3<V>& normal, V range, V radius,
@@ -174,10 +174,10 @@ HWY_INLINE void hull_corners(const ConvexPart& part, const Vec3<V>& n, const Add
   add(point, hn::Lt(deepest, lowest - set<V>(1e-6)));
 }
 
-void touch_planes_lanes(const LockstepScene* scene, int part_index, const LanePairs::Plane* pairs, std::size_t count,
-                        LaneState* state) {
+void touch_planes_lanes(const LockstepScene* scene, const ConvexPart* given, const LanePairs::Plane* pairs,
+                        std::size_t count, LaneState* state) {
   const D d;
-  const ConvexPart& part = scene->parts[static_cast<std::size_t>(part_index)];
+  const ConvexPart& part = *given;
   const std::size_t width = hn::Lanes(d);
   const Mat3<V> R_PS = set_matrix<V>(part.R_PS);
   const V radius = set<V>(part.radius);
@@ -188,16 +188,16 @@ void touch_planes_lanes(const LockstepScene* scene, int part_index, const LanePa
     for (std::size_t i = 0; i < width; ++i) {
       const LanePairs::Plane& pair = pairs[begin + std::min(i, filled - 1)];
       const FixedPlane& plane = scene->planes[static_cast<std::size_t>(pair.plane)];
-      const std::int32_t slot = pair.slot;
-      for (std::size_t k = 0; k < 9; ++k) lanes.R[k][i] = state->R[k][slot];
+      const std::int32_t object = pair.object;
+      for (std::size_t k = 0; k < 9; ++k) lanes.R[k][i] = state->R[k][object];
       for (std::size_t k = 0; k < 3; ++k) {
-        lanes.p[k][i] = state->p[k][slot];
-        lanes.com[k][i] = state->com[k][slot];
+        lanes.p[k][i] = state->p[k][object];
+        lanes.com[k][i] = state->com[k][object];
         lanes.normal[k][i] = plane.normal[k];
       }
       lanes.offset[i] = plane.offset;
-      lanes.range[i] = state->travel[slot] + static_cast<Real>(kLaneMargin);
-      lanes.slot[i] = slot;
+      lanes.range[i] = state->travel[object] + static_cast<Real>(kLaneMargin);
+      lanes.object[i] = object;
       lanes.part[i] = plane.part;
     }
     const auto column = [&](const Real(&rows)[3][kLaneMultiple]) HWY_ATTR {
@@ -235,7 +235,7 @@ void touch_planes_lanes(const LockstepScene* scene, int part_index, const LanePa
         hull_corners(part, n_S, add);
         break;
     }
-    stage.flush(lanes.slot, *state);
+    stage.flush(lanes.object, *state);
   }
 }
 
@@ -247,9 +247,10 @@ namespace prescene::simulation {
 
 HWY_EXPORT(touch_planes_lanes);
 
-void touch_planes(const LockstepScene& scene, int part, std::span<const LanePairs::Plane> pairs, LaneState& state) {
+void touch_planes(const LockstepScene& scene, const ConvexPart& part, std::span<const LanePairs::Plane> pairs,
+                  LaneState& state) {
   if (pairs.empty()) return;
-  HWY_DYNAMIC_DISPATCH(touch_planes_lanes)(&scene, part, pairs.data(), pairs.size(), &state);
+  HWY_DYNAMIC_DISPATCH(touch_planes_lanes)(&scene, &part, pairs.data(), pairs.size(), &state);
 }
 
 }  // namespace prescene::simulation

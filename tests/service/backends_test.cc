@@ -21,14 +21,13 @@ supports:
 objects:
   box: {model: box, pose: {position: [0, 0, 0.2], rotation: any}}
 )";
-constexpr const char* kTwoBoxes = R"(name: boxes
+constexpr const char* kCone = R"(name: cone
 models:
-  box: {box: [0.1, 0.1, 0.1], mass: 0.4}
+  cone: {cone: {radius: 0.05, length: 0.1}, mass: 0.4}
 supports:
   floor: {ground: {size: 2}}
 objects:
-  low: {model: box, pose: {position: [0, 0, 0.05]}}
-  high: {model: box, pose: {position: [0.4, 0, 0.3]}}
+  cone: {model: cone, pose: {position: [0, 0, 0.2]}}
 )";
 
 std::shared_ptr<const belief::Scene> scene_of(const char* text) {
@@ -76,22 +75,22 @@ TEST(Backends, LockstepRunsWhatItCanAndBulletTheRest) {
   EXPECT_FALSE(same(runs(**bullet, *one, {}), runs(**lockstep, *one, {})));
   EXPECT_TRUE(same(runs(**automatic, *one, {}), runs(**lockstep, *one, {})));
 
-  const std::vector<belief::Action> pushed = {{0.05, belief::Push{{-0.3, 0, 0.05}, {0.1, 0, 0.05}}}};
+  const std::vector<belief::Action> pushed(17, {0.05, belief::Push{{-0.3, 0, 0.05}, {0.1, 0, 0.05}}});
   EXPECT_TRUE(same(runs(**lockstep, *one, pushed), runs(**bullet, *one, pushed)));
 }
 
 TEST(Backends, AutomaticStepperIsBulletWhereLockstepRefusesTheScene) {
   core::ThreadPool pool(1);
   BackendSettings settings;
-  const auto two = scene_of(kTwoBoxes);
-  const auto bullet = Backends(pool, settings).make_simulator(*two);
+  const auto cone = scene_of(kCone);
+  const auto bullet = Backends(pool, settings).make_simulator(*cone);
   settings.stepper = Stepper::kAutomatic;
-  const auto automatic = Backends(pool, settings).make_simulator(*two);
+  const auto automatic = Backends(pool, settings).make_simulator(*cone);
   ASSERT_TRUE(bullet.ok() && automatic.ok());
-  EXPECT_TRUE(same(runs(**automatic, *two, {}), runs(**bullet, *two, {})));
+  EXPECT_TRUE(same(runs(**automatic, *cone, {}), runs(**bullet, *cone, {})));
 
   settings.stepper = Stepper::kLockstep;
-  const auto refused = Backends(pool, settings).make_simulator(*two);
+  const auto refused = Backends(pool, settings).make_simulator(*cone);
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.status().message(), HasSubstr("lockstep"));
 }

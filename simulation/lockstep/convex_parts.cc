@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "convex_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace prescene::simulation {
+namespace {
+
+using geometry::Matrix3d;
+using geometry::Pose;
+
+constexpr std::size_t kMostVertices = 64;
+// As in Bullet's stepper: a core keeps at least half of the shape's thickness.
+constexpr double kLargestShare = 0.5;
+
+double core_radius(double rounding, double thinnest) { return std::min(rounding, kLargestShare * thinnest); }
+
+/// Where a body's parts go: from the frame that shapes are given in to that of the lanes.
+struct Placement {
+  Matrix3d R;
+  Vector3d p;
+};
+
+core::Result<ConvexPart> primitive_part(const geometry::Primitive& primitive, const Placement& X, double rounding) {
+  ConvexPart part;
+  Vector3d half;
+  if (const auto* sphere = std::get_if<geometry::Sphere>(&primitive)) {
+    part.kind = CoreKind::kPoint;
+    part.radius = part.ball = sphere->radius;
+    part.box_half = plain(Vector3d(Vector3d::Constant(sphere->radius)));
+    part.R_PS = plain(X.R);
+    part.center = plain(X.p);
+    return part;
+  }
+  if (const auto* box = std::get_if<geometry::BoxShape>(&primitive)) {
+    part.kind = CoreKind::kBox;
+    half = 0.5 * box->size;
+    part.radius = core_radius(rounding, half.minCoeff());
+    part.half = plain(Vector3d(half - Vector3d::Constant(part.radius)));
+    part.ball = half.norm();
+  } else if (const auto* cylinder = std::get_if<geometry::Cylinder>(&primitive)) {
+    part.kind = CoreKind::kCylinder;
+    half = {cylinder->radius, cylinder->radius, 0.5 * cylinder->length};
+    part.radius = core_radius(rounding, std::min(half.x(), half.z()));
+    part.half = {half.x() - part.radius, half.x() - part.radius, half.z() - part.radius};
+    part.ball = std::sqrt(half.x() * half.x() + half.z() * half.z());
+  } else if (const auto* capsule = std::get_if<geometry::Capsule>(&primitive)) {
+    part.kind = CoreKind::kSegment;
+    part.radius = capsule->radius;
+    part.half = {0.0, 0.0, 0.5 * capsule->length};
+    half = {capsule->radius, capsule->radius, 0.5 * capsule->length + capsule->radius};
+    part.ball = half.z();
+  } else {
+    return core::unsupported("cones are not simulated in lockstep");
+  }
+  part.R_PS = plain(X.R);
+  part.center = plain(X.p);
+  part.box_half = plain(Vector3d(X.R.cwiseAbs() * half));
+  return part;
+}
+
+core::Result<ConvexPart> hull_part(const ConvexPolytope& hull, const Placement& X, double rounding) {
+  ConvexPart part;
+  part.kind = CoreKind::kHull;
+  part.radius = core_radius(rounding, hull.inner_radius());
+  ConvexPolytope core = hull;
+  if (std::optional<ConvexPolytope> smaller = inset(hull, part.radius)) {
+    core = std::move(*smaller);
+  } else {
+    part.radius = 0.0;
+  }
+  if (core.vertices.size() > kMostVertices) {
+    return core::unsupported("a hull has " + std::to_string(core.vertices.size()) + " vertices, more than " +
+                             std::to_string(kMostVertices) + ", which are not simulated in lockstep");
+  }
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& v : hull.vertices) box.extend(X.R * v + X.p);
+  const Vector3d center = box.center();
+  part.center = plain(center);
+  part.box_half = plain(Vector3d(0.5 * box.sizes()));
+  for (const Vector3d& v : hull.vertices) part.ball = std::max(part.ball, (X.R * v + X.p - center).norm());
+  for (const Vector3d& v : core.vertices) part.vertices.push_back(plain(Vector3d(X.R * v + X.p - center)));
+  for (const ConvexPolytope::Face& face : core.faces) {
+    const std::size_t corners = face.loop.size();
+    if (corners > static_cast<std::size_t>(kMaxLoop)) {
+      return core::unsupported("a side of a hull has " + std::to_string(corners) + " corners, more than " +
+                               std::to_string(kMaxLoop) + ", which are not simulated in lockstep");
+    }
+    part.normals.push_back(plain(Vector3d(X.R * face.normal)));
+    part.corner_counts.push_back(static_cast<int>(corners));
+    part.longest_loop = std::max(part.longest_loop, static_cast<int>(corners));
+    for (std::size_t k = 0; k < static_cast<std::size_t>(kMaxLoop); ++k) {
+      part.face_corners.push_back(part.vertices[face.loop[std::min(k, corners - 1)]]);
+    }
+  }
+  return part;
+}
+
+/// Appends the parts of a shape.
+core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, double rounding, ShapeStore& shapes,
+                       const DecompositionSettings& decomposition, std::vector<ConvexPart>& parts) {
+  const Matrix3d R = X_LB.rotation.toRotationMatrix();
+  const auto placed = [&](const Pose& X_BS) {
+    return Placement{R * X_BS.rotation.toRotationMatrix(), R * X_BS.translation + X_LB.translation};
+  };
+  if (const auto* primitive = std::get_if<belief::PrimitiveShape>(&shape)) {
+    PRESCENE_TRY(ConvexPart part, primitive_part(primitive->primitive, placed(primitive->X_OS), rounding));
+    parts.push_back(std::move(part));
+    return core::ok_status();
+  }
+  const auto& mesh = std::get<belief::MeshShape>(shape);
+  if (!mesh.mesh) return core::invalid_input("a collision mesh is missing");
+  if (mesh.use == belief::MeshUse::kSurface) {
+    return core::unsupported("triangle surfaces are not simulated in lockstep");
+  }
+  PRESCENE_TRY(const auto hulls, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
+  for (const ConvexPolytope& hull : *hulls) {
+    PRESCENE_TRY(ConvexPart part, hull_part(hull, placed(mesh.X_OS), rounding));
+    parts.push_back(std::move(part));
+  }
+  return core::ok_status();
+}
+
+}  // namespace
+
+core::Result<ConvexPart> convex_part(const geometry::Primitive& primitive, double rounding) {
+  return primitive_part(primitive, {Matrix3d::Identity(), Vector3d::Zero()}, rounding);
+}
+
+core::Status add_shapes(const std::string& name, const std::vector<belief::CollisionShape>& collision,
+                        const geometry::Pose& X_LB, double rounding, ShapeStore& shapes,
+                        const DecompositionSettings& decomposition, std::vector<ConvexPart>& parts) {
+  for (std::size_t i = 0; i < collision.size(); ++i) {
+    const core::Status status = add_shape(collision[i], X_LB, rounding, shapes, decomposition, parts);
+    if (!status.ok()) return status.at(name + ", shape " + std::to_string(i + 1));
+  }
+  return core::ok_status();
+}
+
+}  // namespace prescene::simulation

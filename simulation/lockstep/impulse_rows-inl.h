@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: Apache-2.0
+// Contact rows of a vector of instances. Velocities are in W; spins are in each object's frame P, scaled by the root of
+// their moment for 1 kg, so that a row's response is (1 + |turn|^2) / mass for each object. With one object everything
+// is for each kilogram.
+#if defined(PRESCENE_SIMULATION_IMPULSE_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef PRESCENE_SIMULATION_IMPULSE_ROWS_INL_H_
+#undef PRESCENE_SIMULATION_IMPULSE_ROWS_INL_H_
+#else
+#define PRESCENE_SIMULATION_IMPULSE_ROWS_INL_H_
+#endif
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <type_traits>
+
+#include "lane_math-inl.h"
+#include "lane_state.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace prescene::simulation::HWY_NAMESPACE {
+
+using D = hn::CappedTag<Real, kLaneMultiple>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+/// Of a contact in scratch memory, each a vector.
+enum Field : int {
+  kInverse = 0,  // 1 / response of the normal row
+  kTarget = 1,   // normal velocity to reach, less what it is
+  kBase1 = 2,    // slip velocities without impulses
+  kBase2 = 3,
+  kSlipStep = 4,
+  kMu = 5,
+  kImpulse = 6,
+  kSlip1 = 7,
+  kSlip2 = 8,
+  kPush = 9,  // normal pseudo velocity to reach
+  kPushImpulse = 10,
+  kRollingArm = 11,
+  kRolling = 12,   // rolling impulse: 3; with another object in W, else in P
+  kPosition = 15,  // in the other part's frame, as WarmContact has it: 3
+  kHit = 18,       // 1 or 0
+  kBounced = 19,
+  kHitTime = 20,
+  kPart = 21,
+  kResponse = 22,  // of the normal row
+  kPerSlipStep = 23,
+  kSpin = 24,  // of the kinematic body, P: 3
+  kPerRollingStep = 27,
+  kUpward = 55,  // of the normal, with several objects
+  kNormal = 28,  // direction 3, turn of the object 3, of the other one 3
+  kTangent1 = 37,
+  kTangent2 = 46,
+};
+static_assert(kTangent2 + 9 <= kUpward && kUpward < SolverScratch::kFields);
+
+struct Rates {
+  Vec3<V> velocity, spin;
+};
+HWY_INLINE Rates no_rates() { return {set3<V>(0.0, 0.0, 0.0), set3<V>(0.0, 0.0, 0.0)}; }
+
+/// Rows of the same two bodies: object a with object b, or with all that is not an object (b = -1).
+struct RowGroup {
+  int a, b;
+  int first, count;
+};
+
+/// What rows need of an object.
+struct ObjectLanes {
+  Mat3<V> R;
+  Vec3<V> p;
+  Rates before, flown;
+  V friction, impact_friction, restitution, travel;
+  V inverse_mass;
+  Vec3<V> root, inverse_root;  // of the moments
+};
+
+/// 0 of 0: nothing that is held answers to an impulse. Rows of other lanes come to it, too.
+HWY_INLINE V inverse_of(V value) {
+  const V one = set<V>(1.0);
+  const auto proper = hn::Gt(value, set<V>(0.0));
+  return hn::IfThenElseZero(proper, one / select(proper, value, one));
+}
+
+/// When gap + speed t + acceleration t^2 / 2 becomes zero, within [0, dt].
+HWY_INLINE V time_to_close(V gap, V speed, V acceleration, V dt) {
+  const V zero = set<V>(0.0);
+  const V two = set<V>(2.0);
+  const V discriminant = speed * speed - two * acceleration * gap;
+  const V root = hn::Sqrt(hn::Max(discriminant, zero));
+  const V divisor = root - speed;
+  const auto proper = hn::Gt(divisor, zero);
+  const V time = two * gap / select(proper, divisor, set<V>(1.0));
+  return select(hn::And(proper, hn::Gt(discriminant, zero)), hn::Min(hn::Max(time, zero), dt), dt);
+}
+
+/// The rows of the slots of one vector. kMany: of a scene with several objects.
+template <bool kMany>
+class ContactRows {
+ public:
+  static constexpr int kObjects = kMany ? kMaxObjects : 1;
+
+  ContactRows(const LockstepScene& scene, LaneState& state, SolverScratch& scratch)
+      : scene_(scene), settings_(scene.settings), state_(state), scratch_(scratch), memory_(scratch.memory()) {}
+
+  /// Fills the rows, without impulses. Lanes beyond the last slot repeat it.
+  void load(std::span<const std::int32_t> slots);
+  /// Impulses of the step before, where a contact is still where it was; their effect into `changes`, by object.
+  void warm_start(Rates* changes);
+
+  std::size_t filled() const { return filled_; }
+  std::int32_t slot(std::size_t lane) const { return slots_[lane]; }
+  int objects() const { return kMany ? scene_.objects : 1; }
+  int row_count() const { return row_count_; }
+  std::span<const RowGroup> groups() const { return {groups_.data(), static_cast<std::size_t>(group_count_)}; }
+  /// Null where a lane has no such contact.
+  LaneContact* contact(int row, std::size_t lane) const { return scratch_.contacts(row)[lane]; }
+  const ObjectLanes& object(int index) const { return objects_[static_cast<std::size_t>(index)]; }
+  bool overlap() const { return overlap_; }  ///< In some lane.
+  bool rolls() const { return scene_.rolls; }
+  /// Kinematic bodies may turn what rolls on them.
+  bool has_spins() const { return scene_.rolls && scene_.has_kinematic(); }
+
+  Real* field(int row, int f) const {
+    return memory_ +
+           (static_cast<std::size_t>(row) * SolverScratch::kFields + static_cast<std::size_t>(f)) * kLaneMultiple;
+  }
+  HWY_INLINE V get(int row, int f) const { return hn::Load(D(), field(row, f)); }
+  HWY_INLINE void put(int row, int f, V value) const { hn::Store(value, D(), field(row, f)); }
+  HWY_INLINE Vec3<V> get3(int row, int f) const { return {get(row, f), get(row, f + 1), get(row, f + 2)}; }
+  HWY_INLINE void put3(int row, int f, const Vec3<V>& a) const {
+    put(row, f, a.x);
+    put(row, f + 1, a.y);
+    put(row, f + 2, a.z);
+  }
+
+  // kPair: with another object. Where there is none, `b` is not looked at.
+  template <bool kPair>
+  HWY_INLINE V along(int row, int f, const Rates& a, const Rates& b) const {
+    const Vec3<V> direction = get3(row, f);
+    V speed = dot(direction, a.velocity) + dot(get3(row, f + 3), a.spin);
+    if constexpr (kPair) speed = speed - (dot(direction, b.velocity) + dot(get3(row, f + 6), b.spin));
+    return speed;
+  }
+  template <bool kPair>
+  HWY_INLINE void apply(const RowGroup& group, int row, int f, V impulse, Rates& a, Rates& b) const {
+    const Vec3<V> direction = get3(row, f);
+    const V on_a = per_mass(group.a, impulse);
+    a.velocity = a.velocity + direction * on_a;
+    a.spin = a.spin + get3(row, f + 3) * on_a;
+    if constexpr (kPair) {
+      const V on_b = per_mass(group.b, impulse);
+      b.velocity = b.velocity - direction * on_b;
+      b.spin = b.spin - get3(row, f + 6) * on_b;
+    }
+  }
+  HWY_INLINE V per_mass(int object_index, V value) const {
+    if constexpr (kMany) return value * object(object_index).inverse_mass;
+    return value;
+  }
+  /// Trace of the inverse inertia, scaled as the rows are.
+  HWY_INLINE V softness(int object_index) const {
+    const Vec3<V>& r = object(object_index).inverse_root;
+    return per_mass(object_index, r.x * r.x + r.y * r.y + r.z * r.z);
+  }
+
+  V lanes_of(const Real* row, int object_index) const {
+    HWY_ALIGN Real values[kLaneMultiple] = {};
+    const Real* of_object = row + state_.at(object_index, 0);
+    for (std::size_t i = 0; i < hn::Lanes(D()); ++i) values[i] = of_object[slots_[i]];
+    return hn::Load(D(), values);
+  }
+  Vec3<V> lanes_of(const Rows<3>& rows, int object_index) const {
+    return {lanes_of(rows[0], object_index), lanes_of(rows[1], object_index), lanes_of(rows[2], object_index)};
+  }
+  Quat<V> lanes_of(const Rows<4>& rows, int object_index) const {
+    return {lanes_of(rows[0], object_index), lanes_of(rows[1], object_index), lanes_of(rows[2], object_index),
+            lanes_of(rows[3], object_index)};
+  }
+
+ private:
+  /// The other parts of a row's contacts.
+  struct Others {
+    HWY_ALIGN Real velocity[3][kLaneMultiple], spin[3][kLaneMultiple], origin[3][kLaneMultiple];
+  };
+
+  void gather_contacts();
+  void load_objects();
+  template <bool kPair>
+  void load_row(const RowGroup& group, int row);
+  template <bool kPair>
+  void load_motion(const RowGroup& group, int row, const Vec3<V>& r_W, V gap, V other_restitution, V other_impact,
+                   V other_friction);
+  void load_others(int row, Others& others) const;
+  void note_supports();
+  /// 1 in the lanes in which something else than `but` held an object up in the last step.
+  V held_up(int object_index, int but) const;
+
+  const LockstepScene& scene_;
+  const StepSettings& settings_;
+  LaneState& state_;
+  SolverScratch& scratch_;
+  Real* memory_;
+  std::int32_t slots_[kLaneMultiple] = {};
+  std::size_t filled_ = 0;
+  std::array<RowGroup, kObjects*(kObjects + 1) / 2> groups_;
+  int group_count_ = 0;
+  int row_count_ = 0;
+  ObjectLanes objects_[kObjects];
+  std::uint32_t supports_[kObjects][kLaneMultiple] = {};  // a bit for each object, and one for all that is none
+  bool overlap_ = false;
+  HWY_ALIGN Real warm_[kMaxContacts][8][kLaneMultiple];
+};
+
+template <bool kMany>
+void ContactRows<kMany>::gather_contacts() {
+  group_count_ = 0;
+  row_count_ = 0;
+  const std::size_t width = hn::Lanes(D());
+  for (int a = 0; a < objects(); ++a) {
+    int next[kLaneMultiple] = {};
+    // With each object after it, then with all that is not an object, as they were found.
+    for (int b = kMany ? a + 1 : 1; b <= objects(); ++b) {
+      const int first = row_count_;
+      int most = 0;
+      for (std::size_t i = 0; i < width; ++i) {
+        const int at = state_.at(a, slots_[i]);
+        const int count = state_.contact_count[static_cast<std::size_t>(at)];
+        LaneContact* contacts = state_.contacts(at);
+        int found = 0;
+        for (; next[i] < count; ++next[i], ++found) {
+          LaneContact& c = contacts[next[i]];
+          if (b < objects() && scene_.parts[static_cast<std::size_t>(c.part)].body != b) break;
+          if (found == most) {
+            LaneContact** row = scratch_.contacts(first + most++);
+            std::fill(row, row + kLaneMultiple, nullptr);
+          }
+          scratch_.contacts(first + found)[i] = &c;
+        }
+      }
+      if (most == 0) continue;
+      groups_[static_cast<std::size_t>(group_count_++)] = {a, b < objects() ? b : -1, first, most};
+      row_count_ += most;
+    }
+  }
+}
+
+template <bool kMany>
+void ContactRows<kMany>::load_objects() {
+  for (int index = 0; index < objects(); ++index) {
+    ObjectLanes& o = objects_[index];
+    const auto& m = scene_.bodies[static_cast<std::size_t>(index)].unit_moments;
+    o.root = set3<V>(std::sqrt(m[0]), std::sqrt(m[1]), std::sqrt(m[2]));
+    o.inverse_root = set3<V>(1.0 / std::sqrt(m[0]), 1.0 / std::sqrt(m[1]), 1.0 / std::sqrt(m[2]));
+    const auto entry = [&](std::size_t k) HWY_ATTR { return lanes_of(state_.R[k], index); };
+    o.R = {{entry(0), entry(1), entry(2)}, {entry(3), entry(4), entry(5)}, {entry(6), entry(7), entry(8)}};
+    o.p = lanes_of(state_.p, index);
+    o.before = {lanes_of(state_.v, index), times(transposed(o.R, lanes_of(state_.w, index)), o.root)};
+    o.flown = {lanes_of(state_.flown_v, index), times(transposed(o.R, lanes_of(state_.flown_w, index)), o.root)};
+    o.friction = lanes_of(state_.friction, index);
+    o.impact_friction = lanes_of(state_.impact_friction, index);
+    o.restitution = lanes_of(state_.restitution, index);
+    o.travel = lanes_of(state_.travel, index);
+    if constexpr (kMany) o.inverse_mass = lanes_of(state_.inverse_mass, index);
+  }
+}
+
+template <bool kMany>
+void ContactRows<kMany>::load(std::span<const std::int32_t> slots) {
+  filled_ = slots.size();
+  overlap_ = false;
+  for (std::size_t i = 0; i < hn::Lanes(D()); ++i) slots_[i] = slots[std::min(i, filled_ - 1)];
+  gather_contacts();
+  load_objects();
+  if constexpr (kMany) note_supports();
+  for (const RowGroup& group : groups()) {
+    for (int row = group.first; row < group.first + group.count; ++row) {
+      if (kMany && group.b >= 0) {
+        load_row<kMany>(group, row);
+      } else {
+        load_row<false>(group, row);
+      }
+    }
+  }
+}
+
+template <bool kMany>
+void ContactRows<kMany>::warm_start(Rates* changes) {
+  const D d;
+  int loaded = -1;  // the object whose warm contacts these are
+  int warm_count = 0;
+  for (const RowGroup& group : groups()) {
+    if (loaded != group.a) {
+      loaded = group.a;
+      warm_count = 0;
+      for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+        warm_count = std::max(warm_count, state_.warm_count[static_cast<std::size_t>(state_.at(group.a, slots_[i]))]);
+      }
+      for (int j = 0; j < warm_count; ++j) {
+        for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+          const int at = state_.at(group.a, slots_[i]);
+          const bool there = j < state_.warm_count[static_cast<std::size_t>(at)];
+          const WarmContact& warm = state_.warm(at)[j];
+          for (std::size_t f = 0; f < 3; ++f) {
+            warm_[j][f][i] = there ? warm.position[f] : Real(0);
+            warm_[j][4 + f][i] = there ? warm.friction[f] : Real(0);
+          }
+          warm_[j][3][i] = there ? warm.impulse : Real(0);
+          warm_[j][7][i] = there ? static_cast<Real>(warm.part) : Real(-2);
+        }
+      }
+    }
+    // A contact moves on its bodies by what they slide in a step.
+    V reach = object(group.a).travel + set<V>(1e-3);
+    if (kMany && group.b >= 0) reach = reach + object(group.b).travel;
+    Rates& a = changes[group.a];
+    Rates& b = changes[kMany && group.b >= 0 ? group.b : group.a];
+    for (int row = group.first; row < group.first + group.count; ++row) {
+      const V part = get(row, kPart);
+      const Vec3<V> position = get3(row, kPosition);
+      V nearest = reach * reach;
+      V impulse = set<V>(0.0);
+      Vec3<V> slip = set3<V>(0.0, 0.0, 0.0);
+      for (int j = 0; j < warm_count; ++j) {
+        const auto column = [&](std::size_t f) HWY_ATTR { return hn::Load(d, warm_[j][f]); };
+        const Vec3<V> apart = Vec3<V>{column(0), column(1), column(2)} - position;
+        const V squared = dot(apart, apart);
+        const auto nearer = hn::And(hn::Eq(part, column(7)), hn::Lt(squared, nearest));
+        nearest = select(nearer, squared, nearest);
+        impulse = select(nearer, column(3), impulse);
+        slip = select(nearer, Vec3<V>{column(4), column(5), column(6)}, slip);
+      }
+      V slip_1 = dot(slip, get3(row, kTangent1));
+      V slip_2 = dot(slip, get3(row, kTangent2));
+      const V limit = get(row, kMu) * impulse;
+      const V size = hn::Sqrt(slip_1 * slip_1 + slip_2 * slip_2);
+      const auto too_large = hn::Gt(size, limit);
+      const V scale = select(too_large, limit / select(too_large, size, set<V>(1.0)), set<V>(1.0));
+      slip_1 = slip_1 * scale;
+      slip_2 = slip_2 * scale;
+      put(row, kImpulse, impulse);
+      put(row, kSlip1, slip_1);
+      put(row, kSlip2, slip_2);
+      const auto apply_all = [&](auto pair) HWY_ATTR {
+        constexpr bool kPair = decltype(pair)::value;
+        apply<kPair>(group, row, kNormal, impulse, a, b);
+        apply<kPair>(group, row, kTangent1, slip_1, a, b);
+        apply<kPair>(group, row, kTangent2, slip_2, a, b);
+      };
+      if (kMany && group.b >= 0) {
+        apply_all(std::bool_constant<kMany>());
+      } else {
+        apply_all(std::false_type());
+      }
+    }
+  }
+}
+
+}  // namespace prescene::simulation::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

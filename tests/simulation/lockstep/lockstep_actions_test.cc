@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Actions, contacts and ends of runs, as of any stepper.
+#include "lockstep_scenes.h"
+#include "prescene/tests/support/stepper_contract.h"
+
+namespace prescene::tests {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(Lockstep, StepperContract,
+                         testing::Values(Stepper{"lockstep", [](const Scene& scene) { return lockstep_of(scene); },
+                                                 2e-6}),
+                         [](const auto& stepper) { return stepper.param.name; });
+
+}  // namespace
+}  // namespace prescene::tests
