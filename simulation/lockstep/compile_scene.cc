@@ -6,7 +6,6 @@
 
 #include "convex_parts.h"
 #include "prescene/belief/validation.h"
-#include "prescene/core/check.h"
 #include "prescene/geometry/mass_properties.h"
 
 namespace prescene::simulation {
@@ -213,9 +212,7 @@ std::shared_ptr<const CompiledLockstep> with_pushers(const CompiledLockstep& com
   contact.rolling_friction = 0.0;
   for (std::size_t i = 0; i < radii.size(); ++i) {
     LaneBody body;
-    auto ball = convex_part(geometry::Sphere{radii[i]}, compiled.options.edge_rounding);
-    PRESCENE_CHECK(ball.ok());
-    body.parts.push_back(*std::move(ball));
+    body.parts.push_back(convex_part(geometry::Sphere{radii[i]}, compiled.options.edge_rounding));
     const std::size_t number =
         compiled.scene.objects.size() + compiled.scene.supports.size() + compiled.scene.robot.size() + i;
     add_body(part_id(static_cast<int>(number), contact), std::move(body), more->lanes);

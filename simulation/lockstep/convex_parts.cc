@@ -22,7 +22,7 @@ struct Placement {
   Vector3d p;
 };
 
-core::Result<ConvexPart> primitive_part(const geometry::Primitive& primitive, const Placement& X, double rounding) {
+ConvexPart primitive_part(const geometry::Primitive& primitive, const Placement& X, double rounding) {
   ConvexPart part;
   Vector3d half;
   if (const auto* sphere = std::get_if<geometry::Sphere>(&primitive)) {
@@ -52,7 +52,16 @@ core::Result<ConvexPart> primitive_part(const geometry::Primitive& primitive, co
     half = {capsule->radius, capsule->radius, 0.5 * capsule->length + capsule->radius};
     part.ball = half.z();
   } else {
-    return core::unsupported("cones are not simulated in lockstep");
+    const auto& cone = std::get<geometry::Cone>(primitive);
+    part.kind = CoreKind::kCone;
+    // A ball inside of it bounds the rounding; base and side moved inwards by the same length leave a similar cone.
+    const double slant = std::hypot(cone.radius, cone.length);
+    part.radius = core_radius(rounding, cone.radius * cone.length / (slant + cone.radius));
+    const double base = -0.5 * cone.length + part.radius;
+    const double tip = 0.5 * cone.length - part.radius * slant / cone.radius;
+    part.half = {(tip - base) * cone.radius / cone.length, tip, base};
+    half = {cone.radius, cone.radius, 0.5 * cone.length};
+    part.ball = std::hypot(cone.radius, 0.5 * cone.length);
   }
   part.R_PS = plain(X.R);
   part.center = plain(X.p);
@@ -105,8 +114,7 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
     return Placement{R * X_BS.rotation.toRotationMatrix(), R * X_BS.translation + X_LB.translation};
   };
   if (const auto* primitive = std::get_if<belief::PrimitiveShape>(&shape)) {
-    PRESCENE_TRY(ConvexPart part, primitive_part(primitive->primitive, placed(primitive->X_OS), rounding));
-    parts.push_back(std::move(part));
+    parts.push_back(primitive_part(primitive->primitive, placed(primitive->X_OS), rounding));
     return core::ok_status();
   }
   const auto& mesh = std::get<belief::MeshShape>(shape);
@@ -124,7 +132,7 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
 
 }  // namespace
 
-core::Result<ConvexPart> convex_part(const geometry::Primitive& primitive, double rounding) {
+ConvexPart convex_part(const geometry::Primitive& primitive, double rounding) {
   return primitive_part(primitive, {Matrix3d::Identity(), Vector3d::Zero()}, rounding);
 }
 

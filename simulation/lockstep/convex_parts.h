@@ -18,8 +18,8 @@ inline std::array<double, 9> plain(const geometry::Matrix3d& R) {
   return rows;
 }
 
-/// A primitive about its own frame. kUnsupported: cones.
-core::Result<ConvexPart> convex_part(const geometry::Primitive& primitive, double rounding);
+/// A primitive about its own frame.
+ConvexPart convex_part(const geometry::Primitive& primitive, double rounding);
 
 /// Appends the parts of a body's shapes; X_LB is from the body's frame to that of the lanes. kUnsupported says of which
 /// body and shape and why.

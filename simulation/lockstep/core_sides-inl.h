@@ -8,6 +8,7 @@
 #endif
 
 #include <algorithm>
+#include <cmath>
 
 #include "lane_math-inl.h"
 #include "lane_state.h"
@@ -144,6 +145,31 @@ inline void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side&
         const V t = sense * set<V>(kRimSine[k]);
         const Vec3<V> on_rim{r * (cx * c - cy * t), r * (cx * t + cy * c), end};
         const Vec3<V> on_line{r * cx, r * cy, k == 0 ? hn::Neg(top) : top};
+        side.corner[k] = select(rim, on_rim, on_line);
+      }
+      break;
+    }
+    case CoreKind::kCone: {
+      // The base, or the line up the side that faces most.
+      const V s = hn::Sqrt(direction.x * direction.x + direction.y * direction.y);
+      const auto tilted = hn::Gt(s, set<V>(kFlat));
+      const V scale = one / select(tilted, s, one);
+      const V cx = select(tilted, direction.x * scale, one);
+      const V cy = select(tilted, direction.y * scale, zero);
+      const double height = part.half[1] - part.half[2];
+      const double slant = std::sqrt(part.half[0] * part.half[0] + height * height);
+      const V along_side = s * set<V>(height / slant) + direction.z * set<V>(part.half[0] / slant);
+      const auto rim = hn::Ge(hn::Neg(direction.z), along_side);
+      const V r = set<V>(part.half[0]);
+      const V base = set<V>(part.half[2]);
+      side.most = kRimPoints;
+      side.count = select(rim, set<V>(kRimPoints), set<V>(2.0));
+      side.normal = {zero, zero, hn::IfThenElseZero(rim, hn::Neg(one))};
+      for (int k = 0; k < kRimPoints; ++k) {
+        const V c = set<V>(kRimCosine[k]);
+        const V t = set<V>(-kRimSine[k]);
+        const Vec3<V> on_rim{r * (cx * c - cy * t), r * (cx * t + cy * c), base};
+        const Vec3<V> on_line = k == 0 ? Vec3<V>{r * cx, r * cy, base} : Vec3<V>{zero, zero, set<V>(part.half[1])};
         side.corner[k] = select(rim, on_rim, on_line);
       }
       break;

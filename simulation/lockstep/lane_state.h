@@ -29,13 +29,14 @@ inline constexpr double kRimCosine[kRimPoints] = {1,  0.86602540378443865,  0, -
                                                   -1, -0.86602540378443865, 0, 0.86602540378443865};
 inline constexpr double kRimSine[kRimPoints] = {0, 0.5, 1, 0.5, 0, -0.5, -1, -0.5};
 
-enum class CoreKind { kPoint, kSegment, kBox, kCylinder, kHull };
+enum class CoreKind { kPoint, kSegment, kBox, kCylinder, kCone, kHull };
 
 /// A convex core and the radius about it, as in Bullet's stepper: faces keep their true place, edges are rounded.
 struct ConvexPart {
   CoreKind kind = CoreKind::kBox;
   double radius = 0.0;
-  std::array<double, 3> half{};  ///< Box: half edges; segment: (-, -, z); cylinder: (rim radius, -, z).
+  std::array<double, 3> half{};  ///< Box: half edges; segment: (-, -, z); cylinder: (rim radius, -, z); cone: (rim
+                                 ///< radius, tip z, base z).
   /// Frame S of the shape: of objects in P's directions, of kinematic bodies in theirs, of supports in W. Hulls are
   /// already turned (identity).
   std::array<double, 9> R_PS{1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -32,7 +32,7 @@ struct LockstepOptions {
   RestRule rest;
   DecompositionSettings decomposition;
   /// Instances that a thread has under way at once, in [1, 1024]. More fill the vectors better; memory grows by some
-  /// 6 KiB each.
+  /// 7 KiB each and object.
   int live_instances = 256;
 };
 
@@ -45,8 +45,8 @@ core::Status lockstep_supports(const RunRequest& request, std::span<const belief
 
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
-///   - one to four objects of boxes, spheres, cylinders, capsules and hulls (convex_hull, convex_parts, decompose) of
-///   at
+///   - one to four objects of boxes, spheres, cylinders, cones, capsules and hulls (convex_hull, convex_parts,
+///   decompose) of at
 ///     most 64 vertices, sides of at most 16, and at most 16 parts each;
 ///   - supports of the same shapes, at most 256 parts together;
 ///   - robot bodies of the same shapes, at most 16 parts each and 32 bodies with a shape.

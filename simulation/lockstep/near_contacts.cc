@@ -3,6 +3,7 @@
 // cores, then the sides that face each other along that normal, cut to their common part. Coordinates are those of the
 // opposite part, B, turned and from the middle of the object's part.
 #include <algorithm>
+#include <cmath>
 
 #include "lane_state.h"
 
@@ -186,6 +187,14 @@ HWY_INLINE void try_ways_out(const ConvexPart& b, const Vec3<V>& c, const Try& t
       try_normal(set3<V>(0.0, 0.0, -1.0));
       try_normal(unit({c.x, c.y, zero}));
       break;
+    case CoreKind::kCone: {
+      const double height = b.half[1] - b.half[2];
+      const double slant = std::sqrt(b.half[0] * b.half[0] + height * height);
+      const Vec3<V> out = unit({c.x, c.y, zero});
+      try_normal(set3<V>(0.0, 0.0, -1.0));
+      try_normal(Vec3<V>{out.x * set<V>(height / slant), out.y * set<V>(height / slant), set<V>(b.half[0] / slant)});
+      break;
+    }
     case CoreKind::kHull:
       for (const std::array<double, 3>& normal : b.normals) try_normal(set3<V>(normal));
       break;

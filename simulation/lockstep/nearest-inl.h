@@ -39,6 +39,17 @@ HWY_INLINE Vec3<V> support_of(const ConvexPart& part, const Vec3<V>& direction) 
       return {select(slanted, direction.x * scale, set<V>(part.half[0])), direction.y * scale,
               select(hn::Ge(direction.z, zero), z, hn::Neg(z))};
     }
+    case CoreKind::kCone: {
+      const V s = hn::Sqrt(direction.x * direction.x + direction.y * direction.y);
+      const V r = set<V>(part.half[0]);
+      const V tip = set<V>(part.half[1]);
+      const V base = set<V>(part.half[2]);
+      const auto at_tip = hn::Gt(direction.z * tip, s * r + direction.z * base);
+      const auto slanted = hn::Gt(s, zero);
+      const V scale = r / select(slanted, s, set<V>(1.0));
+      return {hn::IfThenElseZero(hn::Not(at_tip), select(slanted, direction.x * scale, r)),
+              hn::IfThenElseZero(hn::Not(at_tip), direction.y * scale), select(at_tip, tip, base)};
+    }
     case CoreKind::kHull: {
       Vec3<V> best = set3<V>(part.vertices[0]);
       V height = dot(best, direction);

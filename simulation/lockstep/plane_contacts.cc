@@ -2,6 +2,7 @@
 // Contacts of an object with faces that it is over the inner part of: there the nearest point is the lowest one and
 // the normal the face's, whatever else the fixed part has.
 #include <algorithm>
+#include <cmath>
 
 #include "lane_state.h"
 
@@ -133,6 +134,36 @@ HWY_INLINE void cylinder_points(const ConvexPart& part, const Vec3<V>& n, const 
   }
 }
 
+/// The base where it faces the plane more than the side, else the line up the side; n in S.
+template <class Add>
+HWY_INLINE void cone_points(const ConvexPart& part, const Vec3<V>& n, const Add& add) {
+  constexpr double kFlat = 1e-3;  // as of cylinders
+  const V zero = set<V>(0.0);
+  const V one = set<V>(1.0);
+  const V s = hn::Sqrt(n.x * n.x + n.y * n.y);
+  const auto tilted = hn::Gt(s, set<V>(kFlat));
+  const V scale = one / select(tilted, s, one);
+  const V cx = select(tilted, hn::Neg(n.x * scale), one);
+  const V cy = select(tilted, hn::Neg(n.y * scale), zero);
+  const double height = part.half[1] - part.half[2];
+  const double slant = std::sqrt(part.half[0] * part.half[0] + height * height);
+  const auto rim = hn::Ge(n.z, s * set<V>(height / slant) - n.z * set<V>(part.half[0] / slant));
+  const V r = set<V>(part.half[0]);
+  const V base = set<V>(part.half[2]);
+  for (int k = 0; k < kRimPoints; ++k) {
+    const V c = set<V>(kRimCosine[k]);
+    const V t = set<V>(kRimSine[k]);
+    const Vec3<V> on_rim{r * (cx * c - cy * t), r * (cx * t + cy * c), base};
+    if (k == 0) {
+      add(on_rim, all_lanes());
+    } else if (k == 1) {
+      add(select(rim, on_rim, Vec3<V>{zero, zero, set<V>(part.half[1])}), all_lanes());
+    } else {
+      add(on_rim, rim);
+    }
+  }
+}
+
 /// The corners of the side that faces the plane most, and the lowest corner where it is not one of them.
 template <class Add>
 HWY_INLINE void hull_corners(const ConvexPart& part, const Vec3<V>& n, const Add& add) {
@@ -230,6 +261,9 @@ void touch_planes_lanes(const LockstepScene* scene, const ConvexPart* given, con
         break;
       case CoreKind::kCylinder:
         cylinder_points(part, n_S, add);
+        break;
+      case CoreKind::kCone:
+        cone_points(part, n_S, add);
         break;
       case CoreKind::kHull:
         hull_corners(part, n_S, add);

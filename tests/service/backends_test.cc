@@ -21,13 +21,17 @@ supports:
 objects:
   box: {model: box, pose: {position: [0, 0, 0.2], rotation: any}}
 )";
-constexpr const char* kCone = R"(name: cone
+constexpr const char* kFiveBoxes = R"(name: boxes
 models:
-  cone: {cone: {radius: 0.05, length: 0.1}, mass: 0.4}
+  box: {box: [0.1, 0.1, 0.1], mass: 0.4}
 supports:
-  floor: {ground: {size: 2}}
+  floor: {ground: {size: 4}}
 objects:
-  cone: {model: cone, pose: {position: [0, 0, 0.2]}}
+  a: {model: box, pose: {position: [0, 0, 0.05]}}
+  b: {model: box, pose: {position: [0.4, 0, 0.3]}}
+  c: {model: box, pose: {position: [0.8, 0, 0.05]}}
+  d: {model: box, pose: {position: [1.2, 0, 0.05]}}
+  e: {model: box, pose: {position: [1.6, 0, 0.05]}}
 )";
 
 std::shared_ptr<const belief::Scene> scene_of(const char* text) {
@@ -82,15 +86,15 @@ TEST(Backends, LockstepRunsWhatItCanAndBulletTheRest) {
 TEST(Backends, AutomaticStepperIsBulletWhereLockstepRefusesTheScene) {
   core::ThreadPool pool(1);
   BackendSettings settings;
-  const auto cone = scene_of(kCone);
-  const auto bullet = Backends(pool, settings).make_simulator(*cone);
+  const auto five = scene_of(kFiveBoxes);
+  const auto bullet = Backends(pool, settings).make_simulator(*five);
   settings.stepper = Stepper::kAutomatic;
-  const auto automatic = Backends(pool, settings).make_simulator(*cone);
+  const auto automatic = Backends(pool, settings).make_simulator(*five);
   ASSERT_TRUE(bullet.ok() && automatic.ok());
-  EXPECT_TRUE(same(runs(**automatic, *cone, {}), runs(**bullet, *cone, {})));
+  EXPECT_TRUE(same(runs(**automatic, *five, {}), runs(**bullet, *five, {})));
 
   settings.stepper = Stepper::kLockstep;
-  const auto refused = Backends(pool, settings).make_simulator(*cone);
+  const auto refused = Backends(pool, settings).make_simulator(*five);
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.status().message(), HasSubstr("lockstep"));
 }

@@ -263,6 +263,7 @@ TEST(LockstepMechanics, ShapesRestAtTheirTrueHeight) {
       {"box", belief::PrimitiveShape{BoxShape{{0.1, 0.06, 0.04}}, Pose{}}, 0.02},
       {"thin plate", belief::PrimitiveShape{BoxShape{{0.1, 0.1, 0.001}}, Pose{}}, 0.0005},
       {"cylinder", belief::PrimitiveShape{Cylinder{0.03, 0.1}, Pose{}}, 0.05},
+      {"cone", belief::PrimitiveShape{geometry::Cone{0.05, 0.1}, Pose{}}, 0.05},
       {"lying capsule", belief::PrimitiveShape{Capsule{0.02, 0.1}, lying}, 0.02},
       {"lying cylinder", belief::PrimitiveShape{Cylinder{0.03, 0.1}, lying}, 0.03},
       {"hull of a box", hull_of(geometry::make_mesh(BoxShape{{0.1, 0.06, 0.04}})), 0.02},
@@ -306,6 +307,8 @@ TEST(LockstepMechanics, WhatMerelyBalancesIsNotAtRest) {
   EXPECT_NE(end_of(BoxShape{{0.1, 0.1, 0.1}}, on_edge), belief::TrajectoryEnd::kAtRest);
   const Pose on_rim{about(Vector3d::UnitX(), 0.5 * kPi), {0, 0, 0.012}};
   EXPECT_NE(end_of(Cylinder{0.012, 0.00015}, on_rim), belief::TrajectoryEnd::kAtRest);
+  const Pose on_tip{about(Vector3d::UnitX(), kPi), {0, 0, 0.05 - 2e-4 * (std::sqrt(5.0) - 1.0)}};
+  EXPECT_NE(end_of(geometry::Cone{0.05, 0.1}, on_tip), belief::TrajectoryEnd::kAtRest);
   const Pose on_side{about(Vector3d::UnitX(), 0.5 * kPi), {0, 0, 0.03}};
   EXPECT_EQ(end_of(Cylinder{0.03, 0.2}, on_side), belief::TrajectoryEnd::kAtRest);
   EXPECT_EQ(end_of(Sphere{0.05}, Pose::from_translation({0, 0, 0.05})), belief::TrajectoryEnd::kAtRest);
