@@ -151,10 +151,10 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   const V one = set<V>(1.0);
   const ObjectLanes& a = object(group.a);
   const ObjectLanes& b = object(kPair ? group.b : group.a);
-  V speed = along<kPair>(row, kNormal, a.flown, b.flown);
-  V speed_before = along<kPair>(row, kNormal, a.before, b.before);
-  V base_1 = along<kPair>(row, kTangent1, a.flown, b.flown);
-  V base_2 = along<kPair>(row, kTangent2, a.flown, b.flown);
+  V speed = along<kPair>(axis<kPair>(row, kNormal), a.flown, b.flown);
+  V speed_before = along<kPair>(axis<kPair>(row, kNormal), a.before, b.before);
+  V base_1 = along<kPair>(axis<kPair>(row, kTangent1), a.flown, b.flown);
+  V base_2 = along<kPair>(axis<kPair>(row, kTangent2), a.flown, b.flown);
   if constexpr (!kPair) {
     const Vec3<V> position = a.p + r_W;
     if (scene_.has_kinematic()) {
@@ -207,7 +207,7 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   put(row, kHitTime, hit_time);
   const V push = select(open, close_by, close_by * set<V>(settings_.overlap_recovery));
   put(row, kPush, push);
-  overlap_ = overlap_ || !hn::AllFalse(d, hn::Gt(push, zero));
+  overlap_ = overlap_ || !hn::AllFalse(d, hn::Gt(push, set<V>(settings_.accuracy)));
   const auto impact = hn::And(closes, hn::Lt(speed_before, set<V>(-settings_.impact_speed)));
   put(row, kMu, select(impact, a.impact_friction * other_impact, a.friction * other_friction));
   put(row, kBase1, base_1);

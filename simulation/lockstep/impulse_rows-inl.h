@@ -61,6 +61,11 @@ struct Rates {
 };
 HWY_INLINE Rates no_rates() { return {set3<V>(0.0, 0.0, 0.0), set3<V>(0.0, 0.0, 0.0)}; }
 
+/// A direction that an impulse acts in, and how it turns the two objects.
+struct Axis {
+  Vec3<V> direction, turn_a, turn_b;
+};
+
 /// Rows of the same two bodies: object a with object b, or with all that is not an object (b = -1).
 struct RowGroup {
   int a, b;
@@ -118,7 +123,7 @@ class ContactRows {
   /// Null where a lane has no such contact.
   LaneContact* contact(int row, std::size_t lane) const { return scratch_.contacts(row)[lane]; }
   const ObjectLanes& object(int index) const { return objects_[static_cast<std::size_t>(index)]; }
-  bool overlap() const { return overlap_; }  ///< In some lane.
+  bool overlap() const { return overlap_; }  ///< In some lane, and more than rounding.
   bool rolls() const { return scene_.rolls; }
   /// Kinematic bodies may turn what rolls on them.
   bool has_spins() const { return scene_.rolls && scene_.has_kinematic(); }
@@ -138,22 +143,25 @@ class ContactRows {
 
   // kPair: with another object. Where there is none, `b` is not looked at.
   template <bool kPair>
-  HWY_INLINE V along(int row, int f, const Rates& a, const Rates& b) const {
-    const Vec3<V> direction = get3(row, f);
-    V speed = dot(direction, a.velocity) + dot(get3(row, f + 3), a.spin);
-    if constexpr (kPair) speed = speed - (dot(direction, b.velocity) + dot(get3(row, f + 6), b.spin));
+  HWY_INLINE Axis axis(int row, int f) const {
+    const Vec3<V> none = set3<V>(0.0, 0.0, 0.0);
+    return {get3(row, f), get3(row, f + 3), kPair ? get3(row, f + 6) : none};
+  }
+  template <bool kPair>
+  static HWY_INLINE V along(const Axis& axis, const Rates& a, const Rates& b) {
+    V speed = dot(axis.direction, a.velocity) + dot(axis.turn_a, a.spin);
+    if constexpr (kPair) speed = speed - (dot(axis.direction, b.velocity) + dot(axis.turn_b, b.spin));
     return speed;
   }
   template <bool kPair>
-  HWY_INLINE void apply(const RowGroup& group, int row, int f, V impulse, Rates& a, Rates& b) const {
-    const Vec3<V> direction = get3(row, f);
+  HWY_INLINE void apply(const RowGroup& group, const Axis& axis, V impulse, Rates& a, Rates& b) const {
     const V on_a = per_mass(group.a, impulse);
-    a.velocity = a.velocity + direction * on_a;
-    a.spin = a.spin + get3(row, f + 3) * on_a;
+    a.velocity = a.velocity + axis.direction * on_a;
+    a.spin = a.spin + axis.turn_a * on_a;
     if constexpr (kPair) {
       const V on_b = per_mass(group.b, impulse);
-      b.velocity = b.velocity - direction * on_b;
-      b.spin = b.spin - get3(row, f + 6) * on_b;
+      b.velocity = b.velocity - axis.direction * on_b;
+      b.spin = b.spin - axis.turn_b * on_b;
     }
   }
   HWY_INLINE V per_mass(int object_index, V value) const {
@@ -345,9 +353,9 @@ void ContactRows<kMany>::warm_start(Rates* changes) {
       put(row, kSlip2, slip_2);
       const auto apply_all = [&](auto pair) HWY_ATTR {
         constexpr bool kPair = decltype(pair)::value;
-        apply<kPair>(group, row, kNormal, impulse, a, b);
-        apply<kPair>(group, row, kTangent1, slip_1, a, b);
-        apply<kPair>(group, row, kTangent2, slip_2, a, b);
+        apply<kPair>(group, axis<kPair>(row, kNormal), impulse, a, b);
+        apply<kPair>(group, axis<kPair>(row, kTangent1), slip_1, a, b);
+        apply<kPair>(group, axis<kPair>(row, kTangent2), slip_2, a, b);
       };
       if (kMany && group.b >= 0) {
         apply_all(std::bool_constant<kMany>());

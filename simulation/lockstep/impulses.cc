@@ -136,12 +136,13 @@ HWY_INLINE V LaneSolver<kMany>::solve_group(const RowGroup& group, M active, Rat
   for (int k = group.first; k < group.first + group.count; ++k) {
     // Normal.
     const V old = rows_.get(k, kImpulse);
-    const V speed = rows_.template along<kPair>(k, kNormal, a, b);
+    const Axis normal = rows_.template axis<kPair>(k, kNormal);
+    const V speed = rows_.template along<kPair>(normal, a, b);
     const V wanted = hn::Max(zero, old + (rows_.get(k, kTarget) - speed) * rows_.get(k, kInverse));
     const V impulse = select(active, wanted, old);
     const V change = impulse - old;
     rows_.put(k, kImpulse, impulse);
-    rows_.template apply<kPair>(group, k, kNormal, change, a, b);
+    rows_.template apply<kPair>(group, normal, change, a, b);
     largest = hn::Max(largest, hn::Abs(change) * rows_.get(k, kResponse));
     // Friction: a projected gradient step with one step size for both directions. Where it stands still, friction is
     // either below its limit with no slip, or at its limit and exactly opposed to the slip.
@@ -149,8 +150,10 @@ HWY_INLINE V LaneSolver<kMany>::solve_group(const RowGroup& group, M active, Rat
     const V step = rows_.get(k, kSlipStep);
     const V old_1 = rows_.get(k, kSlip1);
     const V old_2 = rows_.get(k, kSlip2);
-    V slip_1 = old_1 - step * (rows_.get(k, kBase1) + rows_.template along<kPair>(k, kTangent1, a, b));
-    V slip_2 = old_2 - step * (rows_.get(k, kBase2) + rows_.template along<kPair>(k, kTangent2, a, b));
+    const Axis tangent_1 = rows_.template axis<kPair>(k, kTangent1);
+    const Axis tangent_2 = rows_.template axis<kPair>(k, kTangent2);
+    V slip_1 = old_1 - step * (rows_.get(k, kBase1) + rows_.template along<kPair>(tangent_1, a, b));
+    V slip_2 = old_2 - step * (rows_.get(k, kBase2) + rows_.template along<kPair>(tangent_2, a, b));
     const V squared = slip_1 * slip_1 + slip_2 * slip_2;
     const auto too_large = hn::Gt(squared, limit * limit);
     const V scale = select(too_large, limit / hn::Sqrt(select(too_large, squared, one)), one);
@@ -160,8 +163,8 @@ HWY_INLINE V LaneSolver<kMany>::solve_group(const RowGroup& group, M active, Rat
     const V change_2 = slip_2 - old_2;
     rows_.put(k, kSlip1, slip_1);
     rows_.put(k, kSlip2, slip_2);
-    rows_.template apply<kPair>(group, k, kTangent1, change_1, a, b);
-    rows_.template apply<kPair>(group, k, kTangent2, change_2, a, b);
+    rows_.template apply<kPair>(group, tangent_1, change_1, a, b);
+    rows_.template apply<kPair>(group, tangent_2, change_2, a, b);
     largest = hn::Max(largest, hn::Max(hn::Abs(change_1), hn::Abs(change_2)) * rows_.get(k, kPerSlipStep));
     if (rolls) largest = hn::Max(largest, solve_rolling<kPair>(group, k, impulse, active, a, b));
   }
@@ -241,12 +244,13 @@ HWY_INLINE V LaneSolver<kMany>::push_group(const RowGroup& group, M active, Rate
   V largest = zero;
   for (int k = group.first; k < group.first + group.count; ++k) {
     const V old = rows_.get(k, kPushImpulse);
-    const V speed = rows_.template along<kPair>(k, kNormal, a, b);
+    const Axis normal = rows_.template axis<kPair>(k, kNormal);
+    const V speed = rows_.template along<kPair>(normal, a, b);
     const V wanted = hn::Max(zero, old + (rows_.get(k, kPush) - speed) * rows_.get(k, kInverse));
     const V impulse = select(active, wanted, old);
     const V change = impulse - old;
     rows_.put(k, kPushImpulse, impulse);
-    rows_.template apply<kPair>(group, k, kNormal, change, a, b);
+    rows_.template apply<kPair>(group, normal, change, a, b);
     largest = hn::Max(largest, hn::Abs(change) * rows_.get(k, kResponse));
   }
   return largest;
@@ -257,10 +261,10 @@ void LaneSolver<kMany>::push_out() {
   const D d;
   const V zero = set<V>(0.0);
   const V accuracy = set<V>(settings_.accuracy);
-  // Only lanes with an overlap: the others' bits do not depend on them.
+  // Only lanes with an overlap that is more than rounding: the others' bits do not depend on them.
   auto active = hn::Lt(zero, zero);
   for (int k = 0; k < rows_.row_count(); ++k) {
-    active = hn::Or(active, hn::Gt(rows_.get(k, kPush), zero));
+    active = hn::Or(active, hn::Gt(rows_.get(k, kPush), accuracy));
     rows_.put(k, kPushImpulse, zero);
   }
   for (int iteration = 0; iteration < settings_.iterations; ++iteration) {
