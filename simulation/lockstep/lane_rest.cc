@@ -128,7 +128,8 @@ bool NudgeTest::runs_away(const LaneEngine& engine, int slot, int object) const 
   const Before& before = before_[static_cast<std::size_t>(object)];
   const double drop = down_.dot(engine.center_of_mass(slot, object) - before.center);
   if (drop > kSunk) return true;
-  if (drop <= 0.0) return false;
+  // What has turned by enough below has sunk by this much.
+  if (drop <= kLeastDrop * 0.5 * before.footing.height * kRunAway * kRunAway * kNudge * kNudge) return false;
   const Vector3d turn = geometry::log_rotation(engine.rotation(slot, object) * before.rotation.conjugate());
   // Turning about the vertical is no toppling.
   const double toppled = (turn - down_ * down_.dot(turn)).norm();

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
+#include <malloc.h>
 
 #include <algorithm>
 
@@ -187,6 +188,21 @@ TEST_P(LockstepBits, WarmedUpStepsDoNotAllocate) {
   const std::uint64_t before = allocation_count();
   for (int n = 0; n < 300; ++n) instance->step();
   EXPECT_EQ(allocation_count(), before);
+}
+
+TEST_P(LockstepBits, LiveInstancesTakeLittleMemory) {
+  if (!can_count_allocations()) GTEST_SKIP() << "memory can't be counted under sanitizers";
+  const Scene scene = this->scene();
+  const auto bytes_of = [&](int live) {
+    LockstepOptions options;
+    options.live_instances = live;
+    const auto simulator = lockstep_of(scene, options);
+    const std::vector<WorldState> starts = drawn_starts(scene, live, 2);
+    const std::size_t before = mallinfo2().uordblks + mallinfo2().hblkhd;
+    run_all(*simulator, starts, short_request(scene));
+    return static_cast<double>(mallinfo2().uordblks + mallinfo2().hblkhd - before);
+  };
+  EXPECT_LT((bytes_of(256) - bytes_of(64)) / 192, 20.0 * 1024);
 }
 
 TEST(LockstepDeterminism, CancelledRunsEnd) {
