@@ -51,7 +51,7 @@ HWY_INLINE std::size_t join(const float* low, const float* high, std::size_t cou
   }
 }
 
-void intersect_lanes(const CriticalPairs& critical, const Swelling& s, const ErrorLines& lines, bool endless,
+void intersect_lanes(const CriticalPairs& critical, const Swelling& s, const ErrorLines& lines,
                      TouchingIntervals* intervals) {
   const Lanes d;
   const std::size_t size = critical.pairs.size;
@@ -94,7 +94,7 @@ void intersect_lanes(const CriticalPairs& critical, const Swelling& s, const Err
       const auto meets = hn::And(used, hn::Ge(discriminant, hn::Zero(d)));
       const V root = hn::Sqrt(hn::Max(discriminant, hn::Zero(d)));
       const V begin = hn::Mul(hn::Sub(hn::Neg(along), root), inverse);
-      const V end = endless ? far : hn::Mul(hn::Sub(root, along), inverse);
+      const V end = hn::Mul(hn::Sub(root, along), inverse);
       hn::Store(hn::IfThenElse(meets, hn::Max(begin, hn::Set(d, -1e30F)), far), d, low[line] + i);
       hn::Store(hn::IfThenElse(meets, hn::Min(end, far), hn::Neg(far)), d, high[line] + i);
     }
@@ -113,9 +113,9 @@ namespace prescene::collision {
 
 HWY_EXPORT(intersect_lanes);
 
-void intersect_lines(const CriticalPairs& critical, const Swelling& swelling, const ErrorLines& lines, bool endless,
+void intersect_lines(const CriticalPairs& critical, const Swelling& swelling, const ErrorLines& lines,
                      TouchingIntervals* intervals) {
-  HWY_DYNAMIC_DISPATCH(intersect_lanes)(critical, swelling, lines, endless, intervals);
+  HWY_DYNAMIC_DISPATCH(intersect_lanes)(critical, swelling, lines, intervals);
 }
 
 }  // namespace prescene::collision

@@ -22,6 +22,8 @@ constexpr double kSymmetric = 1e-6;
 // What is left of a pivot by cancellation, relative to the diagonal.
 constexpr double kRounding = 1e-12;
 constexpr double kNotNegative = 1e-6;
+// As far as bodies may be apart, squared.
+constexpr double kLargestVariance = 1e18;
 // Each of the four sizes that remainder() rests on (two rotations, two translations) is exceeded this often.
 constexpr double kSizeFails = RelativeUncertainty::kRemainderFails / 4;
 // Twice the rounding of a centre's transform and of a distance, relative to the coordinates: a dozen operations.
@@ -58,16 +60,20 @@ bool factorize(const Matrix6d& covariance, Matrix6d& factor) {
   return true;
 }
 
-core::Status check(const Matrix6d& covariance, const char* name) {
+/// Also factorizes it.
+core::Status check(const Matrix6d& covariance, const char* name, Matrix6d& factor) {
   if (!covariance.allFinite())
     return core::invalid_input(std::string("the covariance of body ") + name +
                                " is not finite; check the filter's output");
+  if (covariance.cwiseAbs().maxCoeff() > kLargestVariance) {
+    return core::invalid_input(std::string("the covariance of body ") + name +
+                               " has entries beyond 1e18 m^2; check its " + "units (rad^2, rad m, m^2)");
+  }
   const double off = (covariance - covariance.transpose()).cwiseAbs().maxCoeff();
   if (off > kSymmetric * covariance.cwiseAbs().maxCoeff()) {
     return core::invalid_input(std::string("the covariance of body ") + name + " is not symmetric (off by " +
                                std::to_string(off) + "); use 0.5 (C + C^T)");
   }
-  Matrix6d factor;
   if (covariance.diagonal().minCoeff() < 0.0 || !factorize(covariance, factor)) {
     return core::invalid_input(std::string("the covariance of body ") + name +
                                " is not positive semidefinite; its variances along some direction are negative");
@@ -83,10 +89,9 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
     return core::invalid_input("a confidence of " + std::to_string(confidence) + "; choose one in [0.5, 1 - 1e-9]");
   core::Result<Transform> X_AB = relative_transform(a.X_WB, b.X_WB);
   if (!X_AB.ok()) return X_AB.status();
-  PRESCENE_RETURN_IF_ERROR(check(a.covariance, "A"));
-  PRESCENE_RETURN_IF_ERROR(check(b.covariance, "B"));
-
   RelativeUncertainty result;
+  PRESCENE_RETURN_IF_ERROR(check(a.covariance, "A", result.factor_a_));
+  PRESCENE_RETURN_IF_ERROR(check(b.covariance, "B", result.factor_b_));
   result.X_AB_ = *X_AB;
   result.confidence_ = confidence;
   result.region_radius_ = six_dimensional_radius(1.0 - confidence);
@@ -94,6 +99,9 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
   const Matrix3d R_AW = a.X_WB.rotation.normalized().toRotationMatrix().transpose();
   const Matrix3d R_AB = R_AW * b.X_WB.rotation.normalized().toRotationMatrix();
   const Vector3d p_AB = R_AW * (b.X_WB.translation - a.X_WB.translation);
+  result.mean_ = {geometry::Quaterniond(R_AB), p_AB};
+  for (Matrix6d* factor : {&result.factor_a_, &result.factor_b_})
+    factor->bottomRows<3>() = R_AW * factor->bottomRows<3>();
   Matrix6d from_a = Matrix6d::Zero();
   from_a.topLeftCorner<3, 3>() = -Matrix3d::Identity();
   from_a.bottomRightCorner<3, 3>() = -R_AW;
@@ -154,6 +162,18 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
   most_shift_ = shift;
   reversed_remainder_ = of_moving(turn_a, turn_b) * pivot_.norm() + of_looking(turn_b) * (pivot_ - p_AB).norm() +
                         turn_b * shift + rounding;
+}
+
+Transform RelativeUncertainty::displaced(const Eigen::Matrix<double, 12, 1>& z) const {
+  const Vector6d error_a = factor_a_ * z.head<6>();
+  const Vector6d error_b = factor_b_ * z.tail<6>();
+  const geometry::Quaterniond back = geometry::exp_rotation(-error_a.head<3>());
+  const Matrix3d R = (back * mean_.rotation * geometry::exp_rotation(error_b.head<3>())).toRotationMatrix();
+  const Vector3d p = back * (mean_.translation + error_b.tail<3>() - error_a.tail<3>());
+  Transform X;
+  Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X.rotation.data()) = R.cast<float>();
+  Eigen::Map<Vector3f>(X.translation.data()) = p.cast<float>();
+  return X;
 }
 
 double RelativeUncertainty::Along::largest_across(const Matrix3d& covariance) const {

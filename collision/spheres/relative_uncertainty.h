@@ -48,6 +48,10 @@ class RelativeUncertainty {
   /// Radius of the ball of displacements of one place in standard deviations.
   double ball_radius() const { return ball_radius_; }
 
+  /// X_AB when the error of A's pose (in the coordinates of UncertainPose) is its factor times the first six of `z`,
+  /// that of B's its factor times the last six: exactly, rotations of any size.
+  Transform displaced(const Eigen::Matrix<double, 12, 1>& z) const;
+
   /// Covariance of the place of B's point at p (m, in A), to first order.
   Eigen::Matrix3d covariance_at(const Eigen::Vector3d& p) const;
   /// d(p) = displacement_at(p) * z with z standard normal in six dimensions.
@@ -115,6 +119,9 @@ class RelativeUncertainty {
   void set_growth(const UncertainPose& a, const UncertainPose& b);
 
   Transform X_AB_;
+  geometry::Pose mean_;          // X_AB_ before it was rounded.
+  geometry::Matrix6d factor_a_;  // Of the bodies' own errors, translations in A's axes.
+  geometry::Matrix6d factor_b_;
   geometry::Matrix6d covariance_ = geometry::Matrix6d::Zero();
   geometry::Matrix6d factor_ = geometry::Matrix6d::Zero();
   double confidence_ = 0.0;

@@ -102,8 +102,7 @@ struct TouchingIntervals {
   std::array<std::array<float, kMost>, ErrorLines::kCount> high{};
   std::array<std::size_t, ErrorLines::kCount> count{};
 };
-/// `endless`: who touches goes on touching along the line.
-void intersect_lines(const CriticalPairs& critical, const Swelling& swelling, const ErrorLines& lines, bool endless,
+void intersect_lines(const CriticalPairs& critical, const Swelling& swelling, const ErrorLines& lines,
                      TouchingIntervals* intervals);
 
 /// A tensor of three indices, symmetric in all: t[i](j, k).

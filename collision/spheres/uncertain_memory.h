@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "prescene/collision/spheres/sphere_queries.h"
 #include "prescene/collision/spheres/uncertain_sphere_queries.h"
 #include "prescene/geometry/pose.h"
 #include "uncertain_lanes.h"
@@ -60,6 +61,10 @@ struct UncertainScratch::Memory {
   TouchingIntervals intervals;
   /// Normal numbers of six dimensions that lines are laid through.
   std::array<geometry::Vector6d, ErrorLines::kCount> points;
+  static constexpr std::size_t kDraws = 256;
+  /// Normal numbers of twelve dimensions: errors of two poses.
+  std::vector<Eigen::Matrix<double, 12, 1>> draws;
+  SphereScratch at_draws;
 };
 
 }  // namespace prescene::collision

@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "critical_spheres.h"
+#include "drawn_overlap.h"
+#include "prescene/collision/spheres/static_shape_queries.h"
 #include "prescene/core/random.h"
 #include "uncertain_memory.h"
 
@@ -13,6 +15,9 @@ namespace prescene::collision {
 namespace {
 
 using geometry::Vector6d;
+
+// Bounds this close leave an estimate little to be wrong by.
+constexpr double kCloseBounds = 0.02;
 
 /// P(some sphere touches) along the line of errors start + t direction: spheres are touched from some t on, or up to
 /// one.
@@ -77,7 +82,20 @@ UncertainOverlap uncertain_overlap(const SphereTree& a, const StaticShape& b, co
     overlap.probability_error = 0.5 * (overlap.upper - overlap.lower);
     return overlap;
   }
-  estimate(critical, memory, &overlap);
+  const CriticalSphere& leader = critical.leader();
+  const double missed = between.reversed_along(leader.normal).remainder(leader.centre);
+  const bool of_first_order = critical.complete && is_small_error(missed, leader.deviation);
+  if (of_first_order) estimate(critical, memory, &overlap);
+  const bool is_plane = dynamic_cast<const HalfSpace*>(&b) != nullptr;
+  if (of_first_order && (is_plane || overlap.upper - overlap.lower < kCloseBounds)) return overlap;
+
+  // The shape may end beside its nearest place, or be rounder than the error is small.
+  UncertainOverlap drawn = overlap;
+  estimate_by_draws(
+      between, memory, [&](const Transform& X_AB) { return collision::overlap(a, b, X_AB, memory.at_draws); }, &drawn);
+  const double apart = std::abs(drawn.probability - overlap.probability);
+  if (!of_first_order || apart > drawn.probability_error) return drawn;
+  overlap.probability_error = std::max(overlap.probability_error, apart);
   return overlap;
 }
 

@@ -28,7 +28,8 @@ namespace prescene::collision {
 /// each by its margin along the normal for convex shapes and in any direction for others; a plane before the shape (for
 /// shapes that are not convex: what of it the body may reach) is crossed at one of four points [Worsley 1982].
 /// Estimate: 32 lines through the space of errors (line sampling [Koutsourelakis et al. 2004]) with the shape flat at
-/// its place nearest to each sphere, and solid behind it; then clamped to the bounds.
+/// its place nearest to each sphere, and solid behind it. Unless the shape is a half-space or the bounds are close, 256
+/// poses are drawn, too: they replace the estimate where they contradict it, and else widen its error.
 UncertainOverlap uncertain_overlap(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch);
 

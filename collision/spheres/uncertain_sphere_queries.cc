@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "contact_bounds.h"
+#include "drawn_overlap.h"
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
 #include "uncertain_lanes.h"
@@ -21,24 +22,29 @@ using geometry::Matrix6d;
 using geometry::Vector6d;
 
 // Any: the points are the same in every query, so that answers vary smoothly with their input.
-constexpr std::uint64_t kLineSeed = 1;
+constexpr std::uint64_t kNetSeed = 1;
 // Pairs further apart touch with 0.13 % and push with 2e-4 of a deviation on average.
 constexpr float kWrenchReach = 3.0F;
 
-std::array<Vector6d, ErrorLines::kCount> line_points() {
-  std::array<Vector6d, ErrorLines::kCount> points;
-  const core::SobolNet net(6, kLineSeed);
-  std::array<double, 6> uniform{};
-  for (std::size_t i = 0; i < points.size(); ++i) {
+/// Standard normal points of a net.
+template <int Dimensions, class Points>
+void set_normal_points(Points* points) {
+  const core::SobolNet net(Dimensions, kNetSeed);
+  std::array<double, Dimensions> uniform{};
+  for (std::size_t i = 0; i < points->size(); ++i) {
     net.point(i, uniform);
-    for (std::size_t k = 0; k < 6; ++k) points[i][static_cast<Eigen::Index>(k)] = core::inverse_normal_cdf(uniform[k]);
+    for (int k = 0; k < Dimensions; ++k)
+      (*points)[i][k] = core::inverse_normal_cdf(uniform[static_cast<std::size_t>(k)]);
   }
-  return points;
 }
 
 }  // namespace
 
-UncertainScratch::UncertainScratch() : memory_(std::make_unique<Memory>()) { memory_->points = line_points(); }
+UncertainScratch::UncertainScratch() : memory_(std::make_unique<Memory>()) {
+  set_normal_points<6>(&memory_->points);
+  memory_->draws.resize(Memory::kDraws);
+  set_normal_points<12>(&memory_->draws);
+}
 UncertainScratch::~UncertainScratch() = default;
 UncertainScratch::UncertainScratch(UncertainScratch&&) noexcept = default;
 UncertainScratch& UncertainScratch::operator=(UncertainScratch&&) noexcept = default;
@@ -110,8 +116,15 @@ UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, con
     return overlap;
   }
   overlap.state = OverlapState::kPossible;
+  const double arm = (bounds.leader().b - between.pivot()).norm();
+  if (!overlap.complete || !is_small_error(between.remainder(arm), between.deviation_bound(arm))) {
+    estimate_by_draws(
+        between, memory, [&](const Transform& X_AB) { return collision::overlap(a, b, X_AB, memory.at_draws); },
+        &overlap);
+    return overlap;
+  }
   set_lines(bounds.leader(), between, memory.points, &memory.lines);
-  intersect_lines(memory.critical, swelling, memory.lines, !memory.critical.complete, &memory.intervals);
+  intersect_lines(memory.critical, swelling, memory.lines, &memory.intervals);
   estimate(memory.intervals, &overlap);
   return overlap;
 }

@@ -70,7 +70,6 @@ struct Setting {
   OverlapState state = OverlapState::kPossible;
   double gap_of_bounds = 1.0;  ///< Upper less lower bound at most.
   double moments_off = 0.0;    ///< Relative error of the wrench's covariance that is allowed; 0: it is not compared.
-  bool estimated = true;       ///< The shape is flat enough for the estimate.
   int draws = 100'000;
 };
 
@@ -197,8 +196,7 @@ std::vector<Setting> settings() {
                {world, diagonal({0.1, 0.1, 0.1}, {0.002, 0.002, 0.002})},
                kPossible,
                1.0,
-               0.0,
-               false});
+               0.0});
   s.push_back({"box, usual", box, top, {above(0.0002), usual}, on_table, kPossible, 0.4, 0.06});
   s.push_back({"box, lying on it", box, top, {above(0.0002), lying}, on_table, kPossible, 0.5, 0.06});
   s.push_back({"box, turned far", box, top, {above(0.0002), turned_far}, on_table, kPossible, 0.9, 0.06});
@@ -210,7 +208,6 @@ std::vector<Setting> settings() {
                kPossible,
                0.45,
                0.06,
-               true,
                20'000});
   s.push_back({"mesh of a box, near",
                box,
@@ -220,21 +217,11 @@ std::vector<Setting> settings() {
                kPossible,
                0.02,
                0.0,
-               true,
                20'000});
-  s.push_back({"its surface",
-               box,
-               table(SurfaceSide::kBoth),
-               {above(0.0002), usual},
-               on_table,
-               kPossible,
-               0.45,
-               0.06,
-               true,
-               20'000});
-  s.push_back({"sheet, lying on it", box, sheet(), {above(0.0002), lying}, fixed, kPossible, 0.3, 0.06, true, 50'000});
   s.push_back(
-      {"sheet, touching", box, sheet(), {above(-0.005), millimetres}, fixed, kCertain, 0.01, 0.02, true, 20'000});
+      {"its surface", box, table(SurfaceSide::kBoth), {above(0.0002), usual}, on_table, kPossible, 0.45, 0.06, 20'000});
+  s.push_back({"sheet, lying on it", box, sheet(), {above(0.0002), lying}, fixed, kPossible, 0.3, 0.06, 50'000});
+  s.push_back({"sheet, touching", box, sheet(), {above(-0.005), millimetres}, fixed, kCertain, 0.01, 0.02, 20'000});
   s.push_back({"cylinder, its side",
                box,
                can,
@@ -251,7 +238,6 @@ std::vector<Setting> settings() {
                kPossible,
                0.45,
                0.06,
-               true,
                20'000});
   s.push_back({"field, rough",
                box,
@@ -261,7 +247,6 @@ std::vector<Setting> settings() {
                kPossible,
                1.0,
                0.0,
-               false,
                20'000});
   s.push_back({"ball in a corner",
                ball,
@@ -271,7 +256,6 @@ std::vector<Setting> settings() {
                kPossible,
                1.0,
                0.0,
-               false,
                50'000});
   s.push_back({"error as large as the ball",
                ball,
@@ -280,8 +264,7 @@ std::vector<Setting> settings() {
                on_table,
                kPossible,
                1.0,
-               0.0,
-               false});
+               0.0});
   return s;
 }
 
@@ -312,9 +295,7 @@ TEST(UncertainShapeQueries, BoundsHoldAndMomentsAgreeWithDraws) {
     EXPECT_LE(overlap.lower, overlap.probability);
     EXPECT_GE(overlap.upper, overlap.probability);
     EXPECT_LE(overlap.upper - overlap.lower, setting.gap_of_bounds);
-    if (setting.estimated) {
-      EXPECT_NEAR(overlap.probability, drawn.touching, drawn.noise + overlap.probability_error + 2e-3);
-    }
+    EXPECT_NEAR(overlap.probability, drawn.touching, drawn.noise + overlap.probability_error + 2e-3);
     if (setting.moments_off == 0.0) continue;
     EXPECT_LE(mean_off, 0.03);
     EXPECT_LE(covariance_off, setting.moments_off);
