@@ -23,9 +23,10 @@
 namespace prescene::collision {
 
 struct FirstContactOptions {
-  /// Bodies that approach and are as near as this, m, count as touching. Zero: a ten-thousandth of the smaller body's
-  /// size. What single precision does to coordinates (about 1e-6 of the sum of the two radii and of how far B's origin
-  /// is away) is the least that is possible, and is taken where less is asked for.
+  /// How far the bodies may still be apart at the time reported, m, so that the search ends. It is no safety margin:
+  /// bodies that pass each other closer than this are not reported. Not positive, or not a number: a ten-thousandth of
+  /// the smaller body's size. What single precision does to coordinates is the least that is possible, and is taken
+  /// where less is asked for: about 4e-6 of the two radii, the distance of B's origin and its way, all added up.
   double tolerance = 0.0;
   /// Pairs of nodes or triangles that are looked at before giving up: a bound for the time that a query takes.
   std::uint64_t step_limit = 10'000'000;
@@ -43,7 +44,7 @@ struct FirstContact {
   /// touch at the start, 1 without contact.
   double time = 1.0;
   // At a contact:
-  double distance = 0.0;                             ///< Of the bodies at `time`: 0 to the tolerance, m.
+  double distance = 0.0;  ///< Of the bodies at `time`: 0 to the tolerance or the least possible, m.
   Eigen::Vector3d p_A = Eigen::Vector3d::Zero();     ///< The point of A, m.
   Eigen::Vector3d p_B = Eigen::Vector3d::Zero();     ///< The point of B, in A, m.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< From A to B, unit length; zero where the triangles intersect.

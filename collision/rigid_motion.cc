@@ -5,6 +5,7 @@
 #include <string>
 
 #include "prescene/collision/mesh.h"
+#include "prescene/core/text.h"
 
 namespace prescene::collision {
 namespace {
@@ -24,7 +25,7 @@ core::Result<RigidMotion> RigidMotion::thrown(const geometry::Pose& X_AB_start, 
   if (!V_AB.is_finite() || !p_BP.allFinite())
     return core::invalid_input("the velocities of the motion, or the point that moves, are not finite; check them");
   if (V_AB.angular.norm() > kMostTurns * 2.0 * M_PI) {
-    return core::invalid_input("the motion turns by " + std::to_string(V_AB.angular.norm()) +
+    return core::invalid_input("the motion turns by " + core::rounded_text(V_AB.angular.norm()) +
                                " rad; cut it into shorter ones of at most a thousand turns");
   }
   RigidMotion motion;
@@ -34,7 +35,7 @@ core::Result<RigidMotion> RigidMotion::thrown(const geometry::Pose& X_AB_start, 
   motion.p_AP_ = motion.start_ * p_BP;
   const auto far = static_cast<double>(kLargestCoordinate);
   if (p_BP.norm() + motion.p_AP_.norm() + motion.linear_.norm() > far) {
-    return core::invalid_input("the motion goes " + std::to_string(motion.linear_.norm()) +
+    return core::invalid_input("the motion goes " + core::rounded_text(motion.linear_.norm()) +
                                " m; the limit is 1e9 m: check the unit of the velocity");
   }
   return motion;

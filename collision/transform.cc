@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <string>
+#include "prescene/core/text.h"
 
 namespace prescene::collision {
 namespace {
@@ -17,7 +18,7 @@ core::Status check(const geometry::Pose& X, const char* name) {
     return core::invalid_input(std::string(name) + " is not finite; check the pose that was given: " + to_string(X));
   const double length = X.rotation.norm();
   if (std::abs(length - 1.0) > kRigidTolerance) {
-    return core::invalid_input(std::string(name) + " has a quaternion of length " + std::to_string(length) +
+    return core::invalid_input(std::string(name) + " has a quaternion of length " + core::rounded_text(length) +
                                "; normalise it: scales are not rigid");
   }
   return core::ok_status();
@@ -25,7 +26,7 @@ core::Status check(const geometry::Pose& X, const char* name) {
 
 core::Status check_translation(const Eigen::Vector3d& p) {
   if (p.cwiseAbs().maxCoeff() <= static_cast<double>(kLargestCoordinate)) return core::ok_status();
-  return core::invalid_input("the bodies are " + std::to_string(p.norm()) +
+  return core::invalid_input("the bodies are " + core::rounded_text(p.norm()) +
                              " m apart; the limit is 1e9 m: check the unit of the poses");
 }
 
@@ -75,7 +76,7 @@ core::Result<Transform> to_transform(const Eigen::Matrix4d& X_AB) {
   const Eigen::Matrix3d R_AB = X_AB.topLeftCorner<3, 3>();
   const double off = (R_AB * R_AB.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (off > kRigidTolerance || R_AB.determinant() < 0.0) {
-    return core::invalid_input("the upper 3 x 3 of X_AB is not a rotation (off by " + std::to_string(off) +
+    return core::invalid_input("the upper 3 x 3 of X_AB is not a rotation (off by " + core::rounded_text(off) +
                                (R_AB.determinant() < 0.0 ? ", and it mirrors" : "") +
                                "); only rigid transforms are allowed: apply scales to the mesh");
   }

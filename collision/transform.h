@@ -2,7 +2,7 @@
 // Where one body is relative to another, in single precision: what every query takes.
 //
 //   PRESCENE_TRY(const Transform X_AB, relative_transform(X_WA, X_WB));
-//   bool touching = collide(tree_a, tree_b, X_AB);
+//   bool touching = collide(tree_a, tree_b, X_AB, scratch);
 //
 // A query on meshes A and B puts B's vertices into A's frame by `X_AB * p_BQ`, each operation rounded to single
 // precision in the order written there, and answers exactly for the triangles that result. So all trees, instruction
@@ -18,7 +18,8 @@
 
 namespace prescene::collision {
 
-/// X_AB: rotation row by row, and translation in metres.
+/// X_AB: rotation row by row, and translation in metres. One made by hand is not checked: with numbers that are not
+/// finite queries answer as if the bodies were apart, and what is no rotation scales or shears B.
 struct Transform {
   std::array<float, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   std::array<float, 3> translation = {0, 0, 0};

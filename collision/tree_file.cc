@@ -146,7 +146,7 @@ struct Mapping {
   ~Mapping() { ::munmap(start, size); }
 };
 
-constexpr const char* kRemedy = "; delete it, it will be built anew";
+constexpr const char* kRemedy = "; build the tree anew and save it there";
 
 Status damaged(const std::string& name, const std::string& what) {
   return core::data_loss(name + ": " + what + kRemedy);
@@ -171,7 +171,7 @@ std::array<char, 16> padded(std::string_view kind) {
 
 Status check_header(Bytes bytes, const TreeFileKey& key, const std::string& name) {
   if (bytes.size() < sizeof kMagic || value_at<std::array<char, 8>>(bytes, 0) != kMagic)
-    return foreign(name, "it is not a tree file");
+    return core::invalid_input(name + ": it is not a tree file; name the file that a tree was saved to");
   if (bytes.size() < kEntriesAt) return damaged(name, "it is cut short");
   const auto header = value_at<Header>(bytes, 0);
   if (header.format != kFormat) {
@@ -230,6 +230,7 @@ std::vector<std::uint8_t> TreeFileWriter::bytes() const {
 }
 
 Status TreeFileWriter::write(const std::filesystem::path& path) const {
+  if (path.empty()) return core::invalid_input("no path is given to write the tree to");
   // What is no file stays what it is, and a link stays a link: the file that it leads to is written.
   std::error_code ignored;
   const std::filesystem::path target =
@@ -261,7 +262,7 @@ Result<TreeFile> TreeFile::open(const std::filesystem::path& path, const TreeFil
   if (file.number() < 0) {
     const int error = errno;
     if (error == ENOENT) return core::not_found(name + ": no such file; build the tree and save it");
-    return core::unavailable(name + ": cannot be opened: " + reason(error) + "; change its permissions or delete it");
+    return core::unavailable(name + ": cannot be opened: " + reason(error) + "; change its permissions");
   }
   struct stat about {};
   if (::fstat(file.number(), &about) != 0) return core::unavailable(name + ": cannot be read: " + reason(errno));

@@ -24,7 +24,7 @@ TreeFileKey key_of(const Mesh* mesh, const TriangleTreeOptions& options) {
 }
 
 core::Status damaged(const std::string& what) {
-  return core::data_loss("the tree in it is damaged: " + what + "; delete the file, it will be built anew");
+  return core::data_loss("the tree in it is damaged: " + what + "; build the tree anew and save it there");
 }
 
 /// Nodes and leaves are those of a tree, so that a descent ends and stays inside of the arrays.

@@ -40,7 +40,7 @@ TreeFileKey key_of(const Mesh* mesh, const BoxtreeOptions& o) {
 }
 
 core::Status no_tree(const std::string& name) {
-  return core::data_loss(name + ": what it holds is not a tree of the mesh; delete it to have it made anew");
+  return core::data_loss(name + ": what it holds is not a tree of the mesh; build the tree anew and save it there");
 }
 
 bool is_sound(const DopTree& tree, std::size_t planes) {

@@ -8,6 +8,7 @@
 
 #include "prescene/collision/spheres/continuous_sphere_queries.h"
 #include "prescene/collision/spheres/static_shape.h"
+#include "prescene/core/text.h"
 #include "surface_search.h"
 #include "swept_sphere.h"
 
@@ -33,7 +34,7 @@ core::Status check(const HeightField::Grid& grid, std::string_view name) {
   }
   for (const double spacing : {grid.spacing_x, grid.spacing_y}) {
     if (!(spacing > 0.0) || !std::isfinite(spacing))
-      return refuse(name, "a spacing of " + std::to_string(spacing) + " m; it is positive");
+      return refuse(name, "a spacing of " + core::rounded_text(spacing) + " m; it is positive");
   }
   for (std::size_t i = 0; i < grid.heights.size(); ++i) {
     if (!(std::abs(grid.heights[i]) <= kLargestCoordinate)) {

@@ -66,14 +66,13 @@ OpenEdges open_edges(const Mesh& mesh) {
   return open;
 }
 
-core::Status check_closed(const Mesh& mesh, const OpenEdges& open) {
+core::Status check_closed(const Mesh& mesh, const OpenEdges& open, std::string_view remedy) {
   if (open.edges.empty()) return core::ok_status();
   const Vector3f place = 0.5F * (mesh.vertices()[open.edges[0].from] + mesh.vertices()[open.edges[0].to]);
   std::ostringstream text;
   text << std::setprecision(4) << "mesh '" << mesh.name()
        << "': it is open, or its triangles are of mixed orientation: " << open.edges.size() << " open edges, one at ("
-       << place.x() << ", " << place.y() << ", " << place.z()
-       << ") m; mend it, or have its holes covered by pack_spheres with close_holes";
+       << place.x() << ", " << place.y() << ", " << place.z() << ") m; mend it, or " << remedy;
   return core::invalid_input(text.str());
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "prescene/collision/mesh.h"
@@ -21,7 +22,7 @@ struct OpenEdges {
 };
 OpenEdges open_edges(const Mesh& mesh);
 /// kInvalidInput, with the mesh's name, the number of open edges and a place on one, when there are any.
-core::Status check_closed(const Mesh& mesh, const OpenEdges& open);
+core::Status check_closed(const Mesh& mesh, const OpenEdges& open, std::string_view remedy);
 
 /// A mesh with its holes covered: each closed loop of open edges by triangles from its middle.
 struct ClosedMesh {

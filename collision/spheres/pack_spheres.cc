@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <limits>
 #include <numbers>
 #include <sstream>
 #include <string>
@@ -12,6 +13,7 @@
 #include "hull_gap.h"
 #include "mesh_holes.h"
 #include "prescene/collision/spheres/sphere_packing.h"
+#include "prescene/core/text.h"
 #include "surface_search.h"
 #include "void_search.h"
 
@@ -40,17 +42,23 @@ core::Status check(const Mesh& mesh, const PackingOptions& options) {
     return refuse(mesh, "a packing of at most " + std::to_string(options.max_spheres) +
                             " spheres; set max_spheres to between 1 and " + std::to_string(kMostSpheres));
   }
+  constexpr float kLeastSize = std::numeric_limits<float>::min();
+  if (!(mesh.size() >= kLeastSize)) {
+    return refuse(mesh, "it is " + core::rounded_text(static_cast<double>(mesh.size())) + " m large; scale it to " +
+                            core::rounded_text(static_cast<double>(kLeastSize)) + " m at least");
+  }
   constexpr int kMostLayouts = 1000;
   if (options.layouts < 1 || options.layouts > kMostLayouts) {
     return refuse(mesh, std::to_string(options.layouts) + " layouts to try; set layouts to between 1 and " +
                             std::to_string(kMostLayouts));
   }
   if (!(options.volume_share > 0.0) || !(options.volume_share <= 1.0))
-    return refuse(mesh, "a volume_share of " + std::to_string(options.volume_share) + "; it is above 0 and at most 1");
+    return refuse(mesh,
+                  "a volume_share of " + core::rounded_text(options.volume_share) + "; it is above 0 and at most 1");
   for (const double length : {options.smallest_radius, options.edge_fidelity}) {
     if (!(length >= 0.0) || !std::isfinite(length))
-      return refuse(mesh,
-                    "smallest_radius and edge_fidelity are lengths in m, at least 0; one is " + std::to_string(length));
+      return refuse(
+          mesh, "smallest_radius and edge_fidelity are lengths in m, at least 0; one is " + core::rounded_text(length));
   }
   return core::ok_status();
 }
@@ -69,13 +77,13 @@ double enclosed_volume(const ClosedMesh& mesh) {
 core::Result<ClosedMesh> closed(const Mesh& mesh, bool close, PackingReport& report) {
   const OpenEdges open = open_edges(mesh);
   report.open_edges = static_cast<int>(open.edges.size());
-  if (!close) PRESCENE_RETURN_IF_ERROR(check_closed(mesh, open));
+  if (!close) PRESCENE_RETURN_IF_ERROR(check_closed(mesh, open, "have its holes covered with close_holes"));
   ClosedMesh result = close_holes(mesh, open);
   report.closed_holes = result.holes;
   report.body_volume = enclosed_volume(result);
   if (!(report.body_volume > 0.0)) {
-    return refuse(mesh, "it encloses a volume of " + std::to_string(report.body_volume) +
-                            " m^3; turn its triangles so that they are counter-clockwise seen from outside");
+    return refuse(mesh, "it encloses a volume of " + core::rounded_text(report.body_volume) +
+                            " m^3; give a mesh that is not flat, with triangles counter-clockwise seen from outside");
   }
   return result;
 }
@@ -139,13 +147,13 @@ core::Status place_edges(const Mesh& mesh, const ClosedMesh& body, const Surface
   report.edge_spheres = result.placed;
   if (result.too_thin) {
     return refuse(mesh, "near " + text_of(*result.too_thin) + " it is thinner than the smallest radius of " +
-                            std::to_string(smallest) + " m; allow a larger edge_fidelity or smaller spheres");
+                            core::rounded_text(smallest) + " m; allow a larger edge_fidelity or smaller spheres");
   }
   if (result.unserved > 0) {
     return core::resource_exhausted(
         "mesh '" + mesh.name() + "': with " + std::to_string(options.max_spheres) + " spheres, " +
         std::to_string(result.unserved) + " corners of its hull are further than the edge_fidelity of " +
-        std::to_string(options.edge_fidelity) + " m from the packing; allow more spheres or a larger distance");
+        core::rounded_text(options.edge_fidelity) + " m from the packing; allow more spheres or a larger distance");
   }
   return core::ok_status();
 }
@@ -191,7 +199,7 @@ core::Result<PackedMesh> pack_spheres(const Mesh& mesh, const PackingOptions& op
   grow_to(edges ? (most + 1) / 2 : most);
   if (voids.spheres().empty()) {
     return refuse(mesh,
-                  "no sphere with a radius of " + std::to_string(smallest) +
+                  "no sphere with a radius of " + core::rounded_text(smallest) +
                       " m fits into it; it has no thickness, lies too far from its origin for single precision, or "
                       "smallest_radius is too large");
   }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "prescene/collision/spheres/distance_probability.h"
+#include "prescene/core/text.h"
 
 namespace prescene::collision {
 
@@ -72,7 +73,7 @@ core::Status check(const Matrix6d& covariance, const char* name, Matrix6d& facto
   const double off = (covariance - covariance.transpose()).cwiseAbs().maxCoeff();
   if (off > kSymmetric * covariance.cwiseAbs().maxCoeff()) {
     return core::invalid_input(std::string("the covariance of body ") + name + " is not symmetric (off by " +
-                               std::to_string(off) + "); use 0.5 (C + C^T)");
+                               core::rounded_text(off) + "); use 0.5 (C + C^T)");
   }
   if (covariance.diagonal().minCoeff() < 0.0 || !factorize(covariance, factor)) {
     return core::invalid_input(std::string("the covariance of body ") + name +
@@ -86,7 +87,7 @@ core::Status check(const Matrix6d& covariance, const char* name, Matrix6d& facto
 core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose& a, const UncertainPose& b,
                                                             double confidence) {
   if (!(confidence >= 0.5 && confidence <= 1.0 - 1e-9))
-    return core::invalid_input("a confidence of " + std::to_string(confidence) + "; choose one in [0.5, 1 - 1e-9]");
+    return core::invalid_input("a confidence of " + core::rounded_text(confidence) + "; choose one in [0.5, 1 - 1e-9]");
   core::Result<Transform> X_AB = relative_transform(a.X_WB, b.X_WB);
   if (!X_AB.ok()) return X_AB.status();
   RelativeUncertainty result;

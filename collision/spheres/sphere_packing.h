@@ -67,7 +67,9 @@ class SpherePacking {
 
 struct PackingOptions {
   int max_spheres = 5000;
-  double volume_share = 1.0;     ///< Packing ends when the spheres fill this share of the body's volume: (0, 1].
+  /// Packing ends when the spheres fill this share of the body's volume, in which parts that overlap count twice: (0,
+  /// 1].
+  double volume_share = 1.0;
   double smallest_radius = 0.0;  ///< m; 0: a hundred-thousandth of the body's size.
   /// m; 0: none. No point of the body's surface is further than this from the convex hull of the packing, and where
   /// the hull would be further from a corner there is a sphere with its centre within this distance of the corner, so

@@ -90,7 +90,7 @@ bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, s
               std::vector<SphereContact>* contacts, SphereScratch& scratch);
 
 struct RestitutionOptions {
-  double stiffness = 1.0;                          ///< N/m.
+  double stiffness = 1.0;                          ///< N/m, finite and not negative.
   Eigen::Vector3d p_AP = Eigen::Vector3d::Zero();  ///< The torque is about this point, m; often the centre of mass.
 };
 /// What drives A out of B, in A's frame. B receives the opposite force, and the opposite torque about the same point.

@@ -69,10 +69,12 @@ core::Result<KeptSphereTree> read_sphere_tree(const std::filesystem::path& path,
   PRESCENE_TRY(const Array<double> volumes, file.section<double>(kVolumes));
   PRESCENE_TRY(const Array<std::int32_t> counts, file.section<std::int32_t>(kCounts));
   if (file.section_count() != kSections || root.size() != 1 || volumes.size() != 3 || counts.size() != 3)
-    return core::data_loss(path.string() + ": it is no sphere tree; delete it");
+    return core::data_loss(path.string() + ": it is no sphere tree; pack the mesh anew and write it there");
   parts.root = root[0];
   const auto packed = SpherePacking::make(std::move(spheres), std::move(anchors), mesh.name());
-  if (!packed) return core::data_loss(path.string() + ": " + packed.status().message() + "; delete the file");
+  if (!packed)
+    return core::data_loss(path.string() + ": " + packed.status().message() +
+                           "; pack the mesh anew and write it there");
   KeptSphereTree kept;
   auto restored = SphereTree::restore(*packed, tree, std::move(parts));
   if (!restored) return restored.status().at(path.string());

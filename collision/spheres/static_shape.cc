@@ -168,7 +168,9 @@ std::optional<double> PrimitiveShape::swept_sphere_contact(const Vector3d& from,
 core::Result<TriangleSurface> TriangleSurface::make(std::shared_ptr<const TriangleTree> tree, SurfaceSide side) {
   PRESCENE_CHECK(tree != nullptr);
   const Mesh& mesh = tree->mesh();
-  if (side == SurfaceSide::kSolid) PRESCENE_RETURN_IF_ERROR(check_closed(mesh, open_edges(mesh)));
+  if (side == SurfaceSide::kSolid) {
+    PRESCENE_RETURN_IF_ERROR(check_closed(mesh, open_edges(mesh), "take it as a surface with SurfaceSide::kBoth"));
+  }
   return TriangleSurface(std::move(tree), side);
 }
 

@@ -218,7 +218,7 @@ TEST(PackSpheres, RefusesWhatHasNoInside) {
   core::ThreadPool pool(2);
   geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{2.0, 2.0, 2.0}});
   for (auto& t : box.triangles) std::swap(t[0], t[1]);
-  EXPECT_THAT(pack_spheres(*to_mesh(box), {}, pool).status().message(), HasSubstr("turn its triangles"));
+  EXPECT_THAT(pack_spheres(*to_mesh(box), {}, pool).status().message(), HasSubstr("counter-clockwise"));
   geometry::TriangleMesh sheet;
   sheet.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 1}};
@@ -251,6 +251,8 @@ TEST(PackSpheres, EndsForTinyHugeAndFarBodies) {
     EXPECT_NEAR(packed->report.body_volume, 6.0 * std::pow(scale, 3), 1e-5 * std::pow(scale, 3));
     EXPECT_GT(packed->report.share(), 0.5);
   }
+  const auto speck = geometry::scaled(geometry::make_mesh(geometry::BoxShape{{1.0, 1.0, 1.0}}), 1e-44);
+  EXPECT_THAT(pack_spheres(*to_mesh(speck), {}, pool).status().message(), HasSubstr("scale it"));
   // Ten thousand times its size away, single precision still has room for some spheres; a million times, for none.
   for (const double away : {1e4, 1e6}) {
     geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{{1.0, 2.0, 3.0}});
