@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON of queries, both ways, and of answers.
+#include <algorithm>
 #include <array>
 
 #include "json_values.h"
@@ -10,6 +11,7 @@
 namespace prescene::belief {
 namespace {
 
+constexpr std::int64_t kMostPaths = 1000;
 constexpr std::size_t kLongestQuery = std::size_t{1} << 20;
 
 Json effort_json(const Effort& effort) {
@@ -61,6 +63,39 @@ std::vector<Action> actions_from(JsonObject& fields) {
   return actions;
 }
 
+struct TellWord {
+  const char* word;
+  bool PredictDetail::*field;
+};
+constexpr std::array<TellWord, 6> kTellWords{{{"final_poses", &PredictDetail::final_poses},
+                                              {"typical_runs", &PredictDetail::typical_runs},
+                                              {"inputs", &PredictDetail::inputs},
+                                              {"contacts", &PredictDetail::contacts},
+                                              {"chaos", &PredictDetail::chaos},
+                                              {"model_error", &PredictDetail::model_error}}};
+
+Json tell_json(const PredictDetail& tell) {
+  Json json = Json::array();
+  for (const TellWord& word : kTellWords)
+    if (tell.*word.field) json.push_back(word.word);
+  return json;
+}
+
+PredictDetail tell_from(const JsonAt& at) {
+  PredictDetail tell;
+  for (const TellWord& word : kTellWords) tell.*word.field = false;
+  for (const JsonAt& item : at.items()) {
+    const std::string asked = item.text();
+    const auto found =
+        std::find_if(kTellWords.begin(), kTellWords.end(), [&](const TellWord& word) { return asked == word.word; });
+    if (found == kTellWords.end())
+      item.fail("one of final_poses, typical_runs, inputs, contacts, chaos, model_error is needed");
+    else
+      tell.*found->field = true;
+  }
+  return tell;
+}
+
 struct QueryJson {
   Json operator()(const WhereQuery& where) const {
     Json json = Json::object();
@@ -76,6 +111,8 @@ struct QueryJson {
               {"exclusive_outcomes", std::move(groups)}};
     if (predict.duration) json["duration"] = *predict.duration;
     json["effort"] = effort_json(predict.effort);
+    json["tell"] = tell_json(predict.tell);
+    if (predict.tell.paths > 0) json["paths"] = predict.tell.paths;
     return json;
   }
   Json operator()(const StabilityQuery& stability) const {
@@ -103,6 +140,8 @@ PredictQuery predict_from(JsonObject& fields) {
   read_between(fields, "duration", 0.0, 1e5, duration);
   if (duration > 0.0) predict.duration = duration;
   if (const auto at = fields.find("effort")) predict.effort = effort_from(*at);
+  if (const auto at = fields.find("tell")) predict.tell = tell_from(*at);
+  if (const auto at = fields.find("paths")) predict.tell.paths = static_cast<int>(at->integer(0, kMostPaths));
   return predict;
 }
 
@@ -136,14 +175,6 @@ Json image_json(const geometry::Image<Pixel>& image, const char* encoding) {
           {"base64", core::base64({bytes, image.size() * sizeof(Pixel)})}};
 }
 
-Json outcome_probability_json(const OutcomeProbability& outcome) {
-  Json json{{"name", outcome.name}};
-  if (!outcome.group.empty()) json["group"] = outcome.group;
-  json["probability"] = outcome.probability;
-  json["interval"] = {outcome.low, outcome.high};
-  return json;
-}
-
 Json estimate_json(const ObjectEstimate& estimate) {
   return {{"mean", to_json(estimate.mean)},
           {"covariance", matrix_json(estimate.covariance)},
@@ -152,22 +183,6 @@ Json estimate_json(const ObjectEstimate& estimate) {
           {"motion", to_string(estimate.motion)},
           {"confidence", estimate.confidence},
           {"effective_sample_size", estimate.effective_sample_size}};
-}
-
-Json final_poses_json(const FinalPoses& poses) {
-  Json components = Json::array();
-  for (const PoseComponent& component : poses.components)
-    components.push_back({{"weight", component.weight},
-                          {"outcome", component.outcome},
-                          {"mean", to_json(component.mean)},
-                          {"covariance", matrix_json(component.covariance)}});
-  const HeatMap& map = poses.heat_map;
-  return {{"object", poses.object},
-          {"mean_position", vector_json(poses.mean_position)},
-          {"position_covariance", matrix_json(poses.position_covariance)},
-          {"components", std::move(components)},
-          {"heat_map",
-           {{"cell", map.cell}, {"x0", map.x0}, {"y0", map.y0}, {"nx", map.nx}, {"ny", map.ny}, {"mass", map.mass}}}};
 }
 
 struct AnswerJson {
@@ -182,21 +197,7 @@ struct AnswerJson {
                        {"existence", item.existence}});
     return {{"items", std::move(items)}};
   }
-  Json operator()(const PredictAnswer& predict) const {
-    Json outcomes = Json::array(), poses = Json::array(), runs = Json::array();
-    for (const OutcomeProbability& outcome : predict.outcomes) outcomes.push_back(outcome_probability_json(outcome));
-    for (const FinalPoses& final_poses : predict.final_poses) poses.push_back(final_poses_json(final_poses));
-    for (const TypicalRun& run : predict.typical_runs)
-      runs.push_back({{"outcome", run.outcome},
-                      {"group", run.group},
-                      {"share", run.share},
-                      {"timeline", to_json(run.timeline)},
-                      {"trajectory", to_json(run.trajectory)}});
-    return {{"outcomes", std::move(outcomes)},      {"converged", predict.converged},
-            {"instances", predict.instances},       {"simulated_seconds", predict.simulated_seconds},
-            {"wall_seconds", predict.wall_seconds}, {"final_poses", std::move(poses)},
-            {"typical_runs", std::move(runs)},      {"left_out", predict.left_out}};
-  }
+  Json operator()(const PredictAnswer& predict) const { return prediction_json(predict); }
   Json operator()(const StabilityAnswer& stability) const {
     return {{"object", stability.object},
             {"stable", outcome_probability_json(stability.stable)},

@@ -38,5 +38,9 @@ Action action_from(const JsonAt& at);
 Outcome outcome_from(const JsonAt& at);
 ExclusiveOutcomes exclusive_from(const JsonAt& at);
 Json exclusive_json(const ExclusiveOutcomes& group);
+struct OutcomeProbability;
+struct PredictAnswer;
+Json outcome_probability_json(const OutcomeProbability& outcome);
+Json prediction_json(const PredictAnswer& predict);
 
 }  // namespace prescene::belief

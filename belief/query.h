@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "prescene/belief/belief.h"
-#include "prescene/belief/trajectory.h"
+#include "prescene/belief/prediction.h"
 #include "prescene/geometry/image.h"
 
 namespace prescene::belief {
@@ -28,6 +28,18 @@ struct WhereQuery {
   std::optional<std::string> object;  ///< Empty: all.
   friend bool operator==(const WhereQuery&, const WhereQuery&) = default;
 };
+/// What a prediction is to tell besides probabilities. Where none of what needs places of rest or whole runs is asked
+/// for (final poses, typical runs, contacts, paths), instances end as soon as their outcome is decided.
+struct PredictDetail {
+  bool final_poses = true;
+  bool typical_runs = true;
+  bool inputs = false;       ///< Which uncertain input decides.
+  bool contacts = false;     ///< Who touches whom, when and how hard.
+  bool chaos = false;        ///< Whether small differences decide; takes some more instances.
+  bool model_error = false;  ///< What half and double steps and the ends of the priors change; takes many more.
+  int paths = 0;             ///< So many instances' ways.
+  friend bool operator==(const PredictDetail&, const PredictDetail&) = default;
+};
 /// What happens if...: simulate forward under actions, judge outcomes.
 struct PredictQuery {
   std::vector<Action> actions;    ///< Times from now.
@@ -35,6 +47,7 @@ struct PredictQuery {
   std::vector<ExclusiveOutcomes> exclusive_outcomes;
   std::optional<double> duration;  ///< Empty: the scene's.
   Effort effort;
+  PredictDetail tell;
   friend bool operator==(const PredictQuery&, const PredictQuery&) = default;
 };
 /// Does it stay as it is (released now, if it is held)?
@@ -59,65 +72,6 @@ struct Query {
   friend bool operator==(const Query&, const Query&) = default;
 };
 
-/// Probability of an outcome with an interval of the wanted confidence.
-struct OutcomeProbability {
-  std::string name;
-  std::string group;  ///< Name of the exclusive group, or empty.
-  double probability = 0.0;
-  double low = 0.0;
-  double high = 1.0;
-  friend bool operator==(const OutcomeProbability&, const OutcomeProbability&) = default;
-};
-
-/// Where an object ends: mean and covariance of its final position and the share of each 2 cm cell of a grid in W's xy
-/// plane.
-struct HeatMap {
-  double cell = 0.02;         ///< m
-  double x0 = 0.0, y0 = 0.0;  ///< Lower corner of cell (0, 0), W.
-  int nx = 0, ny = 0;
-  std::vector<double> mass;  ///< Row-major (iy * nx + ix), sums to one.
-  friend bool operator==(const HeatMap&, const HeatMap&) = default;
-};
-/// A Gaussian of final poses inside one outcome.
-struct PoseComponent {
-  double weight = 0.0;
-  std::string outcome;
-  Pose mean;
-  Matrix6d covariance = Matrix6d::Zero();
-  friend bool operator==(const PoseComponent&, const PoseComponent&) = default;
-};
-struct FinalPoses {
-  std::string object;
-  Vector3d mean_position = Vector3d::Zero();
-  geometry::Matrix3d position_covariance = geometry::Matrix3d::Zero();
-  std::vector<PoseComponent> components;  ///< Heaviest first.
-  HeatMap heat_map;
-  friend bool operator==(const FinalPoses&, const FinalPoses&) = default;
-};
-/// A typical run of an outcome: the instance nearest to the middle of those that ended so.
-struct TypicalRun {
-  std::string outcome;
-  std::string group;  ///< Of exclusive outcomes; "" = none.
-  double share = 0.0;
-  Timeline timeline;
-  Trajectory trajectory;
-
-  friend bool operator==(const TypicalRun&, const TypicalRun&) = default;
-};
-
-struct PredictAnswer {
-  std::vector<OutcomeProbability> outcomes;
-  std::vector<FinalPoses> final_poses;
-  std::vector<TypicalRun> typical_runs;
-  /// The scene's outcomes (groups by their name) that need an object which is lost or was never found.
-  std::vector<std::string> left_out;
-  int instances = 0;
-  double simulated_seconds = 0.0;
-  double wall_seconds = 0.0;
-  bool converged = false;  ///< All intervals reached the tolerance.
-
-  friend bool operator==(const PredictAnswer&, const PredictAnswer&) = default;
-};
 struct WhereAnswer {
   struct Item {
     std::string object;

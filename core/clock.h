@@ -15,6 +15,9 @@ inline double seconds_of(TimeNs ns) { return static_cast<double>(ns) * 1e-9; }
 /// Wall time now.
 TimeNs wall_now_ns();
 
+/// Processor time of all threads of this process so far, s.
+double process_cpu_seconds();
+
 /// Seconds since its construction, from a monotonic clock.
 class Stopwatch {
  public:

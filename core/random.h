@@ -33,6 +33,7 @@ enum class Purpose : std::uint32_t {
   kParameters = 12,
   kSurface = 13,
   kAudit = 14,
+  kNearbyStart = 15,
 };
 
 /// The Philox4x32-10 bijection itself [Salmon et al. 2011]: the four words of a counter under a key.

@@ -47,7 +47,8 @@ bool needs_states_along_the_way(const belief::Scene& scene) {
 }  // namespace
 
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
-                                const belief::Effort& effort, const QueryContext& context) {
+                                const belief::Effort& effort, const QueryContext& context,
+                                const ForesightDetail& detail) {
   PRESCENE_RETURN_IF_ERROR(check_effort(effort));
   if (!(duration > 0.0 && duration <= 3600.0))
     return core::invalid_input("a duration of " + std::to_string(duration) + " s: give more than 0 and at most 3600");
@@ -68,7 +69,11 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   options.max_instances = effort.max_instances;
   options.max_seconds = effort.max_seconds;
   options.exact_instances = effort.exact_instances;
+  options.keep_contacts = detail.keep_contacts;
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
+  if (!detail.to_rest && !foresight.variables.empty())
+    foresight.certifier = simulation::make_certifier(foresight.scene, foresight.variables, foresight.request);
+  options.certifier = foresight.certifier.get();
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,
                                     prior.stream, options, *context.pool, context.cancellation, context.progress);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "prediction_parts.h"
 #include "prescene/queries/final_poses.h"
-#include "tasks.h"
 
 namespace prescene::queries {
 namespace {
@@ -38,25 +38,19 @@ std::vector<std::size_t> objects_asked_about(const belief::Scene& scene) {
   return indices;
 }
 
-/// The variable whose classes an object's final poses are told apart by: the first exclusive group about it, else the
-/// first outcome about it. The order of variables is that of simulation::variables_of.
-std::optional<std::size_t> variable_about(const belief::Scene& scene, const std::string& object) {
-  for (std::size_t g = 0; g < scene.exclusive_outcomes.size(); ++g)
-    for (const belief::Outcome& outcome : scene.exclusive_outcomes[g].outcomes)
-      if (outcome.object == object) return g;
-  for (std::size_t i = 0; i < scene.outcomes.size(); ++i)
-    if (scene.outcomes[i].object == object) return scene.exclusive_outcomes.size() + i;
-  return std::nullopt;
-}
-
 belief::FinalPoses final_poses_of(const Foresight& foresight, std::size_t object, core::ThreadPool& pool) {
   const belief::Scene& scene = *foresight.scene;
   const belief::SceneObject& known = scene.objects[object];
   const std::optional<std::size_t> variable = variable_about(scene, known.name);
   std::vector<FinalSample> samples;
+  double mass = 0.0;
   for (const simulation::InstanceRecord& record : foresight.estimate.instances) {
+    if (record.failed) continue;
     samples.push_back({record.final.objects[object].X_WO, record.weight, variable ? record.classes[*variable] : 0});
+    mass += record.weight;
   }
+  if (foresight.estimate.failed > 0)
+    for (FinalSample& sample : samples) sample.weight /= mass;
   const std::vector<std::string> nothing_asked{""};
   const std::vector<std::string>& names = variable ? foresight.variables[*variable].classes : nothing_asked;
   return final_poses(known.name, samples, names, scene.model_of(known).symmetry, {}, pool);
@@ -66,9 +60,7 @@ std::vector<belief::OutcomeProbability> probabilities_of(const Foresight& foresi
   std::vector<belief::OutcomeProbability> all;
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
     const simulation::Variable& variable = foresight.variables[v];
-    // Of a single outcome its opposite is not told: that is the same number again.
-    const std::size_t count = variable.name.empty() ? 1 : variable.classes.size();
-    for (std::size_t c = 0; c < count; ++c) {
+    for (std::size_t c = 0; c < told_classes(variable); ++c) {
       const simulation::ClassEstimate& one = foresight.estimate.variables[v].classes[c];
       all.push_back({variable.classes[c], variable.name, one.probability, one.low, one.high});
     }
@@ -87,8 +79,7 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
   const belief::Scene& scene = *foresight.scene;
   std::vector<Candidate> candidates;
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
-    const std::size_t count = foresight.variables[v].name.empty() ? 1 : foresight.variables[v].classes.size();
-    for (std::size_t c = 0; c < count; ++c) {
+    for (std::size_t c = 0; c < told_classes(foresight.variables[v]); ++c) {
       const double share = foresight.estimate.variables[v].classes[c].probability;
       if (share > 0.0) candidates.push_back({share, v, static_cast<int>(c)});
     }
@@ -119,29 +110,96 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
   return runs;
 }
 
+std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
+  std::vector<belief::ProbabilityStage> history;
+  for (const simulation::EstimateStage& stage : foresight.estimate.history) {
+    belief::ProbabilityStage& told = history.emplace_back();
+    told.instances = stage.instances;
+    for (std::size_t v = 0; v < foresight.variables.size(); ++v)
+      for (std::size_t c = 0; c < told_classes(foresight.variables[v]); ++c) {
+        const simulation::ClassEstimate& one = stage.variables[v].classes[c];
+        told.outcomes.push_back({one.probability, one.low, one.high});
+      }
+  }
+  return history;
+}
+
+/// What the numbers rest on.
+void account(const Foresight& foresight, belief::PredictAnswer& answer) {
+  constexpr double kNoticed = 0.002;  // m: what poses that rest by a scene file's rounded numbers do not reach
+  const simulation::OutcomeEstimate& estimate = foresight.estimate;
+  answer.instances = static_cast<int>(estimate.instances.size());
+  answer.failed_instances = estimate.failed;
+  answer.simulated_seconds = estimate.simulated_seconds;
+  answer.flown_seconds = estimate.flown_seconds;
+  answer.step = foresight.simulator->step_size();
+  answer.certificates = {foresight.certifier != nullptr, estimate.certificates.certified, estimate.certificates.audited,
+                         estimate.certificates.mismatches, estimate.certificates.switched_off};
+  for (const simulation::InstanceRecord& record : estimate.instances) {
+    if (record.deepest_overlap <= kNoticed) continue;
+    answer.overlapping_share += record.weight;
+    answer.deepest_overlap = std::max(answer.deepest_overlap, record.deepest_overlap);
+  }
+  answer.wall_seconds = estimate.wall_seconds;
+  answer.cpu_seconds = estimate.cpu_seconds;
+  answer.converged = estimate.converged;
+  answer.stopped = simulation::to_string(estimate.stop);
+}
+
 }  // namespace
+
+// The order of variables is that of simulation::variables_of.
+std::optional<std::size_t> variable_about(const belief::Scene& scene, const std::string& object) {
+  for (std::size_t g = 0; g < scene.exclusive_outcomes.size(); ++g)
+    for (const belief::Outcome& outcome : scene.exclusive_outcomes[g].outcomes)
+      if (outcome.object == object) return g;
+  for (std::size_t i = 0; i < scene.outcomes.size(); ++i)
+    if (scene.outcomes[i].object == object) return scene.exclusive_outcomes.size() + i;
+  return std::nullopt;
+}
+
+const std::string& name_of(const simulation::Variable& variable) {
+  return variable.name.empty() ? variable.classes.front() : variable.name;
+}
+
+std::size_t told_classes(const simulation::Variable& variable) {
+  return variable.name.empty() ? 1 : variable.classes.size();
+}
 
 core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::PredictQuery& query,
                                             const QueryContext& context) {
   const belief::Scene& own = *prior.scene;
+  const belief::PredictDetail& tell = query.tell;
   const bool use_own_outcomes = query.outcomes.empty() && query.exclusive_outcomes.empty();
   PRESCENE_TRY(auto scene, with_question(own, query.actions.empty() && !prior.seen ? own.actions : query.actions,
                                          use_own_outcomes ? own.outcomes : query.outcomes,
                                          use_own_outcomes ? own.exclusive_outcomes : query.exclusive_outcomes));
   if (scene->objects.empty()) return core::not_found("there is no object whose future could be told");
+  ForesightDetail detail;
+  detail.to_rest = tell.final_poses || tell.typical_runs || tell.contacts || tell.paths > 0;
+  detail.keep_contacts = tell.contacts;
   PRESCENE_TRY(const Foresight foresight,
-               foresee(prior, std::move(scene), query.duration.value_or(own.duration), query.effort, context));
+               foresee(prior, std::move(scene), query.duration.value_or(own.duration), query.effort, context, detail));
+  if (foresight.estimate.failed == static_cast<int>(foresight.estimate.instances.size()))
+    return core::invalid_input("every instance failed in the simulator: look at the scene's shapes, masses and speeds");
 
   belief::PredictAnswer answer;
+  account(foresight, answer);
   answer.outcomes = probabilities_of(foresight);
-  for (std::size_t object : objects_asked_about(*foresight.scene))
-    answer.final_poses.push_back(final_poses_of(foresight, object, *context.pool));
-  answer.typical_runs = typical_runs_of(foresight, prior, context);
-  answer.instances = static_cast<int>(foresight.estimate.instances.size());
-  answer.simulated_seconds = foresight.estimate.simulated_seconds;
-  answer.wall_seconds = foresight.estimate.wall_seconds;
+  answer.history = history_of(foresight);
+  const std::vector<std::size_t> objects = objects_asked_about(*foresight.scene);
+  if (tell.final_poses)
+    for (std::size_t object : objects) answer.final_poses.push_back(final_poses_of(foresight, object, *context.pool));
+  if (tell.typical_runs) answer.typical_runs = typical_runs_of(foresight, prior, context);
+  if (tell.inputs) answer.inputs = deciding_inputs(foresight, prior, context);
+  if (tell.contacts) forecast_contacts(foresight, query.effort.confidence, answer);
+  if (tell.paths > 0) answer.paths = paths_of(foresight, prior, tell.paths, objects, context);
+  if (tell.chaos) answer.chaos = check_for_chaos(foresight, prior, query.effort.confidence, context);
+  if (tell.model_error) {
+    PRESCENE_TRY(answer.model_error, model_error(foresight, prior, query.effort.confidence, context));
+  }
   if (use_own_outcomes) answer.left_out = prior.left_out;
-  answer.converged = foresight.estimate.converged;
+  answer.remarks = remarks_of(answer, query.effort.tolerance);
   return answer;
 }
 

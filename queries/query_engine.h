@@ -28,6 +28,9 @@ struct QueryContext {
   /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where`.
   std::function<core::Result<std::unique_ptr<simulation::Simulator>>(std::shared_ptr<const belief::Scene>)>
       make_simulator;
+  /// The same with every step so many times as long; needed where PredictDetail::model_error is asked for.
+  std::function<core::Result<std::unique_ptr<simulation::Simulator>>(std::shared_ptr<const belief::Scene>, double)>
+      make_simulator_of_step;
   /// Needed by `view`; called once a query.
   std::function<core::Result<std::unique_ptr<rendering::Renderer>>()> make_renderer;
   /// Never null. Its number of threads does not change answers.

@@ -10,7 +10,7 @@
 #include "prescene/belief/query.h"
 #include "prescene/core/status.h"
 #include "prescene/queries/query_engine.h"
-#include "prescene/simulation/uncertain/outcome_estimator.h"
+#include "prescene/simulation/uncertain/certifier.h"
 #include "prior.h"
 
 namespace prescene::queries {
@@ -29,12 +29,18 @@ struct Foresight {
   std::unique_ptr<simulation::Simulator> simulator;
   simulation::RunRequest request;
   std::vector<simulation::Variable> variables;
+  std::unique_ptr<const simulation::Certifier> certifier;  ///< Null: every instance ran to rest.
   simulation::OutcomeEstimate estimate;
+};
+struct ForesightDetail {
+  bool to_rest = true;  ///< Else instances end as soon as they are decided, where that can be told.
+  bool keep_contacts = false;
 };
 /// Fails when the effort or the duration is out of range, when no simulator can be made, or when the query was
 /// cancelled before an instance was finished. The scene's outcomes are what is judged, its actions what is done.
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
-                                const belief::Effort& effort, const QueryContext& context);
+                                const belief::Effort& effort, const QueryContext& context,
+                                const ForesightDetail& detail = {});
 
 /// The instance that stands for those of `class_index` of a variable, by where they left the object; nothing when none
 /// did.

@@ -41,6 +41,8 @@ class EitherSimulator : public simulation::Simulator {
     simulator.run(starts, request, stream, first_instance, pool, trajectories, cancellation);
   }
 
+  double step_size() const override { return bullet_->step_size(); }
+
   std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>& actions,
                                                       const core::RandomStream& stream) const override {
     return bullet_->make_instance(actions, stream);
@@ -55,15 +57,18 @@ class EitherSimulator : public simulation::Simulator {
 Backends::Backends(core::ThreadPool& pool, const BackendSettings& settings)
     : pool_(pool), settings_(settings), shapes_(simulation::hacd_decomposer()) {}
 
-core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(const belief::Scene& scene) {
-  if (settings_.stepper == Stepper::kBullet) return simulation::make_bullet_simulator(scene, shapes_, settings_.bullet);
-  auto lockstep = simulation::make_lockstep_simulator(scene, shapes_, lockstep_options(settings_.bullet));
+core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(const belief::Scene& scene,
+                                                                              double step_factor) {
+  simulation::BulletOptions options = settings_.bullet;
+  options.step *= step_factor;
+  if (settings_.stepper == Stepper::kBullet) return simulation::make_bullet_simulator(scene, shapes_, options);
+  auto lockstep = simulation::make_lockstep_simulator(scene, shapes_, lockstep_options(options));
   if (!lockstep) {
     const bool other_stepper = settings_.stepper == Stepper::kAutomatic;
     if (!other_stepper || lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
-    return simulation::make_bullet_simulator(scene, shapes_, settings_.bullet);
+    return simulation::make_bullet_simulator(scene, shapes_, options);
   }
-  PRESCENE_TRY(auto bullet, simulation::make_bullet_simulator(scene, shapes_, settings_.bullet));
+  PRESCENE_TRY(auto bullet, simulation::make_bullet_simulator(scene, shapes_, options));
   return std::unique_ptr<simulation::Simulator>(
       std::make_unique<EitherSimulator>(*std::move(lockstep), std::move(bullet)));
 }
@@ -75,6 +80,9 @@ core::Result<std::unique_ptr<rendering::Renderer>> Backends::make_renderer() {
 queries::QueryContext Backends::query_context(core::ThreadPool& pool) {
   queries::QueryContext context;
   context.make_simulator = [this](const std::shared_ptr<const belief::Scene>& scene) { return make_simulator(*scene); };
+  context.make_simulator_of_step = [this](const std::shared_ptr<const belief::Scene>& scene, double factor) {
+    return make_simulator(*scene, factor);
+  };
   context.make_renderer = [this] { return make_renderer(); };
   context.pool = &pool;
   context.meshes = &meshes_;

@@ -42,7 +42,9 @@ class Backends {
   core::ThreadPool& pool() { return pool_; }
   filter::MeshCache& meshes() { return meshes_; }
 
-  core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene);
+  /// With steps so many times as long as the settings say.
+  core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene,
+                                                                      double step_factor = 1.0);
   /// Deterministic bits: what is recorded, replayed or answered is drawn by it.
   core::Result<std::unique_ptr<rendering::Renderer>> make_renderer();
   /// For queries that run in `pool`.

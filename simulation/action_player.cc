@@ -12,13 +12,6 @@ double share_done(double begin, double duration, double time) {
   return duration > 0.0 ? std::clamp((time - begin) / duration, 0.0, 1.0) : (time >= begin ? 1.0 : 0.0);
 }
 
-template <class Distribution>
-auto draw_from(const Distribution& distribution, core::RandomStream& stream) {
-  std::vector<double> uniforms(static_cast<std::size_t>(belief::dimensions(distribution)));
-  for (double& u : uniforms) u = stream.uniform();
-  return belief::draw(distribution, uniforms);
-}
-
 /// Horizontal unit vector to the left of a direction of travel; zero when it is vertical.
 Vector3d left_of(const Vector3d& travel) {
   const Vector3d left = Vector3d::UnitZ().cross(travel);
@@ -43,20 +36,13 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
                          core::RandomStream stream) {
   start_ = start.time;
   actions_ = actions;
-  goals_.assign(actions_.size(), Pose{});
-  disturbances_.assign(actions_.size(), Twist{});
+  drawn_ = draw_actions(actions_, stream);
   steps_.assign(actions_.size(), Step{});
   pushers_.clear();
   for (std::size_t i = 0; i < actions_.size(); ++i) {
     const belief::Action& action = actions_[i];
-    if (const auto* place = std::get_if<belief::Place>(&action.what)) {
-      goals_[i] = draw_from(place->X_WO, stream);
-    } else if (const auto* transport = std::get_if<belief::Transport>(&action.what)) {
-      goals_[i] = draw_from(transport->X_WO, stream);
-    } else if (const auto* release = std::get_if<belief::Release>(&action.what)) {
-      disturbances_[i] = draw_from(release->disturbance, stream);
-    } else if (const auto* push = std::get_if<belief::Push>(&action.what)) {
-      const Vector3d shift = draw_from(push->lateral_error, stream) * left_of(push->to - push->from);
+    if (const auto* push = std::get_if<belief::Push>(&action.what)) {
+      const Vector3d shift = drawn_[i].sideways * left_of(push->to - push->from);
       pushers_.push_back({push->from + shift, push->to + shift, action.time, push->duration, push->radius});
     }
   }
@@ -103,7 +89,7 @@ Pose ActionPlayer::carried_pose(const Hold& hold, double time) const {
     X_WO.rotation = geometry::exp_rotation(share * pour->angle * axis) * hold.X_from.rotation;
     return X_WO;
   }
-  return geometry::interpolate(hold.X_from, goals_[index], share);
+  return geometry::interpolate(hold.X_from, drawn_[index].goal, share);
 }
 
 Pose ActionPlayer::object_pose(int object, double time) const {
@@ -208,8 +194,8 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
     Twist V_WO;
     V_WO.linear = (X_next.translation - X_now.translation) / dt;
     V_WO.angular = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt;
-    V_WO.linear += disturbances_[index].linear;
-    V_WO.angular += disturbances_[index].angular;
+    V_WO.linear += drawn_[index].disturbance.linear;
+    V_WO.angular += drawn_[index].disturbance.angular;
     if (hold.hand >= 0) {
       Hand& hand = hands_[static_cast<std::size_t>(hold.hand)];
       if (hand.carries == *object) {

@@ -7,6 +7,7 @@
 
 #include "prescene/belief/scene.h"
 #include "prescene/core/random.h"
+#include "prescene/simulation/action_draws.h"
 #include "prescene/simulation/byte_stream.h"
 
 namespace prescene::simulation {
@@ -89,8 +90,7 @@ class ActionPlayer {
   const belief::Scene* scene_;
   double start_ = 0.0;
   std::vector<belief::Action> actions_;  // times from start_
-  std::vector<Pose> goals_;              // of place and transport, by action
-  std::vector<Twist> disturbances_;      // of releases, by action
+  std::vector<DrawnAction> drawn_;       // by action
   std::vector<Pusher> pushers_;
   std::vector<Hold> objects_;
   std::vector<Hand> hands_;

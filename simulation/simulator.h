@@ -87,6 +87,8 @@ class Simulator {
                    std::span<belief::Trajectory> trajectories,
                    const core::Cancellation* cancellation = nullptr) const = 0;
 
+  /// Of every step, s; 0 = it takes none.
+  virtual double step_size() const { return 0.0; }
   virtual std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                                   const core::RandomStream& stream) const = 0;
 };

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/heat_map_picture.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/prediction_report.h"
 #include "verb.h"
@@ -18,8 +21,12 @@ struct Options {
   std::string scene;
   std::string report;
   std::string stepper = "bullet";
+  std::string heat_map;
   belief::Effort effort;
   double max_seconds = 0.0;
+  std::string budget;
+  bool outcomes_only = false;
+  bool model_error = false;
   double duration = 0.0;
 };
 
@@ -27,6 +34,33 @@ nlohmann::ordered_json document_of(const belief::Scene& scene, std::uint64_t see
   nlohmann::ordered_json document = {{"scene", scene.name}, {"seed", seed}};
   document.update(belief::to_json(answer).at("predict"));
   return document;
+}
+
+/// "where is decided by carton: position x (57 +-4 %), ...": inputs whose share is surely more than nothing.
+std::string deciding_text(const belief::DecidingInputs& inputs) {
+  constexpr std::size_t kShown = 3;
+  std::string text;
+  std::size_t shown = 0;
+  for (const belief::InputShare& input : inputs.inputs) {
+    if (shown == kShown || input.share < 0.02 || input.share < 2.0 * input.standard_error) break;
+    text += (shown++ > 0 ? ", " : "") + input.input + " (" + fixed_text(100.0 * input.share, 0) + " +-" +
+            fixed_text(100.0 * input.standard_error, 0) + " %)";
+  }
+  return inputs.about + " is decided by " +
+         (text.empty() ? "no single uncertain input\n"
+                       : text + "; by several together " +
+                             fixed_text(100.0 * std::max(0.0, 1.0 - inputs.explained_by_single), 0) + " %\n");
+}
+
+std::string cost_text(const belief::PredictAnswer& predicted) {
+  std::string text = std::to_string(predicted.instances) + " instances, ";
+  if (predicted.step > 0.0) text += fixed_text(predicted.simulated_seconds / predicted.step, 0) + " steps, ";
+  text += fixed_text(predicted.simulated_seconds, 0) + " simulated seconds, " + fixed_text(predicted.cpu_seconds, 1) +
+          " s of processor time, " + fixed_text(predicted.wall_seconds, 1) + " s";
+  if (const belief::CertificateSummary& use = predicted.certificates; use.used)
+    text += "; " + fixed_text(100.0 * use.certified / std::max(1, predicted.instances), 0) + " % ended when decided (" +
+            std::to_string(use.audited) + " audited, " + std::to_string(use.mismatches) + " otherwise)";
+  return text + (predicted.converged ? "\n" : "; not all intervals reached the tolerance\n");
 }
 
 std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
@@ -48,13 +82,50 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
               fixed_text(p.z(), 3) + " m\n";
     }
   }
-  return text + std::to_string(predicted.instances) + " instances, " + fixed_text(predicted.simulated_seconds, 0) +
-         " simulated seconds, " + fixed_text(predicted.wall_seconds, 1) + " s" +
-         (predicted.converged ? "" : "; not all intervals reached the tolerance") + "\n";
+  for (const belief::DecidingInputs& inputs : predicted.inputs) text += deciding_text(inputs);
+  text += cost_text(predicted);
+  for (const std::string& remark : predicted.remarks) text += "Note: " + remark + "\n";
+  return text;
+}
+
+/// "0.1s", "100ms", "2 min": seconds; nothing where it is no time above 0.
+std::optional<double> seconds_of(const std::string& text) {
+  std::size_t used = 0;
+  double value = 0.0;
+  try {
+    value = std::stod(text, &used);
+  } catch (const std::exception&) {  // the standard library's way of saying that it is no number
+    return std::nullopt;
+  }
+  std::string unit = text.substr(used);
+  unit.erase(0, unit.find_first_not_of(' '));
+  double factor = 0.0;
+  if (unit == "s" || unit.empty()) factor = 1.0;
+  if (unit == "ms") factor = 1e-3;
+  if (unit == "min") factor = 60.0;
+  const double seconds = factor * value;
+  return seconds > 0.0 && seconds <= 1e6 ? std::optional(seconds) : std::nullopt;
+}
+
+/// What is printed and drawn decides what is asked for; what is not shown is not worked out.
+belief::PredictDetail detail_of(const Options& options, bool json) {
+  belief::PredictDetail tell;
+  const bool pictures = !options.report.empty() || !options.heat_map.empty();
+  const bool full = (json && !options.outcomes_only) || pictures;
+  tell.final_poses = tell.typical_runs = full;
+  tell.inputs = true;
+  tell.contacts = full;
+  // These take more instances than the estimate itself does, so a limit on time leaves them out.
+  const bool unlimited = options.max_seconds <= 0.0 && options.budget.empty();
+  tell.chaos = unlimited || options.model_error;
+  tell.model_error = options.model_error;
+  tell.paths = pictures ? 48 : 0;
+  return tell;
 }
 
 core::Status run(const Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
+  PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene, options.report}));
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
   BackendSettings settings;
   if (options.stepper == "automatic") settings.stepper = Stepper::kAutomatic;
@@ -63,7 +134,11 @@ core::Status run(const Options& options, VerbContext& context) {
   belief::PredictQuery question;
   question.effort = options.effort;
   if (options.max_seconds > 0.0) question.effort.max_seconds = options.max_seconds;
+  if (!options.budget.empty()) question.effort.max_seconds = seconds_of(options.budget);
   if (options.duration > 0.0) question.duration = options.duration;
+  question.tell = detail_of(options, context.options().json);
+  // Without outcomes, where things end is the answer.
+  if (scene->outcomes.empty() && scene->exclusive_outcomes.empty()) question.tell.final_poses = true;
   queries::QueryContext query_context = backends.query_context(context.pool());
   query_context.cancellation = &context.cancellation();
   query_context.progress = context.progress("predicting");
@@ -71,12 +146,16 @@ core::Status run(const Options& options, VerbContext& context) {
   context.end_progress();
   if (!answer.error.empty()) return status_of_error(options.scene + ": ", answer.error);
 
+  const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
+  if (!options.heat_map.empty()) {
+    PRESCENE_RETURN_IF_ERROR(write_heat_map(options.heat_map, *scene, predicted, backends));
+    core::log(context.log(), core::LogLevel::kInfo, "heat map written to " + options.heat_map);
+  }
   if (!options.report.empty()) {
     PRESCENE_RETURN_IF_ERROR(write_prediction_report(options.report, *scene, answer, backends));
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
-  context.print(document_of(*scene, context.options().seed, answer),
-                text_of(std::get<belief::PredictAnswer>(answer.what), options.effort.confidence));
+  context.print(document_of(*scene, context.options().seed, answer), text_of(predicted, options.effort.confidence));
   if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
   return core::ok_status();
 }
@@ -99,6 +178,20 @@ Verb add_predict_verb(CLI::App& app) {
   verb->add_option("--max-seconds", options->max_seconds,
                    "Wall time, s, after which no more instances begin; the answer then depends on the machine's speed")
       ->check(positive_number());
+  verb->add_option("--budget", options->budget,
+                   "The same with a unit, as 0.1s, 100ms or 2min; what takes further instances is left out")
+      ->excludes("--max-seconds")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            return seconds_of(text) ? std::string()
+                                    : "'" + text + "' is no time above 0: give one as 0.1s, 100ms or 2min";
+          },
+          "TIME"));
+  verb->add_flag("--outcomes-only", options->outcomes_only,
+                 "With --json: no final poses, typical runs and contacts, so that instances end once they are decided");
+  verb->add_flag("--model-error", options->model_error,
+                 "Also repeat instances at half and double step and at the ends of uncertain parameters");
+  verb->add_option("--heat-map", options->heat_map, "Write a PNG picture of where objects end");
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
       ->check(positive_number());
   verb->add_option(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/simulation/bullet/bullet_simulator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <utility>
@@ -80,6 +81,7 @@ class BulletSimulator : public Simulator {
     });
   }
 
+  double step_size() const override { return scene_->options.step; }
   std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                           const core::RandomStream& stream) const override {
     return std::make_unique<BulletInstance>(scene_, actions, stream);
@@ -147,6 +149,7 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
       trajectory.end = belief::TrajectoryEnd::kDiverged;
       break;
     }
+    trajectory.deepest_overlap = std::max(trajectory.deepest_overlap, world.overlap());
     worker.contacts.note(world.touches(), begin, world.time(), scene_->options.contact_merge_time);
     const bool left = world.freeze_beyond(request.stop.world_radius);
     const double elapsed = static_cast<double>(done) * dt;

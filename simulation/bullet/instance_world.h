@@ -45,6 +45,8 @@ class InstanceWorld {
   void read(belief::WorldState& state) const;
   /// Touching pairs of the last step, ordered.
   const std::vector<Touch>& touches() const { return touches_; }
+  /// How deep two things were in each other at the beginning of the last step, m.
+  double overlap() const { return overlap_; }
   /// Some number is not finite or some speed beyond 1e4.
   bool diverged() const;
   /// Freezes objects beyond this distance from the origin. Returns whether any object has left.
@@ -165,6 +167,7 @@ class InstanceWorld {
   std::int64_t steps_ = 0;
   std::vector<Warm> warm_;
   std::vector<Touch> touches_;
+  double overlap_ = 0.0;  // not in snapshots: nothing depends on it
 
   // Scratch of a step.
   ContactFinder finder_;

@@ -209,6 +209,7 @@ class LockstepSimulator : public Simulator {
     });
   }
 
+  double step_size() const override { return scene_->options.step; }
   std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                           const core::RandomStream& stream) const override {
     RunRequest request;

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "instance_plan.h"
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
+#include "prescene/core/text.h"
 #include "prescene/simulation/uncertain/certifier.h"
 
 namespace prescene::simulation {
@@ -22,13 +24,6 @@ std::size_t chunk_size(const core::ThreadPool& pool) {
   return std::max<std::size_t>(32, 8 * static_cast<std::size_t>(pool.threads()));
 }
 
-std::vector<StartSampler> samplers_of(const StartDistribution& starts, const core::RandomStream& stream) {
-  core::RandomStream seeds = stream.for_purpose(core::Purpose::kSobolScramble);
-  std::vector<StartSampler> samplers;
-  for (const StartComponent& component : starts.components) samplers.emplace_back(component, seeds.next_u64());
-  return samplers;
-}
-
 /// Foretells how many instances the stop rule will take, from how the widest interval shrank so far.
 class Forecast {
  public:
@@ -36,7 +31,8 @@ class Forecast {
     expected_ = options.exact_instances ? *options.exact_instances : options.max_instances;
   }
 
-  void stage_done(double count, double widest) {
+  void stage_done(double count, double widest, std::string settled) {
+    settled_ = std::move(settled);
     if (options_.exact_instances) return;
     // Between the rates of independent draws (1/2) and of nets in smooth problems (1); 0.6 until two stages are known.
     double rate = 0.6;
@@ -65,7 +61,7 @@ class Forecast {
     shown_ = std::clamp(fraction, shown_, 1.0);  // a bar never runs backwards
     sink_({shown_, left,
            std::to_string(static_cast<int>(done)) + " of about " + std::to_string(static_cast<int>(total)) +
-               " instances"});
+               " instances" + settled_});
   }
 
  private:
@@ -75,6 +71,7 @@ class Forecast {
   double expected_;
   double first_count_ = 0.0, first_widest_ = 0.0;
   double shown_ = 0.0;
+  std::string settled_;
 };
 
 /// All that running instances takes.
@@ -88,24 +85,30 @@ struct Runner {
   const std::vector<StartSampler>& samplers;
   const Certifier* certifier;  // null: run all to rest
   double audit_share;
+  bool keep_contacts;
 };
 
 void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& record) {
   record.classes.clear();
   record.certified = run.end == belief::TrajectoryEnd::kDecided;
-  if (record.certified) {
+  record.failed = run.end == belief::TrajectoryEnd::kDiverged;
+  if (record.failed) {
+    record.classes.assign(runner.variables.size(), -1);
+  } else if (record.certified) {
     const double left = runner.request.stop.duration - run.simulated_seconds;
     std::optional<std::vector<int>> decided = runner.certifier->classes(run.states.back(), left);
     PRESCENE_CHECK_MSG(decided, "a certifier that answers differently when it is asked again");
     record.classes = *std::move(decided);
   }
-  for (std::size_t v = 0; v < runner.variables.size(); ++v) {
+  for (std::size_t v = 0; v < runner.variables.size() && !record.failed; ++v) {
     if (!record.certified) record.classes.push_back(runner.variables[v].classify(run));
     PRESCENE_CHECK(record.classes[v] >= 0 &&
                    static_cast<std::size_t>(record.classes[v]) < runner.variables[v].classes.size());
   }
   record.final = std::move(run.states.back());
   record.end = run.end;
+  record.deepest_overlap = std::max(record.deepest_overlap, run.deepest_overlap);
+  if (runner.keep_contacts) record.contacts = std::move(run.contacts);
   record.simulated_seconds += run.simulated_seconds;
   record.flown_seconds += run.flown_seconds;
 }
@@ -179,7 +182,22 @@ bool repair(const Runner& runner, std::vector<InstanceRecord>& records, Certific
   return done == numbers.size();
 }
 
-/// Fills in weights, intervals and the total from the records.
+/// Of each instance; they sum to one.
+std::vector<double> weights_of(const StartDistribution& starts, const std::vector<InstanceRecord>& records) {
+  std::vector<double> counts(starts.components.size(), 0.0);
+  for (const InstanceRecord& record : records) counts[static_cast<std::size_t>(record.component)] += 1.0;
+  double weight_sum = 0.0;
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    if (counts[k] > 0.0) weight_sum += starts.components[k].weight;
+  std::vector<double> weights;
+  for (const InstanceRecord& record : records) {
+    const auto k = static_cast<std::size_t>(record.component);
+    weights.push_back(starts.components[k].weight / (weight_sum * counts[k]));
+  }
+  return weights;
+}
+
+/// Fills in weights, intervals and the totals from the records, and adds a stage to the history.
 void evaluate(const StartDistribution& starts, std::span<const Variable> variables, const EstimatorOptions& options,
               OutcomeEstimate& estimate) {
   estimate.simulated_seconds = estimate.flown_seconds = 0.0;
@@ -194,6 +212,14 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
   if (!use.switched_off && use.mismatches > 0)
     doubt = static_cast<double>(use.mismatches) / use.audited * use.certified /
             static_cast<double>(estimate.instances.size());
+  estimate.failed = static_cast<int>(std::count_if(estimate.instances.begin(), estimate.instances.end(),
+                                                   [](const InstanceRecord& record) { return record.failed; }));
+  const std::vector<double> weights = weights_of(starts, estimate.instances);
+  double failed_share = 0.0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    estimate.instances[i].weight = weights[i];
+    if (estimate.instances[i].failed) failed_share += weights[i];
+  }
   estimate.converged = true;
   for (std::size_t v = 0; v < variables.size(); ++v) {
     for (ComponentClasses& component : components) component.classes.clear();
@@ -203,26 +229,18 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
     for (std::size_t c = 0; c < variables[v].classes.size(); ++c) {
       ClassEstimate& found =
           variable.classes.emplace_back(class_estimate(components, static_cast<int>(c), options.confidence));
-      found.half_width += doubt;
+      found.half_width += doubt + failed_share;
       found.low = std::max(0.0, found.low - doubt);
-      found.high = std::min(1.0, found.high + doubt);
+      found.high = std::min(1.0, found.high + doubt + failed_share);
       estimate.converged = estimate.converged && variable.classes.back().half_width <= options.tolerance;
     }
   }
 
-  std::vector<double> counts(starts.components.size(), 0.0);
   for (const InstanceRecord& record : estimate.instances) {
-    counts[static_cast<std::size_t>(record.component)] += 1.0;
     estimate.simulated_seconds += record.simulated_seconds;
     estimate.flown_seconds += record.flown_seconds;
   }
-  double weight_sum = 0.0;
-  for (std::size_t k = 0; k < counts.size(); ++k)
-    if (counts[k] > 0.0) weight_sum += starts.components[k].weight;
-  for (InstanceRecord& record : estimate.instances) {
-    const std::size_t k = static_cast<std::size_t>(record.component);
-    record.weight = starts.components[k].weight / (weight_sum * counts[k]);
-  }
+  estimate.history.push_back({static_cast<int>(estimate.instances.size()), estimate.variables});
 }
 
 double widest_half(const OutcomeEstimate& estimate) {
@@ -230,6 +248,22 @@ double widest_half(const OutcomeEstimate& estimate) {
   for (const VariableEstimate& variable : estimate.variables)
     for (const ClassEstimate& one : variable.classes) widest = std::max(widest, one.half_width);
   return widest;
+}
+
+/// The likeliest classes of the first variable, for progress: ", in_bin 0.62 +-0.03, ...".
+std::string settled_text(std::span<const Variable> variables, const OutcomeEstimate& estimate) {
+  constexpr std::size_t kShown = 3;
+  if (estimate.variables.empty()) return {};
+  const std::vector<ClassEstimate>& classes = estimate.variables[0].classes;
+  std::vector<std::size_t> order(variables[0].name.empty() ? 1 : classes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return classes[a].probability > classes[b].probability; });
+  std::string text;
+  for (std::size_t c : std::span(order).first(std::min(kShown, order.size())))
+    text += ", " + variables[0].classes[c] + " " + core::fixed_text(classes[c].probability, 2) + " +-" +
+            core::fixed_text(classes[c].half_width, 2);
+  return text;
 }
 
 }  // namespace
@@ -259,6 +293,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
   PRESCENE_CHECK(options.tolerance > 0.0 && options.confidence > 0.0 && options.confidence < 1.0);
   PRESCENE_CHECK(options.max_instances > 0 && (!options.exact_instances || *options.exact_instances > 0));
   const core::Stopwatch watch;
+  const double cpu_before = core::process_cpu_seconds();
   const std::vector<StartSampler> samplers = samplers_of(starts, stream);
   std::vector<double> weights;
   for (const StartComponent& component : starts.components) weights.push_back(component.weight);
@@ -268,8 +303,16 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
 
   PRESCENE_CHECK(options.audit_share >= 0.0 && options.audit_share <= 1.0);
   OutcomeEstimate estimate;
-  Runner runner{simulator,         variables,          request, stream, pool, cancellation, samplers,
-                options.certifier, options.audit_share};
+  Runner runner{simulator,
+                variables,
+                request,
+                stream,
+                pool,
+                cancellation,
+                samplers,
+                options.certifier,
+                options.audit_share,
+                options.keep_contacts};
   Forecast forecast(options, progress);
   std::size_t chunk = chunk_size(pool);
   std::optional<EstimateStop> stop;
@@ -294,7 +337,8 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
       if (!repair(runner, estimate.instances, estimate.certificates)) stop = EstimateStop::kCancelled;
     }
     evaluate(starts, variables, options, estimate);
-    forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate));
+    forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate),
+                        settled_text(variables, estimate));
     if (stop) break;
     if (options.exact_instances) {
       if (target == limit) stop = EstimateStop::kExact;
@@ -306,6 +350,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
   }
   estimate.stop = *stop;
   estimate.wall_seconds = watch.seconds();
+  estimate.cpu_seconds = core::process_cpu_seconds() - cpu_before;
   return estimate;
 }
 

@@ -53,6 +53,8 @@ struct EstimatorOptions {
   /// Ends instances whose classes are decided (certifier.h), made for the same variables and request. Their `final` is
   /// then no place of rest: leave it out where that is used. Must outlive the estimate.
   const Certifier* certifier = nullptr;
+  /// Keep each instance's contacts. Of an instance that a certificate ended they are those until then.
+  bool keep_contacts = false;
   double audit_share = 0.02;         ///< Of the decided instances that are run to rest all the same, in [0, 1].
   double tolerated_mismatch = 0.01;  ///< Share of the audited with another class beyond which nothing is certified.
 };
@@ -62,12 +64,16 @@ struct InstanceRecord {
   int component = 0;         ///< Of the start distribution.
   std::uint32_t point = 0;   ///< Index in the component's net.
   double weight = 0.0;       ///< The weights of all instances sum to one.
-  std::vector<int> classes;  ///< One a variable.
+  std::vector<int> classes;  ///< One a variable; -1 = none, of an instance that failed.
   belief::WorldState final;
   belief::TrajectoryEnd end = belief::TrajectoryEnd::kDuration;
   double simulated_seconds = 0.0;
   double flown_seconds = 0.0;  ///< Of these, what took no search for contacts.
   bool certified = false;      ///< Ended by its certificate, and not audited since.
+  /// The simulation blew up: no class is true of it (-1), and it counts for none.
+  bool failed = false;
+  double deepest_overlap = 0.0;                   ///< m, see Trajectory.
+  std::vector<belief::ContactInterval> contacts;  ///< With EstimatorOptions::keep_contacts.
 };
 
 /// Instances that ended by a certificate, and what the audit found.
@@ -92,6 +98,13 @@ struct VariableEstimate {
   friend bool operator==(const VariableEstimate&, const VariableEstimate&) = default;
 };
 
+/// What was known after so many instances.
+struct EstimateStage {
+  int instances = 0;
+  std::vector<VariableEstimate> variables;
+  friend bool operator==(const EstimateStage&, const EstimateStage&) = default;
+};
+
 enum class EstimateStop {
   kConverged,     ///< Every half width reached the tolerance.
   kMaxInstances,  ///< Not converged: max_instances were run.
@@ -107,8 +120,12 @@ struct OutcomeEstimate {
   double simulated_seconds = 0.0;           ///< Of all instances together, audits and repairs included.
   double flown_seconds = 0.0;               ///< Of these, what took no search for contacts.
   CertificateUse certificates;
-  double wall_seconds = 0.0;  ///< The only field that differs between runs of equal `instances.size()`.
-  bool converged = false;     ///< Every half width is within the tolerance, however the work ended.
+  /// Instances whose simulation failed. They might have been of any class: their share widens every interval.
+  int failed = 0;
+  std::vector<EstimateStage> history;  ///< At each growth of the net, the last being this estimate.
+  double wall_seconds = 0.0;           ///< These two alone differ between runs of equal `instances.size()`.
+  double cpu_seconds = 0.0;            ///< Of all threads of the process meanwhile.
+  bool converged = false;              ///< Every half width is within the tolerance, however the work ended.
   EstimateStop stop = EstimateStop::kConverged;
 };
 

@@ -41,11 +41,16 @@ class StartSampler {
   StartSampler(const StartComponent& component, std::uint64_t seed);
   /// The start at point `index` of the net. Coordinates beyond core::SobolNet::kMaxDimensions are plain random numbers.
   belief::WorldState draw(std::uint32_t index) const;
+  /// The uniform numbers of that point: component.draw(uniforms(i)) is draw(i).
+  std::vector<double> uniforms(std::uint32_t index) const;
 
  private:
   const StartComponent* component_;
   core::SobolNet net_;
   core::RandomStream padding_;
 };
+
+/// One sampler a component, with the nets that an estimate with this stream uses. `starts` must outlive them.
+std::vector<StartSampler> samplers_of(const StartDistribution& starts, const core::RandomStream& stream);
 
 }  // namespace prescene::simulation

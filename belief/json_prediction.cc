@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON of predictions.
+#include "json_values.h"
+#include "prescene/belief/json.h"
+#include "prescene/belief/prediction.h"
+
+namespace prescene::belief {
+namespace {
+
+Json final_poses_json(const FinalPoses& poses) {
+  Json components = Json::array();
+  for (const PoseComponent& component : poses.components)
+    components.push_back({{"weight", component.weight},
+                          {"outcome", component.outcome},
+                          {"mean", to_json(component.mean)},
+                          {"covariance", matrix_json(component.covariance)}});
+  const HeatMap& map = poses.heat_map;
+  return {{"object", poses.object},
+          {"mean_position", vector_json(poses.mean_position)},
+          {"position_covariance", matrix_json(poses.position_covariance)},
+          {"components", std::move(components)},
+          {"heat_map",
+           {{"cell", map.cell}, {"x0", map.x0}, {"y0", map.y0}, {"nx", map.nx}, {"ny", map.ny}, {"mass", map.mass}}}};
+}
+
+Json history_json(const std::vector<ProbabilityStage>& history) {
+  Json json = Json::array();
+  for (const ProbabilityStage& stage : history) {
+    Json probability = Json::array(), interval = Json::array();
+    for (const ProbabilityStage::Share& share : stage.outcomes) {
+      probability.push_back(share.probability);
+      interval.push_back({share.low, share.high});
+    }
+    json.push_back(
+        {{"instances", stage.instances}, {"probability", std::move(probability)}, {"interval", std::move(interval)}});
+  }
+  return json;
+}
+
+Json inputs_json(const std::vector<DecidingInputs>& all) {
+  Json json = Json::array();
+  for (const DecidingInputs& one : all) {
+    Json inputs = Json::array();
+    for (const InputShare& input : one.inputs) {
+      Json effects = Json::array();
+      for (const InputShare::Effect& effect : input.effects)
+        effects.push_back(
+            {{"outcome", effect.outcome}, {"low_fifth", effect.low_fifth}, {"high_fifth", effect.high_fifth}});
+      inputs.push_back({{"input", input.input},
+                        {"share", input.share},
+                        {"standard_error", input.standard_error},
+                        {"effects", std::move(effects)}});
+    }
+    json.push_back(
+        {{"about", one.about}, {"explained_by_single", one.explained_by_single}, {"inputs", std::move(inputs)}});
+  }
+  return json;
+}
+
+Json chaos_json(const std::vector<ChaosCheck>& checks) {
+  Json json = Json::array();
+  for (const ChaosCheck& check : checks)
+    json.push_back({{"about", check.about},
+                    {"pairs", check.pairs},
+                    {"displacement", check.displacement},
+                    {"changed", check.changed},
+                    {"interval", {check.low, check.high}},
+                    {"chaotic", check.chaotic}});
+  return json;
+}
+
+Json contacts_json(const PredictAnswer& predict) {
+  Json pairs = Json::array();
+  for (const ContactForecast& contact : predict.contacts)
+    pairs.push_back({{"first", contact.first},
+                     {"second", contact.second},
+                     {"probability", contact.probability},
+                     {"interval", {contact.low, contact.high}},
+                     {"first_touch", contact.first_touch},
+                     {"impulse", contact.impulse},
+                     {"touching", contact.touching}});
+  return {{"times", predict.contact_times}, {"pairs", std::move(pairs)}};
+}
+
+Json model_error_json(const ModelError& error) {
+  Json variants = Json::array();
+  for (const ModelError::Variant& variant : error.variants) {
+    Json shifts = Json::array();
+    for (const ModelError::Shift& shift : variant.shifts) {
+      Json item{{"outcome", shift.outcome}};
+      if (!shift.group.empty()) item["group"] = shift.group;
+      item["shift"] = shift.shift;
+      item["interval"] = {shift.low, shift.high};
+      shifts.push_back(std::move(item));
+    }
+    variants.push_back({{"what", variant.what}, {"shifts", std::move(shifts)}});
+  }
+  return {{"instances", error.instances}, {"variants", std::move(variants)}};
+}
+
+Json paths_json(const std::vector<ObjectPath>& paths) {
+  Json json = Json::array();
+  for (const ObjectPath& path : paths) {
+    Json points = Json::array();
+    for (const Vector3d& point : path.points) points.push_back(vector_json(point));
+    json.push_back({{"object", path.object}, {"outcome", path.outcome}, {"points", std::move(points)}});
+  }
+  return json;
+}
+
+Json certificates_json(const CertificateSummary& use) {
+  if (!use.used) return {{"used", false}};
+  return {{"used", true},
+          {"certified", use.certified},
+          {"audited", use.audited},
+          {"mismatches", use.mismatches},
+          {"switched_off", use.switched_off}};
+}
+
+}  // namespace
+
+Json outcome_probability_json(const OutcomeProbability& outcome) {
+  Json json{{"name", outcome.name}};
+  if (!outcome.group.empty()) json["group"] = outcome.group;
+  json["probability"] = outcome.probability;
+  json["interval"] = {outcome.low, outcome.high};
+  return json;
+}
+
+Json prediction_json(const PredictAnswer& predict) {
+  Json outcomes = Json::array(), poses = Json::array(), runs = Json::array();
+  for (const OutcomeProbability& outcome : predict.outcomes) outcomes.push_back(outcome_probability_json(outcome));
+  for (const FinalPoses& final_poses : predict.final_poses) poses.push_back(final_poses_json(final_poses));
+  for (const TypicalRun& run : predict.typical_runs)
+    runs.push_back({{"outcome", run.outcome},
+                    {"group", run.group},
+                    {"share", run.share},
+                    {"timeline", to_json(run.timeline)},
+                    {"trajectory", to_json(run.trajectory)}});
+  Json json{{"outcomes", std::move(outcomes)},
+            {"converged", predict.converged},
+            {"stopped", predict.stopped},
+            {"instances", predict.instances},
+            {"failed_instances", predict.failed_instances},
+            {"simulated_seconds", predict.simulated_seconds},
+            {"flown_seconds", predict.flown_seconds},
+            {"step", predict.step},
+            {"certificates", certificates_json(predict.certificates)},
+            {"overlaps", {{"share", predict.overlapping_share}, {"deepest", predict.deepest_overlap}}},
+            {"wall_seconds", predict.wall_seconds},
+            {"cpu_seconds", predict.cpu_seconds},
+            {"remarks", predict.remarks},
+            {"history", history_json(predict.history)},
+            {"final_poses", std::move(poses)},
+            {"typical_runs", std::move(runs)},
+            {"left_out", predict.left_out}};
+  if (!predict.inputs.empty()) json["inputs"] = inputs_json(predict.inputs);
+  if (!predict.chaos.empty()) json["chaos"] = chaos_json(predict.chaos);
+  if (!predict.contact_times.empty()) json["contacts"] = contacts_json(predict);
+  if (predict.model_error) json["model_error"] = model_error_json(*predict.model_error);
+  if (!predict.paths.empty()) json["paths"] = paths_json(predict.paths);
+  return json;
+}
+
+}  // namespace prescene::belief

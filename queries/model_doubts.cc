@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+// What else could have come out: from starts near by, with other steps, with other parameters; and the ways there.
+#include <algorithm>
+#include <cmath>
+
+#include "prediction_parts.h"
+#include "prescene/core/text.h"
+#include "prescene/simulation/uncertain/repeated_instances.h"
+
+namespace prescene::queries {
+namespace {
+
+using Classes = std::vector<std::vector<int>>;
+
+constexpr double kDisplacement = 0.1;  // standard deviations
+constexpr double kChaotic = 0.1;       // share of pairs that end otherwise
+constexpr std::size_t kFewestPairs = 32, kMostPairs = 128;
+constexpr std::size_t kRepeated = 256;
+constexpr double kLowEnd = 0.05, kHighEnd = 0.95;  // of priors
+constexpr double kPathInterval = 1.0 / 30.0;
+
+void tell(const QueryContext& context, double fraction, const std::string& text) {
+  if (context.progress) context.progress({fraction, std::nullopt, text});
+}
+
+Classes classes_so_far(const Foresight& foresight, std::size_t count) {
+  Classes classes;
+  for (std::size_t i = 0; i < count; ++i) classes.push_back(foresight.estimate.instances[i].classes);
+  return classes;
+}
+
+/// A parameter and how a state's is set.
+struct Parameter {
+  const char* name;
+  double (*get)(const belief::PhysicalParameters&);
+  void (*set)(belief::PhysicalParameters&, double);
+};
+const Parameter kParameters[] = {
+    {"friction", [](const belief::PhysicalParameters& p) { return p.friction; },
+     [](belief::PhysicalParameters& p, double value) {
+       if (p.impact_friction == p.friction) p.impact_friction = value;  // one number, unless given apart
+       p.friction = value;
+     }},
+    {"restitution", [](const belief::PhysicalParameters& p) { return p.restitution; },
+     [](belief::PhysicalParameters& p, double value) { p.restitution = value; }},
+    {"mass", [](const belief::PhysicalParameters& p) { return p.mass; },
+     [](belief::PhysicalParameters& p, double value) { p.mass = value; }},
+    {"centre of mass x", [](const belief::PhysicalParameters& p) { return p.center_of_mass.x(); },
+     [](belief::PhysicalParameters& p, double value) { p.center_of_mass.x() = value; }},
+    {"centre of mass y", [](const belief::PhysicalParameters& p) { return p.center_of_mass.y(); },
+     [](belief::PhysicalParameters& p, double value) { p.center_of_mass.y() = value; }},
+    {"centre of mass z", [](const belief::PhysicalParameters& p) { return p.center_of_mass.z(); },
+     [](belief::PhysicalParameters& p, double value) { p.center_of_mass.z() = value; }},
+};
+
+/// A way in which the model could be otherwise.
+struct Variant {
+  std::string what;
+  double step_factor = 1.0;
+  std::shared_ptr<const belief::Scene> scene;
+  std::vector<belief::WorldState> starts;
+};
+
+void add_object_ends(const belief::Scene& scene, const std::vector<belief::WorldState>& starts,
+                     const std::shared_ptr<const belief::Scene>& same, std::vector<Variant>& variants) {
+  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+    for (const Parameter& parameter : kParameters) {
+      std::vector<double> values;
+      for (const belief::WorldState& start : starts) values.push_back(parameter.get(start.objects[o].physical));
+      std::sort(values.begin(), values.end());
+      if (values.back() - values.front() <= 1e-9 * (1.0 + std::abs(values.front()))) continue;
+      for (const double end : {kLowEnd, kHighEnd}) {
+        const double value = values[static_cast<std::size_t>(end * static_cast<double>(values.size() - 1) + 0.5)];
+        Variant& variant = variants.emplace_back();
+        variant.what = scene.objects[o].name + ": " + parameter.name + " at " + core::rounded_text(value);
+        variant.scene = same;
+        variant.starts = starts;
+        for (belief::WorldState& start : variant.starts) parameter.set(start.objects[o].physical, value);
+      }
+    }
+  }
+}
+
+void add_support_ends(const std::shared_ptr<const belief::Scene>& scene, const std::vector<belief::WorldState>& starts,
+                      std::vector<Variant>& variants) {
+  using Member = belief::ScalarDistribution belief::ContactProperties::*;
+  const std::pair<const char*, Member> members[] = {{"friction", &belief::ContactProperties::friction},
+                                                    {"restitution", &belief::ContactProperties::restitution}};
+  for (std::size_t s = 0; s < scene->supports.size(); ++s) {
+    for (const auto& [name, member] : members) {
+      const belief::ScalarDistribution& prior = scene->supports[s].contact.*member;
+      if (belief::dimensions(prior) != 1) continue;
+      for (const double end : {kLowEnd, kHighEnd}) {
+        const double value = belief::draw(prior, std::span(&end, 1));
+        auto changed = std::make_shared<belief::Scene>(*scene);
+        changed->supports[s].contact.*member = belief::FixedScalar{value};
+        variants.push_back(
+            {scene->supports[s].name + ": " + name + " at " + core::rounded_text(value), 1.0, changed, starts});
+      }
+    }
+  }
+}
+
+/// By how much each probability differs, over the instances of which both are known.
+std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, const Classes& before,
+                                                 const Classes& after, double confidence) {
+  std::vector<belief::ModelError::Shift> shifts;
+  const double reach = core::inverse_normal_cdf(0.5 + 0.5 * confidence);
+  for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
+    const simulation::Variable& variable = foresight.variables[v];
+    for (std::size_t c = 0; c < told_classes(variable); ++c) {
+      double weight = 0.0, squares = 0.0, sum = 0.0, sum_squares = 0.0;
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        if (before[i][v] < 0 || after[i][v] < 0) continue;
+        const double w = foresight.estimate.instances[i].weight;
+        const int is = static_cast<int>(c);
+        const double change = (after[i][v] == is ? 1.0 : 0.0) - (before[i][v] == is ? 1.0 : 0.0);
+        weight += w;
+        squares += w * w;
+        sum += w * change;
+        sum_squares += w * change * change;
+      }
+      belief::ModelError::Shift& shift = shifts.emplace_back();
+      shift.outcome = variable.classes[c];
+      shift.group = variable.name;
+      shift.low = -1.0;
+      shift.high = 1.0;
+      if (!(weight > 0.0)) continue;
+      shift.shift = sum / weight;
+      const double count = weight * weight / squares;
+      const double variance = std::max(0.0, sum_squares / weight - shift.shift * shift.shift) / count;
+      // The continuity term is what keeps no change at all from being told as certainly none.
+      const double half = reach * std::sqrt(variance + 1.0 / (count * count));
+      shift.low = std::max(-1.0, shift.shift - half);
+      shift.high = std::min(1.0, shift.shift + half);
+    }
+  }
+  return shifts;
+}
+
+}  // namespace
+
+std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, const Prior& prior, double confidence,
+                                                const QueryContext& context) {
+  const std::size_t instances = foresight.estimate.instances.size();
+  if (instances < kFewestPairs || foresight.variables.empty()) return {};
+  const std::size_t pairs = std::clamp(instances / 8, kFewestPairs, kMostPairs);
+  tell(context, 0.0, "looking whether small differences decide");
+  const std::vector<belief::WorldState> starts =
+      simulation::starts_nearby(prior.starts, foresight.estimate, pairs, kDisplacement, prior.stream, *context.pool);
+  const auto after =
+      simulation::classes_from(*foresight.simulator, starts, foresight.variables, foresight.request, prior.stream,
+                               foresight.certifier.get(), *context.pool, context.cancellation);
+  if (!after) return {};
+  std::vector<belief::ChaosCheck> checks;
+  for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
+    std::vector<simulation::ComponentClasses> both(1);
+    for (std::size_t i = 0; i < pairs; ++i) {
+      const int before = foresight.estimate.instances[i].classes[v];
+      if (before >= 0 && (*after)[i][v] >= 0) both[0].classes.push_back((*after)[i][v] == before ? 1 : 0);
+    }
+    if (both[0].classes.empty()) continue;
+    const simulation::ClassEstimate changed = simulation::class_estimate(both, 0, confidence);
+    belief::ChaosCheck& check = checks.emplace_back();
+    check.about = name_of(foresight.variables[v]);
+    check.pairs = static_cast<int>(both[0].classes.size());
+    check.displacement = kDisplacement;
+    check.changed = changed.probability;
+    check.low = changed.low;
+    check.high = changed.high;
+    check.chaotic = changed.low > kChaotic;
+  }
+  return checks;
+}
+
+core::Result<std::optional<belief::ModelError>> model_error(const Foresight& foresight, const Prior& prior,
+                                                            double confidence, const QueryContext& context) {
+  if (!context.make_simulator_of_step)
+    return core::unavailable("no simulator of other steps: this service was set up without one");
+  const std::size_t count = std::min(kRepeated, foresight.estimate.instances.size());
+  const std::vector<belief::WorldState> starts =
+      simulation::starts_of(prior.starts, foresight.estimate, count, prior.stream, *context.pool);
+  std::vector<Variant> variants = {{"half the step", 0.5, foresight.scene, starts},
+                                   {"twice the step", 2.0, foresight.scene, starts}};
+  add_object_ends(*foresight.scene, starts, foresight.scene, variants);
+  add_support_ends(foresight.scene, starts, variants);
+
+  const Classes before = classes_so_far(foresight, count);
+  belief::ModelError error;
+  error.instances = static_cast<int>(count);
+  for (std::size_t n = 0; n < variants.size(); ++n) {
+    const Variant& variant = variants[n];
+    tell(context, static_cast<double>(n) / static_cast<double>(variants.size()), "the model's error: " + variant.what);
+    PRESCENE_TRY(const auto simulator, context.make_simulator_of_step(variant.scene, variant.step_factor));
+    // No certificates: they know the scene's friction, not a variant's.
+    const auto after = simulation::classes_from(*simulator, variant.starts, foresight.variables, foresight.request,
+                                                prior.stream, nullptr, *context.pool, context.cancellation);
+    if (!after) return std::optional<belief::ModelError>();
+    error.variants.push_back({variant.what, shifts_of(foresight, before, *after, confidence)});
+  }
+  return std::optional(std::move(error));
+}
+
+std::vector<belief::ObjectPath> paths_of(const Foresight& foresight, const Prior& prior, int count,
+                                         const std::vector<std::size_t>& objects, const QueryContext& context) {
+  const auto runs = std::min(static_cast<std::size_t>(std::max(0, count)), foresight.estimate.instances.size());
+  const std::vector<belief::WorldState> starts =
+      simulation::starts_of(prior.starts, foresight.estimate, runs, prior.stream, *context.pool);
+  simulation::RunRequest request = foresight.request;
+  request.sample_interval = kPathInterval;
+  std::vector<belief::Trajectory> trajectories(runs);
+  foresight.simulator->run(starts, request, prior.stream, 0, *context.pool, trajectories, context.cancellation);
+  std::vector<belief::ObjectPath> paths;
+  for (std::size_t i = 0; i < runs; ++i) {
+    if (trajectories[i].end == belief::TrajectoryEnd::kCancelled || foresight.estimate.instances[i].failed) continue;
+    for (const std::size_t object : objects) {
+      belief::ObjectPath& path = paths.emplace_back();
+      path.object = foresight.scene->objects[object].name;
+      if (const auto variable = variable_about(*foresight.scene, path.object)) {
+        const int which = foresight.estimate.instances[i].classes[*variable];
+        path.outcome = foresight.variables[*variable].classes[static_cast<std::size_t>(which)];
+      }
+      for (const belief::WorldState& state : trajectories[i].states)
+        path.points.push_back(state.objects[object].X_WO.translation);
+    }
+  }
+  return paths;
+}
+
+}  // namespace prescene::queries

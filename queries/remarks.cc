@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// What one should know before trusting the numbers, in sentences.
+#include <algorithm>
+#include <cmath>
+
+#include "prediction_parts.h"
+#include "prescene/core/text.h"
+
+namespace prescene::queries {
+namespace {
+
+using core::fixed_text;
+
+constexpr double kManyFailed = 0.01;
+constexpr std::size_t kMostNamed = 3;
+
+std::string percent(double share, int decimals = 0) { return fixed_text(100.0 * share, decimals) + " %"; }
+std::string points(double shift) { return (shift >= 0.0 ? "+" : "") + fixed_text(100.0 * shift, 1); }
+
+std::string full_name(const std::string& group, const std::string& outcome) {
+  return group.empty() ? outcome : group + " = " + outcome;
+}
+
+/// The variant that shifts an outcome most, of those that surely shift it.
+struct Worst {
+  const belief::ModelError::Shift* shift = nullptr;
+  std::string what;
+};
+
+Worst worst_for(const belief::ModelError& error, const belief::OutcomeProbability& outcome) {
+  Worst worst;
+  for (const belief::ModelError::Variant& variant : error.variants) {
+    for (const belief::ModelError::Shift& shift : variant.shifts) {
+      const bool sure = shift.low > 0.0 || shift.high < 0.0;
+      if (!sure || shift.outcome != outcome.name || shift.group != outcome.group) continue;
+      if (worst.shift && std::abs(shift.shift) <= std::abs(worst.shift->shift)) continue;
+      worst = {&shift, variant.what};
+    }
+  }
+  return worst;
+}
+
+void remark_on_model(const belief::PredictAnswer& answer, std::vector<std::string>& remarks) {
+  const belief::ModelError& error = *answer.model_error;
+  struct Narrow {
+    double excess;
+    std::string text;
+  };
+  std::vector<Narrow> narrow;
+  for (const belief::OutcomeProbability& outcome : answer.outcomes) {
+    const double half = 0.5 * (outcome.high - outcome.low);
+    const Worst worst = worst_for(error, outcome);
+    if (!worst.shift || std::abs(worst.shift->shift) <= half) continue;
+    narrow.push_back({std::abs(worst.shift->shift) - half,
+                      full_name(outcome.group, outcome.name) + " (interval +-" + fixed_text(100.0 * half, 1) +
+                          " points; " + worst.what + " shifts it by " + points(worst.shift->shift) + ", " +
+                          points(worst.shift->low) + " to " + points(worst.shift->high) + ")"});
+  }
+  std::stable_sort(narrow.begin(), narrow.end(), [](const Narrow& a, const Narrow& b) { return a.excess > b.excess; });
+  double resolved = 0.0;  // how small a shift these instances can show
+  for (const belief::ModelError::Variant& variant : error.variants)
+    for (const belief::ModelError::Shift& shift : variant.shifts)
+      resolved = std::max(resolved, 0.5 * (shift.high - shift.low));
+  if (narrow.empty()) {
+    remarks.push_back(
+        "No variant of the model was found to shift a probability by more than the half width of its "
+        "interval; shifts below " +
+        fixed_text(100.0 * resolved, 1) + " points are not seen with " + std::to_string(error.instances) +
+        " instances.");
+    return;
+  }
+  std::string text =
+      "The intervals tell what more instances would change, and are narrower than what the model does not "
+      "know: ";
+  for (std::size_t i = 0; i < std::min(kMostNamed, narrow.size()); ++i) text += (i > 0 ? "; " : "") + narrow[i].text;
+  if (narrow.size() > kMostNamed) text += "; and " + std::to_string(narrow.size() - kMostNamed) + " more";
+  remarks.push_back(text + ".");
+}
+
+}  // namespace
+
+std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, double tolerance) {
+  std::vector<std::string> remarks;
+  const double failed = static_cast<double>(answer.failed_instances) / std::max(1, answer.instances);
+  if (answer.failed_instances > 0) {
+    std::string text = std::to_string(answer.failed_instances) + " of " + std::to_string(answer.instances) +
+                       " instances failed in the simulator. They count for no outcome, and their share widens every "
+                       "interval.";
+    if (failed > kManyFailed)
+      text += " That is more than 1 %: do not rely on this answer; look at the scene's shapes, masses and speeds.";
+    remarks.push_back(std::move(text));
+  }
+  if (answer.overlapping_share > 0.0)
+    remarks.push_back("In " + percent(answer.overlapping_share, 1) +
+                      " of the instances things were in each other, at the start or when let go, by up to " +
+                      fixed_text(1000.0 * answer.deepest_overlap, 0) +
+                      " mm. They are parted gently; what comes of it is doubtful.");
+  if (answer.certificates.switched_off)
+    remarks.push_back(
+        "Certificates ended too many instances with another outcome than running on: all were run to "
+        "rest after all.");
+  for (const belief::ChaosCheck& check : answer.chaos) {
+    if (!check.chaotic) continue;
+    remarks.push_back("'" + check.about + "' is chaotic: of " + std::to_string(check.pairs) + " pairs of starts " +
+                      fixed_text(check.displacement, 1) + " standard deviations apart, " + percent(check.changed) +
+                      " (" + percent(check.low) + " to " + percent(check.high) +
+                      ") end differently. Its interval shrinks no faster than with independent draws: halving it "
+                      "takes four times the instances.");
+  }
+  if (answer.model_error) remark_on_model(answer, remarks);
+  if (!answer.converged && answer.stopped != "exact")
+    remarks.push_back("Not every interval reached +-" + core::rounded_text(tolerance) + ": " +
+                      (answer.stopped == "time_limit"  ? "the time ran out"
+                       : answer.stopped == "cancelled" ? "it was stopped"
+                                                       : "the most instances were run") +
+                      ".");
+  return remarks;
+}
+
+}  // namespace prescene::queries

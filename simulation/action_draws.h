@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is random in actions, drawn for one instance: by the simulator that executes them, and by who wants to know
+// afterwards what it drew.
+#pragma once
+
+#include <vector>
+
+#include "prescene/belief/action.h"
+#include "prescene/core/random.h"
+
+namespace prescene::simulation {
+
+struct DrawnAction {
+  belief::Pose goal;          ///< Of place and transport.
+  belief::Twist disturbance;  ///< Of release.
+  double sideways = 0.0;      ///< Of push: the shift of its path to the left, m.
+};
+
+/// One for each action. `stream` is the instance's own: stream.at(0, number of the instance) of the run's.
+std::vector<DrawnAction> draw_actions(const std::vector<belief::Action>& actions, core::RandomStream stream);
+
+}  // namespace prescene::simulation
