@@ -138,7 +138,7 @@ struct ModelError {
 struct ObjectPath {
   std::string object;
   std::string outcome;           ///< Class of the first group or outcome about it.
-  std::vector<Vector3d> points;  ///< Of its origin in W, every 1/30 s, m.
+  std::vector<Vector3d> points;  ///< Of its origin in W, every 1/30 s, from when it is let go; m.
   friend bool operator==(const ObjectPath&, const ObjectPath&) = default;
 };
 

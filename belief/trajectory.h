@@ -37,8 +37,8 @@ struct Trajectory {
   TrajectoryEnd end = TrajectoryEnd::kDuration;
   double simulated_seconds = 0.0;
   double flown_seconds = 0.0;  ///< Of these, what took no search for contacts.
-  /// How deep two things were in each other in any step, m: at a start or where a hand let go, as impacts make none. 0
-  /// where the simulator does not tell.
+  /// How deep two things were in each other at the start or when something was let go, m. 0 where the simulator does
+  /// not tell.
   double deepest_overlap = 0.0;
   friend bool operator==(const Trajectory&, const Trajectory&) = default;
 

@@ -13,7 +13,7 @@ namespace {
 
 using belief::Vector3d;
 
-constexpr std::size_t kFewestInstances = 64;
+constexpr std::size_t kFewestInstances = 128;
 constexpr double kLargestTurn = 2.0;  // rad: beyond it a rotation is no longer told by a turn from its mean
 const char* const kAxes[] = {"x", "y", "z"};
 

@@ -220,8 +220,10 @@ std::vector<belief::ObjectPath> paths_of(const Foresight& foresight, const Prior
         const int which = foresight.estimate.instances[i].classes[*variable];
         path.outcome = foresight.variables[*variable].classes[static_cast<std::size_t>(which)];
       }
-      for (const belief::WorldState& state : trajectories[i].states)
+      for (const belief::WorldState& state : trajectories[i].states) {
+        if (state.objects[object].mode == belief::MotionMode::kHeld) path.points.clear();  // its way begins when let go
         path.points.push_back(state.objects[object].X_WO.translation);
+      }
     }
   }
   return paths;

@@ -9,7 +9,7 @@
 namespace prescene::queries {
 namespace {
 
-constexpr std::size_t kMostTypicalRuns = 8;
+constexpr std::size_t kMostTypicalRuns = 12;
 
 /// The name of the object that an action moves, empty for pushes.
 std::string object_of(const belief::Action& action) {
@@ -199,7 +199,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
     PRESCENE_TRY(answer.model_error, model_error(foresight, prior, query.effort.confidence, context));
   }
   if (use_own_outcomes) answer.left_out = prior.left_out;
-  answer.remarks = remarks_of(answer, query.effort.tolerance);
+  answer.remarks = remarks_of(answer, query.effort);
   return answer;
 }
 

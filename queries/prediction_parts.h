@@ -19,7 +19,7 @@ struct UncertainInput {
 std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const Prior& prior,
                                              const QueryContext& context);
 
-/// Of each variable whose classes vary; empty with fewer than 64 instances.
+/// Of each variable whose classes vary; empty with fewer than 128 instances.
 std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, const Prior& prior,
                                                     const QueryContext& context);
 
@@ -47,7 +47,7 @@ const std::string& name_of(const simulation::Variable& variable);
 /// Classes that are told: of a single outcome its opposite is not, which is the same number again.
 std::size_t told_classes(const simulation::Variable& variable);
 
-/// Sentences about what was found. `tolerance` is the half width that was asked for.
-std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, double tolerance);
+/// Sentences about what was found.
+std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort);
 
 }  // namespace prescene::queries

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "prediction_parts.h"
+#include "prescene/core/random.h"
 #include "prescene/core/text.h"
 
 namespace prescene::queries {
@@ -27,11 +28,18 @@ struct Worst {
   std::string what;
 };
 
-Worst worst_for(const belief::ModelError& error, const belief::OutcomeProbability& outcome) {
+/// How much wider an interval has to be to hold for all of so many comparisons at once [Bonferroni].
+double widening(const belief::ModelError& error, std::size_t outcomes, double confidence) {
+  const double comparisons = static_cast<double>(std::max<std::size_t>(1, error.variants.size() * outcomes));
+  return core::inverse_normal_cdf(1.0 - 0.5 * (1.0 - confidence) / comparisons) /
+         core::inverse_normal_cdf(0.5 + 0.5 * confidence);
+}
+
+Worst worst_for(const belief::ModelError& error, const belief::OutcomeProbability& outcome, double wider) {
   Worst worst;
   for (const belief::ModelError::Variant& variant : error.variants) {
     for (const belief::ModelError::Shift& shift : variant.shifts) {
-      const bool sure = shift.low > 0.0 || shift.high < 0.0;
+      const bool sure = std::abs(shift.shift) > wider * 0.5 * (shift.high - shift.low);
       if (!sure || shift.outcome != outcome.name || shift.group != outcome.group) continue;
       if (worst.shift && std::abs(shift.shift) <= std::abs(worst.shift->shift)) continue;
       worst = {&shift, variant.what};
@@ -40,8 +48,9 @@ Worst worst_for(const belief::ModelError& error, const belief::OutcomeProbabilit
   return worst;
 }
 
-void remark_on_model(const belief::PredictAnswer& answer, std::vector<std::string>& remarks) {
+void remark_on_model(const belief::PredictAnswer& answer, double confidence, std::vector<std::string>& remarks) {
   const belief::ModelError& error = *answer.model_error;
+  const double wider = widening(error, answer.outcomes.size(), confidence);
   struct Narrow {
     double excess;
     std::string text;
@@ -49,7 +58,7 @@ void remark_on_model(const belief::PredictAnswer& answer, std::vector<std::strin
   std::vector<Narrow> narrow;
   for (const belief::OutcomeProbability& outcome : answer.outcomes) {
     const double half = 0.5 * (outcome.high - outcome.low);
-    const Worst worst = worst_for(error, outcome);
+    const Worst worst = worst_for(error, outcome, wider);
     if (!worst.shift || std::abs(worst.shift->shift) <= half) continue;
     narrow.push_back({std::abs(worst.shift->shift) - half,
                       full_name(outcome.group, outcome.name) + " (interval +-" + fixed_text(100.0 * half, 1) +
@@ -60,7 +69,7 @@ void remark_on_model(const belief::PredictAnswer& answer, std::vector<std::strin
   double resolved = 0.0;  // how small a shift these instances can show
   for (const belief::ModelError::Variant& variant : error.variants)
     for (const belief::ModelError::Shift& shift : variant.shifts)
-      resolved = std::max(resolved, 0.5 * (shift.high - shift.low));
+      resolved = std::max(resolved, wider * 0.5 * (shift.high - shift.low));
   if (narrow.empty()) {
     remarks.push_back(
         "No variant of the model was found to shift a probability by more than the half width of its "
@@ -79,7 +88,7 @@ void remark_on_model(const belief::PredictAnswer& answer, std::vector<std::strin
 
 }  // namespace
 
-std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, double tolerance) {
+std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort) {
   std::vector<std::string> remarks;
   const double failed = static_cast<double>(answer.failed_instances) / std::max(1, answer.instances);
   if (answer.failed_instances > 0) {
@@ -107,9 +116,9 @@ std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, double 
                       ") end differently. Its interval shrinks no faster than with independent draws: halving it "
                       "takes four times the instances.");
   }
-  if (answer.model_error) remark_on_model(answer, remarks);
+  if (answer.model_error) remark_on_model(answer, effort.confidence, remarks);
   if (!answer.converged && answer.stopped != "exact")
-    remarks.push_back("Not every interval reached +-" + core::rounded_text(tolerance) + ": " +
+    remarks.push_back("Not every interval reached +-" + core::rounded_text(effort.tolerance) + ": " +
                       (answer.stopped == "time_limit"  ? "the time ran out"
                        : answer.stopped == "cancelled" ? "it was stopped"
                                                        : "the most instances were run") +

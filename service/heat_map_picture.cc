@@ -27,6 +27,7 @@ constexpr int kWidth = kLeftAxis + 2 * kPanelWidth + 3 * kMargin;
 constexpr int kHeight = kTitle + kPanelHeight + kLegend;
 constexpr Rgb kInk = {35, 38, 45}, kSoft = {105, 110, 120}, kFrame = {150, 155, 165};
 constexpr double kShares[] = {0.5, 0.9};
+constexpr double kStill = 0.003;       // m: deviation of what hardly moves
 constexpr double kLeastShown = 0.005;  // outcomes rarer than this are named, not drawn
 
 std::string percent(double share) {
@@ -134,29 +135,45 @@ void add_heat(const belief::HeatMap& map, Box& box) {
 }
 
 /// What the pictures have to show: where the object begins and may end, and supports that are not far larger.
-Box shown_box(const belief::Scene& scene, const Part& part) {
+struct Shown {
+  Box box;
+  std::vector<Vector3d> points;
+};
+
+Shown shown_of(const belief::Scene& scene, const Part& part) {
   const belief::ObjectModel& model = scene.model_of(scene.objects[part.object]);
   const geometry::TriangleMesh mesh = belief::collision_mesh(model);
-  Box box;
-  add_heat(part.poses->heat_map, box);
+  Shown shown;
+  const auto add_mesh = [&](const geometry::TriangleMesh& more, const geometry::Pose& X_WM) {
+    shown.box.add(more, X_WM);
+    for (const Vector3d& vertex : more.vertices) shown.points.push_back(X_WM * vertex);
+  };
   if (const belief::Trajectory* run = likeliest_run(part))
-    box.add(mesh, run->states[begin_of(*run, part.object)].objects[part.object].X_WO);
+    add_mesh(mesh, run->states[begin_of(*run, part.object)].objects[part.object].X_WO);
   for (const Part::Ending& ending : part.endings)
-    if (ending.run) box.add(mesh, ending.run->trajectory.final().objects[part.object].X_WO);
-  if (box.low.z() > box.high.z())
-    for (const belief::PoseComponent& component : part.poses->components) box.add(mesh, component.mean);
-  const double size = (box.high - box.low).norm();
-  for (const belief::Support& support : scene.supports) {
-    Box all;
-    all.add(belief::collision_mesh(support.collision), support.X_WS);
-    if ((all.high - all.low).norm() > 1.2 * size + 0.3 || !all.meets(box)) continue;
-    box.add(all.low);
-    box.add(all.high);
+    if (ending.run) add_mesh(mesh, ending.run->trajectory.final().objects[part.object].X_WO);
+  if (shown.points.empty())
+    for (const belief::PoseComponent& component : part.poses->components) add_mesh(mesh, component.mean);
+  Box heat;
+  add_heat(part.poses->heat_map, heat);
+  const double ground = shown.box.low.z();
+  for (const double x : {heat.low.x(), heat.high.x()}) {
+    for (const double y : {heat.low.y(), heat.high.y()}) {
+      shown.points.emplace_back(x, y, ground);
+      shown.box.add(shown.points.back());
+    }
   }
-  const Vector3d room = 0.06 * (box.high - box.low).norm() * Vector3d(1.0, 1.0, 0.0);
-  box.low -= room;
-  box.high += room;
-  return box;
+  const double size = (shown.box.high - shown.box.low).norm();
+  for (const belief::Support& support : scene.supports) {
+    const geometry::TriangleMesh whole = belief::collision_mesh(support.collision);
+    Box all;
+    all.add(whole, support.X_WS);
+    if ((all.high - all.low).norm() <= 1.2 * size + 0.3 && all.meets(shown.box)) add_mesh(whole, support.X_WS);
+  }
+  const Vector3d room = 0.06 * (shown.box.high - shown.box.low).norm() * Vector3d(1.0, 1.0, 0.0);
+  shown.box.low -= room;
+  shown.box.high += room;
+  return shown;
 }
 
 void draw_object(const belief::Scene& scene, const Part& part, bool with_labels, bool with_paths, SceneView& view,
@@ -290,8 +307,12 @@ void draw_legend(const belief::PredictAnswer& answer, const Part& part, const Gr
   }
   for (int i = 0; i <= 4; ++i) {
     const double value = i / 4.0;  // the square root of the share of the largest, as the colours
-    const double mass = value * value * density.largest() * cell * cell;
-    interfaces::draw_text(i == 0 ? "0" : fixed_text(100.0 * mass, mass < 0.01 ? 2 : 1) + " %",
+    const double mass = std::min(1.0, value * value * density.largest() * cell * cell);
+    interfaces::draw_text(i == 0 ? "0"
+                                 : fixed_text(100.0 * mass, mass < 0.001  ? 3
+                                                            : mass < 0.01 ? 2
+                                                                          : 1) +
+                                       " %",
                           {x0 + value * (bar_width - 1), y0 + 52.0}, 10.5, kSoft, canvas, TextAlign::kCenter);
   }
   const double line_y = y0 + 78.0;
@@ -346,27 +367,32 @@ void draw_legend(const belief::PredictAnswer& answer, const Part& part, const Gr
 
 core::Status draw_part(const belief::Scene& scene, const belief::PredictAnswer& answer, const Part& part,
                        Backends& backends, int top, ColorImage& canvas) {
-  const Box box = shown_box(scene, part);
+  const Shown shown = shown_of(scene, part);
   // The map's grid covers more than the panel shows, whose sides may differ.
-  const Vector2d low = box.low.head<2>(), high = box.high.head<2>();
+  const Vector2d low = shown.box.low.head<2>(), high = shown.box.high.head<2>();
   const double side = 0.75 * (high - low).maxCoeff();
   const Vector2d middle = 0.5 * (low + high);
-  const GroundDensity density(*part.poses, middle - Vector2d::Constant(1.3 * side),
-                              middle + Vector2d::Constant(1.3 * side));
+  const Vector2d grid_low = middle - Vector2d::Constant(1.3 * side);
+  const Vector2d grid_high = middle + Vector2d::Constant(1.3 * side);
+  const GroundDensity density(part.poses->components, grid_low, grid_high);
+  const belief::ObjectModel& model = scene.model_of(scene.objects[part.object]);
+  const std::vector<DensityLevel> levels = levels_of(*part.poses, belief::collision_mesh(model), grid_low, grid_high);
+  const belief::Trajectory* run = likeliest_run(part);
+  const belief::WorldState* others = run ? &run->final() : nullptr;
   const MapView map = map_view(low, high, kPanelWidth, kPanelHeight);
   Vector3d away(0.55, -0.8, 0.0);
   if (scene.camera) {
     const Vector3d from = scene.camera->X_WC.translation - Vector3d(middle.x(), middle.y(), 0.0);
     if (from.head<2>().norm() > 0.1) away = Vector3d(from.x(), from.y(), 0.0);
   }
-  away = away.normalized() + 0.75 * Vector3d::UnitZ();
-  const MapView oblique = perspective_view(box.low, box.high, away, kPanelWidth, kPanelHeight);
-  PRESCENE_TRY(SceneView from_above, SceneView::make(scene, map, backends));
-  PRESCENE_TRY(SceneView in_space, SceneView::make(scene, oblique, backends));
+  away = away.normalized() + 0.95 * Vector3d::UnitZ();
+  const MapView oblique = perspective_view(shown.points, away, kPanelWidth, kPanelHeight);
+  PRESCENE_TRY(SceneView from_above, SceneView::make(scene, others, part.object, map, backends));
+  PRESCENE_TRY(SceneView in_space, SceneView::make(scene, others, part.object, oblique, backends));
   core::Status status;
-  from_above.paint(density, kShares);
+  from_above.paint(levels, density, kShares);
   draw_object(scene, part, false, false, from_above, backends, status);
-  in_space.paint(density, {});
+  in_space.paint(levels, density, {});
   draw_object(scene, part, true, true, in_space, backends, status);
   if (!status.ok()) return status;
 
@@ -390,11 +416,18 @@ core::Status draw_part(const belief::Scene& scene, const belief::PredictAnswer& 
 core::Result<ColorImage> heat_map_picture(const belief::Scene& scene, const belief::PredictAnswer& answer,
                                           Backends& backends) {
   if (answer.final_poses.empty()) return core::not_found("there is no object whose end could be painted");
-  const std::size_t count = std::min(kMostObjects, answer.final_poses.size());
-  ColorImage canvas(kWidth, static_cast<int>(count) * kHeight, {255, 255, 255});
-  for (std::size_t i = 0; i < count; ++i)
-    PRESCENE_RETURN_IF_ERROR(draw_part(scene, answer, part_of(scene, answer, answer.final_poses[i]), backends,
-                                       static_cast<int>(i) * kHeight, canvas));
+  std::vector<const belief::FinalPoses*> told;
+  for (const belief::FinalPoses& poses : answer.final_poses) {
+    // Of things that surely stay there is nothing to see, unless they are all.
+    const bool still = std::sqrt(poses.position_covariance.trace()) < kStill;
+    if (!still || answer.final_poses.size() == 1) told.push_back(&poses);
+  }
+  if (told.empty()) told.push_back(&answer.final_poses.front());
+  told.resize(std::min(kMostObjects, told.size()));
+  ColorImage canvas(kWidth, static_cast<int>(told.size()) * kHeight, {255, 255, 255});
+  for (std::size_t i = 0; i < told.size(); ++i)
+    PRESCENE_RETURN_IF_ERROR(
+        draw_part(scene, answer, part_of(scene, answer, *told[i]), backends, static_cast<int>(i) * kHeight, canvas));
   return canvas;
 }
 

@@ -5,10 +5,10 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
-#include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/reports/report.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/simulated_camera.h"
+#include "prescene/service/heat_map_picture.h"
 
 namespace prescene::service {
 namespace {
@@ -17,43 +17,19 @@ using core::fixed_text;
 
 constexpr std::size_t kPosePictures = 6;
 
-/// The scene at its mean start, shaded; the same with each object's heat map painted onto the supports.
-core::Result<std::vector<interfaces::PictureBlock::Picture>> scene_pictures(const belief::Scene& scene,
-                                                                            const belief::PredictAnswer& predicted,
-                                                                            Backends& backends) {
+/// The scene at its mean start, shaded, as its own camera sees it.
+core::Result<geometry::ColorImage> start_picture(const belief::Scene& scene, Backends& backends) {
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
   const belief::SceneCamera& camera = *scene.camera;
   rendering::RenderOptions options;
   options.normals = true;
-  const auto shaded = [&](const filter::BeliefView& view,
-                          rendering::RenderedView* images) -> core::Result<geometry::ColorImage> {
-    PRESCENE_RETURN_IF_ERROR(renderer->render(view.scene, camera.intrinsics, camera.X_WC, options, images));
-    geometry::ColorImage picture;
-    rendering::shade(view.scene, *images, camera.X_WC, {}, &picture);
-    return picture;
-  };
-  std::vector<interfaces::PictureBlock::Picture> pictures;
+  const filter::BeliefView view =
+      filter::render_scene(scene, belief::mean_start(scene), {}, filter::MeshDetail::kDisplay, backends.meshes());
   rendering::RenderedView images;
-  PRESCENE_TRY(geometry::ColorImage start, shaded(filter::render_scene(scene, belief::mean_start(scene), {},
-                                                                       filter::MeshDetail::kDisplay, backends.meshes()),
-                                                  &images));
-  pictures.push_back({"The start, at the means of what is uncertain", std::move(start), false});
-  // Without the robot: it would hide what it stands above, and it moves on.
-  belief::Scene unmanned = scene;
-  unmanned.robot.clear();
-  PRESCENE_TRY(
-      const geometry::ColorImage supports,
-      shaded(filter::known_surroundings(unmanned, {}, filter::MeshDetail::kDisplay, backends.meshes()), &images));
-  for (const belief::FinalPoses& poses : predicted.final_poses) {
-    geometry::ColorImage picture = supports;
-    interfaces::HeatMapProjection projection;
-    projection.camera = camera.intrinsics;
-    projection.X_WC = camera.X_WC;
-    projection.surface = images.depth;
-    interfaces::draw_heat_map(poses.heat_map, projection, picture);
-    pictures.push_back({"Where " + poses.object + " may end", std::move(picture), false});
-  }
-  return pictures;
+  PRESCENE_RETURN_IF_ERROR(renderer->render(view.scene, camera.intrinsics, camera.X_WC, options, &images));
+  geometry::ColorImage picture;
+  rendering::shade(view.scene, images, camera.X_WC, {}, &picture);
+  return picture;
 }
 
 /// The mesh as it lies, seen from the side and a little from above.
@@ -91,10 +67,18 @@ core::Status write_prediction_report(const std::filesystem::path& path, const be
   contents.subtitle = "What may happen";
   contents.facts = {{"instances", std::to_string(predicted.instances)},
                     {"simulated", fixed_text(predicted.simulated_seconds, 0) + " s"},
+                    {"processor time", fixed_text(predicted.cpu_seconds, 1) + " s"},
                     {"took", fixed_text(predicted.wall_seconds, 1) + " s"}};
+  if (!predicted.final_poses.empty()) {
+    PRESCENE_TRY(auto picture, heat_map_picture(scene, predicted, backends));
+    contents.sections.push_back(
+        {"Where things may end", {interfaces::PictureBlock{{{"", std::move(picture), false}}}}});
+  }
   if (scene.camera) {
-    PRESCENE_TRY(auto pictures, scene_pictures(scene, predicted, backends));
-    contents.sections.push_back({"The scene", {interfaces::PictureBlock{std::move(pictures)}}});
+    PRESCENE_TRY(geometry::ColorImage start, start_picture(scene, backends));
+    contents.sections.push_back(
+        {"The scene",
+         {interfaces::PictureBlock{{{"The start, at the means of what is uncertain", std::move(start), false}}}}});
   }
   for (interfaces::ReportSection& section : interfaces::answer_sections(answer, scene))
     contents.sections.push_back(std::move(section));

@@ -16,10 +16,9 @@ using geometry::ColorImage;
 using geometry::Rgb;
 using geometry::Vector3d;
 
-constexpr int kFiner = 2;          // pixels are rendered so many times finer on each side, then averaged
-constexpr double kPale = 0.45;     // share of white over the scene, so that what is painted on it stands out
-constexpr double kUpwards = 0.35;  // cosine: steeper surfaces are not painted
-constexpr double kReach = 4.0;     // standard deviations of a kernel
+constexpr int kFiner = 2;       // pixels are rendered so many times finer on each side, then averaged
+constexpr double kPale = 0.5;   // share of white over the scene, so that what is painted on it stands out
+constexpr double kReach = 4.0;  // standard deviations of a kernel
 constexpr int kDensityCells = 420;
 
 void mix(Rgb& pixel, const Rgb& color, double share) {
@@ -53,14 +52,35 @@ rendering::RenderOptions options_for(const MapView& view) {
   return options;
 }
 
+/// Darkens where surfaces end or bend, as a draughtsman would.
+void draw_edges(const rendering::RenderedView& images, ColorImage& picture) {
+  constexpr double kBend = 0.85;   // cosine
+  constexpr double kJump = 0.012;  // m, more where surfaces are seen flat
+  const auto edge_between = [&](int x, int y, int u, int v) {
+    const float a = images.depth(x, y), b = images.depth(u, v);
+    if ((a > 0.0f) != (b > 0.0f)) return true;
+    if (!(a > 0.0f)) return false;
+    if (static_cast<double>(images.normals(x, y).dot(images.normals(u, v))) < kBend) return true;
+    const double flat = std::max(0.05, std::abs(static_cast<double>(images.normals(x, y).z())));
+    return std::abs(static_cast<double>(a - b)) > kJump / flat;
+  };
+  for (int y = 1; y + 1 < picture.height(); ++y)
+    for (int x = 1; x + 1 < picture.width(); ++x)
+      if (edge_between(x, y, x + 1, y) || edge_between(x, y, x, y + 1) || edge_between(x, y, x - 1, y) ||
+          edge_between(x, y, x, y - 1))
+        mix(picture(x, y), {60, 62, 68}, 0.6);
+}
+
 }  // namespace
 
-GroundDensity::GroundDensity(const belief::FinalPoses& poses, const Vector2d& low, const Vector2d& high) : low_(low) {
+GroundDensity::GroundDensity(std::span<const belief::PoseComponent> components, const Vector2d& low,
+                             const Vector2d& high)
+    : low_(low) {
   cell_ = (high - low).maxCoeff() / kDensityCells;
   nx_ = std::max(2, static_cast<int>(std::ceil((high.x() - low.x()) / cell_)) + 1);
   ny_ = std::max(2, static_cast<int>(std::ceil((high.y() - low.y()) / cell_)) + 1);
   values_.assign(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), 0.0);
-  for (const belief::PoseComponent& component : poses.components) {
+  for (const belief::PoseComponent& component : components) {
     Eigen::Matrix2d covariance = component.covariance.block<2, 2>(3, 3);
     covariance.diagonal().array() += 0.25 * cell_ * cell_;  // narrower than a cell would be missed between nodes
     const Eigen::Matrix2d inverse = covariance.inverse();
@@ -105,6 +125,36 @@ double GroundDensity::level_of(double share) const {
   return 0.0;  // the rest lies outside of the grid
 }
 
+std::vector<DensityLevel> levels_of(const belief::FinalPoses& poses, const geometry::TriangleMesh& mesh,
+                                    const Vector2d& low, const Vector2d& high) {
+  constexpr double kTogether = 0.03;  // m
+  struct Placed {
+    double height;
+    belief::PoseComponent component;
+  };
+  std::vector<Placed> placed;
+  for (const belief::PoseComponent& component : poses.components) {
+    double lowest = 1e9;
+    for (const Vector3d& vertex : mesh.vertices) lowest = std::min(lowest, (component.mean * vertex).z());
+    placed.push_back({lowest, component});
+  }
+  std::stable_sort(placed.begin(), placed.end(), [](const Placed& a, const Placed& b) { return a.height < b.height; });
+  std::vector<DensityLevel> levels;
+  for (std::size_t begin = 0; begin < placed.size();) {
+    std::size_t end = begin;
+    double mass = 0.0, moment = 0.0;
+    std::vector<belief::PoseComponent> components;
+    while (end < placed.size() && placed[end].height - placed[begin].height < kTogether) {
+      mass += placed[end].component.weight;
+      moment += placed[end].component.weight * placed[end].height;
+      components.push_back(placed[end++].component);
+    }
+    levels.push_back({moment / mass, GroundDensity(components, low, high)});
+    begin = end;
+  }
+  return levels;
+}
+
 MapView map_view(const Vector2d& low, const Vector2d& high, int width, int height) {
   constexpr double kHeights = 25.0;  // of the extent: things as high as they are wide shift by 2 %
   MapView view;
@@ -116,7 +166,7 @@ MapView map_view(const Vector2d& low, const Vector2d& high, int width, int heigh
   return view;
 }
 
-MapView perspective_view(const Vector3d& low, const Vector3d& high, const Vector3d& away, int width, int height) {
+MapView perspective_view(std::span<const Vector3d> points, const Vector3d& away, int width, int height) {
   constexpr double kFocal = 1.9;  // of the picture's height: a narrow view distorts little
   constexpr double kFilled = 0.94;
   MapView view;
@@ -124,16 +174,21 @@ MapView perspective_view(const Vector3d& low, const Vector3d& high, const Vector
   const Vector3d forward = -away.normalized();
   const Vector3d right = forward.cross(Vector3d::UnitZ()).normalized();
   view.X_WC.rotation = looking(forward, right);
+  Vector3d low = Vector3d::Constant(1e9), high = Vector3d::Constant(-1e9);
+  for (const Vector3d& point : points) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
   const Vector3d middle = 0.5 * (low + high);
-  // The nearest distance from which all corners lie within the picture; then moved so that they lie in its middle.
+  // The nearest distance from which all points lie within the picture; then moved so that they lie in its middle.
   double near = 0.0, far = 100.0 * (high - low).norm();
   const auto extent_at = [&](double distance, Vector2d& least, Vector2d& most) {
     view.X_WC.translation = middle - distance * forward;
     least.setConstant(1e9);
     most.setConstant(-1e9);
-    for (int i = 0; i < 8; ++i) {
-      const Vector3d corner((i & 1 ? high : low).x(), (i & 2 ? high : low).y(), (i & 4 ? high : low).z());
-      const Vector3d p_CQ = view.X_WC.inverse() * corner;
+    const geometry::Pose X_CW = view.X_WC.inverse();
+    for (const Vector3d& point : points) {
+      const Vector3d p_CQ = X_CW * point;
       if (p_CQ.z() < 0.05) return false;
       const Vector2d p = view.camera.project(p_CQ);
       least = least.cwiseMin(p);
@@ -171,14 +226,23 @@ double warm_opacity(double value) {
   return 0.92 * t * t * (3.0 - 2.0 * t);
 }
 
-core::Result<SceneView> SceneView::make(const belief::Scene& scene, const MapView& view, Backends& backends) {
+core::Result<SceneView> SceneView::make(const belief::Scene& scene, const belief::WorldState* state,
+                                        std::size_t left_out, const MapView& view, Backends& backends) {
   SceneView made(view);
   made.view_.camera = enlarged(view.camera);
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
-  belief::Scene unmanned = scene;
-  unmanned.robot.clear();
+  belief::Scene others = scene;
+  others.robot.clear();
+  belief::WorldState where;
+  if (state) {
+    where = *state;
+    where.objects.erase(where.objects.begin() + static_cast<std::ptrdiff_t>(left_out));
+    others.objects.erase(others.objects.begin() + static_cast<std::ptrdiff_t>(left_out));
+  } else {
+    others.objects.clear();
+  }
   const filter::BeliefView what =
-      filter::known_surroundings(unmanned, {}, filter::MeshDetail::kDisplay, backends.meshes());
+      filter::render_scene(others, where, {}, filter::MeshDetail::kDisplay, backends.meshes());
   rendering::RenderedView images;
   PRESCENE_RETURN_IF_ERROR(renderer->render(what.scene, made.view_.camera, view.X_WC, options_for(view), &images));
   rendering::SimulatedCameraOptions look;
@@ -191,30 +255,36 @@ core::Result<SceneView> SceneView::make(const belief::Scene& scene, const MapVie
     mix(pixel, {grey, grey, grey}, 0.5);
     mix(pixel, {255, 255, 255}, kPale);
   }
+  draw_edges(images, made.image_);
   made.depth_ = std::move(images.depth);
-  made.facing_up_ = geometry::Image<float>(made.depth_.width(), made.depth_.height(), 0.0f);
-  const geometry::Matrix3d R_WC = view.X_WC.rotation.toRotationMatrix();
-  for (std::size_t i = 0; i < images.normals.size(); ++i)
-    made.facing_up_.data()[i] = static_cast<float>(R_WC.row(2).dot(images.normals.data()[i].cast<double>()));
   return made;
 }
 
-void SceneView::paint(const GroundDensity& density, std::span<const double> outlined_shares) {
-  if (!(density.largest() > 0.0)) return;
+void SceneView::paint(const std::vector<DensityLevel>& levels, const GroundDensity& whole,
+                      std::span<const double> outlined_shares) {
+  constexpr double kTolerance = 0.012;  // m: a plane that lies so little below a surface lies on it
+  if (!(whole.largest() > 0.0)) return;
   geometry::Image<float> painted(image_.width(), image_.height(), 0.0f);
+  const Vector3d& eye = view_.X_WC.translation;
   for (int v = 0; v < image_.height(); ++v) {
     for (int u = 0; u < image_.width(); ++u) {
+      const Vector3d ray = view_.X_WC.rotation * view_.camera.unproject(u, v, 1.0);
       const double depth = depth_(u, v);
-      if (!(depth > 0.0) || facing_up_(u, v) < kUpwards) continue;
-      const Vector3d p_WQ = view_.X_WC * view_.camera.unproject(u, v, depth);
-      const double value = density.at(p_WQ.x(), p_WQ.y());
+      double value = 0.0;
+      for (const DensityLevel& level : levels) {
+        const double t = (level.height - eye.z()) / ray.z();  // z in C of the plane at this pixel
+        if (!(t > 0.0) || !std::isfinite(t)) continue;
+        const Vector3d p_WQ = eye + t * ray;
+        if (depth > 0.0 && (eye + depth * ray).z() > level.height + kTolerance && depth < t) continue;
+        value += level.density.at(p_WQ.x(), p_WQ.y());
+      }
       painted(u, v) = static_cast<float>(value);
-      const double shown = std::sqrt(value / density.largest());
+      const double shown = std::sqrt(std::min(1.0, value / whole.largest()));
       mix(image_(u, v), warm_color(shown), warm_opacity(shown));
     }
   }
   for (const double share : outlined_shares) {
-    const auto level = static_cast<float>(density.level_of(share));
+    const auto level = static_cast<float>(whole.level_of(share));
     if (!(level > 0.0f)) continue;
     const int reach = share < 0.7 ? 2 : 1;
     for (int v = 0; v + 1 < image_.height(); ++v) {

@@ -18,8 +18,9 @@ namespace prescene::service {
 /// A density of positions over the ground, kept on a fine grid.
 class GroundDensity {
  public:
-  /// The final positions of `poses`, over x, y in [low, high] (m).
-  GroundDensity(const belief::FinalPoses& poses, const Eigen::Vector2d& low, const Eigen::Vector2d& high);
+  /// Of the positions of `components`, over x, y in [low, high] (m).
+  GroundDensity(std::span<const belief::PoseComponent> components, const Eigen::Vector2d& low,
+                const Eigen::Vector2d& high);
   double at(double x, double y) const;  ///< 1/m^2; 0 outside.
   double largest() const { return largest_; }
   /// Density above which the given share of the whole mass lies.
@@ -33,23 +34,36 @@ class GroundDensity {
   double largest_ = 0.0;
 };
 
+/// The part of a density that rests at about one height.
+struct DensityLevel {
+  double height = 0.0;  ///< z in W of what it rests on, m.
+  GroundDensity density;
+};
+/// Final positions by the height of the object's lowest point, heights nearer than 3 cm together.
+std::vector<DensityLevel> levels_of(const belief::FinalPoses& poses, const geometry::TriangleMesh& mesh,
+                                    const Eigen::Vector2d& low, const Eigen::Vector2d& high);
+
 /// Looks straight down from far above, so that the picture is a map: one metre is `scale` pixels.
 struct MapView {
   geometry::PinholeCamera camera;
   geometry::Pose X_WC;
 };
 MapView map_view(const Eigen::Vector2d& low, const Eigen::Vector2d& high, int width, int height);
-/// Looks at a box from a direction (from the box to the camera), near enough to fill the picture.
-MapView perspective_view(const geometry::Vector3d& low, const geometry::Vector3d& high, const geometry::Vector3d& away,
-                         int width, int height);
+/// Looks at points from a direction (from them to the camera), near enough for them to fill the picture.
+MapView perspective_view(std::span<const geometry::Vector3d> points, const geometry::Vector3d& away, int width,
+                         int height);
 
 class SceneView {
  public:
-  /// Renders supports (not robot bodies) at twice the size, pale.
-  static core::Result<SceneView> make(const belief::Scene& scene, const MapView& view, Backends& backends);
+  /// Renders supports and, as they are in `state` (if any), the objects but one, at twice the size, pale; not the
+  /// robot.
+  static core::Result<SceneView> make(const belief::Scene& scene, const belief::WorldState* state, std::size_t left_out,
+                                      const MapView& view, Backends& backends);
 
-  /// Colours what faces up; with lines around the areas of highest density that hold these shares.
-  void paint(const GroundDensity& density, std::span<const double> outlined_shares);
+  /// Colours the planes at the levels' heights where nothing hides them, as shares of the largest of `whole`; with
+  /// lines around the areas of its highest density that hold these shares.
+  void paint(const std::vector<DensityLevel>& levels, const GroundDensity& whole,
+             std::span<const double> outlined_shares);
   /// The object's silhouette at a pose, tinted where it is seen, outlined everywhere.
   core::Status outline(const belief::Scene& scene, std::size_t object, const geometry::Pose& X_WO,
                        const geometry::Rgb& color, double tint, bool dashed, Backends& backends);
@@ -66,7 +80,6 @@ class SceneView {
   SceneView(const MapView& view) : view_(view) {}
   MapView view_;  // its camera is of twice the size
   geometry::DepthImage depth_;
-  geometry::Image<float> facing_up_;  // z in W of the surface's normal
   geometry::ColorImage image_;
 };
 

@@ -16,6 +16,9 @@ struct DrawnAction {
   double sideways = 0.0;      ///< Of push: the shift of its path to the left, m.
 };
 
+/// How many random numbers the actions of an instance take; 0 = nothing in them is random.
+int action_dimensions(const std::vector<belief::Action>& actions);
+
 /// One for each action. `stream` is the instance's own: stream.at(0, number of the instance) of the run's.
 std::vector<DrawnAction> draw_actions(const std::vector<belief::Action>& actions, core::RandomStream stream);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "html_text.h"
+#include "prediction_sections.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/reports/report.h"
@@ -35,67 +36,8 @@ std::vector<Corner> convex_outline(std::vector<Corner> points) {
   return hull;
 }
 
-std::string in_millimetres(double metres) { return decimal(1000.0 * metres, 1); }
-std::string in_degrees(double radians) { return decimal(radians * 180.0 / M_PI, 1); }
-
-std::string position_text(const geometry::Vector3d& p) {
-  return decimal(p.x(), 3) + ", " + decimal(p.y(), 3) + ", " + decimal(p.z(), 3);
-}
-
-/// Tilt and heading of the body's z and x axes, as a person would tell them.
-std::string orientation_text(const geometry::Quaterniond& rotation) {
-  const geometry::Vector3d z = rotation * geometry::Vector3d::UnitZ(), x = rotation * geometry::Vector3d::UnitX();
-  return in_degrees(std::acos(std::clamp(z.z(), -1.0, 1.0))) + ", " + in_degrees(std::atan2(x.y(), x.x()));
-}
-
-TableBlock final_poses_table(const belief::FinalPoses& poses) {
-  constexpr std::size_t kShown = 8;
-  TableBlock table;
-  table.caption = "Where " + poses.object + " ends: the heaviest of " + std::to_string(poses.components.size()) +
-                  " Gaussian components";
-  table.columns = {"share", "outcome", "x, y, z (m)", "spread x, y (mm)", "tilt, heading (°)"};
-  for (std::size_t i = 0; i < std::min(kShown, poses.components.size()); ++i) {
-    const belief::PoseComponent& c = poses.components[i];
-    table.rows.push_back(
-        {percent(c.weight), c.outcome, position_text(c.mean.translation),
-         in_millimetres(std::sqrt(c.covariance(3, 3))) + ", " + in_millimetres(std::sqrt(c.covariance(4, 4))),
-         orientation_text(c.mean.rotation)});
-  }
-  return table;
-}
-
 std::vector<ReportSection> sections_of(const belief::PredictAnswer& answer, const belief::Scene& scene) {
-  std::vector<ReportSection> sections;
-  ReportSection& outcomes = sections.emplace_back();
-  outcomes.title = "What will happen";
-  if (!answer.outcomes.empty()) outcomes.blocks.push_back(OutcomeBlock{"", answer.outcomes});
-  outcomes.blocks.push_back(TextBlock{
-      "From " + std::to_string(answer.instances) + " simulated instances, " + decimal(answer.simulated_seconds, 0) +
-      " simulated seconds in " + decimal(answer.wall_seconds, 1) + " s." +
-      (answer.converged ? "" : " The intervals are wider than asked for: the limit of the work came first.")});
-  for (const belief::FinalPoses& poses : answer.final_poses) {
-    ReportSection& section = sections.emplace_back();
-    section.title = "Where " + poses.object + " ends";
-    section.blocks.push_back(HeatMapBlock{
-        "Probability per " + decimal(100.0 * poses.heat_map.cell, 0) + " cm cell, seen from above; lines: supports",
-        poses.heat_map, support_outlines(scene)});
-    section.blocks.push_back(final_poses_table(poses));
-  }
-  if (!answer.typical_runs.empty()) {
-    ReportSection& section = sections.emplace_back();
-    section.title = "Typical runs";
-    for (const belief::TypicalRun& run : answer.typical_runs) {
-      TimelineBlock block;
-      block.caption = (run.group.empty() ? "" : run.group + ": ") + run.outcome + " (" + percent(run.share) + ")";
-      block.timeline = run.timeline;
-      if (!run.trajectory.states.empty()) {
-        block.begin = run.trajectory.start().time;
-        block.end = run.trajectory.final().time;
-      }
-      section.blocks.push_back(std::move(block));
-    }
-  }
-  return sections;
+  return prediction_sections(answer, scene);
 }
 
 std::vector<ReportSection> sections_of(const belief::WhereAnswer& answer, const belief::Scene&) {

@@ -91,6 +91,18 @@ std::string curve_path(const ChartBlock::Curve& curve, const Axis& x, const Axis
   return path;
 }
 
+/// The area between the lows and highs of a curve.
+std::string band_path(const ChartBlock::Curve& curve, const Axis& x, const Axis& y, const std::string& color) {
+  const std::size_t count = std::min(curve.band.size(), curve.points.size());
+  if (count < 2) return "";
+  std::string path;
+  for (std::size_t i = 0; i < count; ++i)
+    path += (i == 0 ? "M" : "L") + number(x(curve.points[i].first)) + " " + number(y(curve.band[i].second)) + " ";
+  for (std::size_t i = count; i-- > 0;)
+    path += "L" + number(x(curve.points[i].first)) + " " + number(y(curve.band[i].first)) + " ";
+  return "<path d=\"" + path + "Z\" fill=\"" + color + "\" fill-opacity=\"0.16\" stroke=\"none\"/>\n";
+}
+
 constexpr std::size_t kMostLanes = 40;
 
 /// "carton inside bin", "carton falls".
@@ -148,6 +160,10 @@ std::string chart_svg(const ChartBlock& chart) {
   constexpr double kWidth = 860.0, kHeight = 300.0, kLeft = 74.0, kRight = 20.0, kTop = 34.0, kBottom = 48.0;
   double x_low = 1e300, x_high = -1e300, y_low = 1e300, y_high = -1e300;
   for (const ChartBlock::Curve& curve : chart.curves) {
+    for (const auto& [low, high] : curve.band) {
+      if (std::isfinite(low)) y_low = std::min(y_low, low);
+      if (std::isfinite(high)) y_high = std::max(y_high, high);
+    }
     for (const auto& [px, py] : curve.points) {
       if (!std::isfinite(px) || !std::isfinite(py)) continue;
       x_low = std::min(x_low, px);
@@ -170,12 +186,47 @@ std::string chart_svg(const ChartBlock& chart) {
   double legend = kLeft;
   for (std::size_t i = 0; i < chart.curves.size(); ++i) {
     const std::string color = hex(series_color(i));
+    out += band_path(chart.curves[i], x, y, color);
     out += "<path d=\"" + curve_path(chart.curves[i], x, y) + "\" fill=\"none\" stroke=\"" + color +
            "\" stroke-width=\"2\" stroke-linejoin=\"round\"/>\n";
     out += rectangle(legend, 9.0, 14.0, 10.0, color, chart.curves[i].name);
     out += text_at(legend + 20.0, 18.0, chart.curves[i].name, "tick");
     legend += 44.0 + 7.2 * static_cast<double>(chart.curves[i].name.size());
   }
+  return out + "</svg>";
+}
+
+std::string tornado_svg(const TornadoBlock& block) {
+  constexpr double kWidth = 860.0, kLane = 30.0, kLeft = 250.0, kRight = 150.0, kTop = 24.0;
+  const double bottom = kTop + kLane * static_cast<double>(block.rows.size());
+  double low = block.overall, high = block.overall;
+  for (const TornadoBlock::Row& row : block.rows) {
+    low = std::min({low, row.small, row.large});
+    high = std::max({high, row.small, row.large});
+  }
+  std::tie(low, high) = widened(std::max(0.0, low - 0.03), std::min(1.0, high + 0.03));
+  const Axis x{low, high, kLeft, kWidth - kRight};
+  std::string out = svg_begin(kWidth, bottom + 44.0, block.caption);
+  out += x_axis(x, kTop, bottom, "probability where the input is in its lowest and in its highest fifth");
+  out += text_at(kWidth - kRight + 14.0, kTop - 8.0, "decides alone", "tick");
+  for (std::size_t i = 0; i < block.rows.size(); ++i) {
+    const TornadoBlock::Row& row = block.rows[i];
+    const double top = kTop + kLane * static_cast<double>(i), middle = top + 0.5 * kLane;
+    const auto value = [](double p) { return std::isfinite(p) ? std::clamp(p, 0.0, 1.0) : 0.0; };
+    const double small = x(value(row.small)), large = x(value(row.large)), base = x(value(block.overall));
+    out += text_at(kLeft - 10.0, middle + 4.0, shortened(row.input, 38), "lane end");
+    out += rectangle(std::min(small, base), top + 6.0, std::abs(small - base), kLane - 12.0, hex(series_color(1)),
+                     "lowest fifth: " + percent(row.small));
+    out += rectangle(std::min(large, base), top + 6.0, std::abs(large - base), kLane - 12.0, hex(series_color(0)),
+                     "highest fifth: " + percent(row.large));
+    out += text_at(kWidth - kRight + 14.0, middle + 4.0,
+                   percent(row.share) + " \u00b1 " + decimal(100.0 * row.standard_error, 1), "tick");
+  }
+  out += line(x(block.overall), kTop, x(block.overall), bottom, "whisker");
+  out += rectangle(kLeft, 4.0, 12.0, 10.0, hex(series_color(1)), "");
+  out += text_at(kLeft + 18.0, 13.0, "input small", "tick");
+  out += rectangle(kLeft + 110.0, 4.0, 12.0, 10.0, hex(series_color(0)), "");
+  out += text_at(kLeft + 128.0, 13.0, "input large", "tick");
   return out + "</svg>";
 }
 

@@ -11,6 +11,7 @@ namespace prescene::interfaces {
 /// A bar with its interval, filling its cell.
 std::string probability_bar(const belief::OutcomeProbability& outcome);
 std::string chart_svg(const ChartBlock& chart);
+std::string tornado_svg(const TornadoBlock& block);
 std::string timeline_svg(const TimelineBlock& block);
 std::string heat_map_svg(const HeatMapBlock& block);
 

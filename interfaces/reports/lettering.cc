@@ -161,6 +161,7 @@ constexpr Glyph kGlyphs[] = {
     {U'<', 5, "5B0753"},
     {U'>', 5, "0B5703"},
     {U'|', 0, "0E02"},
+    {U'^', 4, "0A2D4A"},
     {U'\u00b1', 6, "0969|3C36|0363"},
 };
 constexpr Glyph kUnknown = {U'?', 6, "03636D0D03"};

@@ -132,6 +132,9 @@ std::string html_of(const TableBlock& block) {
 }
 
 std::string html_of(const ChartBlock& block) { return figure(chart_svg(block) + "\n", block.caption); }
+std::string html_of(const TornadoBlock& block) {
+  return block.rows.empty() ? "" : figure(tornado_svg(block) + "\n", block.caption);
+}
 std::string html_of(const TimelineBlock& block) {
   if (block.timeline.empty()) return "";
   return figure(timeline_svg(block) + "\n", block.caption);

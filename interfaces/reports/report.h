@@ -54,12 +54,24 @@ struct TableBlock {
 struct ChartBlock {
   struct Curve {
     std::string name;
-    std::vector<std::pair<double, double>> points;  ///< Ascending x.
+    std::vector<std::pair<double, double>> points;     ///< Ascending x.
+    std::vector<std::pair<double, double>> band = {};  ///< Low and high about each point; empty = none.
   };
   std::string caption;
   std::string x_label, y_label;  ///< With their units.
   std::vector<Curve> curves;
   bool from_zero = true;  ///< The y axis includes 0.
+};
+/// What moves a probability most: for each input a bar from its value where the input is small to where it is large.
+struct TornadoBlock {
+  struct Row {
+    std::string input;
+    double small = 0.0, large = 0.0;           ///< Probability in the lowest and highest fifth of the input.
+    double share = 0.0, standard_error = 0.0;  ///< Of the variance that it explains alone.
+  };
+  std::string caption;
+  double overall = 0.0;  ///< The probability.
+  std::vector<Row> rows;
 };
 /// Intervals of relations as bars in lanes over time.
 struct TimelineBlock {
@@ -77,8 +89,8 @@ struct HeatMapBlock {
   belief::HeatMap map;
   std::vector<Outline> outlines;
 };
-using ReportBlock =
-    std::variant<TextBlock, PictureBlock, OutcomeBlock, TableBlock, ChartBlock, TimelineBlock, HeatMapBlock>;
+using ReportBlock = std::variant<TextBlock, PictureBlock, OutcomeBlock, TableBlock, ChartBlock, TornadoBlock,
+                                 TimelineBlock, HeatMapBlock>;
 
 struct ReportSection {
   std::string title;

@@ -82,7 +82,14 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
               fixed_text(p.z(), 3) + " m\n";
     }
   }
-  for (const belief::DecidingInputs& inputs : predicted.inputs) text += deciding_text(inputs);
+  for (const belief::DecidingInputs& inputs : predicted.inputs) {
+    // Of what hardly varies it is idle to ask what decides it.
+    const bool open = std::any_of(predicted.outcomes.begin(), predicted.outcomes.end(), [&](const auto& outcome) {
+      return (outcome.group.empty() ? outcome.name : outcome.group) == inputs.about && outcome.probability > 0.02 &&
+             outcome.probability < 0.98;
+    });
+    if (open) text += deciding_text(inputs);
+  }
   text += cost_text(predicted);
   for (const std::string& remark : predicted.remarks) text += "Note: " + remark + "\n";
   return text;

@@ -176,6 +176,7 @@ void InstanceWorld::solve() {
 void InstanceWorld::note_touches() {
   touches_.clear();
   overlap_ = 0.0;
+  const bool begins = steps_ == 1 || !released_.empty();
   Vector3d normal = Vector3d::Zero();
   const auto close = [&] {
     const double norm = normal.norm();
@@ -184,7 +185,7 @@ void InstanceWorld::note_touches() {
   };
   // Contacts of a pair lie together, and pairs ascend.
   for (const SolverContact& c : contacts_) {
-    overlap_ = std::max(overlap_, -c.gap);
+    if (begins) overlap_ = std::max(overlap_, -c.gap);
     if (c.impulse <= 0.0 && c.gap > scene_->options.touching_distance) continue;
     if (touches_.empty() || touches_.back().first != c.body_a || touches_.back().second != c.body_b) {
       close();

@@ -45,7 +45,8 @@ class InstanceWorld {
   void read(belief::WorldState& state) const;
   /// Touching pairs of the last step, ordered.
   const std::vector<Touch>& touches() const { return touches_; }
-  /// How deep two things were in each other at the beginning of the last step, m.
+  /// How deep two things were in each other at the beginning of the last step if it was the first or let something go,
+  /// else 0; m.
   double overlap() const { return overlap_; }
   /// Some number is not finite or some speed beyond 1e4.
   bool diverged() const;

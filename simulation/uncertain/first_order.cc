@@ -12,8 +12,9 @@ namespace {
 
 constexpr int kBlocks = 16;
 
-/// Intervals of the input: few where there are few instances, so that each mean has some.
-int interval_count(std::size_t instances) { return instances < 512 ? 8 : instances < 1024 ? 12 : 16; }
+/// Intervals of the input. In a short net two coordinates may go together: unless there are several instances for every
+/// pair of intervals of two inputs, one takes the other's effect for its own.
+int interval_count(std::size_t instances) { return instances < 512 ? 4 : instances < 2048 ? 8 : 16; }
 
 /// Sums of one interval of the input in one block of the instances.
 struct Cell {

@@ -21,8 +21,9 @@ struct InputEffect {
 };
 
 /// `input` and `classes` are those of the instances in their order; weights need not sum to one; an instance of class
-/// -1 is left out. The input is cut into 8 to 16 intervals of equal mass; what their means scatter by chance is taken
-/// off. An input that hardly varies (fewer than two values) has no share. At least 16 instances, sizes alike (checked).
+/// -1 is left out. The input is cut into 4 to 16 intervals of equal mass; what their means scatter by chance is taken
+/// off. (What an input decides within an interval is missed: a few per cent of its share with 4.) An input that hardly
+/// varies (fewer than two values) has no share. At least 16 instances, sizes alike (checked).
 InputEffect first_order_effect(std::span<const double> input, std::span<const int> classes, int class_count,
                                std::span<const double> weights);
 

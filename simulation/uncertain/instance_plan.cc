@@ -40,6 +40,11 @@ InstancePlan::InstancePlan(const std::vector<double>& weights) : shares_(weights
   for (double& share : shares_) share /= sum;
 }
 
+void InstancePlan::once() {
+  order_.clear();
+  for (std::size_t k = 0; k < shares_.size(); ++k) order_.push_back({static_cast<int>(k), 0});
+}
+
 void InstancePlan::grow() {
   nominal_ = next_net_size(nominal_);
   struct Turn {

@@ -20,6 +20,8 @@ class InstancePlan {
   explicit InstancePlan(const std::vector<double>& weights);
 
   const std::vector<PlannedInstance>& order() const { return order_; }
+  /// The first point of each component, instead of stages: where nothing varies.
+  void once();
   /// Appends the next stage of growth.
   void grow();
 

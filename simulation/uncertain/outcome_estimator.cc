@@ -10,6 +10,7 @@
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
+#include "prescene/simulation/action_draws.h"
 #include "prescene/simulation/uncertain/certifier.h"
 
 namespace prescene::simulation {
@@ -229,6 +230,7 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
     for (std::size_t c = 0; c < variables[v].classes.size(); ++c) {
       ClassEstimate& found =
           variable.classes.emplace_back(class_estimate(components, static_cast<int>(c), options.confidence));
+      if (estimate.certain) found.low = found.high = found.probability, found.half_width = 0.0;
       found.half_width += doubt + failed_share;
       found.low = std::max(0.0, found.low - doubt);
       found.high = std::min(1.0, found.high + doubt + failed_share);
@@ -313,11 +315,18 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
                 options.certifier,
                 options.audit_share,
                 options.keep_contacts};
+  estimate.certain = action_dimensions(request.actions) == 0 &&
+                     std::all_of(starts.components.begin(), starts.components.end(),
+                                 [](const StartComponent& component) { return component.dimensions == 0; }) &&
+                     starts.components.size() <= limit;
   Forecast forecast(options, progress);
   std::size_t chunk = chunk_size(pool);
   std::optional<EstimateStop> stop;
   while (!stop) {
-    plan.grow();
+    if (estimate.certain)
+      plan.once();
+    else
+      plan.grow();
     const std::size_t target = std::min(limit, plan.order().size());
     while (!stop && estimate.instances.size() < target) {
       const std::size_t done = estimate.instances.size();
@@ -340,7 +349,9 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate),
                         settled_text(variables, estimate));
     if (stop) break;
-    if (options.exact_instances) {
+    if (estimate.certain) {
+      stop = EstimateStop::kConverged;
+    } else if (options.exact_instances) {
       if (target == limit) stop = EstimateStop::kExact;
     } else if (estimate.converged && target >= static_cast<std::size_t>(std::max(0, options.min_instances))) {
       stop = EstimateStop::kConverged;

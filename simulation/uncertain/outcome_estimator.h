@@ -122,6 +122,8 @@ struct OutcomeEstimate {
   CertificateUse certificates;
   /// Instances whose simulation failed. They might have been of any class: their share widens every interval.
   int failed = 0;
+  /// Neither starts nor actions hold anything random: one instance a component tells all, and intervals have no width.
+  bool certain = false;
   std::vector<EstimateStage> history;  ///< At each growth of the net, the last being this estimate.
   double wall_seconds = 0.0;           ///< These two alone differ between runs of equal `instances.size()`.
   double cpu_seconds = 0.0;            ///< Of all threads of the process meanwhile.

@@ -86,7 +86,8 @@ belief::Answer predict(std::shared_ptr<const belief::Scene> scene, int instances
 }
 
 std::uint64_t content_hash(belief::Answer answer) {
-  if (auto* predicted = std::get_if<belief::PredictAnswer>(&answer.what)) predicted->wall_seconds = 0.0;
+  if (auto* predicted = std::get_if<belief::PredictAnswer>(&answer.what))
+    predicted->wall_seconds = predicted->cpu_seconds = 0.0;
   return core::Hasher().text(belief::to_json(answer).dump()).digest();
 }
 

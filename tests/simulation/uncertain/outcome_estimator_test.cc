@@ -274,7 +274,14 @@ TEST(OutcomeEstimator, ACertainStartRunsTheInstancesForTheActionsSake) {
   Variable variable;
   variable.classes = {"heads", "tails"};
   variable.classify = [](const belief::Trajectory& run) { return tests::z_of(run.final(), 0) > 0.5 ? 0 : 1; };
-  const OutcomeEstimate found = estimate_outcomes(coin, starts, std::span(&variable, 1), {}, test_stream(), {}, pool);
+  RunRequest request;
+  belief::Push push;
+  push.to.x() = 1.0;
+  push.lateral_error = belief::NormalScalar{0.0, 0.1};
+  request.actions.push_back({0.0, push});
+  const OutcomeEstimate found =
+      estimate_outcomes(coin, starts, std::span(&variable, 1), request, test_stream(), {}, pool);
+  EXPECT_FALSE(found.certain);
   EXPECT_LE(found.variables[0].classes[0].low, 0.25);
   EXPECT_GE(found.variables[0].classes[0].high, 0.25);
 }
@@ -322,6 +329,90 @@ TEST(ClassEstimate, OneInstanceSaysLittle) {
   const ClassEstimate one = class_estimate(std::span(&single, 1), 0, 0.95);
   EXPECT_EQ(one.probability, 1.0);
   EXPECT_LT(one.low, 0.2);
+}
+
+/// Of every `every`-th instance the simulation blows up.
+class FailingSimulator final : public Simulator {
+ public:
+  explicit FailingSimulator(std::uint32_t every) : every_(every) {}
+  void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
+           std::uint32_t first, core::ThreadPool& pool, std::span<belief::Trajectory> runs,
+           const core::Cancellation* cancellation) const override {
+    tests::standing_still().run(starts, request, stream, first, pool, runs, cancellation);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      if ((first + i) % every_ == 0) runs[i].end = belief::TrajectoryEnd::kDiverged;
+      runs[i].contacts = {{0, 1, 0.25, 0.5, 0.125, 1.0}};
+    }
+  }
+  std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>&,
+                                          const core::RandomStream&) const override {
+    return nullptr;
+  }
+
+ private:
+  std::uint32_t every_;
+};
+
+TEST(OutcomeEstimator, FailedInstancesCountForNothingAndWidenIntervals) {
+  core::ThreadPool pool(2);
+  const ToyProblem problem = tests::one_boundary();
+  const std::vector<Variable> variables = problem.variables();
+  EstimatorOptions options;
+  options.exact_instances = 512;
+  const auto run = [&](const Simulator& simulator) {
+    return estimate_outcomes(simulator, problem.starts(), variables, {}, test_stream(), options, pool);
+  };
+  const OutcomeEstimate sound = run(tests::standing_still()), failing = run(FailingSimulator(32));
+  EXPECT_EQ(sound.failed, 0);
+  EXPECT_EQ(failing.failed, 16);
+  double sum = 0.0;
+  for (std::size_t c = 0; c < 2; ++c) {
+    const ClassEstimate &a = sound.variables[0].classes[c], &b = failing.variables[0].classes[c];
+    sum += b.probability;
+    EXPECT_LE(b.probability, a.probability);
+    EXPECT_GE(b.half_width, a.half_width + 0.02);  // 16 of 512 failed: 3.1 points
+    EXPECT_GE(b.high, problem.probabilities[c]);
+    EXPECT_LE(b.low, problem.probabilities[c]);
+  }
+  EXPECT_NEAR(sum, 1.0 - 16.0 / 512.0, 1e-12);
+  for (const InstanceRecord& record : failing.instances) EXPECT_EQ(record.failed, record.classes[0] == -1);
+}
+
+TEST(OutcomeEstimator, KeepsContactsWhenAskedAndTheHistoryOfItsIntervals) {
+  core::ThreadPool pool(1);
+  const ToyProblem problem = tests::one_boundary();
+  const std::vector<Variable> variables = problem.variables();
+  EstimatorOptions options;
+  options.exact_instances = 200;
+  const FailingSimulator simulator(1000);
+  const auto run = [&] {
+    return estimate_outcomes(simulator, problem.starts(), variables, {}, test_stream(), options, pool);
+  };
+  EXPECT_TRUE(run().instances[5].contacts.empty());
+  options.keep_contacts = true;
+  const OutcomeEstimate found = run();
+  ASSERT_EQ(found.instances[5].contacts.size(), 1u);
+  EXPECT_EQ(found.instances[5].contacts[0].largest_impulse, 0.125);
+  std::vector<int> stages;
+  for (const EstimateStage& stage : found.history) stages.push_back(stage.instances);
+  EXPECT_EQ(stages, (std::vector<int>{64, 96, 128, 192, 200}));
+  EXPECT_EQ(found.history.back().variables, found.variables);
+}
+
+TEST(OutcomeEstimator, WithoutUncertaintyOneInstanceTellsAll) {
+  core::ThreadPool pool(1);
+  const ToyProblem problem = tests::one_boundary();
+  const std::vector<Variable> variables = problem.variables();
+  const StartDistribution starts{
+      {{1.0, 0, [](std::span<const double>) { return tests::normal_starts(8).draw(std::vector<double>(8, 0.5)); }}}};
+  const OutcomeEstimate found =
+      estimate_outcomes(tests::standing_still(), starts, variables, {}, test_stream(), {}, pool);
+  EXPECT_TRUE(found.certain);
+  EXPECT_TRUE(found.converged);
+  EXPECT_EQ(found.instances.size(), 1u);
+  EXPECT_EQ(found.variables[0].classes[0].probability, 1.0);
+  EXPECT_EQ(found.variables[0].classes[0].low, 1.0);
+  EXPECT_EQ(found.variables[0].classes[1].high, 0.0);
 }
 
 }  // namespace

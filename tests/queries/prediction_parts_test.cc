@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+// What comes with a prediction's probabilities: what decides, contacts, chaos, the model's error, failures.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "prescene/belief/json.h"
+#include "prescene/queries/query_engine.h"
+#include "sliding_scene.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::Answer;
+using belief::PredictAnswer;
+using belief::PredictQuery;
+using testing::HasSubstr;
+using tests::context_with;
+using tests::slide;
+using tests::sliding_scene;
+
+PredictQuery asking(const std::function<void(belief::PredictDetail&)>& what, int instances = 1024) {
+  PredictQuery query;
+  what(query.tell);
+  query.effort.exact_instances = instances;
+  return query;
+}
+
+PredictAnswer predicted(const Answer& answer) {
+  EXPECT_EQ(answer.error, "");
+  if (const auto* found = std::get_if<PredictAnswer>(&answer.what)) return *found;
+  return {};
+}
+
+const belief::DecidingInputs& about(const PredictAnswer& answer, const std::string& name) {
+  for (const belief::DecidingInputs& one : answer.inputs)
+    if (one.about == name) return one;
+  ADD_FAILURE() << "nothing about " << name;
+  static const belief::DecidingInputs none;
+  return none;
+}
+
+TEST(DecidingInputs, TheFrictionDecidesWhetherTheCartonSlides) {
+  core::ThreadPool pool(2);
+  const PredictAnswer answer = predicted(queries::answer(
+      sliding_scene(), 1, {"", asking([](auto& tell) { tell.inputs = true; })}, context_with(slide, pool)));
+  const belief::DecidingInputs& end = about(answer, "end");
+  ASSERT_GE(end.inputs.size(), 3u);  // friction, two positions, one turn
+  EXPECT_EQ(end.inputs[0].input, "carton: friction");
+  EXPECT_GT(end.inputs[0].share, 0.85);
+  EXPECT_LE(end.explained_by_single, 1.0);
+  for (std::size_t i = 1; i < end.inputs.size(); ++i) {
+    EXPECT_LT(end.inputs[i].share, 0.04) << end.inputs[i].input;
+    EXPECT_THAT(end.inputs[i].input, HasSubstr("carton: "));
+  }
+  for (const belief::InputShare::Effect& effect : end.inputs[0].effects) {
+    EXPECT_EQ(effect.low_fifth, effect.outcome == "slides" ? 1.0 : 0.0);
+    EXPECT_EQ(effect.high_fifth, effect.outcome == "slides" ? 0.0 : 1.0);
+  }
+  for (const belief::DecidingInputs& one : answer.inputs) EXPECT_NE(one.about, "cup moves");  // it never does
+}
+
+TEST(DecidingInputs, WhatActionsDrawCountsToo) {
+  core::ThreadPool pool(1);
+  auto scene = sliding_scene();
+  belief::Push push{{-0.3, 0.0, 0.1}, {0.3, 0.0, 0.1}, 1.0, 0.015, belief::NormalScalar{0.0, 0.02}};
+  scene->actions.push_back({0.0, push});
+  // Draws as whoever executes the push does.
+  const auto by_push = [push](const belief::WorldState& start, const simulation::RunRequest&,
+                              core::RandomStream stream) {
+    belief::WorldState end = start;
+    const double u = stream.uniform();
+    if (belief::draw(push.lateral_error, std::span(&u, 1)) > 0.01) end.objects[0].X_WO.translation.x() += 1.0;
+    return end;
+  };
+  const PredictAnswer answer = predicted(
+      queries::answer(scene, 1, {"", asking([](auto& tell) { tell.inputs = true; })}, context_with(by_push, pool)));
+  EXPECT_EQ(about(answer, "end").inputs[0].input, "push: sideways");
+  EXPECT_GT(about(answer, "end").inputs[0].share, 0.85);
+}
+
+TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
+  core::ThreadPool pool(2);
+  QueryContext context = context_with(slide, pool);
+  const auto all = asking([](auto& tell) { tell.model_error = true; });
+  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", all}, context).error, HasSubstr("no simulator of other steps"));
+
+  std::vector<double> factors;
+  // With longer steps things slide more easily, so that the probability shifts by a known amount.
+  context.make_simulator_of_step = [&](std::shared_ptr<const belief::Scene>,
+                                       double factor) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    factors.push_back(factor);
+    return std::unique_ptr<simulation::Simulator>(std::make_unique<tests::FakeSimulator>(
+        [factor](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+          belief::WorldState end = start;
+          if (start.objects[0].physical.friction < tests::kSlideBelow + (factor > 1.0 ? 0.05 : 0.0))
+            end.objects[0].X_WO.translation.x() += 1.0;
+          return end;
+        }));
+  };
+  const PredictAnswer answer = predicted(queries::answer(sliding_scene(), 1, {"", all}, context));
+  ASSERT_TRUE(answer.model_error);
+  EXPECT_EQ(answer.model_error->instances, 256);
+  EXPECT_EQ(factors, (std::vector<double>{0.5, 2.0, 1.0, 1.0}));
+  ASSERT_EQ(answer.model_error->variants.size(), 4u);
+  const auto shift = [&](std::size_t variant) { return answer.model_error->variants[variant].shifts[0]; };
+  EXPECT_EQ(shift(0).outcome, "slides");
+  EXPECT_EQ(shift(0).shift, 0.0);
+  EXPECT_LE(shift(0).low, 0.0);
+  const double p = tests::slide_probability();
+  const double doubled = core::normal_cdf(0.0) - core::normal_cdf(-0.5);  // friction 0.45 to 0.5 slides as well
+  EXPECT_NEAR(shift(1).shift, doubled, 0.02);
+  EXPECT_GT(shift(1).low, 0.0);
+  EXPECT_THAT(answer.model_error->variants[2].what, HasSubstr("carton: friction at 0.3"));
+  EXPECT_NEAR(shift(2).shift, 1.0 - p, 0.02);  // slippery: all slide
+  EXPECT_NEAR(shift(3).shift, -p, 0.02);
+  ASSERT_FALSE(answer.remarks.empty());
+  EXPECT_THAT(answer.remarks.front(), HasSubstr("narrower than what the model does not know"));
+}
+
+TEST(Chaos, IsToldApartFromABoundary) {
+  core::ThreadPool pool(2);
+  const auto ask = asking([](auto& tell) { tell.chaos = true; });
+  const PredictAnswer smooth = predicted(queries::answer(sliding_scene(), 1, {"", ask}, context_with(slide, pool)));
+  ASSERT_EQ(smooth.chaos.size(), 2u);
+  EXPECT_EQ(smooth.chaos[0].about, "end");
+  EXPECT_EQ(smooth.chaos[0].pairs, 128);
+  EXPECT_FALSE(smooth.chaos[0].chaotic);
+  EXPECT_LT(smooth.chaos[0].changed, 0.1);
+  const auto tumble = [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+    belief::WorldState end = start;
+    const double grown = 1e5 * (start.objects[0].physical.friction + start.objects[0].X_WO.translation.x());
+    if (static_cast<long>(std::floor(grown)) % 2 != 0) end.objects[0].X_WO.translation.x() += 1.0;
+    return end;
+  };
+  const PredictAnswer chaotic = predicted(queries::answer(sliding_scene(), 1, {"", ask}, context_with(tumble, pool)));
+  EXPECT_TRUE(chaotic.chaos[0].chaotic);
+  EXPECT_NEAR(chaotic.chaos[0].changed, 0.5, 0.15);
+  ASSERT_FALSE(chaotic.remarks.empty());
+  EXPECT_THAT(chaotic.remarks.front(), HasSubstr("'end' is chaotic"));
+}
+
+/// Slides as the others, touches the table in every run and the cup where it slides; some runs blow up, some begin in
+/// the table.
+class TouchingSimulator final : public simulation::Simulator {
+ public:
+  explicit TouchingSimulator(double failing) : failing_(failing) {}
+  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
+           const core::RandomStream& stream, std::uint32_t first, core::ThreadPool& pool,
+           std::span<belief::Trajectory> runs, const core::Cancellation* cancellation) const override {
+    tests::FakeSimulator(slide).run(starts, request, stream, first, pool, runs, cancellation);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      const double friction = starts[i].objects[0].physical.friction;
+      runs[i].contacts = {{0, 2, 0.0, 2.0, 0.02, 1.0}};
+      if (friction < tests::kSlideBelow) runs[i].contacts.push_back({0, 1, 0.5, 1.0, friction, 0.0});
+      if (friction > 0.5 && friction < 0.5 + failing_) runs[i].end = belief::TrajectoryEnd::kDiverged;
+      runs[i].deepest_overlap = friction > 0.6 ? 0.015 : 0.0;
+    }
+  }
+  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>&,
+                                                      const core::RandomStream&) const override {
+    return nullptr;
+  }
+
+ private:
+  double failing_;
+};
+
+QueryContext touching(double failing, core::ThreadPool& pool) {
+  QueryContext context;
+  context.pool = &pool;
+  context.make_simulator =
+      [failing](std::shared_ptr<const belief::Scene>) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    return std::unique_ptr<simulation::Simulator>(std::make_unique<TouchingSimulator>(failing));
+  };
+  return context;
+}
+
+TEST(Contacts, TellWhoTouchesWhenAndHowHard) {
+  core::ThreadPool pool(1);
+  const PredictAnswer answer = predicted(
+      queries::answer(sliding_scene(), 1, {"", asking([](auto& tell) { tell.contacts = true; })}, touching(0.0, pool)));
+  ASSERT_EQ(answer.contacts.size(), 2u);
+  const belief::ContactForecast &table = answer.contacts[0], &cup = answer.contacts[1];
+  EXPECT_EQ(table.first + " " + table.second, "carton table");
+  EXPECT_EQ(table.probability, 1.0);
+  EXPECT_LT(table.low, 1.0);
+  EXPECT_EQ(cup.second, "cup");
+  const double p = tests::slide_probability();
+  EXPECT_LE(cup.low, p);
+  EXPECT_GE(cup.high, p);
+  EXPECT_NEAR(cup.first_touch[1], 0.5, 1e-12);
+  // The impulse is the friction of those that slide.
+  EXPECT_LT(cup.impulse[0], cup.impulse[1]);
+  EXPECT_LT(cup.impulse[1], cup.impulse[2]);
+  EXPECT_NEAR(cup.impulse[2], tests::kSlideBelow, 0.02);
+  ASSERT_EQ(cup.touching.size(), answer.contact_times.size());
+  EXPECT_EQ(answer.contact_times.back(), 2.0);
+  for (std::size_t i = 0; i < cup.touching.size(); ++i) {
+    const bool during = answer.contact_times[i] >= 0.5 && answer.contact_times[i] <= 1.0;
+    EXPECT_NEAR(cup.touching[i], during ? cup.probability : 0.0, 1e-9);
+    EXPECT_NEAR(table.touching[i], 1.0, 1e-9);
+  }
+}
+
+TEST(Failures, AreToldAndNotDropped) {
+  core::ThreadPool pool(1);
+  const PredictAnswer answer =
+      predicted(queries::answer(sliding_scene(), 1, {"", asking([](auto&) {})}, touching(0.01, pool)));
+  EXPECT_GT(answer.failed_instances, 10);
+  EXPECT_LT(answer.failed_instances, 80);
+  const double failed = answer.failed_instances / 1024.0;
+  EXPECT_NEAR(answer.outcomes[0].probability + answer.outcomes[1].probability, 1.0 - failed, 1e-9);
+  ASSERT_FALSE(answer.remarks.empty());
+  EXPECT_THAT(answer.remarks.front(), HasSubstr("more than 1 %"));
+  EXPECT_NEAR(answer.overlapping_share, 1.0 - core::normal_cdf(1.0), 0.02);
+  EXPECT_EQ(answer.deepest_overlap, 0.015);
+  EXPECT_THAT(answer.remarks[1], HasSubstr("by up to 15 mm"));
+  double mass = 0.0;
+  for (const belief::PoseComponent& component : answer.final_poses[0].components) mass += component.weight;
+  EXPECT_NEAR(mass, 1.0, 1e-9);
+
+  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", PredictQuery{}},
+                              context_with([](const belief::WorldState& start, const simulation::RunRequest&,
+                                              core::RandomStream) { return start; },
+                                           pool))
+                  .error,
+              "");
+}
+
+TEST(Tell, IsReadFromJsonAndWrittenBack) {
+  const auto query = belief::query_from_json(R"({"predict": {"tell": ["inputs", "contacts"], "paths": 12}})");
+  ASSERT_TRUE(query.ok());
+  const auto& tell = std::get<PredictQuery>(query->what).tell;
+  EXPECT_TRUE(tell.inputs && tell.contacts && !tell.final_poses && !tell.typical_runs && !tell.chaos);
+  EXPECT_EQ(tell.paths, 12);
+  const auto again = belief::query_from_json(belief::to_json(*query).dump());
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(*again, *query);
+  const auto wrong = belief::query_from_json(R"({"predict": {"tell": ["input"]}})");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_THAT(core::to_string(wrong.status()), HasSubstr("predict.tell[0]"));
+}
+
+TEST(Paths, BeginWhereThingsAreLetGo) {
+  core::ThreadPool pool(1);
+  const PredictAnswer answer = predicted(queries::answer(
+      sliding_scene(), 1, {"", asking([](auto& tell) { tell.paths = 20; })}, context_with(slide, pool)));
+  ASSERT_EQ(answer.paths.size(), 40u);  // two objects are asked about
+  for (const belief::ObjectPath& path : answer.paths) {
+    EXPECT_GT(path.points.size(), 30u);
+    if (path.object != "carton") continue;
+    const double way = (path.points.back() - path.points.front()).x();
+    EXPECT_NEAR(way, path.outcome == "slides" ? 1.0 : 0.0, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace prescene::queries
