@@ -15,6 +15,11 @@ namespace {
 
 constexpr std::uint32_t kSnapshotVersion = 0x4c4b0002;
 
+core::Status wrong_snapshot() {
+  return core::invalid_input(
+      "the snapshot is of another simulator, scene or list of actions; restore it where it was saved");
+}
+
 class LockstepInstance : public Instance {
  public:
   LockstepInstance(std::shared_ptr<const CompiledLockstep> scene, std::vector<belief::Action> actions,
@@ -81,11 +86,9 @@ class LockstepInstance : public Instance {
   }
 
   core::Status restore(const Snapshot& snapshot) override {
-    const core::Status wrong = core::invalid_input(
-        "the snapshot is of another simulator, scene or list of actions; restore it where it was saved");
     ByteReader in(snapshot.bytes);
-    if (in.value<std::uint32_t>() != kSnapshotVersion) return wrong;
-    if (in.value<std::uint32_t>() != start_.objects.size()) return wrong;
+    if (in.value<std::uint32_t>() != kSnapshotVersion) return wrong_snapshot();
+    if (in.value<std::uint32_t>() != start_.objects.size()) return wrong_snapshot();
     belief::WorldState start = start_;
     start.time = in.value<double>();
     for (belief::ObjectState& object : start.objects) {
@@ -97,8 +100,9 @@ class LockstepInstance : public Instance {
     }
     SlotState slot(start.objects.size());
     bool sound = true;
-    for (ObjectSlot& object : slot) sound = sound && read(in, object);
-    if (!sound || !in.ok()) return wrong;
+    const auto parts = static_cast<std::int32_t>(scene_->lanes.parts.size());
+    for (ObjectSlot& object : slot) sound = sound && read(in, parts, object);
+    if (!sound || !in.ok()) return wrong_snapshot();
     const Snapshot now = save();
     std::swap(start_, start);
     instance_.start(engine_, 0, start_, actions_, stream_);
@@ -106,7 +110,7 @@ class LockstepInstance : public Instance {
     tested_ = false;
     if (!in.ok() || !in.at_end()) {
       PRESCENE_CHECK(restore(now).ok());
-      return wrong;
+      return wrong_snapshot();
     }
     engine_.restore(0, slot);
     return core::ok_status();
@@ -133,7 +137,7 @@ class LockstepInstance : public Instance {
     }
   }
 
-  static bool read(ByteReader& in, ObjectSlot& object) {
+  static bool read(ByteReader& in, std::int32_t parts, ObjectSlot& object) {
     const auto all = [&](auto& values) {
       for (auto& value : values) value = in.value<std::decay_t<decltype(value)>>();
     };
@@ -151,6 +155,7 @@ class LockstepInstance : public Instance {
       all(object.warm[i].friction);
       object.warm[i].upward = in.value<Real>();
       object.warm[i].part = in.value<std::int32_t>();
+      if (object.warm[i].part < 0 || object.warm[i].part >= parts) return false;
     }
     return true;
   }

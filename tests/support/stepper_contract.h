@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct Stepper {
   std::string name;
   std::function<std::unique_ptr<simulation::Simulator>(const Scene&)> make;
   double precision;  ///< m and m/s: as close as it gets to what is exact.
+
+  friend void PrintTo(const Stepper& stepper, std::ostream* out) { *out << stepper.name; }
 };
 
 class StepperContract : public testing::TestWithParam<Stepper> {

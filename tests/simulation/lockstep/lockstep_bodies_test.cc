@@ -126,6 +126,41 @@ TEST(LockstepBodies, WhatLandsOnALyingThingComesToRest) {
   }
 }
 
+TEST(LockstepBodies, BallReboundsFromALyingSlabAsFromTheFloor) {
+  for (const double e : {0.5, 0.8}) {
+    double worst = 0.0;
+    for (int phase = 0; phase < 16; ++phase) {
+      Scene scene;
+      scene.name = "slab";
+      scene.supports.push_back(floor_support());
+      ObjectModel ball = primitive_model("ball", Sphere{0.03}, 0.1);
+      ball.contact.restitution = belief::FixedScalar{e};
+      add_object(scene, ball, "ball");
+      ObjectModel slab = primitive_model("slab", BoxShape{{0.4, 0.4, 0.1}}, 5.0);
+      slab.contact.restitution = belief::FixedScalar{1.0};
+      add_object(scene, slab, "slab");
+      LockstepOptions options;
+      options.step = 1e-3;
+      auto instance = lockstep_instance_of(scene, options);
+      const double fall = 0.3 + 0.0007 * phase;
+      WorldState start = start_of(scene);
+      start.objects[0].X_WO.translation = {0.0, 0.0, 0.13 + fall};
+      start.objects[1].X_WO.translation = {0.0, 0.0, 0.05};
+      instance->set_state(start);
+      double top = 0.0;
+      for (bool rising = false; !rising || instance->state().objects[0].V_WO.linear.z() > 0.0;) {
+        instance->step();
+        const belief::ObjectState o = instance->state().objects[0];
+        rising = rising || o.V_WO.linear.z() > 0.0;
+        if (rising) top = std::max(top, o.X_WO.translation.z() - 0.13);
+        ASSERT_LT(instance->state().time, 2.0);
+      }
+      worst = std::max(worst, std::abs(top / (e * e * fall) - 1.0));
+    }
+    EXPECT_LT(worst, 0.04) << e;
+  }
+}
+
 /// A plate that speeds up along x, then keeps its speed.
 Scene plate_scene(const belief::ObjectModel& model, double acceleration, double until) {
   Scene scene;
