@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/tests/support/allocations.h"
 
+#include <malloc.h>
+
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -39,5 +41,9 @@ namespace prescene::tests {
 
 bool can_count_allocations() { return PRESCENE_COUNTS_ALLOCATIONS != 0; }
 std::uint64_t allocation_count() { return allocations.load(std::memory_order_relaxed); }
+std::uint64_t heap_bytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
 
 }  // namespace prescene::tests

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
-#include <malloc.h>
 
 #include <algorithm>
 
@@ -198,9 +197,9 @@ TEST_P(LockstepBits, LiveInstancesTakeLittleMemory) {
     options.live_instances = live;
     const auto simulator = lockstep_of(scene, options);
     const std::vector<WorldState> starts = drawn_starts(scene, live, 2);
-    const std::size_t before = mallinfo2().uordblks + mallinfo2().hblkhd;
+    const std::uint64_t before = heap_bytes();
     run_all(*simulator, starts, short_request(scene));
-    return static_cast<double>(mallinfo2().uordblks + mallinfo2().hblkhd - before);
+    return static_cast<double>(heap_bytes() - before);
   };
   EXPECT_LT((bytes_of(256) - bytes_of(64)) / 192, 20.0 * 1024);
 }
