@@ -33,12 +33,12 @@ Placed place(const SphereTree& b, std::uint32_t node, const Transform& X_AB) {
   return result;
 }
 
-// Calls found(sphere of A, sphere of B, places) for each pair of spheres that overlap until it returns true; then
-// returns true.
+// Calls found(sphere of A, sphere of B, places) for each pair of spheres that overlap, or are up to `range` apart, until
+// it returns true; then returns true.
 template <class Found>
 bool for_overlapping(const SphereTree& a, const SphereTree& b, const Transform& X_AB, SphereScratch& scratch,
-                     const Found& found) {
-  const float slack = slack_of(a, b, X_AB);
+                     const Found& found, float range = 0.0F) {
+  const float slack = slack_of(a, b, X_AB) + range;
   const PackedSphere root_b = placed(X_AB, b.root());
   if (!meet(a.root(), root_b, slack)) return false;
   scratch.pairs.clear();
@@ -57,7 +57,7 @@ bool for_overlapping(const SphereTree& a, const SphereTree& b, const Transform& 
       for (std::uint32_t k = 0; k < node_b.count; ++k) {
         const PackedSphere& child_b = children_b.children[k];
         const bool leaves = node_a.is_bottom() && node_b.is_bottom();
-        if (!meet(child_a, child_b, leaves ? 0.0F : slack)) continue;
+        if (!meet(child_a, child_b, leaves ? range : slack)) continue;
         if (leaves) {
           if (found(child_a, child_b, SpherePair{node_a.first + i, node_b.first + k})) return true;
         } else if (node_a.is_bottom()) {
@@ -123,6 +123,15 @@ bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, s
     return false;
   };
   return !for_overlapping(a, b, X_AB, scratch, found);
+}
+
+void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB, double range,
+                std::vector<SpherePair>* pairs, SphereScratch& scratch) {
+  const auto found = [&](const PackedSphere&, const PackedSphere&, SpherePair places) {
+    pairs->push_back({a.order()[places.a], b.order()[places.b]});
+    return false;
+  };
+  for_overlapping(a, b, X_AB, scratch, found, static_cast<float>(range));
 }
 
 Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,

@@ -14,6 +14,8 @@ std::optional<SphereDistance> distance(const SphereTree& a, const SphereTree& b,
 SphereOverlap overlap_volume(const SphereTree& a, const SphereTree& b, const Transform& X_AB, SphereScratch& scratch);
 bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, std::size_t limit,
               std::vector<SphereContact>* contacts, SphereScratch& scratch);
+void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB, double range,
+                std::vector<SpherePair>* pairs, SphereScratch& scratch);
 Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
                         const RestitutionOptions& options, SphereScratch& scratch);
 

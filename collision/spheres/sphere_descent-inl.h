@@ -119,13 +119,13 @@ HWY_INLINE void expand(std::uint32_t index_a, std::uint32_t index_b, SphereTree:
   }
 }
 
-/// Calls leaves(node of A, node of B, children of A, placed children of B) for each pair of bottom nodes that may
-/// overlap until it returns true; then returns true. A level at a time: what a pair needs then never waits for the pair
-/// before.
+/// Calls leaves(node of A, node of B, children of A, placed children of B) for each pair of bottom nodes whose spheres
+/// may overlap, or be up to `range` apart, until it returns true; then returns true. A level at a time: what a pair needs
+/// then never waits for the pair before.
 template <std::size_t kBranching, class Leaves>
 HWY_INLINE bool for_bottom_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
-                                 SphereScratch* scratch, const Leaves& leaves) {
-  const float slack = slack_of(a, b, X_AB);
+                                 SphereScratch* scratch, const Leaves& leaves, float range = 0.0F) {
+  const float slack = slack_of(a, b, X_AB) + range;
   const TransformLanes X_AB_lanes(X_AB);
   if (!meet(a.root(), placed(X_AB, b.root()), slack)) return false;
   PairList first(&scratch->nodes_a, &scratch->nodes_b);

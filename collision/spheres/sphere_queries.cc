@@ -89,6 +89,28 @@ bool contacts_lanes(const SphereTree& a, const SphereTree& b, const Transform& X
   });
 }
 
+void near_pairs_lanes(const SphereTree& a, const SphereTree& b, const Transform& X_AB, float range,
+                      std::vector<SpherePair>* pairs, SphereScratch* scratch) {
+  with_branching(a.branching(), [&](auto branching) HWY_ATTR {
+    constexpr std::size_t kBranching = decltype(branching)::value;
+    const auto leaves = [&](const SphereTree::Node& node_a, const SphereTree::Node& node_b, const Children& children_a,
+                            const PlacedChildren<kBranching>& children_b) HWY_ATTR {
+      for_rows<kBranching>(
+          children_a, node_a.count, children_b, range,
+          [&](std::size_t row, std::size_t lane, const PairVector& found) HWY_ATTR {
+            for (std::uint32_t bits = mask_bits(found.meet); bits != 0; bits &= bits - 1) {
+              const auto at = static_cast<std::size_t>(std::countr_zero(bits));
+              const std::size_t i = row + (Rows<kBranching>::kRows == 1 ? 0 : at / kBranching);
+              const std::size_t k = lane + (Rows<kBranching>::kRows == 1 ? at : at % kBranching);
+              pairs->push_back({a.order()[node_a.first + i], b.order()[node_b.first + k]});
+            }
+          });
+      return false;
+    };
+    return for_bottom_pairs<kBranching>(a, b, X_AB, scratch, leaves, range);
+  });
+}
+
 }  // namespace prescene::collision::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -99,6 +121,7 @@ HWY_EXPORT(overlap_lanes);
 HWY_EXPORT(overlap_volume_lanes);
 HWY_EXPORT(restitution_lanes);
 HWY_EXPORT(contacts_lanes);
+HWY_EXPORT(near_pairs_lanes);
 
 bool overlap(const SphereTree& a, const SphereTree& b, const Transform& X_AB, SphereScratch& scratch) {
   if (a.branching() != b.branching()) return scalar::overlap(a, b, X_AB, scratch);
@@ -124,6 +147,12 @@ bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, s
               std::vector<SphereContact>* contacts, SphereScratch& scratch) {
   if (a.branching() != b.branching()) return scalar::contacts(a, b, X_AB, limit, contacts, scratch);
   return HWY_DYNAMIC_DISPATCH(contacts_lanes)(a, b, X_AB, limit, contacts, &scratch);
+}
+
+void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB, double range,
+                std::vector<SpherePair>* pairs, SphereScratch& scratch) {
+  if (a.branching() != b.branching()) return scalar::near_pairs(a, b, X_AB, range, pairs, scratch);
+  HWY_DYNAMIC_DISPATCH(near_pairs_lanes)(a, b, X_AB, static_cast<float>(range), pairs, &scratch);
 }
 
 }  // namespace prescene::collision

@@ -89,6 +89,11 @@ struct SphereContact {
 bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, std::size_t limit,
               std::vector<SphereContact>* contacts, SphereScratch& scratch);
 
+/// All pairs of spheres that are at most `range` (m, not negative) apart, appended to `pairs` in an order that is the
+/// same for every instruction set. A pair whose distance agrees with the range within rounding may be there or not.
+void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB, double range,
+                std::vector<SpherePair>* pairs, SphereScratch& scratch);
+
 struct RestitutionOptions {
   double stiffness = 1.0;                          ///< N/m, finite and not negative.
   Eigen::Vector3d p_AP = Eigen::Vector3d::Zero();  ///< The torque is about this point, m; often the centre of mass.
