@@ -30,6 +30,7 @@ core::Result<geometry::MassProperties> solid_of(const MeshShape& shape, double d
     }
     case MeshUse::kDecompose:
     case MeshUse::kSurface:
+    case MeshUse::kSpheres:
       return geometry::mass_properties(mesh, density);
   }
   PRESCENE_CHECK_MSG(false, "a MeshUse outside of its enumeration");
@@ -42,7 +43,7 @@ bool operator==(const PrimitiveShape& a, const PrimitiveShape& b) {
 }
 
 bool operator==(const MeshShape& a, const MeshShape& b) {
-  return same_mesh(a.mesh, b.mesh) && a.X_OS == b.X_OS && a.use == b.use;
+  return same_mesh(a.mesh, b.mesh) && a.X_OS == b.X_OS && a.use == b.use && a.spheres == b.spheres;
 }
 
 bool operator==(const ObjectModel& a, const ObjectModel& b) {

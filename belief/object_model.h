@@ -29,11 +29,19 @@ enum class MeshUse {
   kConvexParts,  ///< Each connected component is (about) convex: the hull of each.
   kDecompose,    ///< Approximate convex decomposition.
   kSurface,      ///< The triangles themselves: fixed things only.
+  kSpheres,      ///< An inner sphere tree whose spheres touch the surface everywhere: closed meshes, with all hollows.
+};
+/// How finely spheres stand for a mesh; of MeshUse::kSpheres.
+struct SphereSettings {
+  int count = 3000;            ///< About; in [50, 100000].
+  double edge_fidelity = 0.0;  ///< m; how far inside edges and corners may lie. 0: 0.3 % of the mesh's diagonal.
+  friend bool operator==(const SphereSettings&, const SphereSettings&) = default;
 };
 struct MeshShape {
   MeshPtr mesh;
   Pose X_OS;
   MeshUse use = MeshUse::kConvexHull;
+  SphereSettings spheres = {};
 };
 using CollisionShape = std::variant<PrimitiveShape, MeshShape>;
 bool operator==(const PrimitiveShape& a, const PrimitiveShape& b);

@@ -5,7 +5,10 @@
 #include <cmath>
 #include <string>
 
+#include "prescene/collision/mesh.h"
+#include "prescene/collision/spheres/surface_spheres.h"
 #include "prescene/core/hash.h"
+#include "prescene/core/parallel.h"
 
 namespace prescene::simulation {
 namespace {
@@ -50,9 +53,11 @@ core::Result<ConvexParts> build_parts(const TriangleMesh& mesh, belief::MeshUse 
       return hulls_of(pieces);
     }
     case belief::MeshUse::kSurface:
+      return core::unsupported("a triangle surface has no convex parts; only fixed things can use it");
+    case belief::MeshUse::kSpheres:
       break;
   }
-  return core::unsupported("a triangle surface has no convex parts; only fixed things can use it");
+  return core::unsupported("a mesh of spheres has no convex parts; use convex_hull, convex_parts or decompose");
 }
 
 using EdgeKey = std::pair<std::array<double, 3>, std::array<double, 3>>;
@@ -120,6 +125,19 @@ core::Result<std::shared_ptr<const ConvexParts>> ShapeStore::convex_parts(const 
                                                                           const DecompositionSettings& settings) {
   const Key key{geometry::content_hash(mesh), settings_hash(use, settings)};
   return find_or_build(parts_, key, [&] { return build_parts(mesh, use, settings, decomposer_); });
+}
+
+core::Result<std::shared_ptr<const collision::SurfaceSpheres>> ShapeStore::surface_spheres(
+    const TriangleMesh& mesh, const belief::SphereSettings& settings) {
+  core::Hasher hasher;
+  hasher.value(settings.count).value(settings.edge_fidelity);
+  const Key key{geometry::content_hash(mesh), hasher.digest()};
+  return find_or_build(spheres_, key, [&]() -> core::Result<collision::SurfaceSpheres> {
+    if (mesh.empty()) return core::invalid_input("the mesh has no triangle; check its file");
+    PRESCENE_TRY(const auto single, collision::Mesh::make(mesh, "of spheres"));
+    core::ThreadPool pool(1);
+    return collision::cover_surface(single, {settings.count, settings.edge_fidelity}, pool);
+  });
 }
 
 core::Result<std::shared_ptr<const StaticMesh>> ShapeStore::static_mesh(const TriangleMesh& mesh) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes that are expensive to make, made once: convex parts of meshes and prepared static triangle meshes, keyed by
-// the mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
+// Shapes that are expensive to make, made once: convex parts of meshes, spheres that stand for meshes, and prepared
+// static triangle meshes, keyed by the mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
 // threads may hold it.
 //
 //   ShapeStore shapes(decomposer);  // one is in prescene/simulation/bullet/convex_decomposition.h
@@ -17,6 +17,10 @@
 
 #include "prescene/belief/object_model.h"
 #include "prescene/simulation/convex_polytope.h"
+
+namespace prescene::collision {
+struct SurfaceSpheres;
+}
 
 namespace prescene::simulation {
 
@@ -52,9 +56,14 @@ class ShapeStore {
   explicit ShapeStore(Decomposer decomposer = nullptr) : decomposer_(std::move(decomposer)) {}
 
   /// The parts of a mesh under kConvexHull, kConvexParts or kDecompose. Fails with kInvalidInput for flat or empty
-  /// parts and kUnsupported for kSurface.
+  /// parts and kUnsupported for kSurface
+  /// and kSpheres.
   core::Result<std::shared_ptr<const ConvexParts>> convex_parts(const geometry::TriangleMesh& mesh, belief::MeshUse use,
                                                                 const DecompositionSettings& settings);
+  /// The spheres that stand for a mesh under kSpheres (collision/spheres/surface_spheres.h). Fails with kInvalidInput
+  /// when the mesh is open, inside out or empty, or a setting is out of range.
+  core::Result<std::shared_ptr<const collision::SurfaceSpheres>> surface_spheres(
+      const geometry::TriangleMesh& mesh, const belief::SphereSettings& settings);
   /// Fails with kInvalidInput when the mesh has no triangle.
   core::Result<std::shared_ptr<const StaticMesh>> static_mesh(const geometry::TriangleMesh& mesh);
 
@@ -77,6 +86,7 @@ class ShapeStore {
   Decomposer decomposer_;
   mutable std::mutex mutex_;
   Slots<ConvexParts> parts_;
+  Slots<collision::SurfaceSpheres> spheres_;
   Slots<StaticMesh> meshes_;
   std::size_t built_ = 0;
 };

@@ -80,6 +80,8 @@ const char* word_of(belief::MeshUse use) {
       return "decompose";
     case belief::MeshUse::kSurface:
       return "surface";
+    case belief::MeshUse::kSpheres:
+      return "spheres";
   }
   return "convex_hull";
 }

@@ -208,7 +208,7 @@ void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
 void check_hulls(const BodyShape& shape, Problems& problems) {
   for (const belief::CollisionShape& part : shape.collision) {
     const auto* mesh = std::get_if<belief::MeshShape>(&part);
-    if (!mesh || mesh->use == belief::MeshUse::kSurface || mesh->use == belief::MeshUse::kDecompose) continue;
+    if (!mesh || (mesh->use != belief::MeshUse::kConvexHull && mesh->use != belief::MeshUse::kConvexParts)) continue;
     if (const auto solid = belief::mass_properties(part, 1.0); !solid)
       problems.add(shape.place->place, shape.place->path, "the mesh has no hull: " + solid.status().message(),
                    "give a mesh that is not flat, or 'use: surface'");

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "prescene/core/text.h"
+#include "prescene/geometry/mass_properties.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "read_scene_parts.h"
 
@@ -25,7 +26,10 @@ constexpr const char* kShapeRemedy =
 const std::vector<std::pair<std::string, MeshUse>> kMeshUses{{"convex_hull", MeshUse::kConvexHull},
                                                              {"convex_parts", MeshUse::kConvexParts},
                                                              {"decompose", MeshUse::kDecompose},
-                                                             {"surface", MeshUse::kSurface}};
+                                                             {"surface", MeshUse::kSurface},
+                                                             {"spheres", MeshUse::kSpheres}};
+// An object whose mesh fills less of its hull than this collides as spheres where its file does not say how.
+constexpr double kNearlyConvex = 0.95;
 
 MeshPtr shared(geometry::TriangleMesh mesh) { return std::make_shared<const geometry::TriangleMesh>(std::move(mesh)); }
 
@@ -79,25 +83,61 @@ class ShapeReader {
     return primitive(geometry::Sphere{number(binder, "radius", "give the radius in metres")});
   }
 
-  MeshUse read_use(Binder& binder) {
+  // How a mesh collides, as far as the file says.
+  struct Use {
     MeshUse use = MeshUse::kConvexHull;
-    binder.read_enum("use", use, kMeshUses);
-    if (use == MeshUse::kSurface && may_move_) {
-      const LocatedValue& at = *binder.find("use");
-      problems_.add(at.place, at.path, "a surface of triangles can't move",
-                    "use convex_hull, convex_parts or decompose");
+    belief::SphereSettings spheres;
+    const LocatedValue* at = nullptr;  // nothing: by its shape
+  };
+  Use read_use(Binder& binder) {
+    Use use;
+    binder.read_enum("use", use.use, kMeshUses);
+    use.at = binder.find("use");
+    if (use.use == MeshUse::kSurface && may_move_)
+      problems_.add(use.at->place, use.at->path, "a surface of triangles can't move",
+                    "use spheres, convex_hull, convex_parts or decompose");
+    binder.read("spheres", use.spheres.count, 50, 100'000, "give about how many spheres stand for the surface");
+    binder.read("edge_fidelity", use.spheres.edge_fidelity,
+                {1e-6, 0.1, "give how far inside edges may lie, in metres: 0.001"});
+    for (const char* key : {"spheres", "edge_fidelity"}) {
+      const LocatedValue* at = binder.find(key);
+      if (at && use.at && use.use != MeshUse::kSpheres)
+        problems_.add(at->place, at->path, "only meshes of spheres have this", "write 'use: spheres', or remove it");
+      if (at && !use.at) use.use = MeshUse::kSpheres;
     }
     return use;
   }
 
+  // What a mesh is simulated as. `place` is where the shape is described.
+  MeshShape with_use(MeshPtr mesh, const Use& use, const LocatedValue& place) {
+    MeshShape shape{mesh, Pose{}, use.use, use.spheres};
+    if (!use.at && use.use == MeshUse::kConvexHull && may_move_ && is_hollow(*mesh)) shape.use = MeshUse::kSpheres;
+    if (shape.use != MeshUse::kSpheres) return shape;
+    if (const auto solid = geometry::mass_properties(*mesh, 1.0); !solid)
+      problems_.add(place.place, place.path, "spheres can't stand for this mesh: " + solid.status().message(),
+                    "close the mesh, or use convex_hull or decompose");
+    else if (use.spheres.edge_fidelity > 0.1 * geometry::bounding_box(*mesh).sizes().norm())
+      problems_.add(place.place, place.path, "edge_fidelity is more than a tenth of the mesh's diagonal",
+                    "give metres: 0.001");
+    return shape;
+  }
+
+  static bool is_hollow(const geometry::TriangleMesh& mesh) {
+    const auto solid = geometry::mass_properties(mesh, 1.0);
+    const auto hull = geometry::convex_hull(mesh.vertices);
+    if (!solid || !hull) return false;
+    const auto filled = geometry::mass_properties(*hull, 1.0);
+    return filled && solid->mass < kNearlyConvex * filled->mass;
+  }
+
   BodyShape read_mesh_shape(const LocatedValue& value) {
     Binder binder(value, problems_);
-    const MeshUse use = read_use(binder);
+    const Use use = read_use(binder);
     BodyShape shape;
     if (MeshPtr mesh = read_mesh_file(binder)) {
       check_extent(value, *mesh);
       shape.visual = mesh;
-      shape.collision.emplace_back(MeshShape{mesh, Pose{}, use});
+      shape.collision.emplace_back(with_use(mesh, use, value));
     }
     return shape;
   }
@@ -144,7 +184,7 @@ class ShapeReader {
     Binder binder(value, problems_);
     int segments = 32;
     binder.read("segments", segments, 8, 256);
-    const MeshUse use = read_use(binder);
+    const Use use = read_use(binder);
     const LocatedValue* at = binder.require("profile", "give points [radius, z] from bottom to top");
     if (!at) return {};
     std::vector<Eigen::Vector2d> profile;
@@ -170,13 +210,9 @@ class ShapeReader {
         profile[0].x() + profile[1].x() == 0.0)
       problems_.add(at->place, at->path, "the profile lies on the axis", "give radii of more than 0");
     if (problems_.errors().size() > before) return {};
-    return mesh_shape(geometry::make_lathe(profile, segments), use);
-  }
-
-  static BodyShape mesh_shape(geometry::TriangleMesh mesh, MeshUse use) {
     BodyShape shape;
-    shape.visual = shared(std::move(mesh));
-    shape.collision.emplace_back(MeshShape{shape.visual, Pose{}, use});
+    shape.visual = shared(geometry::make_lathe(profile, segments));
+    shape.collision.emplace_back(with_use(shape.visual, use, value));
     return shape;
   }
 
@@ -189,7 +225,10 @@ class ShapeReader {
     if (binder.find("shoulder_height") && binder.find("height") && !(height > shoulder))
       problems_.add(value.place, value.path, "the height is not above the shoulder_height", "give a height above it");
     if (!base || !(height > shoulder)) return {};
-    return mesh_shape(geometry::make_gable_carton((*base)[0], (*base)[1], shoulder, height), MeshUse::kConvexHull);
+    BodyShape shape;
+    shape.visual = shared(geometry::make_gable_carton((*base)[0], (*base)[1], shoulder, height));
+    shape.collision.emplace_back(MeshShape{shape.visual, Pose{}, MeshUse::kConvexHull});
+    return shape;
   }
 
   // Five boxes, which collide as what they are; the origin is the centre of the outer bottom face.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "prescene/belief/validation.h"
+#include "prescene/collision/spheres/surface_spheres.h"
 #include "prescene/geometry/mass_properties.h"
 
 namespace prescene::simulation {
@@ -24,8 +25,22 @@ Part convex_part(std::unique_ptr<ConvexCore> core, const Pose& X_OS) {
   return part;
 }
 
-core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double rounding, ShapeStore& shapes,
-                       const DecompositionSettings& decomposition, CompiledBody& body) {
+bool collides_as_spheres(const std::vector<belief::CollisionShape>& shapes) {
+  return std::any_of(shapes.begin(), shapes.end(), [](const belief::CollisionShape& shape) {
+    const auto* mesh = std::get_if<belief::MeshShape>(&shape);
+    return mesh && mesh->use == belief::MeshUse::kSpheres;
+  });
+}
+
+/// What the shapes of all bodies are made with.
+struct ShapeMaker {
+  ShapeStore& shapes;
+  const BulletOptions& options;
+  bool spheres = false;  // some object collides as spheres
+};
+
+core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double rounding, const ShapeMaker& maker,
+                       CompiledBody& body) {
   if (const auto* primitive = std::get_if<belief::PrimitiveShape>(&shape)) {
     body.parts.push_back(convex_part(ConvexCore::from_primitive(primitive->primitive, rounding), primitive->X_OS));
     return core::ok_status();
@@ -35,19 +50,29 @@ core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double r
   if (mesh.use == belief::MeshUse::kSurface) {
     if (!fixed) {
       return core::unsupported(
-          "a triangle surface can only be fixed or a robot body; use convex_hull, convex_parts or decompose for "
-          "objects");
+          "a triangle surface can only be fixed or a robot body; use convex_hull, convex_parts, decompose or spheres "
+          "for objects");
     }
-    PRESCENE_TRY(const auto prepared, shapes.static_mesh(*mesh.mesh));
+    PRESCENE_TRY(const auto prepared, maker.shapes.static_mesh(*mesh.mesh));
     Part part;
     part.X_OS = Frame(mesh.X_OS);
-    part.surface = std::make_shared<const SurfaceShape>(prepared);
+    part.surface = std::make_shared<const SurfaceShape>(prepared, maker.spheres);
     const geometry::Box box = geometry::bounding_box(*mesh.mesh);
     set_bounds(part, box.min(), box.max());
     body.parts.push_back(std::move(part));
     return core::ok_status();
   }
-  PRESCENE_TRY(const auto parts, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
+  if (mesh.use == belief::MeshUse::kSpheres) {
+    Part part;
+    PRESCENE_TRY(part.spheres, maker.shapes.surface_spheres(*mesh.mesh, mesh.spheres));
+    part.X_OS = Frame(mesh.X_OS);
+    const geometry::Box box = geometry::bounding_box(*mesh.mesh);
+    const Vector3d rise = Vector3d::Constant(static_cast<double>(part.spheres->rise));
+    set_bounds(part, box.min() - rise, box.max() + rise);
+    body.parts.push_back(std::move(part));
+    return core::ok_status();
+  }
+  PRESCENE_TRY(const auto parts, maker.shapes.convex_parts(*mesh.mesh, mesh.use, maker.options.decomposition));
   for (const ConvexPolytope& polytope : *parts) {
     body.parts.push_back(convex_part(ConvexCore::from_polytope(polytope, rounding), mesh.X_OS));
   }
@@ -55,17 +80,16 @@ core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double r
 }
 
 core::Result<CompiledBody> compile_body(const std::string& name, const std::vector<belief::CollisionShape>& collision,
-                                        const belief::ContactProperties& contact, bool fixed, ShapeStore& shapes,
-                                        const BulletOptions& options) {
+                                        const belief::ContactProperties& contact, bool fixed, const ShapeMaker& maker) {
   CompiledBody body;
   body.name = name;
   body.friction = belief::mean(contact.friction);
   body.impact_friction = contact.impact_friction ? belief::mean(*contact.impact_friction) : body.friction;
   body.restitution = belief::mean(contact.restitution);
   body.rolling_arm = contact.rolling_friction;
-  const double rounding = std::max(options.edge_rounding, contact.edge_radius);
+  const double rounding = std::max(maker.options.edge_rounding, contact.edge_radius);
   for (std::size_t i = 0; i < collision.size(); ++i) {
-    const core::Status status = add_shape(collision[i], fixed, rounding, shapes, options.decomposition, body);
+    const core::Status status = add_shape(collision[i], fixed, rounding, maker, body);
     if (!status.ok()) return status.at(name + ", shape " + std::to_string(i + 1));
   }
   for (const Part& part : body.parts) {
@@ -105,9 +129,12 @@ core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::S
   compiled->object_count = static_cast<int>(scene.objects.size());
   compiled->support_count = static_cast<int>(scene.supports.size());
   compiled->robot_count = static_cast<int>(scene.robot.size());
+  ShapeMaker maker{shapes, options};
+  for (const belief::SceneObject& object : scene.objects)
+    maker.spheres = maker.spheres || collides_as_spheres(scene.model_of(object).collision);
   for (const belief::SceneObject& object : scene.objects) {
     const belief::ObjectModel& model = scene.model_of(object);
-    PRESCENE_TRY(CompiledBody body, compile_body(object.name, model.collision, model.contact, false, shapes, options));
+    PRESCENE_TRY(CompiledBody body, compile_body(object.name, model.collision, model.contact, false, maker));
     geometry::MassProperties unit;
     unit.mass = 1.0;
     unit.I_BBcm_B = model.unit_inertia;
@@ -117,13 +144,12 @@ core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::S
     compiled->bodies.push_back(std::move(body));
   }
   for (const belief::Support& support : scene.supports) {
-    PRESCENE_TRY(CompiledBody body,
-                 compile_body(support.name, support.collision, support.contact, true, shapes, options));
+    PRESCENE_TRY(CompiledBody body, compile_body(support.name, support.collision, support.contact, true, maker));
     body.X_WO = support.X_WS;
     compiled->bodies.push_back(std::move(body));
   }
   for (const belief::KinematicBody& robot : scene.robot) {
-    PRESCENE_TRY(CompiledBody body, compile_body(robot.name, robot.collision, robot.contact, true, shapes, options));
+    PRESCENE_TRY(CompiledBody body, compile_body(robot.name, robot.collision, robot.contact, true, maker));
     compiled->bodies.push_back(std::move(body));
   }
   return std::shared_ptr<const CompiledScene>(std::move(compiled));

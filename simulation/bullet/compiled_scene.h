@@ -16,10 +16,11 @@
 
 namespace prescene::simulation {
 
-/// One convex core or surface of a body. Exactly one of `core` and `surface` is set.
+/// One convex core, surface or tree of spheres of a body: exactly one of them is set.
 struct Part {
   std::shared_ptr<const ConvexCore> core;
   std::shared_ptr<const SurfaceShape> surface;
+  std::shared_ptr<const collision::SurfaceSpheres> spheres;
   Frame X_OS;
   Vector3d box_center, box_half_size;  // in O
 };

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "prescene/core/parallel.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -19,6 +21,8 @@ constexpr double kSameGap = 1e-7;
 constexpr double kSamePoint = 1e-4;
 // Barycentric coordinate below which a nearest point lies on the triangle's edge.
 constexpr double kOnEdge = 1e-6;
+// The same of points on triangles that were rounded to single precision.
+constexpr double kOnEdgeSingle = 1e-4;
 // Sine of the angle up to which two segments count as parallel.
 constexpr double kParallel = 0.05;
 
@@ -30,7 +34,7 @@ Feature& to_world(const Frame& X, Feature& feature) {
 
 }  // namespace
 
-SurfaceShape::SurfaceShape(std::shared_ptr<const StaticMesh> mesh) : mesh_(std::move(mesh)) {
+SurfaceShape::SurfaceShape(std::shared_ptr<const StaticMesh> mesh, bool for_spheres) : mesh_(std::move(mesh)) {
   const geometry::TriangleMesh& m = mesh_->mesh;
   vertices_.reserve(3 * m.vertices.size());
   for (const Vector3d& v : m.vertices) vertices_.insert(vertices_.end(), {v.x(), v.y(), v.z()});
@@ -42,6 +46,24 @@ SurfaceShape::SurfaceShape(std::shared_ptr<const StaticMesh> mesh) : mesh_(std::
       static_cast<int>(m.triangles.size()), indices_.data(), static_cast<int>(3 * sizeof(int)),
       static_cast<int>(m.vertices.size()), vertices_.data(), static_cast<int>(3 * sizeof(btScalar)));
   tree_ = std::make_unique<btBvhTriangleMeshShape>(array_.get(), true);
+  if (!for_spheres) return;
+  core::ThreadPool pool(1);
+  if (auto single = collision::Mesh::make(m, "surface"))
+    nearest_ = collision::TriangleTree::build(*std::move(single), {}, pool);
+}
+
+SurfaceShape::Place SurfaceShape::place_of(std::uint32_t triangle, const Vector3d& point) const {
+  const geometry::TriangleMesh& m = mesh_->mesh;
+  std::array<Vector3d, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k) corners[k] = m.vertices[m.triangles[triangle][k]];
+  const Vector3d area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  Place place{area.normalized(), false};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vector3d& from = corners[k];
+    const double share = (corners[(k + 1) % 3] - from).cross(point - from).dot(area) / area.squaredNorm();
+    if (share <= kOnEdgeSingle && (mesh_->ridges[triangle] >> k & 1u)) place.on_ridge = true;
+  }
+  return place;
 }
 
 void SurfaceShape::overlapping(const Vector3d& low, const Vector3d& high, std::vector<int>& triangles) const {

@@ -9,9 +9,12 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "convex_core.h"
+#include "prescene/collision/triangle_tree.h"
+#include "prescene/core/check.h"
 #include "prescene/simulation/shape_store.h"
 
 namespace prescene::simulation {
@@ -33,15 +36,30 @@ struct ContactPoint {
   Vector3d position;  ///< Midway between the two surfaces, W.
   Vector3d normal;    ///< Unit, from B to A, W.
   double gap = 0.0;   ///< Distance of the surfaces along the normal, m; negative when they overlap.
+  /// m/s; by how much the turning of the bodies slows the closing of the gap within the step. `gap` has its share.
+  double turning = 0.0;
 };
 
 /// A triangle mesh in Bullet's bounding volume tree. Fixed or kinematic bodies only.
 class SurfaceShape {
  public:
-  explicit SurfaceShape(std::shared_ptr<const StaticMesh> mesh);
+  /// `for_spheres`: something in the scene collides as spheres, which needs tree().
+  SurfaceShape(std::shared_ptr<const StaticMesh> mesh, bool for_spheres);
   const StaticMesh& mesh() const { return *mesh_; }
   /// Indices of the triangles whose boxes overlap a box in the mesh's frame.
   void overlapping(const Vector3d& low, const Vector3d& high, std::vector<int>& triangles) const;
+
+  /// The same triangles for queries of nearest points.
+  const collision::TriangleTree& tree() const {
+    PRESCENE_CHECK(nearest_.has_value());
+    return *nearest_;
+  }
+  /// What the surface is like about one of its points.
+  struct Place {
+    Vector3d normal;        ///< Of the triangle.
+    bool on_ridge = false;  ///< On an edge that may be felt: a border, or a ridge of the surface.
+  };
+  Place place_of(std::uint32_t triangle, const Vector3d& point) const;
 
  private:
   std::shared_ptr<const StaticMesh> mesh_;
@@ -49,6 +67,7 @@ class SurfaceShape {
   std::vector<int> indices_;
   std::unique_ptr<btTriangleIndexVertexArray> array_;
   std::unique_ptr<btBvhTriangleMeshShape> tree_;
+  std::optional<collision::TriangleTree> nearest_;
 };
 
 /// Scratch memory of contact finding: one a thread.

@@ -53,6 +53,14 @@ class ConvexCore : public btConvexInternalShape {
   /// The feature of the core that faces `direction` (unit, S): the best aligned face of a polytope, the cap or the side
   /// line of a cylinder or cone, the segment of a capsule, the point of a sphere.
   void facing(const Vector3d& direction, Feature& feature) const;
+  /// Where the core is nearest to a point.
+  struct Nearest {
+    double distance = 0.0;                ///< m; negative inside of the core.
+    Vector3d normal = Vector3d::UnitZ();  ///< Unit: the direction in which the distance grows.
+    bool flat = false;                    ///< That place is on a flat face, and not on its rim.
+  };
+  /// Of a point in S. Not of triangles (checked).
+  Nearest nearest(const Vector3d& p) const;
 
   // btConvexShape
   btVector3 localGetSupportingVertexWithoutMargin(const btVector3& direction) const override;
@@ -71,6 +79,7 @@ class ConvexCore : public btConvexInternalShape {
   Vector3d support(const Vector3d& direction) const;
   void set_bounds(const Vector3d& low, const Vector3d& high);
   void cap(double z, const Vector3d& direction, Feature& feature) const;
+  Nearest nearest_of_polytope(const Vector3d& p) const;
 
   Kind kind_;
   double radius_ = 0.0;

@@ -49,6 +49,24 @@ void InstanceWorld::find_contacts() {
   }
 }
 
+void InstanceWorld::find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb,
+                               double range) {
+  const Frame X_WA = ma.X_WO * part_a.X_OS;
+  const Frame X_WB = mb.X_WO * part_b.X_OS;
+  if (part_a.core && part_b.core) return finder_.convex_convex(*part_a.core, X_WA, *part_b.core, X_WB, range, points_);
+  if (part_a.core && part_b.surface)
+    return finder_.convex_surface(*part_a.core, X_WA, *part_b.surface, X_WB, range, points_);
+  const MovingFrame a{X_WA, {ma.p_WCm, ma.velocity, ma.spin}};
+  const MovingFrame b{X_WB, {mb.p_WCm, mb.velocity, mb.spin}};
+  if (part_a.spheres && part_b.spheres)
+    return sphere_finder_.spheres_spheres(*part_a.spheres, a, *part_b.spheres, b, range, dt(), points_);
+  if (part_a.spheres && part_b.surface)
+    return sphere_finder_.spheres_surface(*part_a.spheres, a, *part_b.surface, b, range, dt(), points_);
+  if (part_a.spheres) return sphere_finder_.spheres_convex(*part_a.spheres, a, *part_b.core, b, range, dt(), points_);
+  sphere_finder_.spheres_convex(*part_b.spheres, b, *part_a.core, a, range, dt(), points_);
+  for (ContactPoint& point : points_) point.normal = -point.normal;
+}
+
 void InstanceWorld::find_pair(int a, int b) {
   const Moving& ma = moving_[static_cast<std::size_t>(a)];
   const Moving& mb = moving_[static_cast<std::size_t>(b)];
@@ -58,7 +76,7 @@ void InstanceWorld::find_pair(int a, int b) {
   const std::size_t first = contacts_.size();
   for (std::uint32_t i = 0; i < body_a.parts.size(); ++i) {
     const Part& part_a = body_a.parts[i];
-    if (!part_a.core) continue;  // surfaces never move by themselves and never meet each other
+    if (part_a.surface) continue;  // surfaces never move by themselves and never meet each other
     const Vector3d center_a = ma.X_WO * part_a.box_center;
     const Vector3d half_a = ma.X_WO.R.cwiseAbs() * part_a.box_half_size + Vector3d::Constant(range);
     for (std::uint32_t j = 0; j < body_b.parts.size(); ++j) {
@@ -67,12 +85,7 @@ void InstanceWorld::find_pair(int a, int b) {
       const Vector3d half_b = mb.X_WO.R.cwiseAbs() * part_b.box_half_size;
       if (((center_a - center_b).cwiseAbs().array() > (half_a + half_b).array()).any()) continue;
       points_.clear();
-      if (part_b.core) {
-        finder_.convex_convex(*part_a.core, ma.X_WO * part_a.X_OS, *part_b.core, mb.X_WO * part_b.X_OS, range, points_);
-      } else {
-        finder_.convex_surface(*part_a.core, ma.X_WO * part_a.X_OS, *part_b.surface, mb.X_WO * part_b.X_OS, range,
-                               points_);
-      }
+      find_parts(part_a, ma, part_b, mb, range);
       add_contacts(a, b, i, j);
     }
   }
@@ -122,7 +135,8 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
     c.restitution = restitution(a, body_a) * restitution(b, body_b);
     c.rolling_arm = std::max(body_a.rolling_arm, body_b.rolling_arm);
     c.speed_before = point.normal.dot(ma.velocity_before + ma.spin_before.cross(point.position - ma.p_WCm) -
-                                      mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm));
+                                      mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm)) +
+                     point.turning;
     const Vector3d p_B = mb.X_WO.inverse_times(point.position);
     double nearest = reach * reach;
     for (const Warm& warm : warm_) {

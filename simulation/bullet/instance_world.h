@@ -13,6 +13,7 @@
 #include "contact_finder.h"
 #include "contact_solver.h"
 #include "prescene/simulation/action_player.h"
+#include "sphere_contacts.h"
 
 namespace prescene::simulation {
 
@@ -152,6 +153,7 @@ class InstanceWorld {
   void sweep(int body);
   void find_contacts();
   void find_pair(int a, int b);
+  void find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb, double range);
   void add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b);
   void solve();
   void integrate();
@@ -172,6 +174,7 @@ class InstanceWorld {
 
   // Scratch of a step.
   ContactFinder finder_;
+  SphereContactFinder sphere_finder_;
   ContactSolver solver_;
   SolverSettings settings_;
   std::vector<Moving> moving_;

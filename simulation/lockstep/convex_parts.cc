@@ -122,6 +122,11 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
   if (mesh.use == belief::MeshUse::kSurface) {
     return core::unsupported("triangle surfaces are not simulated in lockstep");
   }
+  if (mesh.use == belief::MeshUse::kSpheres) {
+    return core::unsupported(
+        "meshes of spheres are not simulated in lockstep; use convex_hull, convex_parts or decompose, or Bullet's "
+        "stepper");
+  }
   PRESCENE_TRY(const auto hulls, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
   for (const ConvexPolytope& hull : *hulls) {
     PRESCENE_TRY(ConvexPart part, hull_part(hull, placed(mesh.X_OS), rounding));

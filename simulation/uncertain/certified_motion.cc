@@ -40,6 +40,14 @@ double depth_of(const ConvexPolytope& hull, const Vector3d& p) {
   return least;
 }
 
+// Spheres round what a mesh has flat and lie inside of its edges: faces, hulls and water levels say too much of them.
+bool collides_as_spheres(const std::vector<belief::CollisionShape>& shapes) {
+  return std::any_of(shapes.begin(), shapes.end(), [](const belief::CollisionShape& shape) {
+    const auto* mesh = std::get_if<belief::MeshShape>(&shape);
+    return mesh && mesh->use == belief::MeshUse::kSpheres;
+  });
+}
+
 std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model) {
   auto hull = make_polytope(belief::collision_mesh(model).vertices);
   if (!hull) return std::nullopt;
@@ -62,6 +70,12 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
                                                              const CertifierOptions& options) {
   const Vector3d& gravity = scene.gravity_W;
   if (gravity.x() != 0.0 || gravity.y() != 0.0 || !(gravity.z() < 0.0)) return nullptr;
+  for (const belief::SceneObject& object : scene.objects)
+    if (collides_as_spheres(scene.model_of(object).collision)) return nullptr;
+  for (const belief::Support& support : scene.supports)
+    if (collides_as_spheres(support.collision)) return nullptr;
+  for (const belief::KinematicBody& body : scene.robot)
+    if (collides_as_spheres(body.collision)) return nullptr;
   auto made = std::make_unique<MotionCertifier>();
   made->options_ = options;
   made->gravity_ = -gravity.z();

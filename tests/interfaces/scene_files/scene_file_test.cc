@@ -46,7 +46,7 @@ belief::PoseDistribution pose_of(const std::string& pose) {
 
 TEST(SceneFile, OfThePageHasAllThatThePageSays) {
   const Scene scene = scene_of(tests::code_blocks(tests::text_of_file("docs/scene_files.md"), "yaml"));
-  EXPECT_EQ(scene.models.size(), 8U);
+  EXPECT_EQ(scene.models.size(), 9U);
   EXPECT_EQ(scene.supports.size(), 4U);
   EXPECT_EQ(scene.robot.size(), 2U);
   EXPECT_EQ(scene.objects.size(), 6U);
@@ -251,10 +251,38 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
     EXPECT_THAT(error_of("models:\n  m: {" + std::string(shape) + ", mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n"),
                 HasSubstr("a surface of triangles can't move"));
   }
+  const auto lathe_error = [](const std::string& keys) {
+    return error_of("models:\n  m: {lathe: {profile: [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]], " + keys +
+                    "}, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n");
+  };
+  EXPECT_THAT(lathe_error("use: convex_hull, spheres: 1000"), HasSubstr("only meshes of spheres have this"));
+  EXPECT_THAT(lathe_error("use: spheres, spheres: 10"), HasSubstr("about how many spheres"));
+  EXPECT_THAT(lathe_error("use: spheres, edge_fidelity: 0.05"), HasSubstr("a tenth of the mesh's diagonal"));
   EXPECT_THAT(error_of("models:\n  m: {mesh: {file: a.obj}, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n"),
               HasSubstr("a.obj: no such file"));
   EXPECT_THAT(error_of("name: x\n"), HasSubstr("the key 'objects' is missing"));
   EXPECT_THAT(error_of("[1, 2]\n"), HasSubstr("this is a list of 2: give a map of keys"));
+}
+
+TEST(SceneFile, HollowObjectsCollideAsSpheresWhereNothingElseIsSaid) {
+  const auto use_of = [](const std::string& profile, const std::string& keys) {
+    const auto scene = parse_scene("models:\n  m: {lathe: {profile: " + profile + keys +
+                                       "}, mass: 1}\nsupports:\n  s: {lathe: {profile: " + profile +
+                                       "}}\nobjects:\n  o: {model: m, pose: {}}\n",
+                                   "s.yaml");
+    EXPECT_TRUE(scene.ok()) << scene.status().message();
+    EXPECT_EQ(std::get<belief::MeshShape>(scene->supports[0].collision[0]).use, belief::MeshUse::kConvexHull);
+    return std::get<belief::MeshShape>(scene->models[0].collision[0]);
+  };
+  const std::string can = "[[0, 0], [0.03, 0], [0.03, 0.1], [0, 0.1]]";
+  const std::string cup = "[[0, 0], [0.04, 0], [0.04, 0.1], [0.037, 0.1], [0.037, 0.003], [0, 0.003]]";
+  EXPECT_EQ(use_of(can, "").use, belief::MeshUse::kConvexHull);
+  EXPECT_EQ(use_of(cup, "").use, belief::MeshUse::kSpheres);
+  EXPECT_EQ(use_of(cup, ", use: convex_hull").use, belief::MeshUse::kConvexHull);
+  const belief::MeshShape finer = use_of(can, ", spheres: 5000, edge_fidelity: 0.001");
+  EXPECT_EQ(finer.use, belief::MeshUse::kSpheres);
+  EXPECT_EQ(finer.spheres.count, 5000);
+  EXPECT_EQ(finer.spheres.edge_fidelity, 0.001);
 }
 
 TEST(SceneFile, WithoutAMeshReaderMeshesAreErrors) {

@@ -213,7 +213,7 @@ TEST(Meshes, WhatCannotBeSimulatedIsNamed) {
   const core::Status surface = status_of(mesh_shape(geometry::make_mesh(BoxShape{{0.1, 0.1, 0.1}}), MeshUse::kSurface));
   EXPECT_EQ(surface.code(), core::StatusCode::kUnsupported);
   EXPECT_THAT(surface.message(), testing::HasSubstr("object"));
-  for (const MeshUse use : {MeshUse::kConvexHull, MeshUse::kConvexParts, MeshUse::kDecompose}) {
+  for (const MeshUse use : {MeshUse::kConvexHull, MeshUse::kConvexParts, MeshUse::kDecompose, MeshUse::kSpheres}) {
     const core::Status flat = status_of(mesh_shape(grid(0.1, 2), use));
     EXPECT_EQ(flat.code(), core::StatusCode::kInvalidInput) << static_cast<int>(use);
     EXPECT_FALSE(flat.message().empty());

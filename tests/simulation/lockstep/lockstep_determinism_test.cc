@@ -270,6 +270,9 @@ TEST(LockstepRefusals, NameTheBodyAndTheReason) {
   const auto bin = std::make_shared<const geometry::TriangleMesh>(geometry::make_open_bin({0.3, 0.3, 0.2}, 0.01));
   surface.supports.push_back(support_of("bin", {belief::MeshShape{bin, Pose{}, belief::MeshUse::kSurface}}, Pose{}));
   expect_refused(surface, "bin, shape 1: triangle surfaces");
+  const auto box = std::make_shared<const geometry::TriangleMesh>(geometry::make_mesh(BoxShape{{0.1, 0.1, 0.1}}));
+  expect_refused(floor_scene(model_of("packed", {belief::MeshShape{box, Pose{}, belief::MeshUse::kSpheres, {}}})),
+                 "object, shape 1: meshes of spheres");
   Scene push = good;
   push.actions.resize(17, {0.1, belief::Push{}});
   expect_refused(push, "17 push actions");
