@@ -167,6 +167,19 @@ Status check_object(const Scene& scene, const SceneObject& object) {
   return {};
 }
 
+/// Both of an outcome's conditions at once are impossible: one is the other turned round.
+bool contradict(const Condition& a, const Condition& b) {
+  return a.predicate == b.predicate && a.when == b.when && a.negated != b.negated;
+}
+
+/// Whenever `later` holds, `earlier` does.
+bool implied(const Outcome& earlier, const Outcome& later) {
+  return earlier.object == later.object &&
+         std::all_of(earlier.all_of.begin(), earlier.all_of.end(), [&](const Condition& condition) {
+           return std::find(later.all_of.begin(), later.all_of.end(), condition) != later.all_of.end();
+         });
+}
+
 Status check_outcome(const Scene& scene, const Outcome& outcome) {
   if (outcome.name.empty()) return invalid_input("an outcome has no name: name it");
   const std::string place = quoted("outcome", outcome.name);
@@ -174,6 +187,10 @@ Status check_outcome(const Scene& scene, const Outcome& outcome) {
   if (outcome.all_of.empty()) return invalid_input("it has no condition: give at least one").at(place);
   for (const Condition& condition : outcome.all_of)
     PRESCENE_RETURN_IF_ERROR(std::visit(PredicateCheck{scene}, condition.predicate).at(place));
+  for (std::size_t i = 0; i < outcome.all_of.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (contradict(outcome.all_of[i], outcome.all_of[j]))
+        return invalid_input("a condition and its opposite never hold together: take one of them out").at(place);
   return {};
 }
 
@@ -196,6 +213,13 @@ Status check_outcomes(const Scene& scene) {
         return invalid_input("two outcomes are called '" + outcome.name + "' ('other' is made by itself): rename one")
             .at(place);
     }
+    for (std::size_t later = 1; later < group.outcomes.size(); ++later)
+      for (std::size_t earlier = 0; earlier < later; ++earlier)
+        if (implied(group.outcomes[earlier], group.outcomes[later]))
+          return invalid_input("'" + group.outcomes[later].name + "' never counts, as '" +
+                               group.outcomes[earlier].name +
+                               "' above it holds whenever it does: put the narrower outcome first")
+              .at(place);
   }
   return {};
 }

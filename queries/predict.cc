@@ -200,6 +200,9 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   }
   if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.remarks = remarks_of(answer, query.effort);
+  if (foresight.estimate.certain)
+    answer.remarks.push_back(
+        "Nothing in the scene is uncertain: one instance tells what the simulator does, not how sure that is.");
   return answer;
 }
 

@@ -116,6 +116,38 @@ TEST(CommandLine, TooLittleTimeIsNoBadInput) {
   EXPECT_NE(parsed(finished)["error"].get<std::string>().find("give more time"), std::string::npos) << finished.out;
 }
 
+TEST(CommandLine, PredictWritesAHeatMapAndRefusesTimesThatAreNone) {
+  const ScratchDir folder;
+  const std::string picture = (folder.path() / "ends.png").string();
+  const Finished finished =
+      run_program({"predict", scenario("milk_on_bin"), "--max-instances", "64", "--heat-map", picture});
+  EXPECT_EQ(finished.exit_code, 0) << finished.err;
+  EXPECT_EQ(read_file(picture).substr(1, 3), "PNG");
+  for (const char* budget : {"0", "-1s", "0ms", "1 fortnight", "nan", "1e9"}) {
+    const Finished refused = run_program({"predict", scenario("milk_on_bin"), "--budget", budget});
+    EXPECT_EQ(refused.exit_code, 2) << budget;
+    EXPECT_NE(refused.err.find("no time above 0"), std::string::npos) << refused.err;
+  }
+  EXPECT_EQ(run_program({"predict", scenario("tossed_cube"), "--budget", "50 ms"}).exit_code, 0);
+}
+
+TEST(CommandLine, APredictionOfThingsInEachOtherSaysSo) {
+  const ScratchDir folder;
+  write_file(folder.path() / "deep.yaml",
+             "name: deep\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\nsupports:\n  floor: {ground: {size: 4}}\n"
+             "objects:\n  box: {model: box, pose: {position: [{normal: [0, 0.01]}, 0, 0.02]}}\n"
+             "outcomes:\n  low: {object: box, below: 0.2}\n");
+  const Finished finished = run_program(
+      {"predict", (folder.path() / "deep.yaml").string(), "--json", "--max-instances", "64", "--outcomes-only"});
+  EXPECT_EQ(finished.exit_code, 0) << finished.err;
+  const nlohmann::ordered_json document = parsed(finished);
+  EXPECT_NEAR(document["overlaps"]["deepest"].get<double>(), 0.03, 0.001);
+  EXPECT_EQ(document["overlaps"]["share"], 1.0);
+  EXPECT_NE(document["remarks"][0].get<std::string>().find("by up to 30 mm"), std::string::npos);
+  EXPECT_EQ(document["certificates"]["used"], true);
+  EXPECT_TRUE(document["final_poses"].empty());
+}
+
 TEST(CommandLine, AnInputIsNeverOverwritten) {
   const ScratchDir folder;
   const std::string scene = (folder.path() / "scene.yaml").string();

@@ -236,6 +236,12 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
               HasSubstr("'not' holds 2 conditions"));
   EXPECT_THAT(error_of(small("exclusive_outcomes:\n  g: {outcomes: {other: {below: 1}}}\n")),
               HasSubstr("'other' is made by itself"));
+  EXPECT_THAT(error_of(small("outcomes:\n  a: {below: 1, not: {below: 1}}\n")), HasSubstr("never hold together"));
+  EXPECT_THAT(error_of(small("exclusive_outcomes:\n  g: {outcomes: {a: {below: 1}, b: {below: 1}}}\n")),
+              HasSubstr("'b' never counts, as 'a' above it"));
+  EXPECT_THAT(error_of(small("exclusive_outcomes:\n  g: {outcomes: {a: {below: 1}, b: {below: 1, moving: true}}}\n")),
+              HasSubstr("put the narrower outcome first"));
+  EXPECT_THAT(error_of(small("", "    mass: 0\n")), HasSubstr("more than 0"));
   EXPECT_THAT(error_of(small("", "    inertia: [1, 1, 3]\n")), HasSubstr("no body has this inertia"));
   EXPECT_THAT(error_of(small("", "    symmetry: {axis: z}\n")), HasSubstr("the turns about the axis are missing"));
   EXPECT_THAT(error_of(small("", "    symmetry: {rotations: [[0.707, 0, 0, 0.707]]}\n")), HasSubstr("no group"));
