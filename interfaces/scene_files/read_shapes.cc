@@ -109,7 +109,7 @@ class ShapeReader {
   }
 
   // What a mesh is simulated as. `place` is where the shape is described.
-  MeshShape with_use(MeshPtr mesh, const Use& use, const LocatedValue& place) {
+  MeshShape with_use(const MeshPtr& mesh, const Use& use, const LocatedValue& place) {
     MeshShape shape{mesh, Pose{}, use.use, use.spheres};
     if (!use.at && use.use == MeshUse::kConvexHull && may_move_ && is_hollow(*mesh)) shape.use = MeshUse::kSpheres;
     if (shape.use != MeshUse::kSpheres) return shape;

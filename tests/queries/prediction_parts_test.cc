@@ -38,8 +38,8 @@ const belief::DecidingInputs& about(const PredictAnswer& answer, const std::stri
   for (const belief::DecidingInputs& one : answer.inputs)
     if (one.about == name) return one;
   ADD_FAILURE() << "nothing about " << name;
-  static const belief::DecidingInputs none;
-  return none;
+  static const belief::DecidingInputs kNone;
+  return kNone;
 }
 
 TEST(DecidingInputs, TheFrictionDecidesWhetherTheCartonSlides) {
