@@ -70,7 +70,8 @@ void add_object_ends(const belief::Scene& scene, const std::vector<belief::World
       std::sort(values.begin(), values.end());
       if (values.back() - values.front() <= 1e-9 * (1.0 + std::abs(values.front()))) continue;
       for (const double end : {kLowEnd, kHighEnd}) {
-        const double value = values[static_cast<std::size_t>(std::lround(end * static_cast<double>(values.size() - 1)))];
+        const double value =
+            values[static_cast<std::size_t>(std::lround(end * static_cast<double>(values.size() - 1)))];
         Variant& variant = variants.emplace_back();
         variant.what = scene.objects[o].name + ": " + parameter.name + " at " + core::rounded_text(value);
         variant.scene = same;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shapes that are expensive to make, made once: convex parts of meshes, spheres that stand for meshes, and prepared
-// static triangle meshes, keyed by the mesh's content and the settings. What comes out is shared and never changes, so that any number of simulators and
-// threads may hold it.
+// static triangle meshes, keyed by the mesh's content and the settings. What comes out is shared and never changes, so
+// that any number of simulators and threads may hold it.
 //
 //   ShapeStore shapes(decomposer);  // one is in prescene/simulation/bullet/convex_decomposition.h
 //   auto parts = shapes.convex_parts(mesh, belief::MeshUse::kConvexHull, {});

@@ -33,8 +33,8 @@ Placed place(const SphereTree& b, std::uint32_t node, const Transform& X_AB) {
   return result;
 }
 
-// Calls found(sphere of A, sphere of B, places) for each pair of spheres that overlap, or are up to `range` apart, until
-// it returns true; then returns true.
+// Calls found(sphere of A, sphere of B, places) for each pair of spheres that overlap, or are up to `range` apart,
+// until it returns true; then returns true.
 template <class Found>
 bool for_overlapping(const SphereTree& a, const SphereTree& b, const Transform& X_AB, SphereScratch& scratch,
                      const Found& found, float range = 0.0F) {

@@ -120,8 +120,8 @@ HWY_INLINE void expand(std::uint32_t index_a, std::uint32_t index_b, SphereTree:
 }
 
 /// Calls leaves(node of A, node of B, children of A, placed children of B) for each pair of bottom nodes whose spheres
-/// may overlap, or be up to `range` apart, until it returns true; then returns true. A level at a time: what a pair needs
-/// then never waits for the pair before.
+/// may overlap, or be up to `range` apart, until it returns true; then returns true. A level at a time: what a pair
+/// needs then never waits for the pair before.
 template <std::size_t kBranching, class Leaves>
 HWY_INLINE bool for_bottom_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
                                  SphereScratch* scratch, const Leaves& leaves, float range = 0.0F) {

@@ -95,16 +95,15 @@ void near_pairs_lanes(const SphereTree& a, const SphereTree& b, const Transform&
     constexpr std::size_t kBranching = decltype(branching)::value;
     const auto leaves = [&](const SphereTree::Node& node_a, const SphereTree::Node& node_b, const Children& children_a,
                             const PlacedChildren<kBranching>& children_b) HWY_ATTR {
-      for_rows<kBranching>(
-          children_a, node_a.count, children_b, range,
-          [&](std::size_t row, std::size_t lane, const PairVector& found) HWY_ATTR {
-            for (std::uint32_t bits = mask_bits(found.meet); bits != 0; bits &= bits - 1) {
-              const auto at = static_cast<std::size_t>(std::countr_zero(bits));
-              const std::size_t i = row + (Rows<kBranching>::kRows == 1 ? 0 : at / kBranching);
-              const std::size_t k = lane + (Rows<kBranching>::kRows == 1 ? at : at % kBranching);
-              pairs->push_back({a.order()[node_a.first + i], b.order()[node_b.first + k]});
-            }
-          });
+      for_rows<kBranching>(children_a, node_a.count, children_b, range,
+                           [&](std::size_t row, std::size_t lane, const PairVector& found) HWY_ATTR {
+                             for (std::uint32_t bits = mask_bits(found.meet); bits != 0; bits &= bits - 1) {
+                               const auto at = static_cast<std::size_t>(std::countr_zero(bits));
+                               const std::size_t i = row + (Rows<kBranching>::kRows == 1 ? 0 : at / kBranching);
+                               const std::size_t k = lane + (Rows<kBranching>::kRows == 1 ? at : at % kBranching);
+                               pairs->push_back({a.order()[node_a.first + i], b.order()[node_b.first + k]});
+                             }
+                           });
       return false;
     };
     return for_bottom_pairs<kBranching>(a, b, X_AB, scratch, leaves, range);

@@ -23,7 +23,8 @@ std::unique_ptr<btRigidBody> make_rigid_body() {
 
 }  // namespace
 
-InstanceWorld::InstanceWorld(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)), player_(scene_->scene) {
+InstanceWorld::InstanceWorld(std::shared_ptr<const CompiledScene> scene)
+    : scene_(std::move(scene)), player_(scene_->scene) {
   const BulletOptions& options = scene_->options;
   settings_.iterations = options.solver_iterations;
   settings_.converged = options.solver_accuracy;
