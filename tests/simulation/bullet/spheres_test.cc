@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "bullet_scenes.h"
+#include "prescene/tests/support/closed_forms.h"
 #include "sphere_scenes.h"
 
 namespace prescene::tests {
@@ -39,20 +40,9 @@ TEST(Spheres, ShapesRestAtTheirTrueHeight) {
 }
 
 double slide(double angle, double mu) {
-  Scene scene;
-  scene.name = "incline";
-  const Quaterniond tilt = about(Vector3d::UnitY(), angle);
-  scene.supports.push_back(support_of("plank", {belief::PrimitiveShape{BoxShape{{10.0, 2.0, 0.1}}, Pose{}}},
-                                      Pose{tilt, tilt * Vector3d(0.0, 0.0, -0.05)}));
-  ObjectModel block = packed_model("block", geometry::make_mesh(BoxShape{{0.1, 0.1, 0.04}}));
-  block.contact.friction = belief::FixedScalar{mu};
-  add_object(scene, block, "block");
-  auto instance = instance_of(scene);
-  WorldState start = start_of(scene);
-  start.objects[0].X_WO = Pose{tilt, tilt * Vector3d(0.0, 0.0, 0.02)};
-  instance->set_state(start);
-  step_for(*instance, 1.0);
-  return (instance->state().objects[0].X_WO.translation - start.objects[0].X_WO.translation).norm();
+  const ObjectModel block = packed_model("block", geometry::make_mesh(BoxShape{{0.1, 0.1, 0.04}}));
+  const Scene scene = incline_scene(block, 0.02, angle, mu);
+  return slide_for_a_second(*instance_of(scene), scene).moved;
 }
 
 TEST(Spheres, BlockSlidesOnAnInclineIffTanThetaExceedsMu) {
@@ -69,30 +59,9 @@ TEST(Spheres, TiltedBoxTipsWithinHalfADegreeOfItsDiagonal) {
     double width, height;
   };
   for (const Case c : {Case{0.06, 0.2}, Case{0.1, 0.1}, Case{0.12, 0.06}}) {
-    const double expected = std::atan2(c.width, c.height) * 180.0 / kPi;
-    const ObjectModel box =
-        packed_model("box", geometry::make_mesh(BoxShape{{c.width, 0.08, c.height}}), 1.0, {3000, 1e-3});
-    const auto tips = [&](double degrees) {
-      Scene scene = floor_scene(box);
-      auto instance = instance_of(scene);
-      WorldState start = start_of(scene);
-      const Quaterniond tilt = about(Vector3d::UnitY(), degrees * kPi / 180.0);
-      // Standing on its lower edge.
-      start.objects[0].X_WO = Pose{tilt, -(tilt * Vector3d(0.5 * c.width, 0.0, -0.5 * c.height))};
-      instance->set_state(start);
-      step_for(*instance, 2.0);
-      const Vector3d up = instance->state().objects[0].X_WO.rotation * Vector3d::UnitZ();
-      return up.z() < std::cos(0.5 * expected * kPi / 180.0) - 0.01;
-    };
-    double low = expected - 3.0;
-    double high = expected + 3.0;
-    ASSERT_FALSE(tips(low));
-    ASSERT_TRUE(tips(high));
-    while (high - low > 0.05) {
-      const double middle = 0.5 * (low + high);
-      (tips(middle) ? high : low) = middle;
-    }
-    EXPECT_NEAR(0.5 * (low + high), expected, 0.5) << c.width << " x " << c.height;
+    const Scene scene =
+        floor_scene(packed_model("box", geometry::make_mesh(BoxShape{{c.width, 0.08, c.height}}), 1.0, {3000, 1e-3}));
+    expect_tipping_at_the_diagonal(*instance_of(scene), scene, c.width, c.height, 0.05, 0.5);
   }
 }
 

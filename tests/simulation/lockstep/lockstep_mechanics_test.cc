@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lockstep_scenes.h"
+#include "prescene/tests/support/closed_forms.h"
 
 namespace prescene::tests {
 namespace {
@@ -60,26 +61,9 @@ TEST(LockstepMechanics, TumblingKeepsItsAngularMomentumAndNearlyItsEnergy) {
   }
 }
 
-struct Slide {
-  double way, speed;
-};
 Slide slide(double angle, double mu, const belief::CollisionShape& shape, double half_height) {
-  Scene scene;
-  scene.name = "incline";
-  const Quaterniond tilt = about(Vector3d::UnitY(), angle);
-  scene.supports.push_back(support_of("plank", {belief::PrimitiveShape{BoxShape{{10.0, 2.0, 0.1}}, Pose{}}},
-                                      Pose{tilt, tilt * Vector3d(0.0, 0.0, -0.05)}));
-  ObjectModel block = model_of("block", {shape});
-  block.contact.friction = belief::FixedScalar{mu};
-  add_object(scene, block, "block");
-  auto instance = lockstep_instance_of(scene);
-  WorldState start = start_of(scene);
-  start.objects[0].X_WO = Pose{tilt, tilt * Vector3d(0.0, 0.0, half_height)};
-  instance->set_state(start);
-  step_for(*instance, 1.0);
-  const belief::ObjectState end = instance->state().objects[0];
-  const Vector3d down = tilt * Vector3d::UnitX();
-  return {down.dot(end.X_WO.translation - start.objects[0].X_WO.translation), down.dot(end.V_WO.linear)};
+  const Scene scene = incline_scene(model_of("block", {shape}), half_height, angle, mu);
+  return slide_for_a_second(*lockstep_instance_of(scene), scene);
 }
 
 TEST(LockstepMechanics, BlockSlidesOnAnInclineIffTanThetaExceedsMu) {
@@ -222,31 +206,11 @@ TEST(LockstepMechanics, TiltedBoxTipsAtTheAngleOfItsDiagonal) {
     bool hull;
   };
   for (const Case c : {Case{0.06, 0.2, false}, Case{0.1, 0.1, false}, Case{0.12, 0.06, true}}) {
-    const double expected = std::atan2(c.width, c.height) * 180.0 / kPi;
     const BoxShape box{{c.width, 0.08, c.height}};
     const belief::CollisionShape primitive = belief::PrimitiveShape{box, Pose{}};
     const Scene scene =
         floor_scene(model_of("box", {c.hull ? belief::CollisionShape(hull_of(geometry::make_mesh(box))) : primitive}));
-    auto instance = lockstep_instance_of(scene);
-    const auto tips = [&](double degrees) {
-      WorldState start = start_of(scene);
-      const Quaterniond tilt = about(Vector3d::UnitY(), degrees * kPi / 180.0);
-      // Standing on its lower edge.
-      start.objects[0].X_WO = Pose{tilt, -(tilt * Vector3d(0.5 * c.width, 0.0, -0.5 * c.height))};
-      instance->set_state(start);
-      step_for(*instance, 2.0);
-      const Vector3d up = instance->state().objects[0].X_WO.rotation * Vector3d::UnitZ();
-      return up.z() < std::cos(0.5 * expected * kPi / 180.0) - 0.01;
-    };
-    double low = expected - 3.0;
-    double high = expected + 3.0;
-    ASSERT_FALSE(tips(low));
-    ASSERT_TRUE(tips(high));
-    while (high - low > 0.02) {
-      const double middle = 0.5 * (low + high);
-      (tips(middle) ? high : low) = middle;
-    }
-    EXPECT_NEAR(0.5 * (low + high), expected, 0.1) << c.width << " x " << c.height;
+    expect_tipping_at_the_diagonal(*lockstep_instance_of(scene), scene, c.width, c.height, 0.02, 0.1);
   }
 }
 
