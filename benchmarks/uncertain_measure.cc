@@ -8,6 +8,7 @@
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/lockstep/lockstep_simulator.h"
 
 namespace prescene::benchmarks {
 namespace {
@@ -19,11 +20,18 @@ using simulation::OutcomeEstimate;
 /// s of processor time of this process.
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-std::unique_ptr<simulation::Simulator> simulator_of(const belief::Scene& scene, bool skip_flight) {
+std::unique_ptr<simulation::Simulator> bullet_of(const belief::Scene& scene, bool skip_flight) {
   BulletOptions options;
   options.skip_flight = skip_flight;
   simulation::ShapeStore shapes;
   auto made = simulation::make_bullet_simulator(scene, shapes, options);
+  PRESCENE_CHECK(made.ok());
+  return *std::move(made);
+}
+
+std::unique_ptr<simulation::Simulator> lockstep_of(const belief::Scene& scene) {
+  simulation::ShapeStore shapes;
+  auto made = simulation::make_lockstep_simulator(scene, shapes);
   PRESCENE_CHECK(made.ok());
   return *std::move(made);
 }
@@ -36,9 +44,10 @@ OutcomeEstimate estimate(const UncertainProblem& problem, const EstimatorOptions
 
 }  // namespace
 
-UncertainProblem::UncertainProblem(const tests::NamedScene& named) : name(named.name), scene(named.scene) {
-  stepper = simulator_of(*scene, false);
-  simulator = simulator_of(*scene, true);
+UncertainProblem::UncertainProblem(const tests::NamedScene& named, Stepping stepping)
+    : name(named.name), scene(named.scene) {
+  stepper = bullet_of(*scene, false);
+  simulator = stepping == Stepping::kBullet ? bullet_of(*scene, true) : lockstep_of(*scene);
   starts = simulation::start_of(scene);
   variables = simulation::variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
   request.stop.duration = scene->duration;

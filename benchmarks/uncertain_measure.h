@@ -14,14 +14,17 @@
 
 namespace prescene::benchmarks {
 
+enum class Stepping { kBullet, kLockstep };
+
 /// A scene made ready for both ways of estimating.
 struct UncertainProblem {
-  explicit UncertainProblem(const tests::NamedScene& named);
+  /// `stepping` of the estimator; the baseline's is Bullet.
+  UncertainProblem(const tests::NamedScene& named, Stepping stepping);
 
   std::string name;
   std::shared_ptr<const belief::Scene> scene;
   std::unique_ptr<simulation::Simulator> stepper;    ///< Steps through flights: the baseline's.
-  std::unique_ptr<simulation::Simulator> simulator;  ///< Skips them.
+  std::unique_ptr<simulation::Simulator> simulator;  ///< The estimator's: skips them.
   simulation::StartDistribution starts;
   std::vector<simulation::Variable> variables;
   simulation::RunRequest request;

@@ -25,7 +25,7 @@ std::vector<belief::Pose> robot_at(const belief::Scene& scene, double time) {
 class StandingStill final : public simulation::Simulator {
  public:
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest&, const core::RandomStream&,
-           std::uint32_t, core::ThreadPool&, std::span<belief::Trajectory> trajectories,
+           simulation::InstanceNumbers, core::ThreadPool&, std::span<belief::Trajectory> trajectories,
            const core::Cancellation*) const override {
     for (std::size_t i = 0; i < starts.size(); ++i) {
       trajectories[i] = {};

@@ -34,11 +34,11 @@ class EitherSimulator : public simulation::Simulator {
       : lockstep_(std::move(lockstep)), bullet_(std::move(bullet)) {}
 
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
-           const core::RandomStream& stream, std::uint32_t first_instance, core::ThreadPool& pool,
+           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
            std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
     const simulation::Simulator& simulator =
         simulation::lockstep_supports(request, starts).ok() ? *lockstep_ : *bullet_;
-    simulator.run(starts, request, stream, first_instance, pool, trajectories, cancellation);
+    simulator.run(starts, request, stream, numbers, pool, trajectories, cancellation);
   }
 
   double step_size() const override { return bullet_->step_size(); }

@@ -76,14 +76,33 @@ class Instance {
   virtual core::Status restore(const Snapshot& snapshot) = 0;
 };
 
+/// Which instances of all those of a stream a run is of.
+class InstanceNumbers {
+ public:
+  /// first, first + 1, ...
+  InstanceNumbers(std::uint32_t first) : first_(first) {}  // NOLINT(google-explicit-constructor)
+  /// These; they must outlive the run.
+  InstanceNumbers(std::span<const std::uint32_t> numbers)  // NOLINT(google-explicit-constructor)
+      : numbers_(numbers) {}
+
+  /// Of the run's i-th instance.
+  std::uint32_t operator[](std::size_t i) const {
+    return numbers_.empty() ? first_ + static_cast<std::uint32_t>(i) : numbers_[i];
+  }
+
+ private:
+  std::uint32_t first_ = 0;
+  std::span<const std::uint32_t> numbers_;
+};
+
 class Simulator {
  public:
   virtual ~Simulator() = default;
 
-  /// Runs starts.size() instances; trajectories.size() == starts.size(). Instance i uses stream.at(step, first_instance
-  /// + i) for what is random in its actions. A cancelled run ends its instances with TrajectoryEnd::kCancelled.
+  /// Runs starts.size() instances; trajectories.size() == starts.size(). Instance i uses stream.at(0, numbers[i]) for
+  /// what is random in its actions. A cancelled run ends its instances with TrajectoryEnd::kCancelled.
   virtual void run(std::span<const belief::WorldState> starts, const RunRequest& request,
-                   const core::RandomStream& stream, std::uint32_t first_instance, core::ThreadPool& pool,
+                   const core::RandomStream& stream, InstanceNumbers numbers, core::ThreadPool& pool,
                    std::span<belief::Trajectory> trajectories,
                    const core::Cancellation* cancellation = nullptr) const = 0;
 

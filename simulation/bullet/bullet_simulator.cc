@@ -70,13 +70,12 @@ class BulletSimulator : public Simulator {
   explicit BulletSimulator(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)) {}
 
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
-           std::uint32_t first_instance, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+           InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
     PRESCENE_CHECK(starts.size() == trajectories.size());
     pool.for_each_index(starts.size(), [&](std::size_t i) {
       std::unique_ptr<Worker> worker = take_worker();
-      const auto particle = static_cast<std::uint32_t>(first_instance + i);
-      run_one(*worker, starts[i], request, stream.at(0, particle), trajectories[i], cancellation);
+      run_one(*worker, starts[i], request, stream.at(0, numbers[i]), trajectories[i], cancellation);
       give_back(std::move(worker));
     });
   }

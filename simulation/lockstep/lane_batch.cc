@@ -143,8 +143,7 @@ void LaneBatch::start(Slot& slot, int at, std::size_t index, LaneQueue& queue) {
   slot.until_asked = queue.request->end_rule_steps;
   slot.touches.clear();
   for (Open& open : slot.open) open.open = false;
-  const auto particle = static_cast<std::uint32_t>(queue.first_instance + index);
-  slot.instance.start(engine_, at, queue.starts[index], queue.request->actions, queue.stream->at(0, particle));
+  slot.instance.start(engine_, at, queue.starts[index], queue.request->actions, queue.stream->at(0, queue.numbers[index]));
   belief::Trajectory& trajectory = queue.trajectories[index];
   trajectory = belief::Trajectory{};
   trajectory.states.push_back(queue.starts[index]);

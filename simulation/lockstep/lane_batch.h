@@ -29,7 +29,7 @@ struct LaneQueue {
   const RunRequest* request = nullptr;
   std::span<belief::Trajectory> trajectories;
   const core::RandomStream* stream = nullptr;
-  std::uint32_t first_instance = 0;
+  InstanceNumbers numbers = 0;
   const core::Cancellation* cancellation = nullptr;
   std::atomic<std::size_t> next{0};
 };

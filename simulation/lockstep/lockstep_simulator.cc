@@ -191,7 +191,7 @@ class LockstepSimulator : public Simulator {
   explicit LockstepSimulator(std::shared_ptr<const CompiledLockstep> scene) : scene_(std::move(scene)) {}
 
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
-           std::uint32_t first_instance, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+           InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
     PRESCENE_CHECK(starts.size() == trajectories.size());
     PRESCENE_CHECK(lockstep_supports(request, starts).ok());
@@ -201,7 +201,7 @@ class LockstepSimulator : public Simulator {
     queue.request = &request;
     queue.trajectories = trajectories;
     queue.stream = &stream;
-    queue.first_instance = first_instance;
+    queue.numbers = numbers;
     queue.cancellation = cancellation;
     const auto scene = scene_for(request.actions);
     // Each thread gets its share of the instances at once, so that none waits for another's.

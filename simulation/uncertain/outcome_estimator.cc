@@ -116,19 +116,20 @@ void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& rec
 
 /// Runs the instances of these numbers to rest and replaces their records; returns how many, in order, were not
 /// cancelled. `mismatches` counts those whose classes change.
-std::size_t run_to_rest(const Runner& runner, const std::vector<std::size_t>& numbers,
+std::size_t run_to_rest(const Runner& runner, const std::vector<std::uint32_t>& numbers,
                         std::vector<InstanceRecord>& records, int* mismatches) {
   RunRequest request = runner.request;
   request.end_rule = nullptr;
+  std::vector<belief::WorldState> starts;
+  for (const std::uint32_t number : numbers)
+    starts.push_back(runner.samplers[static_cast<std::size_t>(records[number].component)].draw(records[number].point));
+  std::vector<belief::Trajectory> runs(numbers.size());
+  runner.simulator.run(starts, request, runner.stream, std::span(numbers), runner.pool, runs, runner.cancellation);
   for (std::size_t n = 0; n < numbers.size(); ++n) {
+    if (runs[n].end == belief::TrajectoryEnd::kCancelled) return n;
     InstanceRecord& record = records[numbers[n]];
-    const belief::WorldState start = runner.samplers[static_cast<std::size_t>(record.component)].draw(record.point);
-    belief::Trajectory run;
-    runner.simulator.run(std::span(&start, 1), request, runner.stream, static_cast<std::uint32_t>(numbers[n]),
-                         runner.pool, std::span(&run, 1), runner.cancellation);
-    if (run.end == belief::TrajectoryEnd::kCancelled) return n;
     const std::vector<int> before = record.classes;
-    note_run(runner, run, record);
+    note_run(runner, runs[n], record);
     *mismatches += record.classes != before;
   }
   return numbers.size();
@@ -158,11 +159,11 @@ bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, s
     record.point = planned[i].point;
     note_run(runner, runs[i], record);
   });
-  std::vector<std::size_t> audited;
-  for (std::size_t n = first; n < first + finished; ++n) {
+  std::vector<std::uint32_t> audited;
+  for (auto n = static_cast<std::uint32_t>(first); n < first + finished; ++n) {
     if (!records[n].certified) continue;
     ++certificates.certified;
-    core::RandomStream draw = runner.stream.for_purpose(core::Purpose::kAudit).at(0, static_cast<std::uint32_t>(n));
+    core::RandomStream draw = runner.stream.for_purpose(core::Purpose::kAudit).at(0, n);
     if (draw.uniform() < runner.audit_share) audited.push_back(n);
   }
   const std::size_t done = run_to_rest(runner, audited, records, &certificates.mismatches);
@@ -173,8 +174,8 @@ bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, s
 
 /// Runs to rest what ended by its certificate; cut to what was repaired when cancelled (false).
 bool repair(const Runner& runner, std::vector<InstanceRecord>& records, CertificateUse& certificates) {
-  std::vector<std::size_t> numbers;
-  for (std::size_t n = 0; n < records.size(); ++n)
+  std::vector<std::uint32_t> numbers;
+  for (std::uint32_t n = 0; n < records.size(); ++n)
     if (records[n].certified) numbers.push_back(n);
   certificates.switched_off = true;
   int changed = 0;

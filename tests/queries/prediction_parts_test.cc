@@ -148,9 +148,9 @@ class TouchingSimulator final : public simulation::Simulator {
  public:
   explicit TouchingSimulator(double failing) : failing_(failing) {}
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
-           const core::RandomStream& stream, std::uint32_t first, core::ThreadPool& pool,
+           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
            std::span<belief::Trajectory> runs, const core::Cancellation* cancellation) const override {
-    tests::FakeSimulator(slide).run(starts, request, stream, first, pool, runs, cancellation);
+    tests::FakeSimulator(slide).run(starts, request, stream, numbers, pool, runs, cancellation);
     for (std::size_t i = 0; i < runs.size(); ++i) {
       const double friction = starts[i].objects[0].physical.friction;
       runs[i].contacts = {{0, 2, 0.0, 2.0, 0.02, 1.0}};

@@ -17,7 +17,7 @@ belief::WorldState between(const belief::WorldState& a, const belief::WorldState
 }  // namespace
 
 void FakeSimulator::run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
-                        const core::RandomStream& stream, std::uint32_t first_instance, core::ThreadPool& pool,
+                        const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
                         std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const {
   pool.for_each_index(starts.size(), [&](std::size_t i) {
     belief::Trajectory& trajectory = trajectories[i];
@@ -28,7 +28,7 @@ void FakeSimulator::run(std::span<const belief::WorldState> starts, const simula
       return;
     }
     const double duration = request.stop.duration;
-    belief::WorldState end = formula_(starts[i], request, stream.at(0, first_instance + static_cast<std::uint32_t>(i)));
+    belief::WorldState end = formula_(starts[i], request, stream.at(0, numbers[i]));
     end.time = starts[i].time + duration;
     if (request.sample_interval > 0.0)
       for (double t = request.sample_interval; t < duration; t += request.sample_interval)

@@ -18,7 +18,7 @@ class FakeSimulator final : public simulation::Simulator {
   /// The trajectory has the start, samples on the straight line between every sample_interval, and the end after
   /// `request.stop.duration`. Cancelled before an instance: it ends with kCancelled.
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
-           const core::RandomStream& stream, std::uint32_t first_instance, core::ThreadPool& pool,
+           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
            std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override;
   /// Always empty: a formula has no steps.
   std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>& actions,

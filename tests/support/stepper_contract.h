@@ -138,6 +138,14 @@ TEST_P(StepperContract, PoseErrorsOfPlacingAreDrawnPerInstance) {
   }
   EXPECT_LT(low, 0.1);
   EXPECT_GT(high, 0.3);
+
+  // Some of them alone, by their numbers, end as they did among all.
+  const std::vector<std::uint32_t> some = {17, 3, 4};
+  std::vector<belief::Trajectory> again(some.size());
+  simulator_of(scene)->run(std::span(starts).first(some.size()), request, core::RandomStream(3, core::Purpose::kAction),
+                           std::span(some), pool, again);
+  for (std::size_t i = 0; i < some.size(); ++i)
+    EXPECT_EQ(again[i].final().objects[0].X_WO.translation, runs[some[i]].final().objects[0].X_WO.translation);
 }
 
 TEST_P(StepperContract, PusherPushesAndIsNumberedAfterAllOthers) {

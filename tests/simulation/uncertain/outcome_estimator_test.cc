@@ -336,11 +336,11 @@ class FailingSimulator final : public Simulator {
  public:
   explicit FailingSimulator(std::uint32_t every) : every_(every) {}
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
-           std::uint32_t first, core::ThreadPool& pool, std::span<belief::Trajectory> runs,
+           InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> runs,
            const core::Cancellation* cancellation) const override {
-    tests::standing_still().run(starts, request, stream, first, pool, runs, cancellation);
+    tests::standing_still().run(starts, request, stream, numbers, pool, runs, cancellation);
     for (std::size_t i = 0; i < runs.size(); ++i) {
-      if ((first + i) % every_ == 0) runs[i].end = belief::TrajectoryEnd::kDiverged;
+      if (numbers[i] % every_ == 0) runs[i].end = belief::TrajectoryEnd::kDiverged;
       runs[i].contacts = {{0, 1, 0.25, 0.5, 0.125, 1.0}};
     }
   }
