@@ -239,13 +239,50 @@ btScalar ContactSolver::solveSingleIteration(int iteration, btCollisionObject** 
   // Bullet's own contact pools are empty: this solves the joints.
   btScalar residual = btSequentialImpulseConstraintSolver::solveSingleIteration(
       iteration, bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info, drawer);
+  btScalar change = solve_contacts();
+  const bool last = iteration + 1 == info.m_numIterations;
+  if (last && change > settings_.converged && adds_energy()) {
+    take_back_impulses();
+    for (int again = 0; again < info.m_numIterations && change > settings_.converged; ++again)
+      change = solve_contacts();
+  }
+  return std::max(residual, change * change);
+}
+
+btScalar ContactSolver::solve_contacts() {
   btScalar change = 0.0;
   for (Contact& c : rows_) {
     change = std::max(change, solve_normal(c));
     change = std::max(change, solve_slip(c));
     change = std::max(change, solve_rolling(c));
   }
-  return std::max(residual, change * change);
+  return change;
+}
+
+bool ContactSolver::adds_energy() const {
+  btScalar before = 0.0, after = 0.0;
+  for (const Contact& c : rows_) {
+    const btSolverBody& a = m_tmpSolverBodyPool[c.a];
+    const btSolverBody& b = m_tmpSolverBodyPool[c.b];
+    for (const Row* row : {&c.normal, &c.tangent_1, &c.tangent_2}) {
+      before += row->impulse * (row->direction.dot(a.m_linearVelocity - b.m_linearVelocity) +
+                                row->torque_a.dot(a.m_angularVelocity) - row->torque_b.dot(b.m_angularVelocity));
+      after += row->impulse * relative_velocity(row->direction, row->torque_a, row->torque_b, a, b);
+    }
+    before -= c.normal.impulse * c.target;
+    after -= c.normal.impulse * c.target;
+  }
+  // Half their sum is what iterations make smaller and smaller; without any impulse it is 0.
+  return before + after > 0.0;
+}
+
+void ContactSolver::take_back_impulses() {
+  for (Contact& c : rows_) {
+    for (Row* row : {&c.normal, &c.tangent_1, &c.tangent_2}) {
+      apply(*row, -row->impulse, m_tmpSolverBodyPool[c.a], m_tmpSolverBodyPool[c.b]);
+      row->impulse = 0.0;
+    }
+  }
 }
 
 btScalar ContactSolver::solveGroupCacheFriendlyFinish(btCollisionObject** bodies, int body_count,

@@ -6,7 +6,8 @@
 //     loses nothing and a body at rest does not bounce;
 //   - a gap that stays open only limits the approach to what closes it (no impulse at a distance);
 //   - overlap is pushed out by pseudo velocities that add no energy;
-//   - warm starts come with the contacts, so that a step is a function of its arguments.
+//   - warm starts come with the contacts, so that a step is a function of its arguments; where they spoil a step it is
+//     solved without them.
 #pragma once
 
 #include <BulletDynamics/ConstraintSolver/btContactSolverInfo.h>
@@ -108,7 +109,12 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
                const btSolverBody& b) const;
   Contact make_contact(const SolverContact& given, btScalar dt);
   void apply(const Row& row, btScalar impulse, btSolverBody& a, btSolverBody& b) const;
+  /// Whether the impulses are worse than none: where things are wedged impulses are large, and those of the step before
+  /// may fit this step's contacts so badly that the iterations end before the energy of it is taken back.
+  bool adds_energy() const;
+  void take_back_impulses();
   /// Each returns the largest change of a relative velocity, m/s.
+  btScalar solve_contacts();
   btScalar solve_normal(Contact& contact);
   btScalar solve_slip(Contact& contact);
   btScalar solve_rolling(Contact& contact);

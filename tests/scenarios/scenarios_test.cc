@@ -134,7 +134,8 @@ INSTANTIATE_TEST_SUITE_P(Files, ForeseenScenario,
                          testing::Values(Case{"tossed_coin", 0.0, 0.0, 256}, Case{"tossed_thick_coin", 0.0, 0.0, 128},
                                          Case{"tossed_cube", 0.0, 0.0, 256}, Case{"tossed_unequal_box", 0.0, 0.0, 256},
                                          Case{"plate_of_balls", 0.0, 0.0, 64}, Case{"pushed_stack", 0.0, 0.0, 64},
-                                         Case{"bottle_by_the_edge", 0.0, 0.0, 64}, Case{"tossed_box", 0.0, 0.0, 256}),
+                                         Case{"bottle_by_the_edge", 0.0, 0.0, 64}, Case{"tossed_box", 0.0, 0.0, 256},
+                                         Case{"mug_on_hook", 0.0, 0.0, 128}, Case{"spoon_in_mug", 0.0, 0.0, 16}),
                          [](const auto& which) { return std::string(which.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(Files, Scenario,
