@@ -10,36 +10,17 @@
 #include <memory>
 
 #include "prescene/core/status.h"
+#include "prescene/simulation/mechanics_options.h"
 #include "prescene/simulation/shape_store.h"
 #include "prescene/simulation/simulator.h"
 
 namespace prescene::simulation {
 
-struct BulletOptions {
-  /// Length of a step, s, in [1e-5, 0.02]. Free flight is exact at any step; impacts and friction are better at 1/1000
-  /// (real cube tosses: see docs/accuracy.md), some four times as dear as 1/240.
-  double step = 1.0 / 240.0;
-  /// Most iterations of the contact solver a step, in [1, 1000]; it stops earlier once nothing changes.
-  int solver_iterations = 60;
-  /// m/s: the solver stops when no contact's velocity changes by more in an iteration; > 0.
+struct BulletOptions : MechanicsOptions {
+  /// m/s: the solver stops when no contact's velocity changes by more in an iteration; >= 1e-15.
   double solver_accuracy = 1e-6;
-  /// Share of an overlap that a step takes away, in (0, 1]; it adds no energy.
-  double overlap_recovery = 0.2;
-  /// m/s: contacts that close slower do not bounce; >= 0.
-  double restitution_speed = 0.02;
-  /// m/s: contacts that close faster rub with impact_friction, slower ones with friction; >= 0.
-  double impact_speed = 0.2;
-  /// Smallest radius of edges and corners, m, in [1e-5, 0.01]; models may ask for more
-  /// (ContactProperties::edge_radius). Faces keep their true place.
-  double edge_rounding = 2e-4;
-  /// Two shapes nearer than this touch, for contact intervals and final contacts, m; >= 0.
-  double touching_distance = 2e-4;
-  /// Contacts that part for less than this are one interval, s; >= 0.
-  double contact_merge_time = 0.02;
   /// Steps in which nothing can touch anything are taken without looking for contacts; the same bits either way.
   bool skip_flight = true;
-  RestRule rest;
-  DecompositionSettings decomposition;
 };
 
 /// Ranges of the options: the message names the field.

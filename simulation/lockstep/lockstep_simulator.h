@@ -13,24 +13,15 @@
 #include <memory>
 
 #include "prescene/core/status.h"
+#include "prescene/simulation/mechanics_options.h"
 #include "prescene/simulation/shape_store.h"
 #include "prescene/simulation/simulator.h"
 
 namespace prescene::simulation {
 
-/// Those that have the same names as in BulletOptions mean the same.
-struct LockstepOptions {
-  double step = 1.0 / 240.0;         ///< s, in [1e-4, 0.02]
-  int solver_iterations = 60;        ///< In [1, 1000].
-  double solver_accuracy = 2e-6;     ///< m/s, >= 1e-7: impulses are single precision.
-  double overlap_recovery = 0.2;     ///< In (0, 1].
-  double restitution_speed = 0.02;   ///< m/s, >= 0
-  double impact_speed = 0.2;         ///< m/s, >= 0
-  double edge_rounding = 2e-4;       ///< m, in [1e-5, 0.01]
-  double touching_distance = 2e-4;   ///< m, >= 0
-  double contact_merge_time = 0.02;  ///< s, >= 0
-  RestRule rest;
-  DecompositionSettings decomposition;
+struct LockstepOptions : MechanicsOptions {
+  /// As in BulletOptions, but >= 1e-7: impulses are single precision.
+  double solver_accuracy = 2e-6;
   /// Instances that a thread has under way at once, in [1, 1024]. More fill the vectors better; memory grows by some
   /// 7 KiB each and object.
   int live_instances = 256;
