@@ -12,18 +12,8 @@ namespace prescene::service {
 namespace {
 
 simulation::LockstepOptions lockstep_options(const simulation::BulletOptions& bullet) {
-  simulation::LockstepOptions options;
-  options.step = bullet.step;
-  options.solver_iterations = bullet.solver_iterations;
+  simulation::LockstepOptions options{bullet};
   options.solver_accuracy = std::max(options.solver_accuracy, bullet.solver_accuracy);
-  options.overlap_recovery = bullet.overlap_recovery;
-  options.restitution_speed = bullet.restitution_speed;
-  options.impact_speed = bullet.impact_speed;
-  options.edge_rounding = bullet.edge_rounding;
-  options.touching_distance = bullet.touching_distance;
-  options.contact_merge_time = bullet.contact_merge_time;
-  options.rest = bullet.rest;
-  options.decomposition = bullet.decomposition;
   return options;
 }
 

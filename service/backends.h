@@ -30,7 +30,7 @@ enum class Stepper {
 struct BackendSettings {
   simulation::BulletOptions bullet;
   /// Answers of the two differ by rounding, which chaotic scenes blow up to other draws of the same probabilities.
-  Stepper stepper = Stepper::kBullet;
+  Stepper stepper = Stepper::kAutomatic;
 };
 
 /// Safe to use from several threads.

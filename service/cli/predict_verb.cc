@@ -20,7 +20,7 @@ using core::fixed_text;
 struct Options {
   std::string scene;
   std::string report;
-  std::string stepper = "bullet";
+  std::string stepper = "automatic";
   std::string heat_map;
   belief::Effort effort;
   double max_seconds = 0.0;
@@ -135,7 +135,7 @@ core::Status run(const Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene, options.report}));
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
   BackendSettings settings;
-  if (options.stepper == "automatic") settings.stepper = Stepper::kAutomatic;
+  if (options.stepper == "bullet") settings.stepper = Stepper::kBullet;
   if (options.stepper == "lockstep") settings.stepper = Stepper::kLockstep;
   Backends backends(context.pool(), settings);
   belief::PredictQuery question;
@@ -201,11 +201,11 @@ Verb add_predict_verb(CLI::App& app) {
   verb->add_option("--heat-map", options->heat_map, "Write a PNG picture of where objects end");
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
       ->check(positive_number());
-  verb->add_option(
-          "--stepper", options->stepper,
-          "Who simulates: bullet, or in lockstep, 3 to 7 times faster, what it can (automatic) or all (lockstep; "
-          "docs/simulation.md says which scenes)")
-      ->check(CLI::IsMember({"bullet", "automatic", "lockstep"}))
+  verb->add_option("--stepper", options->stepper,
+                   "Who simulates: in lockstep, 3 to 7 times faster, what can be and Bullet the rest (automatic), or "
+                   "one of them "
+                   "alone (docs/simulation.md says what lockstep can)")
+      ->check(CLI::IsMember({"automatic", "bullet", "lockstep"}))
       ->capture_default_str();
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
   verb->footer("Example: prescene predict scenarios/milk_on_bin.yaml --json --seed 1");

@@ -110,8 +110,8 @@ belief::Scene make_cube_scene(const CubeModel& model) {
   return scene;
 }
 
-simulation::BulletOptions make_cube_options(const CubeModel& model) {
-  simulation::BulletOptions options;
+simulation::MechanicsOptions make_cube_options(const CubeModel& model) {
+  simulation::MechanicsOptions options;
   options.step = model.step;
   options.impact_speed = model.impact_speed;
   return options;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "prescene/belief/scene.h"
-#include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/mechanics_options.h"
 
 namespace prescene::service {
 
@@ -53,7 +53,7 @@ nlohmann::ordered_json to_json(const CubeModel& model);
 
 /// The cube as object 0 above a board whose surface is z = 0.
 belief::Scene make_cube_scene(const CubeModel& model);
-simulation::BulletOptions make_cube_options(const CubeModel& model);
+simulation::MechanicsOptions make_cube_options(const CubeModel& model);
 
 /// Index of the face that is up: +x, -x, +y, -y, +z, -z.
 int face_up(const geometry::Quaterniond& R_WO);

@@ -8,6 +8,7 @@
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
 #include "prescene/service/evaluate/forecast_scores.h"
+#include "prescene/simulation/lockstep/lockstep_simulator.h"
 
 namespace prescene::service {
 namespace {
@@ -100,7 +101,8 @@ core::Result<std::vector<CubeForecast>> forecast_cube_tosses(
     const core::ProgressSink& progress, const core::Cancellation* cancellation, const CubeOptions& options) {
   const belief::Scene scene = make_cube_scene(model);
   simulation::ShapeStore shapes;
-  PRESCENE_TRY(const auto simulator, simulation::make_bullet_simulator(scene, shapes, make_cube_options(model)));
+  PRESCENE_TRY(const auto simulator, simulation::make_lockstep_simulator(
+                                         scene, shapes, simulation::LockstepOptions{make_cube_options(model)}));
   simulation::RunRequest request;
   request.stop.duration = kLongest;
   const core::RandomStream stream(seed, core::Purpose::kEvaluation);

@@ -143,7 +143,8 @@ void LaneBatch::start(Slot& slot, int at, std::size_t index, LaneQueue& queue) {
   slot.until_asked = queue.request->end_rule_steps;
   slot.touches.clear();
   for (Open& open : slot.open) open.open = false;
-  slot.instance.start(engine_, at, queue.starts[index], queue.request->actions, queue.stream->at(0, queue.numbers[index]));
+  slot.instance.start(engine_, at, queue.starts[index], queue.request->actions,
+                      queue.stream->at(0, queue.numbers[index]));
   belief::Trajectory& trajectory = queue.trajectories[index];
   trajectory = belief::Trajectory{};
   trajectory.states.push_back(queue.starts[index]);
@@ -190,6 +191,12 @@ void LaneBatch::note_touches(int at) {
   }
 }
 
+void LaneBatch::note_overlap(int at) {
+  double& deepest = queue_->trajectories[slots_[static_cast<std::size_t>(at)]->index].deepest_overlap;
+  for (int object = 0; object < engine_.objects(); ++object)
+    for (const LaneContact& c : engine_.contacts(at, object)) deepest = std::max(deepest, -static_cast<double>(c.gap));
+}
+
 void LaneBatch::after_step(int at) {
   Slot& slot = *slots_[static_cast<std::size_t>(at)];
   if (slot.mode == Mode::kNudged) {
@@ -210,6 +217,7 @@ void LaneBatch::after_step(int at) {
     return;
   }
   note_touches(at);
+  if (slot.instance.began()) note_overlap(at);
   freeze_beyond(at);
   const bool calm = slot.instance.calm(engine_, at);
   if (!calm) slot.tested = false;

@@ -72,6 +72,7 @@ class LaneBatch {
   void test_balance();
   void after_step(int at);
   void note_touches(int at);
+  void note_overlap(int at);
   /// Samples or ends a slot that goes on; the part of a step that a test of balance delays.
   void go_on(int at);
   void finish(int at, belief::TrajectoryEnd end);

@@ -43,6 +43,7 @@ void LaneInstance::run_due(LaneEngine& engine, int slot) {
   }
   released_.clear();
   player_.advance(now, dt_, poses_, released_);
+  began_ = began_ || !released_.empty();
   for (const ActionPlayer::Released& event : released_) {
     const auto object = static_cast<std::size_t>(event.object);
     engine.release(slot, event.object, poses_[object], event.V_WO);
@@ -52,6 +53,7 @@ void LaneInstance::run_due(LaneEngine& engine, int slot) {
 }
 
 void LaneInstance::before_step(LaneEngine& engine, int slot) {
+  began_ = steps_ == 0;
   if (settled_) return;
   const double now = time();
   // As ActionPlayer::advance: times are met to the nearest step.

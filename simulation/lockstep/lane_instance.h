@@ -26,6 +26,8 @@ class LaneInstance {
   std::int64_t skip_held(LaneEngine& engine, int slot, std::int64_t most);
 
   std::int64_t steps() const { return steps_; }
+  /// Whether the last step was the first, or something was let go in it.
+  bool began() const { return began_; }
   double time() const { return time_at(steps_); }
   double mass(int object) const { return start_->objects[static_cast<std::size_t>(object)].physical.mass; }
   /// Everything that moves by itself has been calm for long enough, and no action is to come.
@@ -50,6 +52,7 @@ class LaneInstance {
   ActionPlayer player_;
   bool acts_ = false;  // something is held, moved by a timeline, or to be done
   double next_due_ = 0.0, finish_time_ = 0.0;
+  bool began_ = false;
   bool settled_ = false;  // nothing is moved from now on, and all is placed
   std::vector<geometry::Pose> poses_;
   std::vector<ActionPlayer::Released> released_;

@@ -229,6 +229,20 @@ TEST_P(StepperContract, FallingOffTheWorldIsNoticedAndFrozen) {
   EXPECT_NEAR(run.simulated_seconds, std::sqrt(2.0 * 5.0 / kG), 0.01);
 }
 
+TEST_P(StepperContract, ThingsThatBeginInEachOtherAreTold) {
+  Scene scene = floor_scene(primitive_model("box", BoxShape{{0.1, 0.1, 0.1}}));
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.02})};
+  EXPECT_NEAR(run_actions(scene, {}, 1.0).deepest_overlap, 0.03, 1e-4);
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.2})};
+  EXPECT_EQ(run_actions(scene, {}, 1.0).deepest_overlap, 0.0);  // what an impact does is no such overlap
+
+  scene = held_scene();
+  for (auto& [time, X_WG] : scene.robot[0].timeline) X_WG.translation.z() -= 0.46;
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.04})};
+  EXPECT_EQ(run_actions(scene, {}, 1.0).deepest_overlap, 0.0);
+  EXPECT_NEAR(run_actions(scene, {{0.5, release_of("object")}}, 1.0).deepest_overlap, 0.01, 1e-4);
+}
+
 TEST_P(StepperContract, NotANumberIsDivergenceNotAnAnswer) {
   Scene scene = floor_scene(primitive_model("ball", geometry::Sphere{0.05}));
   WorldState start = start_of(scene);

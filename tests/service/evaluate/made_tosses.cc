@@ -3,6 +3,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/geometry/sampling.h"
+#include "prescene/simulation/bullet/bullet_simulator.h"
 
 namespace prescene::service::tests {
 
@@ -11,7 +12,8 @@ using geometry::Vector3d;
 std::vector<CubeToss> made_tosses(const CubeModel& model, int count) {
   simulation::ShapeStore shapes;
   const belief::Scene scene = make_cube_scene(model);
-  const auto simulator = *simulation::make_bullet_simulator(scene, shapes, make_cube_options(model));
+  const auto simulator =
+      *simulation::make_bullet_simulator(scene, shapes, simulation::BulletOptions{make_cube_options(model)});
   core::RandomStream stream(21, core::Purpose::kTest);
   std::vector<CubeToss> tosses;
   for (int i = 0; i < count; ++i) {
