@@ -2,6 +2,7 @@
 #include "prescene/interfaces/scene_files/model_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 
@@ -96,12 +97,82 @@ std::string quoted_yaml(const std::string& text) {
   return result + "\"";
 }
 
+// A value in flow style, on one line. Files that it names are found from `folder`.
+std::string flow_text(const LocatedValue& value, const std::string& key, const std::filesystem::path& folder) {
+  std::string text;
+  switch (value.kind) {
+    case LocatedValue::Kind::kNothing:
+      return "null";
+    case LocatedValue::Kind::kScalar: {
+      if (key == "file") {
+        const std::filesystem::path path =
+            std::filesystem::absolute(std::filesystem::path(*value.place.file).parent_path() / value.text)
+                .lexically_normal();
+        const std::filesystem::path relative = path.lexically_relative(std::filesystem::absolute(folder));
+        return quoted_yaml((relative.empty() ? path : relative).generic_string());
+      }
+      const bool plain =
+          !value.quoted && !value.text.empty() && value.text.find_first_of(",[]{}#:&*!|>'\"%@`\n") == std::string::npos;
+      return plain ? value.text : quoted_yaml(value.text);
+    }
+    case LocatedValue::Kind::kList:
+      for (const LocatedValue& item : value.items)
+        text.append(text.empty() ? "" : ", ").append(flow_text(item, "", folder));
+      return "[" + text + "]";
+    case LocatedValue::Kind::kMap:
+      for (std::size_t i = 0; i < value.items.size(); ++i) {
+        const std::string& name = value.keys[i].name;
+        text.append(text.empty() ? "" : ", ").append(name).append(": ").append(flow_text(value.items[i], name, folder));
+      }
+      return "{" + text + "}";
+  }
+  return text;
+}
+
+// The keys of a model with those of the file that it names under them.
+core::Result<LocatedValue> whole_description(const LocatedValue& model, const YamlLimits& limits) {
+  const LocatedValue* file = model.find("file");
+  if (!file) return model;
+  PRESCENE_TRY(const LocatedValue document,
+               read_yaml(std::filesystem::path(*file->place.file).parent_path() / file->text, limits));
+  const LocatedValue* under = document.find("model");
+  if (!under) return core::invalid_input(file->text + ": a model file holds one key 'model' with the model's keys");
+  LocatedValue whole;
+  whole.kind = LocatedValue::Kind::kMap;
+  for (const LocatedValue* from : {&model, under}) {
+    for (std::size_t i = 0; i < from->items.size(); ++i) {
+      if (from->keys[i].name == "file" || whole.find(from->keys[i].name)) continue;
+      whole.keys.push_back(from->keys[i]);
+      whole.items.push_back(from->items[i]);
+    }
+  }
+  return whole;
+}
+
 // Of a remark only what fits into a comment.
 std::string comment(const std::string& text) {
   std::string line = "# " + text;
   std::replace_if(
       line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   return line + "\n";
+}
+
+std::string key_line(const char* key, const std::string& value) {
+  return std::string("  ") + key + ": " + value + "\n";
+}
+
+// What recordings of its motion tell of an object.
+std::string fitted_lines(const belief::ObjectModel& model) {
+  const belief::ContactProperties& contact = model.contact;
+  std::string text = key_line("center_of_mass", text_of(model.center_of_mass) + "  # m");
+  text += key_line("unit_inertia", text_of(model.unit_inertia) + "  # m^2, of 1 kg about the centre of mass");
+  text += key_line("friction", text_of(contact.friction));
+  if (contact.impact_friction) text += key_line("impact_friction", text_of(*contact.impact_friction));
+  text += key_line("restitution", text_of(contact.restitution));
+  if (contact.rolling_friction != 0.0)
+    text += key_line("rolling_friction", number_text(contact.rolling_friction) + "  # m");
+  if (contact.edge_radius != 0.0) text += key_line("edge_radius", number_text(contact.edge_radius) + "  # m");
+  return text;
 }
 
 }  // namespace
@@ -111,20 +182,11 @@ std::string model_yaml(const ModelFile& file) {
   std::string text;
   for (const std::string& remark : file.remarks) text += comment(remark);
   text += "model:\n";
-  const auto line = [&](const char* key, const std::string& value) {
-    text.append("  ").append(key).append(": ").append(value).append("\n");
-  };
+  const auto line = [&](const char* key, const std::string& value) { text += key_line(key, value); };
   line("mesh", "{file: " + quoted_yaml(file.mesh_file) + ", scale: " + number_text(file.scale) +
                    ", up: " + (file.y_up ? "y" : "z") + ", use: " + word_of(file.use) + "}");
   line("mass", text_of(model.mass) + "  # kg");
-  line("center_of_mass", text_of(model.center_of_mass) + "  # m");
-  line("unit_inertia", text_of(model.unit_inertia) + "  # m^2, of 1 kg about the centre of mass");
-  line("friction", text_of(model.contact.friction));
-  if (model.contact.impact_friction) line("impact_friction", text_of(*model.contact.impact_friction));
-  line("restitution", text_of(model.contact.restitution));
-  if (model.contact.rolling_friction != 0.0)
-    line("rolling_friction", number_text(model.contact.rolling_friction) + "  # m");
-  if (model.contact.edge_radius != 0.0) line("edge_radius", number_text(model.contact.edge_radius) + "  # m");
+  text += fitted_lines(model);
   line("symmetry", text_of(model.symmetry));
   line("color", text_of(Vector3d(model.color.r, model.color.g, model.color.b)));
   if (model.surface != belief::SurfaceKind::kOpaque)
@@ -133,6 +195,27 @@ std::string model_yaml(const ModelFile& file) {
     line("hollow", "{size: " + text_of(model.hollow->size) + ", position: " + text_of(model.hollow->X_OV.translation) +
                        ", rotation: {quaternion: " + text_of(model.hollow->X_OV.rotation) + "}}");
   return text;
+}
+
+core::Result<std::string> fitted_model_yaml(const std::filesystem::path& scene, const std::string& name,
+                                            const belief::ObjectModel& fitted, const std::filesystem::path& folder,
+                                            const std::vector<std::string>& remarks, const YamlLimits& limits) {
+  PRESCENE_TRY(const LocatedValue document, read_yaml(scene, limits));
+  const LocatedValue* models = document.find("models");
+  const LocatedValue* described = models ? models->find(name) : nullptr;
+  if (!described) return core::not_found(scene.string() + ": it has no model '" + name + "'");
+  PRESCENE_TRY(const LocatedValue whole, whole_description(*described, limits));
+  std::string text;
+  for (const std::string& remark : remarks) text += comment(remark);
+  text += "model:\n";
+  for (std::size_t i = 0; i < whole.items.size(); ++i) {
+    const std::string& key = whole.keys[i].name;
+    constexpr std::array kFitted = {"center_of_mass",  "unit_inertia", "inertia",          "friction",
+                                    "impact_friction", "restitution",  "rolling_friction", "edge_radius"};
+    if (std::ranges::find(kFitted, key) != kFitted.end()) continue;
+    text += "  " + key + ": " + flow_text(whole.items[i], key, folder) + "\n";
+  }
+  return text + fitted_lines(fitted);
 }
 
 core::Status write_model(const std::filesystem::path& path, const ModelFile& file) {

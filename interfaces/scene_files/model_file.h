@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Model files: one object model in YAML beside its mesh, as `prescene inspect MESH -o model.yaml` writes it and a
-// scene's `carton: {file: model.yaml}` refers to it.
+// Model files: one object model in YAML, as `prescene inspect MESH -o model.yaml` writes it beside its mesh, as
+// `prescene calibrate` writes it of a scene's model, and as a scene's `carton: {file: model.yaml}` refers to it.
 #pragma once
 
 #include <filesystem>
@@ -27,6 +27,15 @@ struct ModelFile {
 std::string model_yaml(const ModelFile& file);
 /// Writes it; fails as write_file does.
 core::Status write_model(const std::filesystem::path& path, const ModelFile& file);
+
+/// The text of a model file for the model `name` of a scene file: everything as it is described there (or in the model
+/// file that is named there), but centre of mass, unit inertia and contact properties those of `fitted`. Paths in it
+/// are made relative to `folder`. `remarks` as in ModelFile. Errors as read_yaml; kNotFound where there is no such
+/// model.
+core::Result<std::string> fitted_model_yaml(const std::filesystem::path& scene, const std::string& name,
+                                            const belief::ObjectModel& fitted, const std::filesystem::path& folder,
+                                            const std::vector<std::string>& remarks = {},
+                                            const YamlLimits& limits = {});
 /// Reads a model file on its own and gives the model a name.
 core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
                                              const SceneFileOptions& options = {}, FileReport* report = nullptr);
