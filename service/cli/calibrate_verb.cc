@@ -3,9 +3,12 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "prescene/core/text.h"
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/evaluate/cube_calibration.h"
+#include "prescene/service/object_calibration.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -16,8 +19,11 @@ using core::fixed_text;
 struct Options {
   std::string name;
   std::string data;
+  std::string output;
+  std::vector<std::string> keep;
   std::string start = "measured";
-  CalibrationOptions search;
+  std::optional<int> samples;
+  std::optional<int> max_evaluations;
 };
 
 /// How a model does on the tosses that it is fitted to, with as many samples as forecasts have.
@@ -49,16 +55,22 @@ std::string text_of(const nlohmann::ordered_json& start, const nlohmann::ordered
   return table(rows);
 }
 
-core::Status run(const Options& options, VerbContext& context) {
+/// cube_tosses: the model that evaluate forecasts with.
+core::Status run_cube(const Options& options, VerbContext& context) {
   const std::map<std::string, CubeModel> starts = {
       {"measured", measured_cube_model()}, {"described", described_cube_model()}, {"shipped", shipped_cube_model()}};
+  if (!options.output.empty() || !options.keep.empty())
+    return core::invalid_input("cube_tosses takes neither -o nor --keep: its model is part of the program");
   const CubeModel& start = starts.at(options.start);
+  CalibrationOptions search;
+  search.samples = options.samples.value_or(search.samples);
+  search.max_evaluations = options.max_evaluations.value_or(search.max_evaluations);
   const std::filesystem::path folder = std::filesystem::path(options.data) / options.name;
   PRESCENE_TRY(const std::vector<CubeToss> all, read_cube_tosses(folder));
   const std::vector<CubeToss> tosses = select(all, CubeSplit::kCalibrate);
-  PRESCENE_TRY(CubeCalibration found, calibrate_cube(tosses, start, context.options().seed, context.pool(),
-                                                     context.progress("calibrating " + options.name),
-                                                     &context.cancellation(), options.search));
+  PRESCENE_TRY(CubeCalibration found,
+               calibrate_cube(tosses, start, context.options().seed, context.pool(),
+                              context.progress("calibrating " + options.name), &context.cancellation(), search));
   found.model.provenance = "found by prescene calibrate " + options.name + " --from " + options.start;
   bool better = found.cost < found.start_cost;
 
@@ -87,25 +99,78 @@ core::Status run(const Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
+std::string text_of(const ObjectCalibration& found) {
+  std::vector<std::vector<std::string>> rows = {{"", "value", "+-", "before", "+-", "left of prior"}};
+  for (const simulation::CalibratedParameter& p : found.motion.parameters) {
+    const simulation::MotionBelief& prior = found.prior[static_cast<std::size_t>(p.parameter)];
+    rows.push_back({to_string(p.parameter), fixed_text(p.value, 5), fixed_text(p.standard_error, 5),
+                    fixed_text(prior.mean, 5), fixed_text(prior.deviation, 5),
+                    fixed_text(100.0 * p.left_of_prior, 0) + " %"});
+  }
+  std::string text = table(rows) + "\n" + std::to_string(found.flights) + " recordings begin in flight, " +
+                     std::to_string(found.slides) + " on a support; " + std::to_string(found.motion.evaluations) +
+                     " models tried\n";
+  for (const std::string& remark : found.remarks) text += remark + "\n";
+  return text;
+}
+
+/// A folder with recordings of somebody's own object.
+core::Status run_folder(const Options& options, VerbContext& context) {
+  if (options.output.empty())
+    return core::invalid_input("-o is missing: name the model file to write, or give cube_tosses and --data");
+  PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(options.name, context.log()));
+  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, dataset.inputs));
+  BackendSettings settings;
+  settings.stepper = Stepper::kAutomatic;
+  Backends backends(context.pool(), settings);
+  ObjectCalibrationOptions fit;
+  fit.seed = context.options().seed;
+  fit.max_evaluations = options.max_evaluations.value_or(fit.max_evaluations);
+  fit.samples = options.samples.value_or(fit.samples);
+  fit.keep = options.keep;
+  PRESCENE_TRY(const ObjectCalibration found,
+               calibrate_object(dataset, backends, fit, context.progress("calibrating"), &context.cancellation()));
+  context.end_progress();
+  const std::filesystem::path output = options.output;
+  PRESCENE_TRY(const std::string yaml, calibrated_yaml(dataset, found, output.parent_path()));
+  PRESCENE_RETURN_IF_ERROR(interfaces::write_file(output, std::string_view(yaml)));
+  nlohmann::ordered_json document = to_json(found);
+  document["output"] = options.output;
+  context.print(document, text_of(found) + "wrote " + options.output + "\n");
+  return core::ok_status();
+}
+
+core::Status run(const Options& options, VerbContext& context) {
+  if (options.name == "cube_tosses" && !options.data.empty()) return run_cube(options, context);
+  if (!options.data.empty()) return core::invalid_input("--data goes with cube_tosses only; give the folder itself");
+  return run_folder(options, context);
+}
+
 }  // namespace
 
 Verb add_calibrate_verb(CLI::App& app) {
-  auto* verb = app.add_subcommand(
-      "calibrate", "Fits a model to recorded motion (docs/accuracy.md); Ctrl-C ends the search with the best so far");
+  auto* verb = app.add_subcommand("calibrate", "Fits an object's model to recorded motion of it (docs/calibration.md)");
   auto options = std::make_shared<Options>();
-  verb->add_option("NAME", options->name, "cube_tosses")->required()->check(CLI::IsMember({"cube_tosses"}));
-  verb->add_option("--data", options->data, "Folder that holds the data sets' folders")->required();
+  verb->add_option("DATASET", options->name, "Folder with scene.yaml and tosses.csv; or cube_tosses, with --data")
+      ->required();
+  verb->add_option("-o,--output", options->output, "Model file to write, for scenes to use");
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < simulation::kMotionParameters; ++i)
+    names.push_back(to_string(static_cast<simulation::MotionParameter>(i)));
+  verb->add_option("--keep", options->keep, "Parameter that stays as the scene has it; may be repeated")
+      ->check(CLI::IsMember(names));
+  verb->add_option("--samples", options->samples, "Simulated starts a recording; 16, of cube_tosses 24")
+      ->check(CLI::Range(2, 4096));
+  verb->add_option("--max-evaluations", options->max_evaluations,
+                   "Models that the search tries at most; 600, of cube_tosses 150")
+      ->check(CLI::Range(1, 100000));
+  verb->add_option("--data", options->data, "cube_tosses: folder that holds the data sets' folders");
   verb->add_option("--from", options->start,
-                   "Where the search starts: measured (read off the recordings), described (by the data set), shipped")
+                   "cube_tosses: where the search starts: measured (read off the recordings), described (by the data "
+                   "set), shipped")
       ->check(CLI::IsMember({"measured", "described", "shipped"}))
       ->capture_default_str();
-  verb->add_option("--samples", options->search.samples, "Simulated starts a toss in the search")
-      ->check(CLI::Range(2, 4096))
-      ->capture_default_str();
-  verb->add_option("--max-evaluations", options->search.max_evaluations, "Models tried at most")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  verb->footer("Example: prescene calibrate cube_tosses --data data --json");
+  verb->footer("Example: prescene calibrate recordings -o mug.yaml");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 

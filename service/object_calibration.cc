@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/object_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "prescene/core/random.h"
+#include "prescene/core/text.h"
+#include "prescene/interfaces/scene_files/model_file.h"
+#include "prescene/simulation/calibration/find_beginning.h"
+#include "prescene/simulation/calibration/sliding_fit.h"
+
+namespace prescene::service {
+namespace {
+
+using simulation::FlightCalibration;
+using simulation::FlightParameter;
+using simulation::MotionBeginning;
+using simulation::MotionParameter;
+using simulation::RecordedMotion;
+
+constexpr std::size_t kLeastFlights = 3;
+// A tracker that claims to be better than that is a simulation.
+constexpr double kLeastPositionNoise = 1e-5;  // m
+constexpr double kLeastRotationNoise = 1e-4;  // rad
+// Shares of the prior's deviation that are left: nothing was told, little was told.
+constexpr double kNothing = 0.9;
+constexpr double kLittle = 0.6;
+// A tracker's metre is worth a remark when it is off by so much, and by three standard errors.
+constexpr double kScaleRemark = 0.003;
+
+std::size_t place_of(MotionParameter parameter) { return static_cast<std::size_t>(parameter); }
+
+const char* what_tells(MotionParameter parameter) {
+  switch (parameter) {
+    case MotionParameter::kFriction:
+      return "record slides, or tosses that end in a slide";
+    case MotionParameter::kImpactFriction:
+      return "record tosses that hit at a slant";
+    case MotionParameter::kRestitution:
+      return "record bounces";
+    case MotionParameter::kInertiaSize:
+      return "record tosses that hit with a corner or an edge";
+    case MotionParameter::kEdgeRadius:
+      return "record tosses that hit with corners and edges";
+    default:
+      return "record tosses that spin about several axes";
+  }
+}
+
+std::string words(MotionParameter parameter) {
+  std::string text = to_string(parameter);
+  std::ranges::replace(text, '_', ' ');
+  return text;
+}
+
+core::Result<std::vector<RecordedMotion>> beginnings(const MotionDataset& dataset, Backends& backends) {
+  PRESCENE_TRY(const auto simulator, backends.make_simulator(*dataset.scene));
+  std::vector<RecordedMotion> motions;
+  for (const MotionRecording& recording : dataset.recordings) {
+    PRESCENE_TRY(RecordedMotion motion, simulation::find_beginning(recording.name, recording.frames, *dataset.scene,
+                                                                   *simulator, backends.pool()));
+    motions.push_back(std::move(motion));
+  }
+  return motions;
+}
+
+/// What flights tell becomes the prior of what contacts, which come later, are asked.
+void use_flights(const FlightCalibration& flight, const simulation::FlightPrior& before, belief::Scene* scene,
+                 simulation::MotionPrior* prior) {
+  scene->models[static_cast<std::size_t>(scene->objects[0].model)].unit_inertia = flight.unit_inertia(before);
+  scene->gravity_W = flight.gravity_W;
+  constexpr std::array kCenter = {MotionParameter::kCenterOfMassX, MotionParameter::kCenterOfMassY,
+                                  MotionParameter::kCenterOfMassZ};
+  for (int i = 0; i < 3; ++i) {
+    simulation::MotionBelief& belief = (*prior)[place_of(kCenter[static_cast<std::size_t>(i)])];
+    if (belief.deviation > 0.0)
+      belief = {flight.center_of_mass[i], flight.standard_error(static_cast<FlightParameter>(i))};
+  }
+}
+
+core::Result<FlightCalibration> fly(const std::vector<RecordedMotion>& motions, const simulation::FlightPrior& prior) {
+  std::vector<std::span<const simulation::TimedPose>> flights;
+  for (const RecordedMotion& motion : motions) {
+    if (motion.beginning == MotionBeginning::kFlight)
+      flights.push_back(std::span(motion.frames).first(motion.first_frames));
+  }
+  return simulation::calibrate_flights(flights, prior);
+}
+
+/// Noise of the tracker, from slides where there are no flights.
+core::Status measure_noise(const std::vector<RecordedMotion>& motions, simulation::MotionCalibrationOptions* options) {
+  std::vector<double> positions;
+  std::vector<double> rotations;
+  for (const RecordedMotion& motion : motions) {
+    if (motion.beginning != MotionBeginning::kSlide) continue;
+    const auto fit = simulation::fit_sliding(std::span(motion.frames).first(motion.first_frames));
+    if (!fit) return fit.status().at(motion.name);
+    const auto n = static_cast<double>(motion.first_frames);
+    // Two numbers a coordinate are fitted, three along the motion.
+    const double freedom = 3.0 * n / (3.0 * n - 7.0);
+    positions.push_back(fit->state.position_rms * std::sqrt(freedom));
+    rotations.push_back(fit->state.rotation_rms * std::sqrt(freedom));
+  }
+  if (positions.empty()) return core::ok_status();
+  const auto middle = static_cast<std::ptrdiff_t>(positions.size() / 2);
+  std::ranges::nth_element(positions, positions.begin() + middle);
+  std::ranges::nth_element(rotations, rotations.begin() + middle);
+  options->position_noise = positions[static_cast<std::size_t>(middle)];
+  options->rotation_noise = rotations[static_cast<std::size_t>(middle)];
+  return core::ok_status();
+}
+
+void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
+  for (const simulation::CalibratedParameter& p : found->motion.parameters) {
+    if (p.left_of_prior < kLittle) continue;
+    found->remarks.push_back("these recordings say " + std::string(p.left_of_prior > kNothing ? "nothing" : "little") +
+                             " about " + words(p.parameter) + ": " + what_tells(p.parameter));
+  }
+  if (!found->motion.settled)
+    found->remarks.emplace_back("the estimate did not settle: errors may be too small; give more --max-evaluations");
+  if (found->flights < static_cast<int>(kLeastFlights))
+    found->remarks.emplace_back("there are fewer than three flights: the centre of mass comes from contacts alone");
+  if (!found->flight) return;
+  const double given = dataset.scene->gravity_W.norm();
+  const double scale = found->flight->gravity_W.norm() / given;
+  const double error = found->flight->standard_error(FlightParameter::kGravityZ) / given;
+  if (std::abs(scale - 1.0) > std::max(kScaleRemark, 3.0 * error)) {
+    found->remarks.push_back("flights fall as if gravity were " + core::fixed_text(scale, 3) + " +- " +
+                             core::fixed_text(error, 3) +
+                             " of the scene's: the recordings' metre or second is off; describe the object in the " +
+                             "recordings' metres, which the fit takes it to be in");
+  }
+}
+
+}  // namespace
+
+core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, Backends& backends,
+                                                 const ObjectCalibrationOptions& options,
+                                                 const core::ProgressSink& progress,
+                                                 const core::Cancellation* cancellation) {
+  PRESCENE_TRY(const std::vector<RecordedMotion> motions, beginnings(dataset, backends));
+  ObjectCalibration found;
+  for (const RecordedMotion& motion : motions)
+    ++(motion.beginning == MotionBeginning::kFlight ? found.flights : found.slides);
+  belief::Scene scene = *dataset.scene;
+  const belief::ObjectModel& model = scene.model_of(scene.objects[0]);
+  found.prior = simulation::motion_prior(model);
+  for (std::size_t i = 0; i < simulation::kMotionParameters; ++i) {
+    const std::string name = to_string(static_cast<MotionParameter>(i));
+    if (std::ranges::find(options.keep, name) != options.keep.end()) found.prior[i].deviation = 0.0;
+  }
+
+  simulation::MotionPrior prior = found.prior;
+  simulation::MotionCalibrationOptions motion;
+  motion.max_evaluations = options.max_evaluations;
+  motion.samples = options.samples;
+  if (found.flights >= static_cast<int>(kLeastFlights)) {
+    simulation::FlightPrior flight;
+    const simulation::MotionBelief& x = found.prior[place_of(MotionParameter::kCenterOfMassX)];
+    flight.center_of_mass = {x.mean, found.prior[place_of(MotionParameter::kCenterOfMassY)].mean,
+                             found.prior[place_of(MotionParameter::kCenterOfMassZ)].mean};
+    if (x.deviation > 0.0) flight.center_of_mass_deviation = x.deviation;
+    flight.gravity_W = scene.gravity_W;
+    flight.unit_inertia = model.unit_inertia;
+    PRESCENE_TRY(found.flight, fly(motions, flight));
+    use_flights(*found.flight, flight, &scene, &prior);
+    motion.position_noise = found.flight->position_noise;
+    motion.rotation_noise = found.flight->rotation_noise;
+  } else {
+    PRESCENE_RETURN_IF_ERROR(measure_noise(motions, &motion));
+  }
+  motion.position_noise = std::max(motion.position_noise, kLeastPositionNoise);
+  motion.rotation_noise = std::max(motion.rotation_noise, kLeastRotationNoise);
+  const auto make_simulator = [&](const belief::Scene& varied) { return backends.make_simulator(varied); };
+  PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, make_simulator,
+                                               core::RandomStream(options.seed, core::Purpose::kEvaluation),
+                                               backends.pool(), motion, progress, cancellation));
+  for (simulation::CalibratedParameter& p : found.motion.parameters)
+    p.left_of_prior = p.standard_error / found.prior[place_of(p.parameter)].deviation;
+  found.model = calibrated_model(model, found.motion);
+  add_remarks(dataset, &found);
+  return found;
+}
+
+core::Result<std::string> calibrated_yaml(const MotionDataset& dataset, const ObjectCalibration& found,
+                                          const std::filesystem::path& folder) {
+  std::vector<std::string> remarks = {"fitted to " + std::to_string(found.flights + found.slides) +
+                                      " recordings by prescene calibrate; +- is one standard error"};
+  for (const simulation::CalibratedParameter& p : found.motion.parameters) {
+    // A model file has no place for these two's.
+    if (p.parameter == MotionParameter::kInertiaSize)
+      remarks.push_back("size of the inertia: +- " + core::fixed_text(100.0 * p.standard_error, 1) + " %");
+    if (p.parameter == MotionParameter::kEdgeRadius)
+      remarks.push_back("edge radius: +- " + core::fixed_text(1e3 * p.standard_error, 2) + " mm");
+  }
+  remarks.insert(remarks.end(), found.remarks.begin(), found.remarks.end());
+  return interfaces::fitted_model_yaml(dataset.scene_file(), dataset.scene->model_of(dataset.scene->objects[0]).name,
+                                       found.model, folder, remarks);
+}
+
+nlohmann::ordered_json to_json(const ObjectCalibration& found) {
+  nlohmann::ordered_json json;
+  json["recordings"] = found.flights + found.slides;
+  json["flights"] = found.flights;
+  json["slides"] = found.slides;
+  json["evaluations"] = found.motion.evaluations;
+  json["settled"] = found.motion.settled;
+  json["score"] = {{"prior", found.motion.start_cost}, {"found", found.motion.cost}};
+  json["start_noise"] = found.motion.start_noise;
+  json["friction_scatter"] = found.motion.friction_scatter;
+  if (found.flight) {
+    const FlightCalibration& flight = *found.flight;
+    json["flight"] = {{"gravity", {flight.gravity_W.x(), flight.gravity_W.y(), flight.gravity_W.z()}},
+                      {"gravity_error", flight.standard_error(FlightParameter::kGravityZ)},
+                      {"position_noise", flight.position_noise},
+                      {"rotation_noise", flight.rotation_noise},
+                      {"frames", flight.frames}};
+  }
+  json["parameters"] = nlohmann::ordered_json::array();
+  for (const simulation::CalibratedParameter& p : found.motion.parameters) {
+    const simulation::MotionBelief& prior = found.prior[place_of(p.parameter)];
+    json["parameters"].push_back({{"name", to_string(p.parameter)},
+                                  {"value", p.value},
+                                  {"standard_error", p.standard_error},
+                                  {"prior", {{"mean", prior.mean}, {"deviation", prior.deviation}}},
+                                  {"left_of_prior", p.left_of_prior}});
+  }
+  json["remarks"] = found.remarks;
+  return json;
+}
+
+}  // namespace prescene::service
