@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "prediction_parts.h"
+#include "prescene/core/text.h"
 #include "prescene/queries/final_poses.h"
 
 namespace prescene::queries {
@@ -146,6 +147,23 @@ void account(const Foresight& foresight, belief::PredictAnswer& answer) {
   answer.stopped = simulation::to_string(estimate.stop);
 }
 
+/// What is too far away is not simulated any more: what is said of it then may not be what is meant.
+void remark_on_leaving(const simulation::OutcomeEstimate& estimate, std::vector<std::string>& remarks) {
+  const double radius = simulation::StopRule{}.world_radius;
+  double share = 0.0;
+  for (const simulation::InstanceRecord& record : estimate.instances) {
+    const auto& objects = record.final.objects;
+    if (std::any_of(objects.begin(), objects.end(), [&](const belief::ObjectState& object) {
+          return !record.failed && object.X_WO.translation.norm() > radius;
+        }))
+      share += record.weight;
+  }
+  if (share > 0.0)
+    remarks.push_back("In " + core::fixed_text(100.0 * share, 1) + " % of the instances something got farther than " +
+                      core::fixed_text(radius, 0) +
+                      " m from the world's origin. It is not simulated beyond, and judged as it was there.");
+}
+
 }  // namespace
 
 // The order of variables is that of simulation::variables_of.
@@ -200,6 +218,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   }
   if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.remarks = remarks_of(answer, query.effort);
+  remark_on_leaving(foresight.estimate, answer.remarks);
   if (foresight.estimate.certain)
     answer.remarks.push_back(
         "Nothing in the scene is uncertain: one instance tells what the simulator does, not how sure that is.");

@@ -29,10 +29,10 @@ constexpr std::size_t kMostSamples = 100'000;
 constexpr const char* kScalarForms =
     "give a number, {normal: [mean, deviation]}, {uniform: [low, high]} or {samples: [...]}";
 
-// A deviation has the unit of its quantity and is not negative.
+// A deviation has the unit of its quantity, is not negative, and not beyond what the quantity itself may be.
 NumberRange deviation_range(const NumberRange& range) {
-  return {0.0, std::max(std::abs(range.low), std::abs(range.high)), "give a standard deviation of at least 0",
-          range.unit};
+  return {0.0, std::max(std::abs(range.low), std::abs(range.high)),
+          "give a standard deviation of at least 0, no larger than the value itself may be", range.unit};
 }
 
 ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const NumberRange& range, bool cut_low,

@@ -172,5 +172,58 @@ TEST(Outcome, RestingOnNeedsAContactFromAboveThatStillLasts) {
   EXPECT_FALSE(holds_one(scene, moving, {RestingOn{"table"}, When::kAtEnd, false}));
 }
 
+TEST(Outcome, EachPredicateIsTrueOfAHandMadeRunWhenItShouldBe) {
+  const Scene scene = tests::small_scene();
+  // The block slides from the table into the bin a metre on, tips over its long edge on the way, and stops.
+  Trajectory run;
+  const double half_turn = 1.5707963267948966;
+  const std::vector<Pose> poses = {Pose::from_translation({0.0, 0.0, 0.3}),
+                                   {geometry::exp_rotation({0.0, 0.5 * half_turn, 0.0}), {0.5, 0.0, 0.5}},
+                                   {geometry::exp_rotation({0.0, half_turn, 0.0}), {1.0, 0.0, 0.1}}};
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    WorldState state;
+    state.time = 0.5 * static_cast<double>(i);
+    state.objects.resize(2);
+    state.objects[0].X_WO = poses[i];
+    if (i == 1) state.objects[0].V_WO = {{0.0, 3.0, 0.0}, {1.0, 0.0, 0.0}};
+    run.states.push_back(state);
+  }
+  run.contacts = {{0, 2, 0.0, 0.2, 0.1, 1.0}, {0, 3, 0.8, 1.0, 0.4, 0.9}};
+  run.final_contacts = {{0, 3}};
+  struct Expected {
+    Predicate predicate;
+    bool at_end, ever, always;
+  };
+  const Vector3d x = Vector3d::UnitX(), z = Vector3d::UnitZ();
+  const std::vector<Expected> all = {
+      {InsideVolume{Pose::from_translation({1.0, 0.0, 0.2}), {0.3, 0.3, 0.4}, false}, true, true, false},
+      {InsideVolume{Pose::from_translation({0.5, 0.0, 0.5}), {0.1, 0.1, 0.1}, false}, false, true, false},
+      {BelowHeight{0.2}, true, true, false},
+      {BelowHeight{0.6}, true, true, true},
+      {UprightWithin{z, 0.3}, false, true, false},
+      {UprightWithin{-x, 0.01}, true, true, false},  // -x of the block points up after a quarter turn about y
+      {UprightWithin{z, 2.0}, true, true, true},
+      {FaceUp{-x}, true, true, false},
+      {FaceUp{z}, false, true, false},
+      {MovedMoreThan{0.9}, true, true, false},
+      {MovedMoreThan{1.2}, false, false, false},
+      {TurnedMoreThan{1.5}, true, true, false},
+      {TurnedMoreThan{1.6}, false, false, false},
+      {StillMoving{}, false, true, false},
+      {Touched{"table"}, true, true, true},
+      {Touched{"bin"}, true, true, true},
+      {Touched{"ball"}, false, false, false},
+      {RestingOn{"bin"}, true, true, false},
+      {RestingOn{"table"}, false, true, false},
+  };
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Expected& expected = all[i];
+    EXPECT_EQ(holds_one(scene, run, {expected.predicate, When::kAtEnd, false}), expected.at_end) << i;
+    EXPECT_EQ(holds_one(scene, run, {expected.predicate, When::kEver, false}), expected.ever) << i;
+    EXPECT_EQ(holds_one(scene, run, {expected.predicate, When::kAlways, false}), expected.always) << i;
+    EXPECT_EQ(holds_one(scene, run, {expected.predicate, When::kAtEnd, true}), !expected.at_end) << i;
+  }
+}
+
 }  // namespace
 }  // namespace prescene::belief

@@ -230,6 +230,19 @@ TEST(Failures, AreToldAndNotDropped) {
               "");
 }
 
+TEST(Remarks, SayThatSomethingLeftTheWorld) {
+  core::ThreadPool pool(1);
+  const auto flies = [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+    belief::WorldState end = start;
+    if (start.objects[0].physical.friction < 0.5) end.objects[0].X_WO.translation.z() = 25.0;
+    return end;
+  };
+  const PredictAnswer answer =
+      predicted(queries::answer(sliding_scene(), 1, {"", asking([](auto&) {})}, context_with(flies, pool)));
+  ASSERT_FALSE(answer.remarks.empty());
+  EXPECT_THAT(answer.remarks.front(), HasSubstr("In 50.0 % of the instances something got farther than 20 m"));
+}
+
 TEST(Tell, IsReadFromJsonAndWrittenBack) {
   const auto query = belief::query_from_json(R"({"predict": {"tell": ["inputs", "contacts"], "paths": 12}})");
   ASSERT_TRUE(query.ok());

@@ -260,6 +260,28 @@ TEST(UncertainSphereQueries, BoundsHoldAndMomentsAgreeWithDraws) {
   }
 }
 
+TEST(UncertainSphereQueries, PairsOfOneBodyAreNotIndependent) {
+  // Two plates of spheres on each other: all pairs share the error of the pose, so their forces add up together. The
+  // sum of their covariances, each on its own, is what they would give if they were independent.
+  const std::vector<PackedSphere> below = grid(5, 5, 1, 0.01F);
+  const std::vector<PackedSphere> above = grid(6, 6, 1, 0.01F);
+  const UncertainPose fixed = {Pose::identity(), Matrix6d::Zero()};
+  const UncertainPose placed = {Pose::from_translation({0.0, 0.0, 0.011}),
+                                diagonal(Vector3d::Zero(), Vector3d::Constant(5e-4))};
+  const auto between = *RelativeUncertainty::make(fixed, placed);
+  UncertainScratch scratch;
+  const RestitutionOptions options = {.stiffness = kStiffness};
+  const Matrix6d together = uncertain_wrench(*tree_of(below), *tree_of(above), between, options, scratch).covariance;
+  Matrix6d apart = Matrix6d::Zero();
+  for (const PackedSphere& a : below)
+    for (const PackedSphere& b : above)
+      apart += uncertain_wrench(*tree_of({a}), *tree_of({b}), between, options, scratch).covariance;
+  const Sampled drawn = sample({"plates", below, above, fixed, placed, OverlapState::kPossible, 0.0, 50'000});
+  const auto deviation = [](const Matrix6d& covariance) { return std::sqrt(covariance(2, 2)); };
+  EXPECT_NEAR(deviation(together), deviation(drawn.covariance), 0.15 * deviation(drawn.covariance));
+  EXPECT_LT(deviation(apart), deviation(drawn.covariance) / 1.8);
+}
+
 void use_target(std::int64_t target) {
   hwy::SetSupportedTargetsForTest(target);
   hwy::GetChosenTarget().DeInit();

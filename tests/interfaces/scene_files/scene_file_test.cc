@@ -251,6 +251,14 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
               HasSubstr("as its mean"));
   EXPECT_THAT(error_of(small("", "", "    pose: {position: [{uniform: [1, 0]}, 0, 0]}\n")),
               HasSubstr("runs backwards"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {position: [0, 0, 0], normal: {position: 1.0e+9}}\n")),
+              HasSubstr("no larger than the value itself may be"));
+  EXPECT_THAT(error_of(small("", "",
+                             "    pose: {position: [0, 0, 0], normal: {covariance: [[1, 2, 0, 0, 0, 0], "
+                             "[2, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0], "
+                             "[0, 0, 0, 0, 0, 1]]}}\n")),
+              HasSubstr("a negative eigenvalue"));
+  EXPECT_THAT(error_of(small("", "", "    velocity: [0, 0, 1.0e+6]\n")), HasSubstr("m/s between"));
   EXPECT_THAT(error_of("objects:\n  a b: {}\n"), HasSubstr("characters that names can't have"));
   EXPECT_THAT(error_of(small("robot:\n  table: {sphere: 0.1, pose: {}}\n")), HasSubstr("the name is taken on line"));
   for (const char* shape : {"mesh: {file: a.ply, use: surface}", "lathe: {profile: [[0, 0], [1, 1]], use: surface}"}) {

@@ -85,6 +85,43 @@ TEST(Certificates, ThatForgetTheEdgesOfSupportsAreCaughtAndRepaired) {
   }
 }
 
+/// Believes that things move at a third of their speed: a ninth of their energy.
+class Careless final : public Certifier {
+ public:
+  explicit Careless(const Certifier& of) : of_(of) {}
+  std::optional<std::vector<int>> classes(const belief::WorldState& state, double seconds_left) const override {
+    belief::WorldState slower = state;
+    for (belief::ObjectState& object : slower.objects) {
+      object.V_WO.linear /= 3.0;
+      object.V_WO.angular /= 3.0;
+    }
+    return of_.classes(slower, seconds_left);
+  }
+
+ private:
+  const Certifier& of_;
+};
+
+TEST(Certificates, ThatTakeEnergyForLessAreCaughtAndRepaired) {
+  for (const std::size_t which : {2U, 3U}) {
+    const tests::NamedScene named = tests::uncertain_scenes()[which];
+    const Problem problem(named.scene);
+    const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+    const Careless careless(*certifier);
+    const OutcomeEstimate whole = problem.run_exactly(1024, nullptr, 0.0);
+    const OutcomeEstimate certified = problem.run_exactly(1024, &careless, 0.0);
+    int wrong = 0;
+    for (std::size_t i = 0; i < whole.instances.size(); ++i)
+      wrong += whole.instances[i].classes != certified.instances[i].classes;
+    EXPECT_GT(wrong, 10) << named.name;
+    // One in forty is wrong in C: an audit of 2 % would have to be lucky.
+    const OutcomeEstimate audited = problem.run_exactly(1024, &careless, 0.2);
+    EXPECT_GT(audited.certificates.mismatches, 0) << named.name;
+    EXPECT_TRUE(audited.certificates.switched_off) << named.name;
+    EXPECT_EQ(audited.variables, whole.variables) << named.name;
+  }
+}
+
 TEST(Certificates, GiveTheSameBitsForAnyNumberOfThreads) {
   const Problem problem(tests::uncertain_scenes()[0].scene);
   const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
@@ -134,6 +171,19 @@ TEST(Certificates, AreNotGivenForWhatTheyDoNotUnderstand) {
   scene->gravity_W = {0.5, 0.0, -9.7};
   const Problem problem(scene);
   EXPECT_EQ(make_certifier(problem.scene, problem.variables, problem.request), nullptr);
+}
+
+TEST(Certificates, AreNotGivenWhereSomethingCollidesAsSpheres) {
+  auto scene = std::make_shared<belief::Scene>(tests::shoved_stack());
+  const auto mesh =
+      std::make_shared<const geometry::TriangleMesh>(geometry::make_mesh(geometry::BoxShape{{0.12, 0.12, 0.10}}));
+  const auto given = [&](belief::MeshUse use) {
+    scene->models[1].collision = {belief::MeshShape{mesh, {}, use}};
+    const auto variables = variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
+    return make_certifier(scene, variables, {}) != nullptr;
+  };
+  EXPECT_TRUE(given(belief::MeshUse::kConvexHull));
+  EXPECT_FALSE(given(belief::MeshUse::kSpheres));
 }
 
 TEST(Certificates, AreNeverGivenToWhatRolls) {

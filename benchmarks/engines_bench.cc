@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Outcome probabilities of twenty small scenes (prescene/tests/support/engine_scenes.h) by both steppers and by MuJoCo,
+// from the same uncertain starts: where do engines disagree by more than sampling explains?
+//
+//   bench_engines [--quick] [--instances=N] [--benchmark_out=PATH]
+//
+// --instances: starts a scene (512; quick 64).
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "prescene/benchmarks/report.h"
+#include "prescene/core/check.h"
+#include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/lockstep/lockstep_simulator.h"
+#include "prescene/simulation/uncertain/outcome_estimator.h"
+#include "prescene/tests/peers/scene_mujoco.h"
+#include "prescene/tests/support/engine_scenes.h"
+
+namespace prescene::benchmarks {
+namespace {
+
+constexpr double kFineStep = 1.0 / 2000.0;  // s, at which ours are looked at once more
+constexpr double kQuantile = 1.645;         // of 90 %
+
+struct Problem {
+  tests::EngineScene named;
+  simulation::Variable variable;
+  std::vector<belief::WorldState> starts;
+};
+
+Problem problem_of(const tests::EngineScene& named, int instances) {
+  Problem problem{named, simulation::variables_of(named.scene, {}, named.scene->exclusive_outcomes)[0], {}};
+  const simulation::StartDistribution distribution = simulation::start_of(named.scene);
+  const simulation::StartSampler sampler(distribution.components[0], 7);
+  for (int i = 0; i < instances; ++i) problem.starts.push_back(sampler.draw(static_cast<std::uint32_t>(i)));
+  return problem;
+}
+
+/// The class of each start; -1 where the run blew up.
+std::vector<int> classes_by(const simulation::Simulator& simulator, const Problem& problem) {
+  simulation::RunRequest request;
+  request.stop.duration = problem.named.scene->duration;
+  std::vector<belief::Trajectory> runs(problem.starts.size());
+  core::ThreadPool pool(2);
+  simulator.run(problem.starts, request, core::RandomStream(1, core::Purpose::kEvaluation), 0, pool, runs);
+  std::vector<int> classes;
+  for (const belief::Trajectory& run : runs)
+    classes.push_back(run.end == belief::TrajectoryEnd::kDiverged ? -1 : problem.variable.classify(run));
+  return classes;
+}
+
+std::vector<int> by_bullet(const Problem& problem, double step) {
+  simulation::BulletOptions options;
+  options.step = step;
+  simulation::ShapeStore shapes;
+  const auto simulator = simulation::make_bullet_simulator(*problem.named.scene, shapes, options);
+  PRESCENE_CHECK(simulator.ok());
+  return classes_by(**simulator, problem);
+}
+
+std::vector<int> by_lockstep(const Problem& problem) {
+  simulation::ShapeStore shapes;
+  const auto simulator = simulation::make_lockstep_simulator(*problem.named.scene, shapes);
+  PRESCENE_CHECK(simulator.ok());
+  return classes_by(**simulator, problem);
+}
+
+std::vector<int> by_mujoco(const Problem& problem) {
+  tests::MujocoScene engine(*problem.named.scene);
+  std::vector<int> classes;
+  for (const belief::WorldState& start : problem.starts) {
+    const belief::Trajectory run = engine.run(start, problem.named.scene->duration);
+    classes.push_back(run.end == belief::TrajectoryEnd::kDiverged ? -1 : problem.variable.classify(run));
+  }
+  return classes;
+}
+
+/// Of those that did not blow up.
+double share(const std::vector<int>& classes, int which) {
+  const auto n =
+      static_cast<double>(classes.size() - static_cast<std::size_t>(std::count(classes.begin(), classes.end(), -1)));
+  return static_cast<double>(std::count(classes.begin(), classes.end(), which)) / n;
+}
+
+double half_width(double p, double n) { return kQuantile * std::sqrt(std::max(p * (1.0 - p), 0.25 / n) / n); }
+
+double same(const std::vector<int>& a, const std::vector<int>& b) {
+  double count = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) count += a[i] == b[i] ? 1.0 : 0.0;
+  return count / static_cast<double>(a.size());
+}
+
+bool disagree(double p, double q, double n) { return std::abs(p - q) > half_width(p, n) + half_width(q, n); }
+
+int run(int instances, const std::string& out) {
+  Report report("engines", "MuJoCo 2.2.2, step 1/2000 s");
+  report.note("Scenes of tests/support/engine_scenes.cc, " + std::to_string(instances) +
+              " starts each; a class disagrees where shares differ by more than both 90 % intervals.");
+  Table classes{"classes",
+                {"scene", "class", "bullet", "lockstep", "bullet 1/2000 s", "mujoco", "half width", "disagrees",
+                 "disagrees at 1/2000 s"},
+                {}};
+  Table runs{"runs",
+             {"scene", "same end, lockstep", "same end, mujoco", "same end, mujoco and 1/2000 s", "blown up in mujoco"},
+             {}};
+  int scenes_apart = 0, scenes_apart_fine = 0;
+  const double n = instances;
+  for (const tests::EngineScene& named : tests::engine_scenes()) {
+    std::fprintf(stderr, "%s\n", named.name.c_str());
+    const Problem problem = problem_of(named, instances);
+    const std::vector<int> bullet = by_bullet(problem, simulation::BulletOptions{}.step);
+    const std::vector<int> lockstep = by_lockstep(problem);
+    const std::vector<int> fine = by_bullet(problem, kFineStep);
+    const std::vector<int> mujoco = by_mujoco(problem);
+    bool apart = false, apart_fine = false;
+    for (int c = 0; c < static_cast<int>(problem.variable.classes.size()); ++c) {
+      const double p = share(bullet, c), q = share(mujoco, c), p_fine = share(fine, c);
+      const bool differs = disagree(p, q, n), differs_fine = disagree(p_fine, q, n);
+      apart = apart || differs;
+      apart_fine = apart_fine || differs_fine;
+      classes.rows.push_back({named.name, problem.variable.classes[static_cast<std::size_t>(c)], p, share(lockstep, c),
+                              p_fine, q, half_width(p, n), static_cast<std::int64_t>(differs),
+                              static_cast<std::int64_t>(differs_fine)});
+    }
+    scenes_apart += apart;
+    scenes_apart_fine += apart_fine;
+    runs.rows.push_back({named.name, same(bullet, lockstep), same(bullet, mujoco), same(fine, mujoco),
+                         static_cast<std::int64_t>(std::count(mujoco.begin(), mujoco.end(), -1))});
+  }
+  report.add(classes);
+  report.add(runs);
+  std::fputs(report.text().c_str(), stdout);
+  std::printf("%s\n%s\n%d of %zu scenes disagree, %d at 1/2000 s\n", text_of(classes).c_str(), text_of(runs).c_str(),
+              scenes_apart, runs.rows.size(), scenes_apart_fine);
+  if (out.empty()) return 0;
+  const core::Status status = report.write(out);
+  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
+  return status.ok() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace prescene::benchmarks
+
+int main(int count, char** words) {
+  int instances = 512;
+  std::string out;
+  for (int i = 1; i < count; ++i) {
+    const std::string_view word = words[i];
+    const std::string value(word.substr(std::min(word.find('=') + 1, word.size())));
+    if (word == "--quick") {
+      instances = 64;
+    } else if (word.starts_with("--instances=") && std::atoi(value.c_str()) > 0) {
+      instances = std::atoi(value.c_str());
+    } else if (word.starts_with("--benchmark_out=")) {
+      out = value;
+    } else {
+      std::fprintf(stderr, "usage: %s [--quick] [--instances=N] [--benchmark_out=PATH]\n", words[0]);
+      return 2;
+    }
+  }
+  return prescene::benchmarks::run(instances, out);
+}
