@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// A data set as a laboratory records one, through the program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "prescene/service/backends.h"
+#include "prescene/tests/support/simulated_motions.h"
+#include "program.h"
+
+namespace prescene::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+class CalibrateTest : public ::testing::Test {
+ protected:
+  CalibrateTest()
+      : folder_(std::filesystem::path(::testing::TempDir()) /
+                (std::string("calibrate_") + ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    std::filesystem::create_directories(folder_);
+    core::ThreadPool pool(1);
+    service::Backends backends(pool);
+    const belief::Scene scene = box_scene({});
+    const auto simulator = backends.make_simulator(scene);
+    BoxTruth guess;
+    guess.friction = 0.3;
+    write_file(folder_ / "scene.yaml", box_scene_yaml(guess));
+    write_file(folder_ / "tosses.csv", motion_table(simulated_slides(
+                                           scene, **simulator, 6, core::RandomStream(1, core::Purpose::kTest), pool)));
+  }
+  ~CalibrateTest() override { std::filesystem::remove_all(folder_); }
+
+  std::vector<std::string> command(const std::string& output) const {
+    std::vector<std::string> args = {"calibrate", folder_.string(), "-o", output, "--json", "-q"};
+    args.insert(args.end(), {"--samples", "4", "--max-evaluations", "60"});
+    for (const char* name :
+         {"impact_friction", "inertia_size", "edge_radius", "center_of_mass_x", "center_of_mass_y", "center_of_mass_z"})
+      args.insert(args.end(), {"--keep", name});
+    return args;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(CalibrateTest, WritesAModelThatValidates) {
+  const std::string output = (folder_ / "object.yaml").string();
+  const Finished finished = run_program(command(output));
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const auto document = nlohmann::json::parse(finished.out);
+  EXPECT_EQ(document["slides"], 6);
+  ASSERT_EQ(document["parameters"].size(), 2U);
+  EXPECT_EQ(document["parameters"][0]["name"], "friction");
+  EXPECT_NEAR(document["parameters"][0]["value"].get<double>(), 0.22, 0.02);
+  EXPECT_THAT(document["remarks"].dump(), HasSubstr("these recordings say nothing about restitution: record bounces"));
+  EXPECT_EQ(run_program({"validate", output}).exit_code, 0);
+  EXPECT_THAT(read_file(output), HasSubstr("box: [0.1, 0.1, 0.1]"));
+}
+
+TEST_F(CalibrateTest, NeverWritesOverAnInput) {
+  for (const char* name : {"scene.yaml", "tosses.csv"}) {
+    const std::string before = read_file(folder_ / name);
+    const Finished finished = run_program(command((folder_ / name).string()));
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_EQ(read_file(folder_ / name), before);
+  }
+}
+
+TEST_F(CalibrateTest, BadDataSetsEndWithTwo) {
+  write_file(folder_ / "tosses.csv", "toss,t,x,y,z\n1,0,0,0,0\n");
+  const Finished finished = run_program(command((folder_ / "object.yaml").string()));
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_THAT(finished.err, HasSubstr("tosses.csv, line 1: there is no column 'qw'"));
+  EXPECT_THAT(nlohmann::json::parse(finished.out)["error"].get<std::string>(), HasSubstr("qw"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "object.yaml"));
+  EXPECT_EQ(run_program({"calibrate", folder_.string()}).exit_code, 2);
+  EXPECT_EQ(run_program({"calibrate", folder_.string(), "-o", "x.yaml", "--keep", "colour"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace prescene::tests
