@@ -86,7 +86,6 @@ struct Step {
 };
 
 Step step_from(const VectorXd& u, const PointResponse& response, const Neighbourhood& around, const Problem& problem) {
-  const Index n = u.size();
   const MatrixXd slopes = response.slopes(u);
   const auto cases = static_cast<double>(slopes.rows());
   // Directions in which the scores do not rise tell nothing.
@@ -95,9 +94,10 @@ Step step_from(const VectorXd& u, const PointResponse& response, const Neighbour
       eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
   const VectorXd slope = slopes.colwise().mean().transpose();
   const MatrixXd centred = slopes.rowwise() - slope.transpose();
-  const double freedom = cases - static_cast<double>(n);
-  MatrixXd B = centred.transpose() * centred / (cases * freedom);
-  B *= std::pow(student_factor(freedom), 2);
+  // No freedom is taken off for the parameters: jumps of the simulation, which the trials see as slopes, widen the
+  // spread of the slopes by as much (docs/calibration.md has the count).
+  MatrixXd B = centred.transpose() * centred / (cases * (cases - 1.0));
+  B *= std::pow(student_factor(cases - 1.0), 2);
   B.diagonal().array() += 1e-12 * B.trace() + 1e-300;
   const MatrixXd weights = B.ldlt().solve(H).transpose();  // H B^-1
   const MatrixXd prior = around.factor.transpose() * problem.precision.asDiagonal() * around.factor;

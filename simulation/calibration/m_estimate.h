@@ -73,9 +73,9 @@ using EstimateProgress = std::function<void(double)>;
 /// The values that make the mean score least, and the covariance of their errors as of an M-estimate over independent
 /// recordings [Huber 1967], with the prior added. Each round fits every simulated point by a linear function of the
 /// values, over trials about the estimate so far, and takes the scores of these functions: Gauss-Newton steps without
-/// derivatives. Where the functions miss the points, distances count less. As recordings are few, their slopes'
-/// covariance has the freedom of the parameters taken off, and the errors are such that 1.645 of them hold 90 %. Takes
-/// at least parameters + 3 recordings. Fails as `simulate` does.
+/// derivatives. Where the functions miss the points, distances count less. Errors are widened
+/// by Student's factor, such that 1.645 of them hold 90 %. Takes at least parameters + 3 recordings. Fails as
+/// `simulate` does.
 core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& parameters, const Observations& observations,
                                   const SimulatedPoints& simulate, core::RandomStream stream,
                                   const EstimateOptions& options = {}, const EstimateProgress& progress = {});

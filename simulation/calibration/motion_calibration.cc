@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
@@ -19,11 +20,17 @@ using geometry::Vector3d;
 
 // Of the search, in the parameters' steps: what comes then needs no better.
 constexpr double kSearchAccuracy = 0.05;
+// Particles of the stream; a recording's starts are drawn from particle 0.
+constexpr std::uint32_t kSearchDraws = 1;
+constexpr std::uint32_t kTrialDraws = 2;
 // Of estimate and noise.
 constexpr int kTurns = 2;
 constexpr int kNoiseHalvings = 2;
 constexpr int kNoiseEvaluations = 40;
 
+// Of the friction that slides tell, beside its statistical error: by how much simulated slides of known friction were
+// off. A third of it is half a step of the simulator, in which a sliding object's velocity lags behind its place.
+constexpr double kSlideError = 0.04;
 // Of a fitted model, as in scene files.
 constexpr double kMostFriction = 100.0;
 
@@ -235,7 +242,7 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     return failure.ok();
   };
   const SearchResult found = evolution_search(varied.searched(), cost, kSearchAccuracy, options.max_evaluations,
-                                              stream.for_purpose(core::Purpose::kEvaluation), report);
+                                              stream.at(0, kSearchDraws), report);
   PRESCENE_RETURN_IF_ERROR(failure);
 
   // The noise goes by what it makes of the score, in turns with the rest.
@@ -248,8 +255,9 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     const auto refined = [&](double share) {
       if (progress) progress({0.5 + 0.5 * (turn + share) / kTurns, std::nullopt, "errors"});
     };
-    PRESCENE_TRY(estimate, m_estimate(varied.estimated(best), judge.observations(), simulate,
-                                      stream.for_purpose(core::Purpose::kTest), options.estimate, refined));
+    PRESCENE_TRY(estimate,
+                 m_estimate(varied.estimated(best), judge.observations(), simulate,
+                            stream.at(static_cast<std::uint64_t>(turn), kTrialDraws), options.estimate, refined));
     best = varied.with_parameters(best, std::span(estimate.value.data(), varied.free().size()));
     result.evaluations += estimate.evaluations;
     if (turn + 1 == kTurns) break;
@@ -259,11 +267,16 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     best = varied.with_noise(best, noise.values);
     result.evaluations += noise.evaluations;
   }
+  const auto slides = std::ranges::count(motions, MotionBeginning::kSlide, &RecordedMotion::beginning);
+  const double slide_share = static_cast<double>(slides) / static_cast<double>(motions.size());
   for (std::size_t i = 0; i < varied.free().size(); ++i) {
     const std::size_t k = varied.free()[i];
+    const auto parameter = static_cast<MotionParameter>(k);
     const auto row = static_cast<Eigen::Index>(i);
-    result.parameters.push_back({static_cast<MotionParameter>(k), estimate.value[row], estimate.standard_error(row),
-                                 estimate.standard_error(row) / prior[k].deviation});
+    double error = estimate.standard_error(row);
+    if (parameter == MotionParameter::kFriction)
+      error = std::min(std::hypot(error, kSlideError * slide_share * estimate.value[row]), prior[k].deviation);
+    result.parameters.push_back({parameter, estimate.value[row], error, error / prior[k].deviation});
   }
   result.start_noise = best.start_noise;
   result.friction_scatter = best.friction_scatter;

@@ -122,6 +122,51 @@ TEST(ModelFile, OfThePageIsReadAndOverriddenByAScene) {
   EXPECT_EQ(scene->models[0].contact.friction, belief::ScalarDistribution(belief::FixedScalar{0.4}));
 }
 
+TEST(ModelFile, OfAFittedModelHasEverythingElseAsItsSceneDescribesIt) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path elsewhere = folder.path() / "fitted";
+  std::filesystem::create_directory(elsewhere);
+  int models = 0;
+  for (const tests::SceneText& text : tests::scene_texts()) {
+    std::ofstream(folder.path() / "scene.yaml") << text.text;
+    const auto scene = read_scene(folder.path() / "scene.yaml", tests::options_with_meshes());
+    ASSERT_TRUE(scene.ok()) << text.file << scene.status().message();
+    for (belief::ObjectModel model : scene->models) {
+      model.contact.friction = belief::NormalScalar{0.3, 0.01, 0.0, 2.0};
+      model.contact.impact_friction = belief::FixedScalar{0.25};
+      model.contact.edge_radius = 0.0021;
+      model.center_of_mass.y = belief::NormalScalar{0.001, 2e-4};
+      model.unit_inertia *= 1.1;
+      const auto yaml = fitted_model_yaml(folder.path() / "scene.yaml", model.name, model, elsewhere, {"a remark"});
+      ASSERT_TRUE(yaml.ok()) << yaml.status().message();
+      std::ofstream(elsewhere / "model.yaml") << *yaml;
+      const auto read = read_model(elsewhere / "model.yaml", model.name, tests::options_with_meshes());
+      ASSERT_TRUE(read.ok()) << text.file << read.status().message() << *yaml;
+      EXPECT_EQ(*read, model) << text.file << *yaml;
+      ++models;
+    }
+  }
+  EXPECT_GT(models, 15);
+  EXPECT_EQ(fitted_model_yaml(folder.path() / "scene.yaml", "none such", {}, elsewhere).status().code(),
+            core::StatusCode::kNotFound);
+}
+
+TEST(ModelFile, OfAFittedModelFindsTheSameFilesFromItsOwnFolder) {
+  const tests::ScratchDir folder;
+  std::filesystem::create_directories(folder.path() / "models");
+  std::filesystem::create_directories(folder.path() / "fitted");
+  std::ofstream(folder.path() / "models" / "mug.yaml") << "model:\n  mesh: {file: mesh/mug.ply, scale: 0.001}\n"
+                                                          "  mass: 0.3\n  friction: 0.2\n";
+  std::ofstream(folder.path() / "scene.yaml") << "models:\n  mug: {file: models/mug.yaml, mass: 0.4}\n"
+                                                 "objects:\n  o: {model: mug, pose: {}}\n";
+  const auto scene = read_scene(folder.path() / "scene.yaml", tests::options_with_meshes());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  const auto yaml = fitted_model_yaml(folder.path() / "scene.yaml", "mug", scene->models[0], folder.path() / "fitted");
+  ASSERT_TRUE(yaml.ok()) << yaml.status().message();
+  EXPECT_THAT(*yaml, HasSubstr("\"../models/mesh/mug.ply\""));
+  EXPECT_THAT(*yaml, HasSubstr("mass: 0.4"));
+}
+
 TEST(ModelFile, MistakesInItAreToldWithItsOwnName) {
   const tests::ScratchDir folder;
   std::ofstream(folder.path() / "mug.yaml") << "model:\n  mesh: {file: mug.ply, scale: 0.001}\n  mas: 0.3\n";

@@ -129,7 +129,7 @@ TEST_F(MotionCalibrationTest, SlidesTellFrictionAndNothingOfRestitution) {
   ASSERT_TRUE(motions.ok()) << motions.status().message();
   for (const RecordedMotion& motion : *motions) EXPECT_EQ(motion.beginning, MotionBeginning::kSlide);
   MotionPrior prior = contact_prior();
-  prior[1].deviation = 0.0;
+  prior[1] = {BoxTruth{}.impact_friction, 0.0};
   const auto found = calibrated(*motions, prior, pool_);
   ASSERT_TRUE(found.ok()) << found.status().message();
   const CalibratedParameter& friction = found->parameters[0];
