@@ -11,4 +11,16 @@ std::string kind_of(const Action& action) {
   return kKinds[action.what.index()];
 }
 
+std::string object_of(const Action& action) {
+  struct Visitor {
+    std::string operator()(const Release& release) const { return release.object; }
+    std::string operator()(const Place& place) const { return place.object; }
+    std::string operator()(const Push&) const { return {}; }
+    std::string operator()(const Pour& pour) const { return pour.container; }
+    std::string operator()(const Grasp& grasp) const { return grasp.object; }
+    std::string operator()(const Transport& transport) const { return transport.object; }
+  };
+  return std::visit(Visitor{}, action.what);
+}
+
 }  // namespace prescene::belief

@@ -65,5 +65,7 @@ struct Action {
 };
 /// "release", "place", ...
 std::string kind_of(const Action& action);
+/// The name of the object that it moves; empty for a push.
+std::string object_of(const Action& action);
 
 }  // namespace prescene::belief

@@ -98,6 +98,14 @@ Json model_error_json(const ModelError& error) {
   return {{"instances", error.instances}, {"variants", std::move(variants)}};
 }
 
+Json flight_json(const FlightForecast& flight) {
+  Json pairs = Json::array();
+  for (const FlightForecast::Pair& pair : flight.may_touch)
+    pairs.push_back(
+        {{"first", pair.first}, {"second", pair.second}, {"probability", pair.probability}, {"error", pair.error}});
+  return {{"apart_until", flight.apart_until}, {"may_touch", std::move(pairs)}};
+}
+
 Json paths_json(const std::vector<ObjectPath>& paths) {
   Json json = Json::array();
   for (const ObjectPath& path : paths) {
@@ -157,6 +165,7 @@ Json prediction_json(const PredictAnswer& predict) {
   if (!predict.inputs.empty()) json["inputs"] = inputs_json(predict.inputs);
   if (!predict.chaos.empty()) json["chaos"] = chaos_json(predict.chaos);
   if (!predict.contact_times.empty()) json["contacts"] = contacts_json(predict);
+  if (predict.flight) json["flight"] = flight_json(*predict.flight);
   if (predict.model_error) json["model_error"] = model_error_json(*predict.model_error);
   if (!predict.paths.empty()) json["paths"] = paths_json(predict.paths);
   return json;

@@ -116,6 +116,19 @@ struct ContactForecast {
   friend bool operator==(const ContactForecast&, const ContactForecast&) = default;
 };
 
+/// For how long a start is one object: nothing can touch anything, and what each object does is told by the moments of
+/// its flight. What is in contact from the start ends it at 0.
+struct FlightForecast {
+  struct Pair {
+    std::string first, second;
+    double probability = 0.0, error = 0.0;  ///< That they touch just then, and two standard errors of it.
+    friend bool operator==(const Pair&, const Pair&) = default;
+  };
+  double apart_until = 0.0;     ///< s
+  std::vector<Pair> may_touch;  ///< Then, likeliest first; empty: nothing ever does.
+  friend bool operator==(const FlightForecast&, const FlightForecast&) = default;
+};
+
 /// What becomes of the probabilities when something that is not known is otherwise.
 struct ModelError {
   struct Shift {
@@ -163,6 +176,7 @@ struct PredictAnswer {
   std::vector<ChaosCheck> chaos;
   std::vector<double> contact_times;      ///< s
   std::vector<ContactForecast> contacts;  ///< Likeliest first.
+  std::optional<FlightForecast> flight;
   std::optional<ModelError> model_error;
   std::vector<ObjectPath> paths;
   std::vector<std::string> remarks;  ///< What one should know before trusting the numbers, in sentences.

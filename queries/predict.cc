@@ -12,26 +12,13 @@ namespace {
 
 constexpr std::size_t kMostTypicalRuns = 12;
 
-/// The name of the object that an action moves, empty for pushes.
-std::string object_of(const belief::Action& action) {
-  struct Visitor {
-    std::string operator()(const belief::Release& release) const { return release.object; }
-    std::string operator()(const belief::Place& place) const { return place.object; }
-    std::string operator()(const belief::Push&) const { return {}; }
-    std::string operator()(const belief::Pour& pour) const { return pour.container; }
-    std::string operator()(const belief::Grasp& grasp) const { return grasp.object; }
-    std::string operator()(const belief::Transport& transport) const { return transport.object; }
-  };
-  return std::visit(Visitor{}, action.what);
-}
-
 /// Indices of the objects that outcomes judge or actions move; all when there are none.
 std::vector<std::size_t> objects_asked_about(const belief::Scene& scene) {
   std::set<std::string> names;
   for (const belief::ExclusiveOutcomes& group : scene.exclusive_outcomes)
     for (const belief::Outcome& outcome : group.outcomes) names.insert(outcome.object);
   for (const belief::Outcome& outcome : scene.outcomes) names.insert(outcome.object);
-  for (const belief::Action& action : scene.actions) names.insert(object_of(action));
+  for (const belief::Action& action : scene.actions) names.insert(belief::object_of(action));
   names.erase("");
   std::vector<std::size_t> indices;
   for (std::size_t i = 0; i < scene.objects.size(); ++i)
@@ -210,7 +197,10 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
     for (std::size_t object : objects) answer.final_poses.push_back(final_poses_of(foresight, object, *context.pool));
   if (tell.typical_runs) answer.typical_runs = typical_runs_of(foresight, prior, context);
   if (tell.inputs) answer.inputs = deciding_inputs(foresight, prior, context);
-  if (tell.contacts) forecast_contacts(foresight, query.effort.confidence, answer);
+  if (tell.contacts) {
+    forecast_contacts(foresight, query.effort.confidence, answer);
+    answer.flight = forecast_flight(foresight, prior, context);
+  }
   if (tell.paths > 0) answer.paths = paths_of(foresight, prior, tell.paths, objects, context);
   if (tell.chaos) answer.chaos = check_for_chaos(foresight, prior, query.effort.confidence, context);
   if (tell.model_error) {

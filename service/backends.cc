@@ -74,6 +74,7 @@ queries::QueryContext Backends::query_context(core::ThreadPool& pool) {
     return make_simulator(*scene, factor);
   };
   context.make_renderer = [this] { return make_renderer(); };
+  context.shapes = &shapes_;
   context.pool = &pool;
   context.meshes = &meshes_;
   return context;

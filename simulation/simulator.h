@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -19,6 +20,7 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/random.h"
+#include "prescene/core/status.h"
 
 namespace prescene::simulation {
 
@@ -111,5 +113,7 @@ class Simulator {
   virtual std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                                   const core::RandomStream& stream) const = 0;
 };
+
+using SimulatorFactory = std::function<core::Result<std::unique_ptr<Simulator>>(const belief::Scene& scene)>;
 
 }  // namespace prescene::simulation

@@ -152,6 +152,12 @@ void add_contacts(const belief::PredictAnswer& answer, std::vector<ReportSection
     for (std::size_t i = 0; i < std::min(answer.contact_times.size(), contact.touching.size()); ++i)
       curve.points.emplace_back(answer.contact_times[i], contact.touching[i]);
   }
+  if (answer.flight && answer.flight->apart_until > 0.0 && !answer.flight->may_touch.empty()) {
+    const belief::FlightForecast::Pair& next = answer.flight->may_touch.front();
+    section.blocks.push_back(TextBlock{"Surely nothing touches anything before " +
+                                       decimal(answer.flight->apart_until, 2) + " s; then " + next.first + " and " +
+                                       next.second + " may."});
+  }
   section.blocks.push_back(std::move(table));
   section.blocks.push_back(std::move(chart));
 }
