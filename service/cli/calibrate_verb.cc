@@ -77,6 +77,7 @@ core::Status run_cube(const Options& options, VerbContext& context) {
   nlohmann::ordered_json document;
   document["n"] = tosses.size();
   document["evaluations"] = found.evaluations;
+  document["widened"] = found.widened;
   document["stopped"] = found.stopped;
   document["search_cost"] = {{"start", found.start_cost}, {"found", found.cost}};
   document["start"]["model"] = to_json(start);

@@ -33,15 +33,18 @@ constexpr Coordinate kCoordinates[] = {
     {"friction_noise", &CubeModel::friction_noise, 0.02, 0.0, 0.2},
 };
 
+CubeModel with_noise(CubeModel model, double factor) {
+  model.position_noise *= factor;
+  model.rotation_noise *= factor;
+  model.velocity_noise *= factor;
+  model.spin_noise *= factor;
+  return model;
+}
+
 CubeModel model_from(const CubeModel& start, std::span<const double> values) {
   CubeModel model = start;
   for (std::size_t i = 0; i < std::size(kCoordinates); ++i) model.*kCoordinates[i].field = values[i];
-  const double noise = values[std::size(kCoordinates)];
-  model.position_noise *= noise;
-  model.rotation_noise *= noise;
-  model.velocity_noise *= noise;
-  model.spin_noise *= noise;
-  return model;
+  return with_noise(model, values[std::size(kCoordinates)]);
 }
 
 }  // namespace
@@ -102,6 +105,23 @@ double calibration_cost(const std::vector<CubeForecast>& forecasts) {
   return cost / static_cast<double>(forecasts.size());
 }
 
+namespace {
+
+/// The factor on the model's noise with which regions of 90 % hold that many of the tosses; 2 at most.
+core::Result<double> widening(const std::vector<CubeToss>& tosses, const CubeModel& model, std::uint64_t seed,
+                              core::ThreadPool& threads, const core::Cancellation* cancellation) {
+  constexpr double kStep = 1.1, kWidest = 2.0, kHeld = 0.9;
+  double factor = 1.0;
+  for (; factor < kWidest; factor *= kStep) {
+    PRESCENE_TRY(auto forecasts,
+                 forecast_cube_tosses(tosses, with_noise(model, factor), seed, threads, {}, cancellation));
+    if (report_of(std::move(forecasts)).coverage_90 >= kHeld) break;
+  }
+  return factor;
+}
+
+}  // namespace
+
 core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses, CubeModel start, std::uint64_t seed,
                                              core::ThreadPool& threads, const core::ProgressSink& progress,
                                              const core::Cancellation* cancellation,
@@ -141,6 +161,13 @@ core::Result<CubeCalibration> calibrate_cube(const std::vector<CubeToss>& tosses
   result.model = model_from(start, found.values);
   result.cost = found.cost;
   result.evaluations = found.evaluations;
+  if (!result.stopped) {
+    const auto widened = widening(tosses, result.model, seed, threads, cancellation);
+    result.stopped = widened.status().code() == core::StatusCode::kCancelled;
+    if (!widened && !result.stopped) return widened.status();
+    if (widened) result.widened = *widened;
+    result.model = with_noise(result.model, result.widened);
+  }
   return result;
 }
 

@@ -20,14 +20,14 @@ CubeModel shipped_cube_model() {
   model.sliding_friction = 0.221;
   model.impact_friction = 0.164;
   model.restitution = 0.27;
-  model.position_noise = 0.0012;
-  model.rotation_noise = 0.00628;
-  model.velocity_noise = 0.012;
-  model.spin_noise = 0.06;
+  model.position_noise = 0.0016;
+  model.rotation_noise = 0.00836;
+  model.velocity_noise = 0.016;
+  model.spin_noise = 0.08;
   model.friction_noise = 0.04;
   model.provenance =
       "prescene calibrate cube_tosses --seed 1: 150 evaluations of 24 samples on the 143 tosses at even places of the "
-      "list, from the values read off by hand";
+      "list, from the values read off by hand; noise widened by 1.33 until 90 % of these tosses lie in their regions";
   return model;
 }
 

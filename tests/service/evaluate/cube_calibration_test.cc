@@ -36,6 +36,30 @@ TEST(CubeCalibration, FindsTheFrictionThatItWasMadeWith) {
   EXPECT_NEAR(found->model.sliding_friction, model.sliding_friction, 0.03);
 }
 
+TEST(CubeCalibration, WidensNoiseThatIsTooSmallForTheTosses) {
+  CubeModel model = shipped_cube_model();
+  model.step = 1.0 / 240.0;
+  const std::vector<CubeToss> tosses = made_tosses(model, 20);
+  CubeModel sure = model;
+  sure.friction_noise = 0.0;
+  for (double CubeModel::*noise :
+       {&CubeModel::position_noise, &CubeModel::rotation_noise, &CubeModel::velocity_noise, &CubeModel::spin_noise})
+    sure.*noise *= 0.1;
+  sure.sliding_friction *= 1.15;  // what it is sure of is wrong
+  core::ThreadPool threads(1);
+  CalibrationOptions options;
+  options.samples = 8;
+  options.max_evaluations = 1;  // no search
+  const auto found = calibrate_cube(tosses, sure, 3, threads, {}, nullptr, options);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_GT(found->widened, 1.0);
+  EXPECT_NEAR(found->model.velocity_noise, found->widened * sure.velocity_noise, 1e-12);
+  if (found->widened < 2.0) {
+    auto forecasts = forecast_cube_tosses(tosses, found->model, 3, threads);
+    EXPECT_GE(report_of(*std::move(forecasts)).coverage_90, 0.9);
+  }
+}
+
 TEST(CubeCalibration, IsTheSameForAnyNumberOfThreads) {
   CubeModel model = measured_cube_model();
   model.step = 1.0 / 240.0;
