@@ -39,15 +39,16 @@ struct Bank {
   double cpu = 0.0;                                                          ///< s, of one to rest.
   double certified_seconds = 0.0, flown_seconds = 0.0, certified_cpu = 0.0;  ///< Mean of one, with certificates.
   int certified = 0;
-  int wrong = 0;
+  int wrong = 0;  ///< Of these, of another class when the same simulator runs them to rest.
 };
 Bank make_bank(const UncertainProblem& problem, int count);
 
 /// Plain Monte Carlo on the bank: independent instances until Wald's interval of every class is narrow enough.
 struct Cost {
   double instances = 0.0;
-  double seconds = 0.0;  ///< Simulated with looking for contacts.
-  double cpu = 0.0;      ///< s
+  double seconds = 0.0;      ///< Simulated with looking for contacts.
+  double all_seconds = 0.0;  ///< Simulated.
+  double cpu = 0.0;          ///< s
 };
 Cost plain_cost(const Bank& bank, int classes, double tolerance, double confidence, int repetitions);
 

@@ -94,8 +94,6 @@ struct MotionCalibration {
 /// A copy of the model with the values as means and the errors as deviations.
 belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCalibration& found);
 
-using SimulatorFactory = std::function<core::Result<std::unique_ptr<Simulator>>(const belief::Scene& scene)>;
-
 /// Least number of recordings for so many free parameters.
 constexpr std::size_t least_recordings(std::size_t free_parameters) { return free_parameters + 3; }
 

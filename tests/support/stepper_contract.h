@@ -243,6 +243,51 @@ TEST_P(StepperContract, ThingsThatBeginInEachOtherAreTold) {
   EXPECT_NEAR(run_actions(scene, {{0.5, release_of("object")}}, 1.0).deepest_overlap, 0.01, 1e-4);
 }
 
+TEST_P(StepperContract, WhatIsWedgedGainsNoEnergy) {
+  // A heavy box drops on one of ten grams between walls that lean to each other downwards.
+  Scene scene;
+  scene.name = "wedge";
+  scene.supports.push_back(floor_support());
+  for (const double side : {-1.0, 1.0})
+    scene.supports.push_back(
+        support_of(side < 0.0 ? "left" : "right", {belief::PrimitiveShape{BoxShape{{0.02, 0.3, 0.36}}, Pose{}}},
+                   Pose{about(Vector3d::UnitY(), -side * 5.0 * kPi / 180.0), Vector3d(side * 0.085, 0.0, 0.25)}));
+  add_object(scene, primitive_model("light", BoxShape{{0.09, 0.1, 0.1}}, 0.01), "light");
+  add_object(scene, primitive_model("heavy", BoxShape{{0.05, 0.08, 0.08}}, 5.0), "heavy");
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.55})};
+  scene.objects[1].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.75})};
+  const auto simulator = simulator_of(scene);
+  simulation::RunRequest request;
+  request.stop.duration = 1.0;
+  request.sample_interval = simulator->step_size();
+  core::RandomStream stream(5, core::Purpose::kTest);
+  std::vector<WorldState> starts(24, start_of(scene));
+  for (WorldState& start : starts)
+    for (belief::ObjectState& object : start.objects) {
+      object.X_WO.translation.x() += 0.01 * stream.normal();
+      object.X_WO.rotation =
+          geometry::exp_rotation(Vector3d(0.2 * stream.normal(), 0.2 * stream.normal(), 0.6 * stream.normal()));
+    }
+  std::vector<belief::Trajectory> runs(starts.size());
+  core::ThreadPool pool(1);
+  simulator->run(starts, request, stream, 0, pool, runs);
+  const auto energy = [&](const WorldState& state) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < state.objects.size(); ++i) {
+      const belief::ObjectState& object = state.objects[i];
+      const Vector3d spin_O = object.X_WO.rotation.conjugate() * object.V_WO.angular;
+      sum += object.physical.mass * (kG * object.X_WO.translation.z() + 0.5 * object.V_WO.linear.squaredNorm() +
+                                     0.5 * spin_O.dot(scene.models[i].unit_inertia * spin_O));
+    }
+    return sum;
+  };
+  for (const belief::Trajectory& run : runs) {
+    EXPECT_NE(run.end, TrajectoryEnd::kDiverged);
+    const double begin = energy(run.start());
+    for (const WorldState& state : run.states) ASSERT_LT(energy(state), 1.05 * begin) << "at " << state.time << " s";
+  }
+}
+
 TEST_P(StepperContract, NotANumberIsDivergenceNotAnAnswer) {
   Scene scene = floor_scene(primitive_model("ball", geometry::Sphere{0.05}));
   WorldState start = start_of(scene);
