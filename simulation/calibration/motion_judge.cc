@@ -140,7 +140,7 @@ core::Status MotionJudge::add(const RecordedMotion& motion) {
     observations_.points.col(before + static_cast<Eigen::Index>(j)) = points[j];
     observations_.recordings.push_back(static_cast<int>(cases_.size()));
   }
-  cases_.push_back(std::move(made));
+  cases_.push_back(made);
   return core::ok_status();
 }
 
