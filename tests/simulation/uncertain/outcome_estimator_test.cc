@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <memory>
 #include <set>
 
 #include "toy_problems.h"
@@ -275,10 +276,10 @@ TEST(OutcomeEstimator, ACertainStartRunsTheInstancesForTheActionsSake) {
   variable.classes = {"heads", "tails"};
   variable.classify = [](const belief::Trajectory& run) { return tests::z_of(run.final(), 0) > 0.5 ? 0 : 1; };
   RunRequest request;
-  belief::Push push;
-  push.to.x() = 1.0;
-  push.lateral_error = belief::NormalScalar{0.0, 0.1};
-  request.actions.push_back({0.0, push});
+  auto push = std::make_unique<belief::Push>();  // on the stack g++ 12 takes parts for uninitialized under sanitizers
+  push->to.x() = 1.0;
+  push->lateral_error = belief::NormalScalar{0.0, 0.1};
+  request.actions.push_back({0.0, *push});
   const OutcomeEstimate found =
       estimate_outcomes(coin, starts, std::span(&variable, 1), request, test_stream(), {}, pool);
   EXPECT_FALSE(found.certain);
