@@ -2,16 +2,17 @@
 #include "prescene/simulation/calibration/flight_calibration.h"
 
 #include <ceres/ceres.h>
-#include <ceres/normal_prior.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "torque_free_motion.h"
 
@@ -115,6 +116,28 @@ class FlightErrors {
 };
 
 using FlightCost = ceres::AutoDiffCostFunction<FlightErrors, ceres::DYNAMIC, 3, 3, 2, kMotion>;
+
+/// Independent Gaussians. (Ceres has such a cost, but it frees in our code what its own has allocated.)
+class Prior final : public ceres::CostFunction {
+ public:
+  Prior(Eigen::VectorXd mean, Eigen::VectorXd deviations) : mean_(std::move(mean)), deviations_(std::move(deviations)) {
+    set_num_residuals(static_cast<int>(mean_.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<std::int32_t>(mean_.size()));
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Index size = mean_.size();
+    const Eigen::Map<const Eigen::VectorXd> values(parameters[0], size);
+    Eigen::Map<Eigen::VectorXd>(residuals, size) = (values - mean_).cwiseQuotient(deviations_);
+    if (jacobians && jacobians[0]) {
+      using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      Eigen::Map<Jacobian>(jacobians[0], size, size) = deviations_.cwiseInverse().asDiagonal();
+    }
+    return true;
+  }
+
+ private:
+  Eigen::VectorXd mean_, deviations_;
+};
 
 core::Status check(const FlightPrior& prior) {
   if (!prior.center_of_mass.allFinite() || !prior.gravity_W.allFinite() || !prior.unit_inertia.allFinite())
@@ -240,10 +263,9 @@ class FlightFit {
       problem.AddResidualBlock(costs_[i].get(), nullptr, all[0], all[1], all[2], all[3]);
       order->AddElementToGroup(all[3], 0);
     }
-    std::vector<std::unique_ptr<ceres::NormalPrior>> priors;
+    std::vector<std::unique_ptr<Prior>> priors;
     const auto hold = [&](int first, int size, const Eigen::VectorXd& mean) {
-      const Eigen::MatrixXd precision = deviations_.segment(first, size).cwiseInverse().asDiagonal();
-      priors.push_back(std::make_unique<ceres::NormalPrior>(precision, mean));
+      priors.push_back(std::make_unique<Prior>(mean, deviations_.segment(first, size)));
       problem.AddResidualBlock(priors.back().get(), nullptr, values_.data() + first);
       order->AddElementToGroup(values_.data() + first, 1);
     };
