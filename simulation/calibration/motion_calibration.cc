@@ -255,9 +255,15 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     const auto refined = [&](double share) {
       if (progress) progress({0.5 + 0.5 * (turn + share) / kTurns, std::nullopt, "errors"});
     };
+    const std::vector<EstimatedParameter> estimated = varied.estimated(best);
     PRESCENE_TRY(estimate,
-                 m_estimate(varied.estimated(best), judge.observations(), simulate,
+                 m_estimate(estimated, judge.observations(), simulate,
                             stream.at(static_cast<std::uint64_t>(turn), kTrialDraws), options.estimate, refined));
+    // What is hardly told may end beyond what can be.
+    for (std::size_t i = 0; i < estimated.size(); ++i) {
+      double& value = estimate.value[static_cast<Eigen::Index>(i)];
+      value = std::clamp(value, estimated[i].low, estimated[i].high);
+    }
     best = varied.with_parameters(best, std::span(estimate.value.data(), varied.free().size()));
     result.evaluations += estimate.evaluations;
     if (turn + 1 == kTurns) break;

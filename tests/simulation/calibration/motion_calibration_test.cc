@@ -140,6 +140,19 @@ TEST_F(MotionCalibrationTest, SlidesTellFrictionAndNothingOfRestitution) {
   EXPECT_NEAR(restitution.value, 0.2, 0.2);
 }
 
+TEST_F(MotionCalibrationTest, EdgesThatNothingIsToldOfAreNotRoundedInside) {
+  const auto motions = begun(slides({}, 8));
+  ASSERT_TRUE(motions.ok());
+  MotionPrior prior = contact_prior();
+  prior[1] = {BoxTruth{}.impact_friction, 0.0};
+  prior[4] = {0.0, 0.002};  // half of what is believed is below 0
+  const auto found = calibrated(*motions, prior, pool_);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  const CalibratedParameter& edges = found->parameters.back();
+  ASSERT_EQ(edges.parameter, MotionParameter::kEdgeRadius);
+  EXPECT_GE(edges.value, 0.0);
+}
+
 TEST_F(MotionCalibrationTest, StopsWhenTold) {
   const auto motions = begun(tosses({}, 8));
   ASSERT_TRUE(motions.ok());
