@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <system_error>
 
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
@@ -132,7 +134,11 @@ belief::PredictDetail detail_of(const Options& options, bool json) {
 
 core::Status run(const Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
-  PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene, options.report}));
+  PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene}));
+  std::error_code none;
+  const auto place = [&](const std::string& file) { return std::filesystem::weakly_canonical(file, none); };
+  if (!options.heat_map.empty() && !options.report.empty() && place(options.heat_map) == place(options.report))
+    return core::invalid_input("--heat-map and --report name the same file " + options.report + ": name two");
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
   BackendSettings settings;
   if (options.stepper == "bullet") settings.stepper = Stepper::kBullet;

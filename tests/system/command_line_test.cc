@@ -148,6 +148,16 @@ TEST(CommandLine, APredictionOfThingsInEachOtherSaysSo) {
   EXPECT_TRUE(document["final_poses"].empty());
 }
 
+TEST(CommandLine, TwoOutputsAreTwoFiles) {
+  const ScratchDir folder;
+  const std::string output = (folder.path() / "out").string();
+  const Finished finished = run_program({"predict", scenario("milk_on_bin"), "--max-instances", "4", "--report", output,
+                                         "--heat-map", folder.path().string() + "/./out"});
+  EXPECT_EQ(finished.exit_code, 2) << finished.err;
+  EXPECT_NE(finished.err.find("name two"), std::string::npos) << finished.err;
+  EXPECT_FALSE(std::filesystem::exists(output));
+}
+
 TEST(CommandLine, AnInputIsNeverOverwritten) {
   const ScratchDir folder;
   const std::string scene = (folder.path() / "scene.yaml").string();
