@@ -235,9 +235,7 @@ int run(const Arguments& arguments) {
   print(report, results);
   if (arguments.out.empty()) return 0;
   add_raw_figures(results, &report);
-  const core::Status status = report.write(arguments.out);
-  if (!status.ok()) std::fprintf(stderr, "%s\n", status.message().c_str());
-  return status.ok() ? 0 : 1;
+  return report.finish(arguments.out);
 }
 
 }  // namespace

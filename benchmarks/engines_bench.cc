@@ -137,10 +137,7 @@ int run(int instances, const std::string& out) {
   std::fputs(report.text().c_str(), stdout);
   std::printf("%s\n%s\n%d of %zu scenes disagree, %d at 1/2000 s\n", text_of(classes).c_str(), text_of(runs).c_str(),
               scenes_apart, runs.rows.size(), scenes_apart_fine);
-  if (out.empty()) return 0;
-  const core::Status status = report.write(out);
-  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
-  return status.ok() ? 0 : 1;
+  return report.finish(out);
 }
 
 }  // namespace

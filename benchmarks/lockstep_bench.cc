@@ -131,10 +131,7 @@ int run(int count, const std::string& scenarios, const std::string& out) {
   std::fputs(text_of(table).c_str(), stdout);
   report.add(std::move(table));
   std::fputs(report.text().c_str(), stdout);
-  if (out.empty()) return 0;
-  const core::Status status = report.write(out);
-  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
-  return status.ok() ? 0 : 1;
+  return report.finish(out);
 }
 
 }  // namespace

@@ -156,6 +156,13 @@ std::string Report::text() const {
   return text + "\n" + text_of(table) + (remarks.empty() ? "" : "\n" + remarks);
 }
 
+int Report::finish(const std::filesystem::path& path) const {
+  if (path.empty()) return 0;
+  const core::Status status = write(path);
+  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
+  return status.ok() ? 0 : 1;
+}
+
 core::Status Report::write(const std::filesystem::path& path) const {
   Json json = {{"name", name_}, {"machine", machine_}, {"simd_target", simd_target_}, {"notes", notes_}};
   json["targets"] = Json::array();

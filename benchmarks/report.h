@@ -76,6 +76,8 @@ class Report {
   /// `path` and, for each table with rows, `path` with ".TABLE.csv" instead of its extension;
   /// plots likewise with ".PLOT.svg". Fails as writing does.
   core::Status write(const std::filesystem::path& path) const;
+  /// write() where a path is given, a failure to stderr; the benchmark's exit status.
+  int finish(const std::filesystem::path& path) const;
 
  private:
   std::string name_;

@@ -256,10 +256,7 @@ int run(const Arguments& arguments) {
   std::fputs(report.text().c_str(), stdout);
   for (const Table* table : {&contacts, &tables.cost, &tables.coverage, &tables.certificates})
     std::printf("\n%s", text_of(*table).c_str());
-  if (arguments.out.empty()) return 0;
-  const core::Status status = report.write(arguments.out);
-  if (!status.ok()) std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
-  return status.ok() ? 0 : 1;
+  return report.finish(arguments.out);
 }
 
 }  // namespace
