@@ -62,4 +62,21 @@ inline void expect_tipping_at_the_diagonal(simulation::Instance& instance, const
   EXPECT_NEAR(0.5 * (low + high), expected, tolerance) << width << " x " << height;
 }
 
+/// The scene's boxes of 10 cm stand on each other, each turned and shifted a little against the one below; they stay
+/// for ten seconds within `distance` (m) and `turn` (rad).
+inline void expect_stack_stays(simulation::Instance& instance, const Scene& scene, double distance, double turn) {
+  WorldState start = start_of(scene);
+  for (std::size_t i = 0; i < start.objects.size(); ++i) {
+    const auto n = static_cast<double>(i);
+    start.objects[i].X_WO = Pose{about(Vector3d::UnitZ(), 0.1 * n), {0.004 * n, -0.003 * n, 0.05 + 0.1 * n}};
+  }
+  instance.set_state(start);
+  step_for(instance, 10.0);
+  const WorldState end = instance.state();
+  for (std::size_t i = 0; i < start.objects.size(); ++i) {
+    EXPECT_LT((end.objects[i].X_WO.translation - start.objects[i].X_WO.translation).norm(), distance) << i;
+    EXPECT_LT(geometry::angle_between(end.objects[i].X_WO.rotation, start.objects[i].X_WO.rotation), turn) << i;
+  }
+}
+
 }  // namespace prescene::tests

@@ -43,6 +43,17 @@ std::vector<SimulatedMotion> recorded(const std::vector<belief::WorldState>& sta
   return motions;
 }
 
+/// `place` sets where the box is and how it moves, one start after the other.
+template <class Place>
+std::vector<belief::WorldState> moving_starts(const belief::Scene& scene, int count, const Place& place) {
+  std::vector<belief::WorldState> starts(static_cast<std::size_t>(count), belief::mean_start(scene));
+  for (belief::WorldState& start : starts) {
+    start.objects[0].mode = belief::MotionMode::kMoving;
+    place(start.objects[0]);
+  }
+  return starts;
+}
+
 }  // namespace
 
 belief::Scene box_scene(const BoxTruth& truth) {
@@ -90,34 +101,24 @@ std::string box_scene_yaml(const BoxTruth& truth) {
 std::vector<SimulatedMotion> simulated_tosses(const belief::Scene& scene, const simulation::Simulator& simulator,
                                               int count, core::RandomStream stream, core::ThreadPool& pool,
                                               const TrackerNoise& noise) {
-  std::vector<belief::WorldState> starts;
-  for (int i = 0; i < count; ++i) {
-    belief::WorldState start = belief::mean_start(scene);
-    belief::ObjectState& box = start.objects[0];
-    box.mode = belief::MotionMode::kMoving;
+  const auto starts = moving_starts(scene, count, [&](belief::ObjectState& box) {
     box.X_WO.translation = {0.0, 0.0, stream.uniform(0.25, 0.35)};
     box.X_WO.rotation = geometry::exp_rotation(2.0 * geometry::normal_vector(stream));
     box.V_WO.linear = Vector3d(1.0, 0.0, 0.0) + 0.3 * geometry::normal_vector(stream);
     box.V_WO.angular = 5.0 * geometry::normal_vector(stream);
-    starts.push_back(start);
-  }
+  });
   return recorded(starts, simulator, stream, pool, noise);
 }
 
 std::vector<SimulatedMotion> simulated_slides(const belief::Scene& scene, const simulation::Simulator& simulator,
                                               int count, core::RandomStream stream, core::ThreadPool& pool,
                                               const TrackerNoise& noise) {
-  std::vector<belief::WorldState> starts;
-  for (int i = 0; i < count; ++i) {
-    belief::WorldState start = belief::mean_start(scene);
-    belief::ObjectState& box = start.objects[0];
-    box.mode = belief::MotionMode::kMoving;
+  const auto starts = moving_starts(scene, count, [&](belief::ObjectState& box) {
     box.X_WO.translation = {0.0, 0.0, 0.5 * kEdge};
     box.X_WO.rotation = geometry::exp_rotation({0.0, 0.0, stream.uniform(-3.0, 3.0)});
     box.V_WO.linear = {stream.uniform(0.8, 1.2), 0.0, 0.0};
     box.V_WO.angular = {0.0, 0.0, stream.uniform(-1.0, 1.0)};
-    starts.push_back(start);
-  }
+  });
   return recorded(starts, simulator, stream, pool, noise);
 }
 

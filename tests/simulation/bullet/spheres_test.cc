@@ -77,19 +77,7 @@ TEST(Spheres, StacksOfThreeStayForTenSeconds) {
                                  : packed_model(name, geometry::make_mesh(BoxShape{{0.1, 0.1, 0.1}})),
                  name);
     }
-    auto instance = instance_of(scene);
-    WorldState start = start_of(scene);
-    for (int i = 0; i < 3; ++i) {
-      start.objects[static_cast<std::size_t>(i)].X_WO =
-          Pose{about(Vector3d::UnitZ(), 0.1 * i), {0.004 * i, -0.003 * i, 0.05 + 0.1 * i}};
-    }
-    instance->set_state(start);
-    step_for(*instance, 10.0);
-    const WorldState end = instance->state();
-    for (std::size_t i = 0; i < 3; ++i) {
-      EXPECT_LT((end.objects[i].X_WO.translation - start.objects[i].X_WO.translation).norm(), 2e-5) << i;
-      EXPECT_LT(geometry::angle_between(end.objects[i].X_WO.rotation, start.objects[i].X_WO.rotation), 1e-4) << i;
-    }
+    expect_stack_stays(*instance_of(scene), scene, 2e-5, 1e-4);
   }
 }
 
