@@ -72,7 +72,8 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   options.keep_contacts = detail.keep_contacts;
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
   if (!detail.to_rest && !foresight.variables.empty())
-    foresight.certifier = simulation::make_certifier(foresight.scene, foresight.variables, foresight.request);
+    foresight.certifier =
+        simulation::make_certifier(foresight.scene, foresight.variables, foresight.request, {.shapes = context.shapes});
   options.certifier = foresight.certifier.get();
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,

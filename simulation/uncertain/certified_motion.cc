@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/simulation/uncertain/bearing_body.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -40,27 +42,29 @@ double depth_of(const ConvexPolytope& hull, const Vector3d& p) {
   return least;
 }
 
-// Spheres round what a mesh has flat and lie inside of its edges: faces, hulls and water levels say too much of them.
-bool collides_as_spheres(const std::vector<belief::CollisionShape>& shapes) {
-  return std::any_of(shapes.begin(), shapes.end(), [](const belief::CollisionShape& shape) {
-    const auto* mesh = std::get_if<belief::MeshShape>(&shape);
-    return mesh && mesh->use == belief::MeshUse::kSpheres;
-  });
-}
-
-std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model) {
+std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model, ShapeStore* store) {
   auto hull = make_polytope(belief::collision_mesh(model).vertices);
   if (!hull) return std::nullopt;
   CertifiedObject object;
   object.hull = *std::move(hull);
+  object.bearing = object.hull;
   object.shapes = shape_hulls(model.collision);
   object.center_of_mass = belief::mean(model.center_of_mass);
   object.center_play = belief::dimensions(model.center_of_mass) > 0 ? 2e-3 : 1e-9;
+  if (collides_as_spheres(model.collision)) {
+    if (!store) return std::nullopt;
+    std::optional<BearingBody> body = bearing_body(model.collision, object.hull, object.center_of_mass, *store);
+    if (!body) return std::nullopt;
+    object.bearing = std::move(body->polytope);
+    object.rise = body->rise;
+    object.inner_radius = std::max(0.0, body->inner_radius - object.center_play);
+  }
   object.edge_radius = std::max(kLeastEdge, model.contact.edge_radius);
   for (const ConvexPolytope& shape : object.shapes)
     object.inner_radius = std::max(object.inner_radius, depth_of(shape, object.center_of_mass) - object.center_play);
   for (const Vector3d& v : object.hull.vertices)
-    object.outer_radius = std::max(object.outer_radius, (v - object.center_of_mass).norm() + object.center_play);
+    object.outer_radius =
+        std::max(object.outer_radius, (v - object.center_of_mass).norm() + object.rise + object.center_play);
   return object;
 }
 
@@ -70,18 +74,15 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
                                                              const CertifierOptions& options) {
   const Vector3d& gravity = scene.gravity_W;
   if (gravity.x() != 0.0 || gravity.y() != 0.0 || !(gravity.z() < 0.0)) return nullptr;
-  for (const belief::SceneObject& object : scene.objects)
-    if (collides_as_spheres(scene.model_of(object).collision)) return nullptr;
+  // Between spheres of a fixed thing others come lower than its faces, hulls and water levels say.
   for (const belief::Support& support : scene.supports)
     if (collides_as_spheres(support.collision)) return nullptr;
-  for (const belief::KinematicBody& body : scene.robot)
-    if (collides_as_spheres(body.collision)) return nullptr;
   auto made = std::make_unique<MotionCertifier>();
   made->options_ = options;
   made->gravity_ = -gravity.z();
   made->robot_ = !scene.robot.empty();
   for (const belief::SceneObject& object : scene.objects) {
-    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object));
+    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object), options.shapes);
     if (!certified) return nullptr;
     made->objects_.push_back(*std::move(certified));
     made->unit_inertias_.push_back(scene.model_of(object).unit_inertia);
@@ -125,6 +126,8 @@ bool MotionCertifier::assess(const belief::WorldState& state, double seconds_lef
     motion.kinetic = motion.spin + 0.5 * object.physical.mass * motion.velocity.squaredNorm();
     motion.box.setEmpty();
     for (const Vector3d& v : known.hull.vertices) motion.box.extend(object.X_WO.translation + R * v);
+    motion.box.min().array() -= known.rise;
+    motion.box.max().array() += known.rise;
   }
   stand(state, motions);
   bound_heights(motions);
@@ -184,7 +187,7 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom +
                    2.0 * std::sqrt(sideways * upwards) / gravity_;
     const double edge = options_.shorten_arms ? distance_inside(*best, foot) - motion.reach : 1e30;
-    motion.trap = trap_of(objects_[i].hull, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
+    motion.trap = trap_of(objects_[i].bearing, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
                           objects_[i].edge_radius);
   }
 }

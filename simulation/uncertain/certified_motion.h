@@ -17,8 +17,10 @@ namespace prescene::simulation {
 /// What of an object does not change from instance to instance.
 struct CertifiedObject {
   ConvexPolytope hull;                 ///< Of the whole body, in O.
+  ConvexPolytope bearing;              ///< What of the hull is sure to hold planes off, in O.
   std::vector<ConvexPolytope> shapes;  ///< In O.
   Vector3d center_of_mass = Vector3d::Zero();
+  double rise = 0.0;          ///< How far the body may leave the hull, m.
   double center_play = 0.0;   ///< How far an instance's centre of mass may be from that, m.
   double inner_radius = 0.0;  ///< Of a ball about any such centre that the body holds, m; 0 = none known.
   double outer_radius = 0.0;  ///< Of a ball about any such centre that holds the body, m.

@@ -20,7 +20,12 @@
 
 namespace prescene::simulation {
 
+class ShapeStore;
+
 struct CertifierOptions {
+  /// Where the spheres of objects that collide as spheres are kept; without it, scenes that have such get no
+  /// certificates.
+  ShapeStore* shapes = nullptr;
   /// Off only to see that the audit catches it: supports are taken to be without edges.
   bool shorten_arms = true;
 };
@@ -35,8 +40,8 @@ class Certifier : public EndRule {
 };
 
 /// Understands conditions at the end: inside a volume, below a height, upright, a face up, resting on a support or
-/// object; and actions that let go. Null where any variable needs something else, or gravity is not along -z of W.
-/// `request` tells actions and duration.
+/// object; and actions that let go. Null where any variable needs something else, gravity is not along -z of W, or
+/// spheres stand for a support. `request` tells actions and duration.
 std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const belief::Scene>& scene,
                                                 std::span<const Variable> variables, const RunRequest& request,
                                                 const CertifierOptions& options = {});

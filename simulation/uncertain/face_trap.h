@@ -42,8 +42,9 @@ struct Trap {
   double tilt(double height) const;
 };
 
-/// `hull` is that of the whole body in O; `edge_radius` rounds its edges (m); `longest_arm` (m) is how far from below
-/// the centre of mass the support is sure to reach. Nothing when the body is not above the plane at `plane_height`.
+/// `hull` is that of the whole body in O, or lies inside of it; `edge_radius` rounds its edges (m); `longest_arm` (m)
+/// is how far from below the centre of mass the support is sure to reach. Nothing when the body is not above the plane
+/// at `plane_height`.
 std::optional<Trap> trap_of(const ConvexPolytope& hull, const Pose& X_WO, const Vector3d& center_of_mass_O,
                             double plane_height, double longest_arm, double edge_radius);
 
