@@ -16,10 +16,8 @@ using geometry::ColorImage;
 using geometry::Rgb;
 using geometry::Vector3d;
 
-constexpr int kFiner = 2;       // pixels are rendered so many times finer on each side, then averaged
-constexpr double kPale = 0.5;   // share of white over the scene, so that what is painted on it stands out
-constexpr double kReach = 4.0;  // standard deviations of a kernel
-constexpr int kDensityCells = 420;
+constexpr int kFiner = 2;      // pixels are rendered so many times finer on each side, then averaged
+constexpr double kPale = 0.5;  // share of white over the scene, so that what is painted on it stands out
 
 void mix(Rgb& pixel, const Rgb& color, double share) {
   for (std::size_t c = 0; c < 3; ++c)
@@ -52,8 +50,8 @@ rendering::RenderOptions options_for(const MapView& view) {
   return options;
 }
 
-/// Darkens where surfaces end or bend, as a draughtsman would.
-void draw_edges(const rendering::RenderedView& images, ColorImage& picture) {
+/// 1 where surfaces end or bend, as a draughtsman would draw them.
+geometry::Image<std::uint8_t> edges_of(const rendering::RenderedView& images) {
   constexpr double kBend = 0.85;   // cosine
   constexpr double kJump = 0.012;  // m, more where surfaces are seen flat
   const auto edge_between = [&](int x, int y, int u, int v) {
@@ -64,96 +62,45 @@ void draw_edges(const rendering::RenderedView& images, ColorImage& picture) {
     const double flat = std::max(0.05, std::abs(static_cast<double>(images.normals(x, y).z())));
     return std::abs(static_cast<double>(a - b)) > kJump / flat;
   };
-  for (int y = 1; y + 1 < picture.height(); ++y)
-    for (int x = 1; x + 1 < picture.width(); ++x)
-      if (edge_between(x, y, x + 1, y) || edge_between(x, y, x, y + 1) || edge_between(x, y, x - 1, y) ||
-          edge_between(x, y, x, y - 1))
-        mix(picture(x, y), {60, 62, 68}, 0.6);
+  geometry::Image<std::uint8_t> edges(images.depth.width(), images.depth.height(), 0);
+  for (int y = 1; y + 1 < edges.height(); ++y)
+    for (int x = 1; x + 1 < edges.width(); ++x)
+      edges(x, y) = edge_between(x, y, x + 1, y) || edge_between(x, y, x, y + 1) || edge_between(x, y, x - 1, y) ||
+                    edge_between(x, y, x, y - 1);
+  return edges;
+}
+
+void draw_edges(const geometry::Image<std::uint8_t>& edges, ColorImage& picture) {
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    if (edges.data()[i] != 0) mix(picture.data()[i], {60, 62, 68}, 0.6);
+}
+
+struct Rendered {
+  rendering::RenderedView images;
+  ColorImage pale;
+};
+
+core::Result<Rendered> render_pale(const belief::Scene& scene, const belief::WorldState& state, const MapView& view,
+                                   Backends& backends) {
+  PRESCENE_TRY(const auto renderer, backends.make_renderer());
+  const filter::BeliefView what =
+      filter::render_scene(scene, state, {}, filter::MeshDetail::kDisplay, backends.meshes());
+  Rendered rendered;
+  PRESCENE_RETURN_IF_ERROR(renderer->render(what.scene, view.camera, view.X_WC, options_for(view), &rendered.images));
+  rendering::SimulatedCameraOptions look;
+  look.background_low = look.background_high = {225, 228, 232};
+  rendering::shade(what.scene, rendered.images, view.X_WC, look, &rendered.pale);
+  for (std::size_t i = 0; i < rendered.pale.size(); ++i) {
+    Rgb& pixel = rendered.pale.data()[i];
+    // Half of the colour and most of the darkness are taken out.
+    const auto grey = static_cast<std::uint8_t>((pixel[0] + pixel[1] + pixel[2]) / 3);
+    mix(pixel, {grey, grey, grey}, 0.5);
+    mix(pixel, {255, 255, 255}, kPale);
+  }
+  return rendered;
 }
 
 }  // namespace
-
-GroundDensity::GroundDensity(std::span<const belief::PoseComponent> components, const Vector2d& low,
-                             const Vector2d& high)
-    : low_(low) {
-  cell_ = (high - low).maxCoeff() / kDensityCells;
-  nx_ = std::max(2, static_cast<int>(std::ceil((high.x() - low.x()) / cell_)) + 1);
-  ny_ = std::max(2, static_cast<int>(std::ceil((high.y() - low.y()) / cell_)) + 1);
-  values_.assign(static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_), 0.0);
-  for (const belief::PoseComponent& component : components) {
-    Eigen::Matrix2d covariance = component.covariance.block<2, 2>(3, 3);
-    covariance.diagonal().array() += 0.25 * cell_ * cell_;  // narrower than a cell would be missed between nodes
-    const Eigen::Matrix2d inverse = covariance.inverse();
-    const double peak = component.weight / (2.0 * M_PI * std::sqrt(covariance.determinant()));
-    const Vector2d mean = component.mean.translation.head<2>();
-    const Vector2d reach = kReach * covariance.diagonal().cwiseSqrt();
-    const auto first = [&](int axis) {
-      return std::max(0, static_cast<int>(std::ceil((mean[axis] - reach[axis] - low[axis]) / cell_)));
-    };
-    const auto last = [&](int axis, int count) {
-      return static_cast<int>(std::min(count - 1.0, std::floor((mean[axis] + reach[axis] - low[axis]) / cell_)));
-    };
-    for (int iy = first(1); iy <= last(1, ny_); ++iy) {
-      for (int ix = first(0); ix <= last(0, nx_); ++ix) {
-        const Vector2d d = low + cell_ * Vector2d(ix, iy) - mean;
-        values_[static_cast<std::size_t>(iy) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(ix)] +=
-            peak * std::exp(-0.5 * d.dot(inverse * d));
-      }
-    }
-  }
-  largest_ = *std::max_element(values_.begin(), values_.end());
-}
-
-double GroundDensity::at(double x, double y) const {
-  const double u = (x - low_.x()) / cell_, v = (y - low_.y()) / cell_;
-  if (!(u >= 0.0 && v >= 0.0 && u < nx_ - 1.0 && v < ny_ - 1.0)) return 0.0;
-  const auto ix = static_cast<std::size_t>(u), iy = static_cast<std::size_t>(v);
-  const double a = u - static_cast<double>(ix), b = v - static_cast<double>(iy);
-  const double* row = &values_[iy * static_cast<std::size_t>(nx_) + ix];
-  const double* next = row + nx_;
-  return (1.0 - b) * ((1.0 - a) * row[0] + a * row[1]) + b * ((1.0 - a) * next[0] + a * next[1]);
-}
-
-double GroundDensity::level_of(double share) const {
-  std::vector<double> sorted = values_;
-  std::sort(sorted.begin(), sorted.end(), std::greater<>());
-  double sum = 0.0;
-  for (double value : sorted) {
-    sum += value * cell_ * cell_;
-    if (sum >= share) return value;
-  }
-  return 0.0;  // the rest lies outside of the grid
-}
-
-std::vector<DensityLevel> levels_of(const belief::FinalPoses& poses, const geometry::TriangleMesh& mesh,
-                                    const Vector2d& low, const Vector2d& high) {
-  constexpr double kTogether = 0.03;  // m
-  struct Placed {
-    double height;
-    belief::PoseComponent component;
-  };
-  std::vector<Placed> placed;
-  for (const belief::PoseComponent& component : poses.components) {
-    double lowest = 1e9;
-    for (const Vector3d& vertex : mesh.vertices) lowest = std::min(lowest, (component.mean * vertex).z());
-    placed.push_back({lowest, component});
-  }
-  std::stable_sort(placed.begin(), placed.end(), [](const Placed& a, const Placed& b) { return a.height < b.height; });
-  std::vector<DensityLevel> levels;
-  for (std::size_t begin = 0; begin < placed.size();) {
-    std::size_t end = begin;
-    double mass = 0.0, moment = 0.0;
-    std::vector<belief::PoseComponent> components;
-    while (end < placed.size() && placed[end].height - placed[begin].height < kTogether) {
-      mass += placed[end].component.weight;
-      moment += placed[end].component.weight * placed[end].height;
-      components.push_back(placed[end++].component);
-    }
-    levels.push_back({moment / mass, GroundDensity(components, low, high)});
-    begin = end;
-  }
-  return levels;
-}
 
 MapView map_view(const Vector2d& low, const Vector2d& high, int width, int height) {
   constexpr double kHeights = 25.0;  // of the extent: things as high as they are wide shift by 2 %
@@ -228,61 +175,62 @@ double warm_opacity(double value) {
 
 core::Result<SceneView> SceneView::make(const belief::Scene& scene, const belief::WorldState* state,
                                         std::size_t left_out, const MapView& view, Backends& backends) {
+  constexpr double kSeenThrough = 0.5;
   SceneView made(view);
   made.view_.camera = enlarged(view.camera);
-  PRESCENE_TRY(const auto renderer, backends.make_renderer());
-  belief::Scene others = scene;
-  others.robot.clear();
-  belief::WorldState where;
-  if (state) {
-    where = *state;
+  belief::Scene supports = scene;
+  supports.robot.clear();
+  supports.objects.clear();
+  PRESCENE_TRY(Rendered bare, render_pale(supports, {}, made.view_, backends));
+  const geometry::Image<std::uint8_t> edges = edges_of(bare.images);
+  made.image_ = std::move(bare.pale);
+  made.support_depth_ = made.depth_ = std::move(bare.images.depth);
+  made.object_edges_ = geometry::Image<std::uint8_t>(edges.width(), edges.height(), 0);
+  if (state && scene.objects.size() > 1) {
+    belief::Scene others = scene;
+    others.robot.clear();
+    belief::WorldState where = *state;
     where.objects.erase(where.objects.begin() + static_cast<std::ptrdiff_t>(left_out));
     others.objects.erase(others.objects.begin() + static_cast<std::ptrdiff_t>(left_out));
-  } else {
-    others.objects.clear();
+    PRESCENE_TRY(const Rendered full, render_pale(others, where, made.view_, backends));
+    made.object_edges_ = edges_of(full.images);
+    for (std::size_t i = 0; i < made.image_.size(); ++i) {
+      if (edges.data()[i] != 0) made.object_edges_.data()[i] = 0;
+      if (full.images.depth.data()[i] != made.depth_.data()[i])
+        mix(made.image_.data()[i], full.pale.data()[i], kSeenThrough);
+    }
+    made.depth_ = full.images.depth;
   }
-  const filter::BeliefView what =
-      filter::render_scene(others, where, {}, filter::MeshDetail::kDisplay, backends.meshes());
-  rendering::RenderedView images;
-  PRESCENE_RETURN_IF_ERROR(renderer->render(what.scene, made.view_.camera, view.X_WC, options_for(view), &images));
-  rendering::SimulatedCameraOptions look;
-  look.background_low = look.background_high = {225, 228, 232};
-  rendering::shade(what.scene, images, view.X_WC, look, &made.image_);
-  for (std::size_t i = 0; i < made.image_.size(); ++i) {
-    Rgb& pixel = made.image_.data()[i];
-    // Half of the colour and most of the darkness are taken out.
-    const auto grey = static_cast<std::uint8_t>((pixel[0] + pixel[1] + pixel[2]) / 3);
-    mix(pixel, {grey, grey, grey}, 0.5);
-    mix(pixel, {255, 255, 255}, kPale);
-  }
-  draw_edges(images, made.image_);
-  made.depth_ = std::move(images.depth);
+  draw_edges(edges, made.image_);
+  draw_edges(made.object_edges_, made.image_);
   return made;
 }
 
 void SceneView::paint(const std::vector<DensityLevel>& levels, const GroundDensity& whole,
                       std::span<const double> outlined_shares) {
   constexpr double kTolerance = 0.012;  // m: a plane that lies so little below a surface lies on it
-  if (!(whole.largest() > 0.0)) return;
+  if (!(whole.largest_mass() > 0.0)) return;
   geometry::Image<float> painted(image_.width(), image_.height(), 0.0f);
   const Vector3d& eye = view_.X_WC.translation;
   for (int v = 0; v < image_.height(); ++v) {
     for (int u = 0; u < image_.width(); ++u) {
       const Vector3d ray = view_.X_WC.rotation * view_.camera.unproject(u, v, 1.0);
-      const double depth = depth_(u, v);
-      double value = 0.0;
+      const double depth = support_depth_(u, v);
+      double value = 0.0, mass = 0.0;
       for (const DensityLevel& level : levels) {
         const double t = (level.height - eye.z()) / ray.z();  // z in C of the plane at this pixel
         if (!(t > 0.0) || !std::isfinite(t)) continue;
         const Vector3d p_WQ = eye + t * ray;
         if (depth > 0.0 && (eye + depth * ray).z() > level.height + kTolerance && depth < t) continue;
         value += level.density.at(p_WQ.x(), p_WQ.y());
+        mass += level.density.mass_around(p_WQ.x(), p_WQ.y());
       }
       painted(u, v) = static_cast<float>(value);
-      const double shown = std::sqrt(std::min(1.0, value / whole.largest()));
+      const double shown = std::sqrt(std::min(1.0, mass / whole.largest_mass()));
       mix(image_(u, v), warm_color(shown), warm_opacity(shown));
     }
   }
+  draw_edges(object_edges_, image_);
   for (const double share : outlined_shares) {
     const auto level = static_cast<float>(whole.level_of(share));
     if (!(level > 0.0f)) continue;

@@ -12,36 +12,9 @@
 #include "prescene/geometry/image.h"
 #include "prescene/geometry/pose.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/ground_density.h"
 
 namespace prescene::service {
-
-/// A density of positions over the ground, kept on a fine grid.
-class GroundDensity {
- public:
-  /// Of the positions of `components`, over x, y in [low, high] (m).
-  GroundDensity(std::span<const belief::PoseComponent> components, const Eigen::Vector2d& low,
-                const Eigen::Vector2d& high);
-  double at(double x, double y) const;  ///< 1/m^2; 0 outside.
-  double largest() const { return largest_; }
-  /// Density above which the given share of the whole mass lies.
-  double level_of(double share) const;
-
- private:
-  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
-  double cell_ = 0.01;
-  int nx_ = 0, ny_ = 0;
-  std::vector<double> values_;
-  double largest_ = 0.0;
-};
-
-/// The part of a density that rests at about one height.
-struct DensityLevel {
-  double height = 0.0;  ///< z in W of what it rests on, m.
-  GroundDensity density;
-};
-/// Final positions by the height of the object's lowest point, heights nearer than 3 cm together.
-std::vector<DensityLevel> levels_of(const belief::FinalPoses& poses, const geometry::TriangleMesh& mesh,
-                                    const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
 /// Looks straight down from far above, so that the picture is a map: one metre is `scale` pixels.
 struct MapView {
@@ -56,12 +29,12 @@ MapView perspective_view(std::span<const geometry::Vector3d> points, const geome
 class SceneView {
  public:
   /// Renders supports and, as they are in `state` (if any), the objects but one, at twice the size, pale; not the
-  /// robot.
+  /// robot. The objects are seen through.
   static core::Result<SceneView> make(const belief::Scene& scene, const belief::WorldState* state, std::size_t left_out,
                                       const MapView& view, Backends& backends);
 
-  /// Colours the planes at the levels' heights where nothing hides them, as shares of the largest of `whole`; with
-  /// lines around the areas of its highest density that hold these shares.
+  /// Colours the planes at the levels' heights where no support hides them, by the mass around each place as a share of
+  /// the largest of `whole`; with lines around the areas of its highest density that hold these shares.
   void paint(const std::vector<DensityLevel>& levels, const GroundDensity& whole,
              std::span<const double> outlined_shares);
   /// The object's silhouette at a pose, tinted where it is seen, outlined everywhere.
@@ -78,12 +51,13 @@ class SceneView {
 
  private:
   SceneView(const MapView& view) : view_(view) {}
-  MapView view_;  // its camera is of twice the size
-  geometry::DepthImage depth_;
+  MapView view_;                                // its camera is of twice the size
+  geometry::DepthImage depth_, support_depth_;  // with the objects, and without
   geometry::ColorImage image_;
+  geometry::Image<std::uint8_t> object_edges_;  // 1 where an object's edge is, drawn over what is painted
 };
 
-/// Colour of a share of the largest density, in [0, 1]: from pale yellow over orange to dark red, evenly darker.
+/// Colour of a share of the largest mass, in [0, 1]: from pale yellow over orange to dark red, evenly darker.
 geometry::Rgb warm_color(double value);
 /// How strongly it is laid over the scene.
 double warm_opacity(double value);
