@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
@@ -18,11 +19,11 @@ namespace prescene::service {
 namespace {
 
 constexpr std::size_t kMaxTextBytes = std::size_t{256} << 20;
-constexpr const char* kTable = "tosses.csv";
 constexpr std::array<const char*, 9> kColumns = {"toss", "t", "x", "y", "z", "qw", "qx", "qy", "qz"};
 // Of a quaternion's length: cells with three decimals.
 constexpr double kLengthTolerance = 2e-3;
 constexpr double kLargestNumber = 1e9;
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 std::vector<std::string_view> cells_of(std::string_view line) {
   std::vector<std::string_view> cells;
@@ -44,6 +45,13 @@ class TableReader {
 
   core::Status read_header(std::string_view line) {
     const std::vector<std::string_view> names = cells_of(line);
+    if (names.size() == 1) {
+      for (const auto& [separator, word] : {std::pair(';', "semicolons"), std::pair('\t', "tabs")}) {
+        if (std::ranges::count(names[0], separator) + 1 >= static_cast<std::ptrdiff_t>(kColumns.size()))
+          return wrong(std::string("its cells are separated by ") + word +
+                       "; separate them by commas, with points in numbers: toss,t,x,y,z,qw,qx,qy,qz");
+      }
+    }
     width_ = names.size();
     for (std::size_t i = 0; i < kColumns.size(); ++i) {
       const auto found = std::ranges::find(names, kColumns[i]);
@@ -132,6 +140,7 @@ void add_files(const interfaces::LocatedValue& value, std::vector<std::string>* 
 core::Result<std::vector<MotionRecording>> read_motion_table(const std::filesystem::path& file) {
   PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(file, kMaxTextBytes));
   std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (rest.starts_with(kByteOrderMark)) rest.remove_prefix(kByteOrderMark.size());
   const auto next_line = [&] {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
     const std::string_view line = rest.substr(0, end);
@@ -148,12 +157,12 @@ core::Result<MotionDataset> read_motion_dataset(const std::filesystem::path& fol
   MotionDataset dataset;
   dataset.folder = folder;
   if (!std::filesystem::is_directory(folder)) {
-    return core::not_found(folder.string() + ": is no folder; give one with scene.yaml and " + kTable);
+    return core::not_found(folder.string() + ": is no folder; give one with scene.yaml and tosses.csv");
   }
-  for (const std::filesystem::path& file : {dataset.scene_file(), folder / kTable}) {
+  for (const std::filesystem::path& file : {dataset.scene_file(), dataset.table_file()}) {
     if (!std::filesystem::exists(file))
-      return core::not_found(file.string() + ": there is no such file; a data set is a folder with scene.yaml and " +
-                             kTable);
+      return core::not_found(file.string() +
+                             ": there is no such file; a data set is a folder with scene.yaml and tosses.csv");
     dataset.inputs.push_back(file.string());
   }
   PRESCENE_TRY(dataset.scene, load_scene(dataset.scene_file(), log));
@@ -165,7 +174,7 @@ core::Result<MotionDataset> read_motion_dataset(const std::filesystem::path& fol
     return core::invalid_input(dataset.scene_file().string() + ": it has no support; give what the object falls on");
   PRESCENE_TRY(const interfaces::LocatedValue document, interfaces::read_yaml(dataset.scene_file(), {}));
   add_files(document, &dataset.inputs);
-  PRESCENE_TRY(dataset.recordings, read_motion_table(folder / kTable));
+  PRESCENE_TRY(dataset.recordings, read_motion_table(dataset.table_file()));
   return dataset;
 }
 

@@ -27,12 +27,13 @@ struct MotionDataset {
   std::vector<std::string> inputs;          ///< Files that were read, and the scene's model file and meshes.
 
   std::filesystem::path scene_file() const { return folder / "scene.yaml"; }
+  std::filesystem::path table_file() const { return folder / "tosses.csv"; }
 };
 
 /// One recording for each value of the column `toss`, whose rows stand together. Columns may come in any order, others
-/// are left out. Fails with kNotFound or kInvalidInput that name file, line and remedy: a missing file or column, a
-/// cell that is no finite number, times that do not ascend, a quaternion that is not of length one, a toss in two
-/// places, a scene that has not exactly one object.
+/// are left out, as is a byte order mark. Fails with kNotFound or kInvalidInput that name file, line and remedy: a
+/// missing file or column, a cell that is no finite number, times that do not ascend, a quaternion that is not of
+/// length one, a toss in two places, a scene that has not exactly one object.
 core::Result<MotionDataset> read_motion_dataset(const std::filesystem::path& folder, const core::LogSink& log);
 
 /// The table alone.

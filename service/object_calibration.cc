@@ -9,7 +9,9 @@
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/scene_files/model_file.h"
+#include "prescene/service/motion_units.h"
 #include "prescene/simulation/calibration/find_beginning.h"
+#include "prescene/simulation/calibration/keep_untold.h"
 #include "prescene/simulation/calibration/sliding_fit.h"
 
 namespace prescene::service {
@@ -25,11 +27,15 @@ constexpr std::size_t kLeastFlights = 3;
 // A tracker that claims to be better than that is a simulation.
 constexpr double kLeastPositionNoise = 1e-5;  // m
 constexpr double kLeastRotationNoise = 1e-4;  // rad
-// Shares of the prior's deviation that are left: nothing was told, little was told.
-constexpr double kNothing = 0.9;
+// Share of the prior's deviation that is left where little was told.
 constexpr double kLittle = 0.6;
 // A tracker's metre is worth a remark when it is off by so much, and by three standard errors.
 constexpr double kScaleRemark = 0.003;
+// And no metre at all when gravity is off by such a factor.
+constexpr double kScaleRefused = 2.0;
+// Times as uncertain as frames show, that starts may be before the fit is called poor.
+constexpr double kPoorFit = 10.0;
+constexpr double kLeastFrameRate = 100.0;  // Hz
 
 std::size_t place_of(MotionParameter parameter) { return static_cast<std::size_t>(parameter); }
 
@@ -77,7 +83,8 @@ void use_flights(const FlightCalibration& flight, const simulation::FlightPrior&
   for (int i = 0; i < 3; ++i) {
     simulation::MotionBelief& belief = (*prior)[place_of(kCenter[static_cast<std::size_t>(i)])];
     if (belief.deviation > 0.0)
-      belief = {flight.center_of_mass[i], flight.standard_error(static_cast<FlightParameter>(i))};
+      belief = {flight.center_of_mass[i], std::max(flight.standard_error(static_cast<FlightParameter>(i)),
+                                                   simulation::least_center_error(flight.position_noise))};
   }
 }
 
@@ -88,6 +95,14 @@ core::Result<FlightCalibration> fly(const std::vector<RecordedMotion>& motions, 
       flights.push_back(std::span(motion.frames).first(motion.first_frames));
   }
   return simulation::calibrate_flights(flights, prior);
+}
+
+core::Status check_gravity(const MotionDataset& dataset, double gravity) {
+  const double given = dataset.scene->gravity_W.norm();
+  if (gravity < kScaleRefused * given && gravity * kScaleRefused > given) return core::ok_status();
+  return core::invalid_input(dataset.table_file().string() + ": flights fall with " + core::rounded_text(gravity) +
+                             " m/s^2, the scene's gravity is " + core::rounded_text(given) +
+                             ": x, y, z must be in metres and t in seconds");
 }
 
 /// Noise of the tracker, from slides where there are no flights.
@@ -116,11 +131,32 @@ core::Status measure_noise(const std::vector<RecordedMotion>& motions, simulatio
 void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
   for (const simulation::CalibratedParameter& p : found->motion.parameters) {
     if (p.left_of_prior < kLittle) continue;
-    found->remarks.push_back("these recordings say " + std::string(p.left_of_prior > kNothing ? "nothing" : "little") +
-                             " about " + words(p.parameter) + ": " + what_tells(p.parameter));
+    found->remarks.push_back("these recordings say " +
+                             std::string(p.left_of_prior >= simulation::kUntold ? "nothing" : "little") + " about " +
+                             words(p.parameter) + ": " + what_tells(p.parameter));
   }
-  if (!found->motion.settled)
-    found->remarks.emplace_back("the estimate did not settle: errors may be too small; give more --max-evaluations");
+  if (!found->motion.search_settled)
+    found->remarks.emplace_back("the search had not settled when it ended: values may be wrong; give more " +
+                                std::string("--max-evaluations"));
+  if (!found->motion.estimate_settled)
+    found->remarks.emplace_back(
+        "the estimate did not settle: errors may be too small; record more, or --keep what is "
+        "hardly told");
+  if (found->motion.start_noise > kPoorFit) {
+    found->remarks.push_back("the fit is poor: recordings differ from what the model does as if their starts were " +
+                             core::fixed_text(found->motion.start_noise, 0) +
+                             " times as uncertain as their frames show; values may be off by more than their errors: "
+                             "check shape, size and supports, and that nothing else touches the object");
+  }
+  if (found->position_noise < kLeastPositionNoise || found->rotation_noise < kLeastRotationNoise) {
+    found->remarks.push_back("the frames show next to no noise (" + core::fixed_text(1e3 * found->position_noise, 2) +
+                             " mm, " + core::fixed_text(1e3 * found->rotation_noise, 2) +
+                             " mrad): they are simulated, or smoothed by the tracker, and errors may be too small");
+  }
+  if (const double rate = frame_rate(dataset.recordings); rate < kLeastFrameRate) {
+    found->remarks.push_back("recordings have " + core::fixed_text(rate, 0) +
+                             " frames a second: starts and contacts show better at 100 Hz or more");
+  }
   if (found->flights < static_cast<int>(kLeastFlights))
     found->remarks.emplace_back("there are fewer than three flights: the centre of mass comes from contacts alone");
   if (!found->flight) return;
@@ -141,6 +177,8 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
                                                  const ObjectCalibrationOptions& options,
                                                  const core::ProgressSink& progress,
                                                  const core::Cancellation* cancellation) {
+  if (core::Status status = check_units(dataset.recordings, dataset.scene->gravity_W.norm()); !status.ok())
+    return status.at(dataset.table_file().string());
   PRESCENE_TRY(const std::vector<RecordedMotion> motions, beginnings(dataset, backends));
   ObjectCalibration found;
   for (const RecordedMotion& motion : motions)
@@ -166,20 +204,30 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
     flight.gravity_W = scene.gravity_W;
     flight.unit_inertia = model.unit_inertia;
     PRESCENE_TRY(found.flight, fly(motions, flight));
+    PRESCENE_RETURN_IF_ERROR(check_gravity(dataset, found.flight->gravity_W.norm()));
     use_flights(*found.flight, flight, &scene, &prior);
     motion.position_noise = found.flight->position_noise;
     motion.rotation_noise = found.flight->rotation_noise;
   } else {
     PRESCENE_RETURN_IF_ERROR(measure_noise(motions, &motion));
   }
+  found.position_noise = motion.position_noise;
+  found.rotation_noise = motion.rotation_noise;
   motion.position_noise = std::max(motion.position_noise, kLeastPositionNoise);
   motion.rotation_noise = std::max(motion.rotation_noise, kLeastRotationNoise);
   const auto make_simulator = [&](const belief::Scene& varied) { return backends.make_simulator(varied); };
   PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, make_simulator,
                                                core::RandomStream(options.seed, core::Purpose::kEvaluation),
                                                backends.pool(), motion, progress, cancellation));
-  for (simulation::CalibratedParameter& p : found.motion.parameters)
-    p.left_of_prior = p.standard_error / found.prior[place_of(p.parameter)].deviation;
+  // Of what was believed before the flights too.
+  for (simulation::CalibratedParameter& p : found.motion.parameters) {
+    const simulation::MotionBelief& before = found.prior[place_of(p.parameter)];
+    if (p.standard_error >= simulation::kUntold * before.deviation) {
+      p.value = before.mean;
+      p.standard_error = before.deviation;
+    }
+    p.left_of_prior = p.standard_error / before.deviation;
+  }
   found.model = calibrated_model(model, found.motion);
   add_remarks(dataset, &found);
   return found;
@@ -207,7 +255,7 @@ nlohmann::ordered_json to_json(const ObjectCalibration& found) {
   json["flights"] = found.flights;
   json["slides"] = found.slides;
   json["evaluations"] = found.motion.evaluations;
-  json["settled"] = found.motion.settled;
+  json["settled"] = found.motion.settled();
   json["score"] = {{"prior", found.motion.start_cost}, {"found", found.motion.cost}};
   json["start_noise"] = found.motion.start_noise;
   json["friction_scatter"] = found.motion.friction_scatter;

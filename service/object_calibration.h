@@ -22,7 +22,7 @@ namespace prescene::service {
 
 struct ObjectCalibrationOptions {
   std::uint64_t seed = 1;
-  int max_evaluations = 600;      ///< Of the search, > 0.
+  int max_evaluations = 1000;     ///< Of the search, > 0.
   int samples = 16;               ///< Simulated starts a recording, > 1.
   std::vector<std::string> keep;  ///< Names of parameters that stay as the model has them.
 };
@@ -31,6 +31,8 @@ struct ObjectCalibration {
   int flights = 0;  ///< Recordings that begin in flight.
   int slides = 0;   ///< That begin on a support.
   std::optional<simulation::FlightCalibration> flight;
+  double position_noise = 0.0;           ///< Of a recorded coordinate, m, as flights or slides show it.
+  double rotation_noise = 0.0;           ///< rad
   simulation::MotionPrior prior;         ///< Before any recording.
   simulation::MotionCalibration motion;  ///< left_of_prior is of that prior, after flights and contacts.
   belief::ObjectModel model;             ///< With the values as means and the errors as deviations.

@@ -100,12 +100,25 @@ core::Status run_cube(const Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
+const char* unit_of(simulation::MotionParameter parameter) {
+  switch (parameter) {
+    case simulation::MotionParameter::kFriction:
+    case simulation::MotionParameter::kImpactFriction:
+    case simulation::MotionParameter::kRestitution:
+      return "1";
+    case simulation::MotionParameter::kInertiaSize:
+      return "ln factor";
+    default:
+      return "m";
+  }
+}
+
 std::string text_of(const ObjectCalibration& found) {
-  std::vector<std::vector<std::string>> rows = {{"", "value", "+-", "before", "+-", "left of prior"}};
+  std::vector<std::vector<std::string>> rows = {{"", "unit", "value", "+-", "before", "+-", "left of prior"}};
   for (const simulation::CalibratedParameter& p : found.motion.parameters) {
     const simulation::MotionBelief& prior = found.prior[static_cast<std::size_t>(p.parameter)];
-    rows.push_back({to_string(p.parameter), fixed_text(p.value, 5), fixed_text(p.standard_error, 5),
-                    fixed_text(prior.mean, 5), fixed_text(prior.deviation, 5),
+    rows.push_back({to_string(p.parameter), unit_of(p.parameter), fixed_text(p.value, 5),
+                    fixed_text(p.standard_error, 5), fixed_text(prior.mean, 5), fixed_text(prior.deviation, 5),
                     fixed_text(100.0 * p.left_of_prior, 0) + " %"});
   }
   std::string text = table(rows) + "\n" + std::to_string(found.flights) + " recordings begin in flight, " +
@@ -158,12 +171,15 @@ Verb add_calibrate_verb(CLI::App& app) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < simulation::kMotionParameters; ++i)
     names.push_back(to_string(static_cast<simulation::MotionParameter>(i)));
-  verb->add_option("--keep", options->keep, "Parameter that stays as the scene has it; may be repeated")
+  verb->add_option(
+          "--keep", options->keep,
+          "Parameter that stays as the scene has it; may be repeated (inertia_size is the natural logarithm of "
+          "a factor)")
       ->check(CLI::IsMember(names));
   verb->add_option("--samples", options->samples, "Simulated starts a recording; 16, of cube_tosses 24")
       ->check(CLI::Range(2, 4096));
   verb->add_option("--max-evaluations", options->max_evaluations,
-                   "Models that the search tries at most; 600, of cube_tosses 150")
+                   "Models that the search tries at most; 1000, of cube_tosses 150")
       ->check(CLI::Range(1, 100000));
   verb->add_option("--data", options->data, "cube_tosses: folder that holds the data sets' folders");
   verb->add_option("--from", options->start,

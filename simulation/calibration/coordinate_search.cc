@@ -50,6 +50,7 @@ SearchResult coordinate_search(const std::vector<SearchParameter>& parameters,
       --halvings;
     }
   }
+  best.settled = halvings <= 0;
   return best;
 }
 

@@ -15,12 +15,15 @@ struct SearchParameter {
   double step = 0.0;   ///< First step, > 0; halved whenever a whole round brings nothing.
   double low = 0.0;    ///< The value stays in [low, high].
   double high = 0.0;
+
+  friend bool operator==(const SearchParameter&, const SearchParameter&) = default;
 };
 
 struct SearchResult {
   std::vector<double> values;
   double cost = 0.0;
   int evaluations = 0;
+  bool settled = false;  ///< Else it ended at its evaluations, or was stopped.
 };
 
 /// Called after each evaluation with the best so far; false stops the search.

@@ -50,7 +50,7 @@ struct FlightCalibration {
   /// Of the parameters' errors, in the order of FlightParameter: flights are independent, the frames of one need not be
   /// [Liang & Zeger 1986]; the prior's part is added.
   Eigen::Matrix<double, kFlightParameters, kFlightParameters> covariance;
-  /// Standard deviation after the flights over that before: near 1, they tell nothing of it.
+  /// Standard deviation after the flights over that before; 1: they tell nothing of it, and it is the prior's.
   Eigen::Matrix<double, kFlightParameters, 1> left_of_prior;
   double position_noise = 0.0;  ///< Of a frame's coordinate, m, robust against outliers.
   double rotation_noise = 0.0;  ///< rad, likewise.

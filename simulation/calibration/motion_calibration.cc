@@ -2,15 +2,20 @@
 #include "prescene/simulation/calibration/motion_calibration.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "motion_judge.h"
 #include "prescene/simulation/calibration/evolution_search.h"
+#include "prescene/simulation/calibration/keep_untold.h"
+#include "varied_parameters.h"
 
 namespace prescene::simulation {
 namespace {
@@ -20,6 +25,12 @@ using geometry::Vector3d;
 
 // Of the search, in the parameters' steps: what comes then needs no better.
 constexpr double kSearchAccuracy = 0.05;
+// Nor does it need what less than so much, of the mean score, is gained by in so many evaluations a parameter: it
+// differs by chance.
+constexpr double kSearchGain = 0.1;
+constexpr int kSearchPatience = 20;
+// Shares of the search's evaluations that each of its starts, and then the better half of them, may take at most.
+constexpr std::array kFieldShares = {1.0 / 16.0, 1.0 / 6.0};
 // Particles of the stream; a recording's starts are drawn from particle 0.
 constexpr std::uint32_t kSearchDraws = 1;
 constexpr std::uint32_t kTrialDraws = 2;
@@ -31,99 +42,20 @@ constexpr int kNoiseEvaluations = 40;
 // Of the friction that slides tell, beside its statistical error: by how much simulated slides of known friction were
 // off. A third of it is half a step of the simulator, in which a sliding object's velocity lags behind its place.
 constexpr double kSlideError = 0.04;
+// Of the centre of mass, in the noise of a position: what frames of one tracker have in common, such as where it takes
+// the object's frame to be, is not averaged out by any number of them.
+constexpr double kCommonError = 0.1;
+constexpr double kLeastCenterError = 1e-5;  // m
 // Of a fitted model, as in scene files.
 constexpr double kMostFriction = 100.0;
 
-struct Range {
-  double step;  // Half of the first one of the search.
-  double low;
-  double high;
-};
-
-Range range_of(MotionParameter parameter, double radius_of_gyration) {
-  switch (parameter) {
-    case MotionParameter::kFriction:
-    case MotionParameter::kImpactFriction:
-      return {0.02, 0.0, 3.0};
-    case MotionParameter::kRestitution:
-      return {0.03, 0.0, 0.98};
-    case MotionParameter::kInertiaSize:
-      return {0.06, -1.0, 1.0};
-    case MotionParameter::kEdgeRadius:
-      return {0.02 * radius_of_gyration, 0.0, 0.3 * radius_of_gyration};
-    default:
-      return {0.02 * radius_of_gyration, -2.0 * radius_of_gyration, 2.0 * radius_of_gyration};
-  }
-}
+bool is_center(MotionParameter parameter) { return parameter >= MotionParameter::kCenterOfMassX; }
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double value : values) sum += value;
   return sum / static_cast<double>(values.size());
 }
-
-/// What is varied, as numbers in a row: the parameters that have a prior deviation, then the starts' noise (its
-/// logarithm) and the scatter of friction.
-class Varied {
- public:
-  Varied(const MotionPrior& prior, double gyration) {
-    for (std::size_t i = 0; i < kMotionParameters; ++i) {
-      fixed_.values[i] = prior[i].mean;
-      if (prior[i].deviation == 0.0) continue;
-      const auto parameter = static_cast<MotionParameter>(i);
-      free_.push_back(i);
-      add(to_string(parameter), prior[i], range_of(parameter, gyration));
-    }
-  }
-
-  /// Places of the free ones in a MotionPrior.
-  const std::vector<std::size_t>& free() const { return free_; }
-  /// Of the search: the free parameters and the noise.
-  std::vector<SearchParameter> searched() const {
-    std::vector<SearchParameter> all;
-    for (const EstimatedParameter& p : estimated_)
-      all.push_back({p.name, std::clamp(p.prior_mean, p.low, p.high), 2.0 * p.scale, p.low, p.high});
-    MotionHypothesis start;
-    start.start_noise = 3.0;
-    start.friction_scatter = 0.03;
-    for (const SearchParameter& p : noise(start)) all.push_back(p);
-    return all;
-  }
-  static std::vector<SearchParameter> noise(const MotionHypothesis& at) {
-    return {{"start_noise", std::log(at.start_noise), 0.5, std::log(0.3), std::log(300.0)},
-            {"friction_scatter", at.friction_scatter, 0.02, 0.0, 0.5}};
-  }
-  std::vector<EstimatedParameter> estimated(const MotionHypothesis& at) const {
-    std::vector<EstimatedParameter> all = estimated_;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      all[i].value = at.values[free_[i]];
-      all[i].scale = 0.5 * std::min(all[i].scale, all[i].prior_deviation);
-    }
-    return all;
-  }
-  MotionHypothesis with_parameters(MotionHypothesis hypothesis, std::span<const double> values) const {
-    for (std::size_t i = 0; i < free_.size(); ++i) hypothesis.values[free_[i]] = values[i];
-    return hypothesis;
-  }
-  static MotionHypothesis with_noise(MotionHypothesis hypothesis, std::span<const double> values) {
-    hypothesis.start_noise = std::exp(values[0]);
-    hypothesis.friction_scatter = values[1];
-    return hypothesis;
-  }
-  /// Of the values of a search.
-  MotionHypothesis hypothesis_of(std::span<const double> values) const {
-    return with_noise(with_parameters(fixed_, values), values.subspan(free_.size()));
-  }
-
- private:
-  void add(const std::string& name, const MotionBelief& belief, const Range& range) {
-    estimated_.push_back({name, belief.mean, range.step, range.low, range.high, belief.mean, belief.deviation});
-  }
-
-  MotionHypothesis fixed_;
-  std::vector<std::size_t> free_;
-  std::vector<EstimatedParameter> estimated_;
-};
 
 core::Status check(const std::vector<RecordedMotion>& motions, const belief::Scene& scene, const MotionPrior& prior,
                    const MotionCalibrationOptions& options) {
@@ -146,7 +78,71 @@ core::Status check(const std::vector<RecordedMotion>& motions, const belief::Sce
   return core::ok_status();
 }
 
+/// Searches from several starts: each a little, the better half some more, the best to its end.
+SearchResult search_from(std::vector<std::vector<SearchParameter>> starts, const EvolutionSearch::Cost& cost,
+                         int max_evaluations, const core::RandomStream& stream, const SearchProgress& report) {
+  const SearchEnd end{kSearchAccuracy, kSearchPatience * static_cast<int>(starts.front().size()), kSearchGain};
+  std::vector<EvolutionSearch> field;
+  for (std::vector<SearchParameter>& start : starts)
+    field.emplace_back(std::move(start), end, stream.at(field.size(), kSearchDraws));
+  const auto best_first = [&] {
+    std::ranges::stable_sort(field, {}, [](const EvolutionSearch& search) { return search.best().cost; });
+  };
+  int tried = 0;
+  for (const double share : kFieldShares) {
+    if (field.size() == 1) break;
+    const int most = std::max(1, static_cast<int>(share * max_evaluations));
+    for (EvolutionSearch& search : field) {
+      const int before = search.best().evaluations;
+      search.run(cost, std::min(most, before + max_evaluations - tried), report);
+      tried += search.best().evaluations - before;
+    }
+    std::erase_if(field, [](const EvolutionSearch& search) { return search.best().evaluations == 0; });
+    best_first();
+    field.erase(field.begin() + static_cast<std::ptrdiff_t>((field.size() + 1) / 2), field.end());
+  }
+  best_first();
+  EvolutionSearch& best = field.front();
+  best.run(cost, best.best().evaluations + max_evaluations - tried, report);
+  return best.best();
+}
+
+/// What the recordings tell, and what they do not.
+std::vector<CalibratedParameter> told(const Estimate& estimate, const VariedParameters& varied,
+                                      const MotionPrior& prior, double slide_share, double position_noise) {
+  const auto n = static_cast<Eigen::Index>(varied.free().size());
+  Eigen::VectorXd value = estimate.value;
+  Eigen::MatrixXd covariance = estimate.covariance;
+  Eigen::VectorXd mean(n);
+  Eigen::VectorXd deviation(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::size_t k = varied.free()[static_cast<std::size_t>(i)];
+    mean[i] = prior[k].mean;
+    deviation[i] = prior[k].deviation;
+    double least = 0.0;
+    if (static_cast<MotionParameter>(k) == MotionParameter::kFriction)
+      covariance(i, i) += std::pow(kSlideError * slide_share * value[i], 2);
+    if (is_center(static_cast<MotionParameter>(k))) least = least_center_error(position_noise);
+    covariance(i, i) = std::max(covariance(i, i), least * least);
+  }
+  keep_untold(mean, deviation, &value, &covariance);
+  std::vector<CalibratedParameter> all;
+  const std::vector<EstimatedParameter> estimated = varied.estimated({});
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    const double error = std::sqrt(covariance(i, i));
+    // What is told hardly more than that may end beyond what can be.
+    const bool untold = error >= kUntold * deviation[i];
+    all.push_back({static_cast<MotionParameter>(varied.free()[place]),
+                   untold ? value[i] : std::clamp(value[i], estimated[place].low, estimated[place].high), error,
+                   error / deviation[i]});
+  }
+  return all;
+}
+
 }  // namespace
+
+double least_center_error(double position_noise) { return std::max(kCommonError * position_noise, kLeastCenterError); }
 
 std::string to_string(MotionParameter parameter) {
   static constexpr std::array<const char*, kMotionParameters> kNames = {
@@ -178,34 +174,38 @@ MotionPrior motion_prior(const belief::ObjectModel& model) {
 
 belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCalibration& found) {
   const double infinity = std::numeric_limits<double>::infinity();
+  const belief::ContactProperties before = model.contact;
   for (const CalibratedParameter& p : found.parameters) {
-    const auto normal = [&](double low, double high) {
+    const bool untold = p.left_of_prior >= kUntold;
+    const auto fitted = [&](const ScalarDistribution& prior, double low, double high) {
+      // A distribution that nothing is told of stays what it is, whatever its form.
+      if (untold && belief::variance(prior) > 0.0) return prior;
       return ScalarDistribution(belief::NormalScalar{p.value, p.standard_error, low, high});
     };
     switch (p.parameter) {
       case MotionParameter::kFriction:
-        model.contact.friction = normal(0.0, kMostFriction);
+        model.contact.friction = fitted(before.friction, 0.0, kMostFriction);
         break;
       case MotionParameter::kImpactFriction:
-        model.contact.impact_friction = normal(0.0, kMostFriction);
+        model.contact.impact_friction = fitted(before.impact_friction.value_or(before.friction), 0.0, kMostFriction);
         break;
       case MotionParameter::kRestitution:
-        model.contact.restitution = normal(0.0, 1.0);
+        model.contact.restitution = fitted(before.restitution, 0.0, 1.0);
         break;
       case MotionParameter::kInertiaSize:
-        model.unit_inertia *= std::exp(p.value);
+        if (!untold) model.unit_inertia *= std::exp(p.value);
         break;
       case MotionParameter::kEdgeRadius:
-        model.contact.edge_radius = std::max(0.0, p.value);
+        if (!untold) model.contact.edge_radius = std::max(0.0, p.value);
         break;
       case MotionParameter::kCenterOfMassX:
-        model.center_of_mass.x = normal(-infinity, infinity);
+        model.center_of_mass.x = fitted(model.center_of_mass.x, -infinity, infinity);
         break;
       case MotionParameter::kCenterOfMassY:
-        model.center_of_mass.y = normal(-infinity, infinity);
+        model.center_of_mass.y = fitted(model.center_of_mass.y, -infinity, infinity);
         break;
       case MotionParameter::kCenterOfMassZ:
-        model.center_of_mass.z = normal(-infinity, infinity);
+        model.center_of_mass.z = fitted(model.center_of_mass.z, -infinity, infinity);
         break;
     }
   }
@@ -222,7 +222,7 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
   PRESCENE_RETURN_IF_ERROR(check(motions, scene, prior, options));
   MotionJudge judge(scene, make_simulator, stream, pool, options, cancellation);
   for (const RecordedMotion& motion : motions) PRESCENE_RETURN_IF_ERROR(judge.add(motion));
-  const Varied varied(prior, radius_of_gyration(scene.model_of(scene.objects[0])));
+  const VariedParameters varied(prior, radius_of_gyration(scene.model_of(scene.objects[0])));
 
   core::Status failure;
   const auto cost_of = [&](const MotionHypothesis& hypothesis) {
@@ -231,18 +231,22 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     if (!points) failure = points.status();
     return points ? mean_of(recording_scores(judge.observations(), *points)) : std::numeric_limits<double>::infinity();
   };
-  const auto cost = [&](std::span<const double> values) { return cost_of(varied.hypothesis_of(values)); };
   MotionCalibration result;
+  int tried = 0;
+  const auto cost = [&](std::span<const double> values) {
+    const double found = cost_of(varied.hypothesis_of(values));
+    // The first is what is believed.
+    if (tried++ == 0) result.start_cost = found;
+    return found;
+  };
   const auto report = [&](const SearchResult& best) {
-    if (best.evaluations == 1) result.start_cost = best.cost;
     if (progress) {
-      progress(
-          {0.5 * best.evaluations / options.max_evaluations, std::nullopt, "mean score " + std::to_string(best.cost)});
+      progress({0.5 * std::min(1.0, static_cast<double>(tried) / options.max_evaluations), std::nullopt,
+                "mean score " + std::to_string(best.cost)});
     }
     return failure.ok();
   };
-  const SearchResult found = evolution_search(varied.searched(), cost, kSearchAccuracy, options.max_evaluations,
-                                              stream.at(0, kSearchDraws), report);
+  const SearchResult found = search_from(varied.starts(), cost, options.max_evaluations, stream, report);
   PRESCENE_RETURN_IF_ERROR(failure);
 
   // The noise goes by what it makes of the score, in turns with the rest.
@@ -267,28 +271,24 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     best = varied.with_parameters(best, std::span(estimate.value.data(), varied.free().size()));
     result.evaluations += estimate.evaluations;
     if (turn + 1 == kTurns) break;
-    const auto noise_cost = [&](std::span<const double> values) { return cost_of(varied.with_noise(best, values)); };
-    const SearchResult noise = coordinate_search(varied.noise(best), noise_cost, kNoiseHalvings, kNoiseEvaluations, {});
+    const auto noise_cost = [&](std::span<const double> values) {
+      return cost_of(VariedParameters::with_noise(best, values));
+    };
+    const SearchResult noise =
+        coordinate_search(VariedParameters::noise(best), noise_cost, kNoiseHalvings, kNoiseEvaluations, {});
     PRESCENE_RETURN_IF_ERROR(failure);
-    best = varied.with_noise(best, noise.values);
+    best = VariedParameters::with_noise(best, noise.values);
     result.evaluations += noise.evaluations;
   }
   const auto slides = std::ranges::count(motions, MotionBeginning::kSlide, &RecordedMotion::beginning);
   const double slide_share = static_cast<double>(slides) / static_cast<double>(motions.size());
-  for (std::size_t i = 0; i < varied.free().size(); ++i) {
-    const std::size_t k = varied.free()[i];
-    const auto parameter = static_cast<MotionParameter>(k);
-    const auto row = static_cast<Eigen::Index>(i);
-    double error = estimate.standard_error(row);
-    if (parameter == MotionParameter::kFriction)
-      error = std::min(std::hypot(error, kSlideError * slide_share * estimate.value[row]), prior[k].deviation);
-    result.parameters.push_back({parameter, estimate.value[row], error, error / prior[k].deviation});
-  }
+  result.parameters = told(estimate, varied, prior, slide_share, options.position_noise);
   result.start_noise = best.start_noise;
   result.friction_scatter = best.friction_scatter;
-  result.settled = estimate.settled;
+  result.search_settled = found.settled;
+  result.estimate_settled = estimate.settled;
   result.cost = estimate.score;
-  result.evaluations += found.evaluations;
+  result.evaluations += tried;
   return result;
 }
 

@@ -65,7 +65,7 @@ MotionPrior motion_prior(const belief::ObjectModel& model);
 
 struct MotionCalibrationOptions {
   int samples = 16;              ///< Simulated starts a recording, > 1.
-  int max_evaluations = 600;     ///< Of the search, > 0; the estimate takes some 400 more.
+  int max_evaluations = 1000;    ///< Of the search, > 0; the estimate takes some 400 more.
   double horizon = 0.6;          ///< s after the start that are compared, at most, > 0.
   int checkpoints = 6;           ///< Times within the horizon, > 0.
   int fit_frames = 10;           ///< Most of the beginning that the start is fitted to, >= 5.
@@ -78,7 +78,7 @@ struct CalibratedParameter {
   MotionParameter parameter = MotionParameter::kFriction;
   double value = 0.0;  ///< Recordings and prior together.
   double standard_error = 0.0;
-  /// Over the prior's deviation: near 1, the recordings tell nothing of it.
+  /// Over the prior's deviation, at most 1: then the recordings tell nothing of it, and the value is the prior's mean.
   double left_of_prior = 1.0;
 };
 struct MotionCalibration {
@@ -89,9 +89,15 @@ struct MotionCalibration {
   double start_cost = 0.0;        ///< Mean score of the prior's means.
   double cost = 0.0;              ///< Of what was found.
   int evaluations = 0;
-  bool settled = false;  ///< Else the errors may be too small.
+  bool search_settled = false;    ///< Else it ended at its evaluations, and the values may be wrong.
+  bool estimate_settled = false;  ///< Else the errors may be too small.
+  bool settled() const { return search_settled && estimate_settled; }
 };
-/// A copy of the model with the values as means and the errors as deviations.
+/// Of the centre of mass: no number of frames with this noise of a coordinate, m, tells it better.
+double least_center_error(double position_noise);
+
+/// A copy of the model with the values as means and the errors as deviations; what is untold stays as it is, plain
+/// numbers with the prior's deviation.
 belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCalibration& found);
 
 /// Least number of recordings for so many free parameters.

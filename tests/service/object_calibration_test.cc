@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/scene_files/model_file.h"
+#include "prescene/service/motion_units.h"
 #include "prescene/tests/support/simulated_motions.h"
 
 namespace prescene::tests {
@@ -21,6 +23,7 @@ using service::ObjectCalibration;
 using service::read_motion_dataset;
 using service::read_motion_table;
 using simulation::CalibratedParameter;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 
 class ObjectCalibrationTest : public ::testing::Test {
@@ -96,6 +99,111 @@ TEST_F(ObjectCalibrationTest, FitsAModelThatScenesCanUse) {
   EXPECT_EQ(model->center_of_mass, found->model.center_of_mass);
 }
 
+TEST_F(ObjectCalibrationTest, ExactFramesTellTheCentreAndAreRemarkedOn) {
+  BoxTruth truth;
+  truth.center_of_mass = {0.004, -0.003, 0.002};
+  const belief::Scene scene = box_scene(truth);
+  const auto simulator = backends_.make_simulator(scene);
+  ASSERT_TRUE(simulator.ok());
+  auto motions =
+      simulated_tosses(scene, **simulator, 16, core::RandomStream(1, core::Purpose::kTest), pool_, {0.0, 0.0});
+  // Every other frame: 60 Hz.
+  for (SimulatedMotion& motion : motions) {
+    for (std::size_t i = 0; 2 * i < motion.times.size(); ++i) {
+      motion.times[i] = motion.times[2 * i];
+      motion.X_WO[i] = motion.X_WO[2 * i];
+    }
+    motion.times.resize((motion.times.size() + 1) / 2);
+    motion.X_WO.resize((motion.X_WO.size() + 1) / 2);
+  }
+  write("scene.yaml", box_scene_yaml({}));
+  write("tosses.csv", motion_table(motions));
+  const auto dataset = read_motion_dataset(folder_, {});
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  service::ObjectCalibrationOptions options;
+  options.samples = 8;
+  options.max_evaluations = 100;
+  options.keep = {"inertia_size", "edge_radius", "friction"};
+  const auto found = calibrate_object(*dataset, backends_, options);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  for (int i = 0; i < 3; ++i) {
+    const CalibratedParameter& center = found->motion.parameters[static_cast<std::size_t>(2 + i)];
+    EXPECT_NEAR(center.value, truth.center_of_mass[i], 4.0 * center.standard_error) << to_string(center.parameter);
+    EXPECT_GE(center.standard_error, 1e-5);
+    EXPECT_LT(center.standard_error, 1e-4);
+  }
+  EXPECT_THAT(found->remarks, Contains(HasSubstr("next to no noise")));
+  EXPECT_THAT(found->remarks, Contains(HasSubstr("60 frames a second")));
+}
+
+TEST_F(ObjectCalibrationTest, SaysThatAFitIsPoor) {
+  const belief::Scene scene = box_scene({});
+  auto motions = simulated_tosses(scene, **backends_.make_simulator(scene), 12,
+                                  core::RandomStream(1, core::Purpose::kTest), pool_);
+  // Something else touches it: after the first contact it drifts to a side of its own.
+  core::RandomStream stream(2, core::Purpose::kTest);
+  for (SimulatedMotion& motion : motions) {
+    const geometry::Vector3d drift(stream.normal(), stream.normal(), 0.0);
+    for (std::size_t i = 0; i < motion.times.size(); ++i)
+      motion.X_WO[i].translation += std::max(0.0, motion.times[i] - motion.first_contact) * drift;
+  }
+  write("scene.yaml", box_scene_yaml({}));
+  write("tosses.csv", motion_table(motions));
+  const auto dataset = read_motion_dataset(folder_, {});
+  ASSERT_TRUE(dataset.ok());
+  service::ObjectCalibrationOptions options;
+  options.samples = 8;
+  options.max_evaluations = 100;
+  options.keep = {"inertia_size", "edge_radius", "center_of_mass_x", "center_of_mass_y", "center_of_mass_z"};
+  const auto found = calibrate_object(*dataset, backends_, options);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_GT(found->motion.start_noise, 10.0);
+  EXPECT_THAT(found->remarks, Contains(HasSubstr("the fit is poor")));
+}
+
+TEST_F(ObjectCalibrationTest, OtherUnitsAreRefusedWithTheirRemedy) {
+  const belief::Scene scene = box_scene({});
+  write("scene.yaml", box_scene_yaml({}));
+  const auto refusal_of = [&](std::vector<SimulatedMotion> motions, double lengths, double times) {
+    for (SimulatedMotion& motion : motions) {
+      for (double& time : motion.times) time *= times;
+      for (geometry::Pose& pose : motion.X_WO) pose.translation *= lengths;
+    }
+    write("tosses.csv", motion_table(motions));
+    const auto dataset = read_motion_dataset(folder_, {});
+    if (!dataset.ok()) return std::string(dataset.status().message());
+    const auto found = calibrate_object(*dataset, backends_, {});
+    return found.ok() ? std::string("accepted") : std::string(found.status().message());
+  };
+  const auto simulator = backends_.make_simulator(scene);
+  const auto tosses = simulated_tosses(scene, **simulator, 12, core::RandomStream(1, core::Purpose::kTest), pool_);
+  const auto slides = simulated_slides(scene, **simulator, 12, core::RandomStream(1, core::Purpose::kTest), pool_);
+  for (const auto& motions : {tosses, slides}) {
+    const std::string millimetres = refusal_of(motions, 1000.0, 1.0);
+    EXPECT_THAT(millimetres, HasSubstr("tosses.csv: "));
+    EXPECT_THAT(millimetres, HasSubstr("in millimetres divide them by 1000"));
+    EXPECT_THAT(refusal_of(motions, 1.0, 1000.0), HasSubstr("t must be in seconds"));
+  }
+  EXPECT_THAT(refusal_of(tosses, 100.0, 1.0), HasSubstr("centimetres"));
+}
+
+TEST(MotionUnits, OneRecordingThatRunsAwayRefusesNoDataSet) {
+  std::vector<service::MotionRecording> recordings(3);
+  for (int i = 0; i < 20; ++i) {
+    const double t = 0.01 * i;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double speed = k == 0 ? 1e4 : 2.0;
+      recordings[k].frames.push_back({t, geometry::Pose::from_translation({speed * t, 0.0, -4.9 * t * t})});
+    }
+  }
+  EXPECT_NEAR(service::frame_rate(recordings), 100.0, 1e-6);
+  EXPECT_TRUE(service::check_units(recordings, 9.81).ok());
+  recordings[1] = recordings[0];
+  EXPECT_EQ(service::check_units(recordings, 9.81).code(), core::StatusCode::kInvalidInput);
+  EXPECT_EQ(service::frame_rate({}), 0.0);
+  EXPECT_TRUE(service::check_units({}, 9.81).ok());
+}
+
 TEST_F(ObjectCalibrationTest, BadTablesAreRefusedByLine) {
   const std::string header = "toss,t,x,y,z,qw,qx,qy,qz\n";
   EXPECT_THAT(refusal(""), HasSubstr("line 1: there is no column 'toss'"));
@@ -109,6 +217,11 @@ TEST_F(ObjectCalibrationTest, BadTablesAreRefusedByLine) {
   EXPECT_THAT(refusal(header + "1,0.1,0,0,0,1,0,0,0\n1,0.1,0,0,0,1,0,0,0\n"), HasSubstr("line 3: toss 1: its time"));
   EXPECT_THAT(refusal(header + "1,0,0,0,0,1,0,0,0\n2,0,0,0,0,1,0,0,0\n1,1,0,0,0,1,0,0,0\n"),
               HasSubstr("line 4: toss 1 stands in two places"));
+  EXPECT_THAT(refusal("toss;t;x;y;z;qw;qx;qy;qz\n1;0;0;0;0;1;0;0;0\n"),
+              HasSubstr("line 1: its cells are separated by semicolons; separate them by commas"));
+  EXPECT_THAT(refusal("toss\tt\tx\ty\tz\tqw\tqx\tqy\tqz\n"), HasSubstr("separated by tabs"));
+  // Spreadsheets put a byte order mark first.
+  EXPECT_EQ(refusal("\xEF\xBB\xBF" + header + "1,0,0,0,0,1,0,0,0\n"), "accepted");
   // Other columns, another order, carriage returns and an empty last line are fine.
   EXPECT_EQ(refusal("note,qz,qy,qx,qw,z,y,x,t,toss\r\nhello,0,0,0,1,0.3,0.2,0.1,0,a\r\n\r\n"), "accepted");
 }

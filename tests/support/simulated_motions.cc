@@ -110,6 +110,17 @@ std::vector<SimulatedMotion> simulated_tosses(const belief::Scene& scene, const 
   return recorded(starts, simulator, stream, pool, noise);
 }
 
+std::vector<SimulatedMotion> simulated_spins(const belief::Scene& scene, const simulation::Simulator& simulator,
+                                             int count, core::RandomStream stream, core::ThreadPool& pool,
+                                             const TrackerNoise& noise) {
+  const auto starts = moving_starts(scene, count, [&](belief::ObjectState& ball) {
+    ball.X_WO.translation = {0.0, 0.0, stream.uniform(0.15, 0.3)};
+    for (double& v : ball.V_WO.linear) v = stream.uniform(-1.0, 1.0);
+    for (double& w : ball.V_WO.angular) w = stream.uniform(-20.0, 20.0);
+  });
+  return recorded(starts, simulator, stream, pool, noise);
+}
+
 std::vector<SimulatedMotion> simulated_slides(const belief::Scene& scene, const simulation::Simulator& simulator,
                                               int count, core::RandomStream stream, core::ThreadPool& pool,
                                               const TrackerNoise& noise) {

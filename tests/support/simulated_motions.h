@@ -38,6 +38,10 @@ struct TrackerNoise {
 std::vector<SimulatedMotion> simulated_tosses(const belief::Scene& scene, const simulation::Simulator& simulator,
                                               int count, core::RandomStream stream, core::ThreadPool& pool,
                                               const TrackerNoise& noise = {});
+/// Of what is dropped from 15 to 30 cm with a spin of up to 20 rad/s about each axis.
+std::vector<SimulatedMotion> simulated_spins(const belief::Scene& scene, const simulation::Simulator& simulator,
+                                             int count, core::RandomStream stream, core::ThreadPool& pool,
+                                             const TrackerNoise& noise = {});
 /// Of boxes that lie flat on the board and slide at 0.8 to 1.2 m/s.
 std::vector<SimulatedMotion> simulated_slides(const belief::Scene& scene, const simulation::Simulator& simulator,
                                               int count, core::RandomStream stream, core::ThreadPool& pool,

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -66,6 +67,31 @@ TEST_F(CalibrateTest, NeverWritesOverAnInput) {
     EXPECT_EQ(finished.exit_code, 2) << finished.err;
     EXPECT_EQ(read_file(folder_ / name), before);
   }
+}
+
+TEST_F(CalibrateTest, AFewTriesAreNotCalledSettled) {
+  std::vector<std::string> args = command((folder_ / "object.yaml").string());
+  *(std::ranges::find(args, "--max-evaluations") + 1) = "5";
+  const Finished finished = run_program(args);
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const auto document = nlohmann::json::parse(finished.out);
+  EXPECT_EQ(document["settled"], false);
+  EXPECT_THAT(document["remarks"].dump(), HasSubstr("give more --max-evaluations"));
+}
+
+TEST_F(CalibrateTest, MillimetresEndWithTwoAndOneMessage) {
+  core::ThreadPool pool(1);
+  service::Backends backends(pool);
+  const belief::Scene scene = box_scene({});
+  auto motions =
+      simulated_tosses(scene, **backends.make_simulator(scene), 12, core::RandomStream(1, core::Purpose::kTest), pool);
+  for (SimulatedMotion& motion : motions)
+    for (geometry::Pose& pose : motion.X_WO) pose.translation *= 1000.0;
+  write_file(folder_ / "tosses.csv", motion_table(motions));
+  const Finished finished = run_program(command((folder_ / "object.yaml").string()));
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_THAT(finished.err, HasSubstr("millimetres"));
+  EXPECT_EQ(std::ranges::count(finished.err, '\n'), 1) << finished.err;
 }
 
 TEST_F(CalibrateTest, BadDataSetsEndWithTwo) {

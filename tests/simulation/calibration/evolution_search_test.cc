@@ -43,13 +43,14 @@ double rosenbrock(std::span<const double> x) {
 
 TEST(EvolutionSearch, FindsTheMiddleOfATurnedEllipsoid) {
   const SearchResult found =
-      evolution_search(parameters(8, 0.0, 0.5, -10.0, 10.0), turned_ellipsoid, 1e-6, 20000, stream(1));
+      evolution_search(parameters(8, 0.0, 0.5, -10.0, 10.0), turned_ellipsoid, {1e-6}, 20000, stream(1));
   for (const double value : found.values) EXPECT_NEAR(value, 0.7, 1e-3);
   EXPECT_LT(found.evaluations, 20000);
 }
 
 TEST(EvolutionSearch, FollowsABentValley) {
-  const SearchResult found = evolution_search(parameters(5, -0.5, 0.3, -5.0, 5.0), rosenbrock, 1e-6, 30000, stream(2));
+  const SearchResult found =
+      evolution_search(parameters(5, -0.5, 0.3, -5.0, 5.0), rosenbrock, {1e-6}, 30000, stream(2));
   for (const double value : found.values) EXPECT_NEAR(value, 1.0, 1e-3);
 }
 
@@ -59,7 +60,7 @@ TEST(EvolutionSearch, StaysWithinBoundsAndFindsAMinimumOnThem) {
     for (const double value : x) outside += value < 0.2 || value > 1.0 ? 1 : 0;
     return x[0] + 2.0 * x[1] - x[2];
   };
-  const SearchResult found = evolution_search(parameters(3, 0.5, 0.5, 0.2, 1.0), cost, 1e-4, 5000, stream(3));
+  const SearchResult found = evolution_search(parameters(3, 0.5, 0.5, 0.2, 1.0), cost, {1e-4}, 5000, stream(3));
   EXPECT_EQ(outside, 0);
   EXPECT_NEAR(found.values[0], 0.2, 1e-2);
   EXPECT_NEAR(found.values[1], 0.2, 1e-2);
@@ -73,7 +74,7 @@ TEST(EvolutionSearch, TheSameSeedTriesTheSame) {
       tried.push_back(x[0]);
       return turned_ellipsoid(x);
     };
-    evolution_search(parameters(4, 0.0, 0.5, -10.0, 10.0), cost, 1e-3, 200, stream(seed));
+    evolution_search(parameters(4, 0.0, 0.5, -10.0, 10.0), cost, {1e-3}, 200, stream(seed));
     return tried;
   };
   EXPECT_EQ(run(5), run(5));
@@ -82,13 +83,38 @@ TEST(EvolutionSearch, TheSameSeedTriesTheSame) {
 
 TEST(EvolutionSearch, EndsAtItsAccuracyItsEvaluationsOrWhenTold) {
   const auto all = parameters(4, 0.0, 0.5, -10.0, 10.0);
-  const SearchResult rough = evolution_search(all, turned_ellipsoid, 1e-1, 100000, stream(1));
-  const SearchResult fine = evolution_search(all, turned_ellipsoid, 1e-5, 100000, stream(1));
+  const SearchResult rough = evolution_search(all, turned_ellipsoid, {1e-1}, 100000, stream(1));
+  const SearchResult fine = evolution_search(all, turned_ellipsoid, {1e-5}, 100000, stream(1));
   EXPECT_LT(rough.evaluations, fine.evaluations);
   EXPECT_LT(fine.cost, rough.cost);
-  EXPECT_EQ(evolution_search(all, turned_ellipsoid, 1e-9, 77, stream(1)).evaluations, 77);
+  EXPECT_EQ(evolution_search(all, turned_ellipsoid, {1e-9}, 77, stream(1)).evaluations, 77);
   const auto stop = [](const SearchResult& best) { return best.evaluations < 20; };
-  EXPECT_EQ(evolution_search(all, turned_ellipsoid, 1e-9, 1000, stream(1), stop).evaluations, 20);
+  EXPECT_EQ(evolution_search(all, turned_ellipsoid, {1e-9}, 1000, stream(1), stop).evaluations, 20);
+}
+
+TEST(EvolutionSearch, SaysWhetherItSettledOrWasCut) {
+  const auto all = parameters(4, 0.0, 0.5, -10.0, 10.0);
+  EXPECT_TRUE(evolution_search(all, turned_ellipsoid, {1e-1}, 100000, stream(1)).settled);
+  EXPECT_FALSE(evolution_search(all, turned_ellipsoid, {1e-9}, 77, stream(1)).settled);
+  // Where nothing is to be gained, its patience ends it.
+  const auto flat = [](std::span<const double>) { return 1.0; };
+  const SearchResult patient = evolution_search(all, flat, {1e-9, 100, 0.01}, 1000, stream(1));
+  EXPECT_TRUE(patient.settled);
+  EXPECT_GE(patient.evaluations, 100);
+  EXPECT_LT(patient.evaluations, 120);
+  EXPECT_FALSE(evolution_search(all, flat, {1e-9, 100, 0.01}, 50, stream(1)).settled);
+}
+
+TEST(EvolutionSearch, GoesOnWhereItStopped) {
+  const auto all = parameters(4, 0.0, 0.5, -10.0, 10.0);
+  simulation::EvolutionSearch search(all, {1e-2}, stream(1));
+  // Generations of eight, after the start.
+  search.run(turned_ellipsoid, 81);
+  EXPECT_EQ(search.best().evaluations, 81);
+  search.run(turned_ellipsoid, 100000);
+  const SearchResult at_once = evolution_search(all, turned_ellipsoid, {1e-2}, 100000, stream(1));
+  EXPECT_EQ(search.best().cost, at_once.cost);
+  EXPECT_EQ(search.best().evaluations, at_once.evaluations);
 }
 
 TEST(EvolutionSearch, ReturnsTheBestThatItTried) {
@@ -98,7 +124,7 @@ TEST(EvolutionSearch, ReturnsTheBestThatItTried) {
     least = std::min(least, value);
     return value;
   };
-  const SearchResult found = evolution_search(parameters(3, 0.0, 0.5, -2.0, 2.0), cost, 1e-3, 500, stream(4));
+  const SearchResult found = evolution_search(parameters(3, 0.0, 0.5, -2.0, 2.0), cost, {1e-3}, 500, stream(4));
   EXPECT_EQ(found.cost, least);
   EXPECT_EQ(cost(found.values), least);
 }

@@ -137,10 +137,26 @@ TEST(FlightCalibration, SaysWhatFlightsWithoutSpinDoNotTell) {
   ASSERT_TRUE(found.ok());
   for (const FlightParameter parameter : {FlightParameter::kCenterOfMassX, FlightParameter::kCenterOfMassY,
                                           FlightParameter::kCenterOfMassZ, FlightParameter::kInertiaX}) {
-    EXPECT_GT(found->left_of_prior[static_cast<int>(parameter)], 0.95);
+    EXPECT_EQ(found->left_of_prior[static_cast<int>(parameter)], 1.0);
   }
+  EXPECT_EQ(found->center_of_mass, prior.center_of_mass);
+  EXPECT_EQ(found->inertia_stretch, Vector3d::Ones());
   EXPECT_LT(found->left_of_prior[static_cast<int>(FlightParameter::kGravityZ)], 0.1);
-  EXPECT_LT(found->center_of_mass.norm(), 2.0 * prior.center_of_mass_deviation);
+}
+
+TEST(FlightCalibration, PrintsNothingWhateverTheUnits) {
+  for (const double unit : {1e3, 1e6, 1e160}) {
+    core::RandomStream stream(4, core::Purpose::kTest);
+    auto wild = flights(stream, 8, 32, 6.0, {2e-4, 2e-3});
+    for (auto& poses : wild)
+      for (TimedPose& pose : poses) pose.X_WO.translation *= unit;
+    ::testing::internal::CaptureStderr();
+    const auto found = calibrated(wild);
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "") << unit;
+    if (found.ok()) {
+      EXPECT_TRUE(found->gravity_W.allFinite()) << unit;
+    }
+  }
 }
 
 TEST(FlightCalibration, RefusesWhatIsNoFlight) {

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/simulation/calibration/keep_untold.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <vector>
+
+namespace prescene::simulation {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Makes the errors of value i as large as `deviation`; correlations stay.
+void set_error(MatrixXd* covariance, Index i, double deviation) {
+  const double factor = deviation / std::sqrt((*covariance)(i, i));
+  covariance->row(i) *= factor;
+  covariance->col(i) *= factor;
+  (*covariance)(i, i) = deviation * deviation;
+}
+
+}  // namespace
+
+void keep_untold(const VectorXd& prior_mean, const VectorXd& prior_deviation, VectorXd* value, MatrixXd* covariance) {
+  std::vector<Index> untold;
+  for (Index i = 0; i < value->size(); ++i)
+    if (!(std::sqrt((*covariance)(i, i)) < kUntold * prior_deviation[i])) untold.push_back(i);
+  if (untold.empty()) return;
+  const auto count = static_cast<Index>(untold.size());
+  VectorXd back(count);
+  MatrixXd own(count, count);
+  MatrixXd across(value->size(), count);
+  for (Index a = 0; a < count; ++a) {
+    const Index i = untold[static_cast<std::size_t>(a)];
+    back[a] = prior_mean[i] - (*value)[i];
+    across.col(a) = covariance->col(i);
+    for (Index b = 0; b < count; ++b) own(a, b) = (*covariance)(i, untold[static_cast<std::size_t>(b)]);
+  }
+  *value += across * own.ldlt().solve(back);
+  for (const Index i : untold) {
+    (*value)[i] = prior_mean[i];
+    set_error(covariance, i, prior_deviation[i]);
+  }
+}
+
+}  // namespace prescene::simulation
