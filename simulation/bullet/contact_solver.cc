@@ -81,8 +81,13 @@ ContactSolver::Contact ContactSolver::make_contact(const SolverContact& given, b
   btSolverBody& b = m_tmpSolverBodyPool[c.b];
   const btVector3 n = to_bullet(given.normal);
   const btVector3 position = to_bullet(given.position);
-  const btVector3 arm_a = a.m_originalBody ? position - a.m_worldTransform.getOrigin() : btVector3(0, 0, 0);
-  const btVector3 arm_b = b.m_originalBody ? position - b.m_worldTransform.getOrigin() : btVector3(0, 0, 0);
+  // Arms end on the bodies' own surfaces, which will have met when the impulse acts. Of two that are free they end
+  // midway, or the two would not keep their angular momentum.
+  const bool both_free = a.internalGetInvMass().x() > 0.0 && b.internalGetInvMass().x() > 0.0;
+  const btVector3 to_surface = n * (both_free ? 0.0 : 0.5 * std::max(0.0, given.gap));
+  const btVector3 no_arm(0, 0, 0);
+  const btVector3 arm_a = a.m_originalBody ? position + to_surface - a.m_worldTransform.getOrigin() : no_arm;
+  const btVector3 arm_b = b.m_originalBody ? position - to_surface - b.m_worldTransform.getOrigin() : no_arm;
   btVector3 t1, t2;
   btPlaneSpace1(n, t1, t2);
   c.normal = make_row(n, arm_a, arm_b, a, b);

@@ -67,6 +67,8 @@ class InstanceWorld {
 
   /// Position of the centre of mass, W.
   Vector3d center_of_mass(int object) const { return objects_[static_cast<std::size_t>(object)].p_WCm; }
+  /// Of the centre of mass, m/s.
+  const Vector3d& velocity(int object) const { return objects_[static_cast<std::size_t>(object)].v_WCm; }
   Quaterniond rotation(int object) const { return objects_[static_cast<std::size_t>(object)].R_WO; }
   /// Turns an object about an axis through its centre of mass and stops it. Overlap that comes of it is pushed out by
   /// the steps that follow, without energy.

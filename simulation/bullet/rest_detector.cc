@@ -8,6 +8,9 @@
 namespace prescene::simulation {
 namespace {
 
+// m/s. A body that stands firmly, calm for the rest rule's time, and still faster slides on a slope that friction hardly
+// holds it on.
+constexpr double kCreep = 1e-3;
 // rad. A body that half a degree topples is not at rest: tables shake more.
 constexpr double kNudge = 0.0087;
 // A toppling body has turned this many nudges when the test ends, and its centre of mass is lower by at least this
@@ -65,6 +68,8 @@ bool RestDetector::at_rest(InstanceWorld& world, const core::Cancellation* cance
   }
   if (!world.actions_finished()) return false;
   if (!tested_) {
+    for (int i = 0; i < world.object_count(); ++i)
+      if (world.free(i) && world.velocity(i).norm() > kCreep && stands_firmly(world, i)) return false;
     tested_ = true;
     stable_ = true;
     for (int i = 0; i < world.object_count() && stable_; ++i) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether an instance is at rest: everything has been calm for the rest rule's time, and nothing merely balances.
+// Whether an instance is at rest: everything has been calm for the rest rule's time, nothing merely balances, and what
+// stands firmly does not creep down a slope.
 //
 // Balance is tested twice. An object that only fixed bodies touch is stable when the vertical through its centre of
 // mass passes inside the polygon of its contacts, a nudge's reach or more from every side. All others (balanced on an

@@ -81,21 +81,29 @@ void ContactRows<kMany>::load_row(const RowGroup& group, int row) {
       // Far off: never pressed.
       for (auto& values : raw) values[i] = 0;
       raw[5][i] = 1;
-      raw[6][i] = Real(1e6);
+      raw[6][i] = Real(1e3);
       raw[11][i] = -1;
     }
   }
   const auto column = [&](std::size_t j) HWY_ATTR { return hn::Load(d, raw[j]); };
   const ObjectLanes& a = object(group.a);
-  const Vec3<V> r{column(0), column(1), column(2)};
   const Vec3<V> n{column(3), column(4), column(5)};
-  const Vec3<V> r_W = a.R * r;
+  // Arms end on the body's own surface, which will have met the other when the impulse acts. Of two that are free they
+  // end midway, or the two would not keep their angular momentum.
+  V to_surface = set<V>(0.5) * hn::Max(column(6), set<V>(0.0));
+  if constexpr (kPair) {
+    const V both_free = a.inverse_mass * object(group.b).inverse_mass;
+    to_surface = hn::IfThenZeroElse(hn::Gt(both_free, set<V>(0.0)), to_surface);
+  }
+  const Vec3<V> midway{column(0), column(1), column(2)};
+  const Vec3<V> r = midway + n * to_surface;
+  const Vec3<V> on_other_W = a.R * (midway - n * to_surface);
   Vec3<V> t1, t2;
   basis(n, t1, t2);
   Vec3<V> r_b = set3<V>(0.0, 0.0, 0.0);
   if constexpr (kPair) {
     const ObjectLanes& b = object(group.b);
-    r_b = transposed(b.R, r_W + (a.p - b.p));
+    r_b = transposed(b.R, on_other_W + (a.p - b.p));
     put3(row, kPosition, r_b);
   }
   const auto put_row = [&](int at, const Vec3<V>& direction, Vec3<V>& turn_a, Vec3<V>& turn_b) HWY_ATTR {
@@ -136,16 +144,16 @@ void ContactRows<kMany>::load_row(const RowGroup& group, int row) {
   put(row, kPart, column(11));
   if constexpr (kPair) {
     const ObjectLanes& b = object(group.b);
-    load_motion<kPair>(group, row, r_W, column(6), b.restitution, b.impact_friction, b.friction);
+    load_motion<kPair>(group, row, on_other_W, column(6), b.restitution, b.impact_friction, b.friction);
   } else {
-    load_motion<kPair>(group, row, r_W, column(6), column(9), column(8), column(7));
+    load_motion<kPair>(group, row, on_other_W, column(6), column(9), column(8), column(7));
   }
 }
 
 template <bool kMany>
 template <bool kPair>
-void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<V>& r_W, V gap, V other_restitution,
-                                     V other_impact, V other_friction) {
+void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap,
+                                     V other_restitution, V other_impact, V other_friction) {
   const D d;
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
@@ -156,7 +164,7 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   V base_1 = along<kPair>(axis<kPair>(row, kTangent1), a.flown, b.flown);
   V base_2 = along<kPair>(axis<kPair>(row, kTangent2), a.flown, b.flown);
   if constexpr (!kPair) {
-    const Vec3<V> position = a.p + r_W;
+    const Vec3<V> position = a.p + on_other_W;
     if (scene_.has_kinematic()) {
       // The surface that moves.
       Others others;

@@ -199,8 +199,9 @@ class ContactRows {
   template <bool kPair>
   void load_row(const RowGroup& group, int row);
   template <bool kPair>
-  void load_motion(const RowGroup& group, int row, const Vec3<V>& r_W, V gap, V other_restitution, V other_impact,
-                   V other_friction);
+  /// `on_other_W` is the place of the other's surface from the middle of a.
+  void load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap, V other_restitution,
+                   V other_impact, V other_friction);
   void load_others(int row, Others& others) const;
   void note_supports();
   /// 1 in the lanes in which something else than `but` held an object up in the last step.

@@ -114,6 +114,12 @@ void LaneBatch::test_balance() {
   for (int at = 0; at < live_; ++at) {
     Slot& slot = *slots_[static_cast<std::size_t>(at)];
     if (slot.mode != Mode::kCalm) continue;
+    if (slot.nudges.slides(engine_, at)) {
+      slot.mode = Mode::kRuns;
+      go_on(at);
+      if (ended_[static_cast<std::size_t>(at)]) steps_[static_cast<std::size_t>(at)] = 0;
+      continue;
+    }
     steps_[static_cast<std::size_t>(at)] = 0;
     if (slot.nudges.stands_or_begins(engine_, at)) {
       finish_at_rest(at);

@@ -87,6 +87,8 @@ void LaneEngine::reset(int slot, const belief::WorldState& start) {
 
 Vector3d LaneEngine::center_of_mass(int slot, int object) const { return vector_at(state_.p, state_.at(object, slot)); }
 
+Vector3d LaneEngine::velocity(int slot, int object) const { return vector_at(state_.v, state_.at(object, slot)); }
+
 Quaterniond LaneEngine::rotation(int slot, int object) const {
   const int at = state_.at(object, slot);
   return Quaterniond(static_cast<double>(state_.q[0][at]), static_cast<double>(state_.q[1][at]),

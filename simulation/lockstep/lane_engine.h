@@ -76,6 +76,8 @@ class LaneEngine {
 
   /// From the local origin.
   Vector3d center_of_mass(int slot, int object) const;
+  /// Of the centre of mass.
+  Vector3d velocity(int slot, int object) const;
   geometry::Quaterniond rotation(int slot, int object) const;
   /// Turns an object about an axis through its centre of mass and stops it.
   void nudge(int slot, int object, const Vector3d& axis_W, double angle);

@@ -10,6 +10,7 @@ namespace prescene::simulation {
 namespace {
 
 // As in simulation/bullet/rest_detector.cc, which says why.
+constexpr double kCreep = 1e-3;    // m/s
 constexpr double kNudge = 0.0087;  // rad
 constexpr double kRunAway = 3.0;
 constexpr double kLeastDrop = 0.25;
@@ -90,6 +91,13 @@ LaneFooting footing_of(LaneEngine& engine, int slot, int object) {
   footing.firm =
       !others && margin_inside({points.data(), count}) > std::max(kLeastMargin, footing.height * std::tan(kNudge));
   return footing;
+}
+
+bool NudgeTest::slides(LaneEngine& engine, int slot) const {
+  for (int object = 0; object < engine.objects(); ++object)
+    if (engine.free(slot, object) && engine.velocity(slot, object).norm() > kCreep && footing_of(engine, slot, object).firm)
+      return true;
+  return false;
 }
 
 bool NudgeTest::stands_or_begins(LaneEngine& engine, int slot) {

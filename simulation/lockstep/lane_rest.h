@@ -20,6 +20,8 @@ class NudgeTest {
  public:
   explicit NudgeTest(int objects) : before_(static_cast<std::size_t>(objects)) {}
 
+  /// Whether one that stands firmly still slides, slowly. After LaneEngine::find_contacts.
+  bool slides(LaneEngine& engine, int slot) const;
   /// Whether all stand firmly, so that there is nothing to nudge. Else keeps the slot as it is and gives it the first
   /// nudge. After LaneEngine::find_contacts.
   bool stands_or_begins(LaneEngine& engine, int slot);

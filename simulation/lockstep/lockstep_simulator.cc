@@ -59,6 +59,9 @@ class LockstepInstance : public Instance {
   bool at_rest() const override {
     if (!instance_.calm(engine_, 0)) return false;
     if (!tested_) {
+      instance_.before_step(engine_, 0);
+      engine_.find_contacts(one_);
+      if (nudges_.slides(engine_, 0)) return false;
       tested_ = true;
       stable_ = balances();
     }
@@ -160,10 +163,8 @@ class LockstepInstance : public Instance {
     return true;
   }
 
-  /// Moves objects and puts them back.
+  /// After contacts have been found. Moves objects and puts them back.
   bool balances() const {
-    instance_.before_step(engine_, 0);
-    engine_.find_contacts(one_);
     if (nudges_.stands_or_begins(engine_, 0)) return true;
     for (;;) {
       engine_.find_contacts(one_);

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/tests/support/closed_forms.h"
 #include "prescene/tests/support/simple_scenes.h"
 
 namespace prescene::tests {
@@ -241,6 +242,44 @@ TEST_P(StepperContract, ThingsThatBeginInEachOtherAreTold) {
   scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.04})};
   EXPECT_EQ(run_actions(scene, {}, 1.0).deepest_overlap, 0.0);
   EXPECT_NEAR(run_actions(scene, {{0.5, release_of("object")}}, 1.0).deepest_overlap, 0.01, 1e-4);
+}
+
+TEST_P(StepperContract, AFastBallThatGripsKeepsFiveSeventhsOfItsSpeedWhereverInAStepItLands) {
+  ObjectModel ball = primitive_model("ball", geometry::Sphere{0.03});
+  ball.contact.friction = belief::FixedScalar{1.0};
+  ball.contact.restitution = belief::FixedScalar{0.5};
+  const Scene scene = floor_scene(ball);
+  const auto simulator = simulator_of(scene);
+  for (int i = 0; i < 20; ++i) {
+    WorldState start = start_of(scene);
+    start.objects[0].X_WO.translation = {0.0, 0.0, 0.06 + 0.0007 * i};
+    start.objects[0].V_WO.linear = {1.0, 0.0, -4.0};
+    simulation::RunRequest request;
+    request.stop.duration = 0.03;
+    const belief::Trajectory run = run_one(*simulator, start, request);
+    ASSERT_GT(run.final().objects[0].V_WO.linear.z(), 1.0);
+    EXPECT_NEAR(run.final().objects[0].V_WO.linear.x(), 5.0 / 7.0, 2e-3) << i;
+  }
+}
+
+TEST_P(StepperContract, WhatCreepsDownASlopeIsNotAtRest) {
+  const double angle = 20.0 * kPi / 180.0;
+  const ObjectModel block = primitive_model("block", BoxShape{{0.1, 0.1, 0.04}});
+  simulation::RunRequest request;
+  request.stop.duration = 2.0;
+  for (const double more : {-5e-3, 5e-3}) {
+    const Scene scene = incline_scene(block, 0.02, angle, std::tan(angle) + more);
+    const belief::Trajectory run = run_one(*simulator_of(scene), start_of(scene), request);
+    const double way = (run.final().objects[0].X_WO.translation - run.states[0].objects[0].X_WO.translation).norm();
+    const double acceleration = kG * std::cos(angle) * 5e-3;
+    if (more < 0.0) {
+      EXPECT_EQ(run.end, TrajectoryEnd::kDuration);
+      EXPECT_NEAR(way, 0.5 * acceleration * 4.0, 0.02 * way);
+    } else {
+      EXPECT_EQ(run.end, TrajectoryEnd::kAtRest);
+      EXPECT_LT(way, 1e-4);
+    }
+  }
 }
 
 TEST_P(StepperContract, WhatIsWedgedGainsNoEnergy) {

@@ -245,7 +245,7 @@ TEST(BulletAgreement, StepsAboutEdgesAreTheSame) {
             std::string(other.name) == "drum" || std::string(other.name) == "rail" || std::string(other.name) == "hat";
         // Where 60 iterations do not settle an impact, the order of its contacts shows.
         EXPECT_LT(errors[errors.size() / 2], round ? 2e-4 : 5e-6);
-        EXPECT_LT(errors[errors.size() * 85 / 100], round ? 5e-4 : 1e-4);
+        EXPECT_LT(errors[errors.size() * 85 / 100], round ? 6e-4 : 1e-4);
         // Rims are eight points here, twelve there.
         EXPECT_LE(found.different, found.touching / (round ? 7 : 10));
       }
