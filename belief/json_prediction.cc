@@ -51,8 +51,10 @@ Json inputs_json(const std::vector<DecidingInputs>& all) {
                         {"standard_error", input.standard_error},
                         {"effects", std::move(effects)}});
     }
-    json.push_back(
-        {{"about", one.about}, {"explained_by_single", one.explained_by_single}, {"inputs", std::move(inputs)}});
+    Json item{{"about", one.about}, {"explained_by_single", one.explained_by_single}};
+    if (one.by_several) item["by_several"] = *one.by_several;
+    item["inputs"] = std::move(inputs);
+    json.push_back(std::move(item));
   }
   return json;
 }
@@ -93,7 +95,9 @@ Json model_error_json(const ModelError& error) {
       item["interval"] = {shift.low, shift.high};
       shifts.push_back(std::move(item));
     }
-    variants.push_back({{"what", variant.what}, {"shifts", std::move(shifts)}});
+    variants.push_back({{"kind", variant.kind == ModelError::Kind::kStep ? "step" : "prior"},
+                        {"what", variant.what},
+                        {"shifts", std::move(shifts)}});
   }
   return {{"instances", error.instances}, {"variants", std::move(variants)}};
 }

@@ -87,7 +87,10 @@ struct InputShare {
 struct DecidingInputs {
   std::string about;                 ///< The group's name, or the outcome's.
   std::vector<InputShare> inputs;    ///< Largest share first.
-  double explained_by_single = 0.0;  ///< Sum of the shares, at most 1; the rest is decided by several together.
+  double explained_by_single = 0.0;  ///< Sum of the shares, at most 1.
+  /// Of the variance, what only several together decide. Nothing where the instances are too few to tell that from what
+  /// a single input does between the few values of it that can be told apart.
+  std::optional<double> by_several;
   friend bool operator==(const DecidingInputs&, const DecidingInputs&) = default;
 };
 
@@ -137,7 +140,11 @@ struct ModelError {
     double low = 0.0, high = 0.0;  ///< Its interval.
     friend bool operator==(const Shift&, const Shift&) = default;
   };
+  /// What is otherwise: the simulator, whose error the probabilities do not contain, or one value of what the scene
+  /// says is not known, over all of which they are already taken.
+  enum class Kind { kStep, kPrior };
   struct Variant {
+    Kind kind = Kind::kStep;
     std::string what;  ///< "half the step", "carton: friction at 0.27".
     std::vector<Shift> shifts;
     friend bool operator==(const Variant&, const Variant&) = default;

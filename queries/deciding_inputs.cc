@@ -14,7 +14,8 @@ namespace {
 using belief::Vector3d;
 
 constexpr std::size_t kFewestInstances = 128;
-constexpr double kLargestTurn = 2.0;  // rad: beyond it a rotation is no longer told by a turn from its mean
+constexpr std::size_t kFewestForRest = 512;  // below, first_order_effect() cuts inputs into 4 intervals only
+constexpr double kLargestTurn = 2.0;         // rad: beyond it a rotation is no longer told by a turn from its mean
 const char* const kAxes[] = {"x", "y", "z"};
 
 bool varies(const std::vector<double>& values) {
@@ -152,6 +153,7 @@ std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, 
     double sum = 0.0;
     for (const belief::InputShare& input : found.inputs) sum += input.share;
     found.explained_by_single = std::min(1.0, sum);
+    if (instances.size() >= kFewestForRest) found.by_several = 1.0 - found.explained_by_single;
     std::stable_sort(found.inputs.begin(), found.inputs.end(),
                      [](const belief::InputShare& a, const belief::InputShare& b) { return a.share > b.share; });
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "prescene/core/text.h"
 #include "prescene/queries/typical_runs.h"
 #include "tasks.h"
 
@@ -51,11 +52,16 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
                                 const ForesightDetail& detail) {
   PRESCENE_RETURN_IF_ERROR(check_effort(effort));
   if (!(duration > 0.0 && duration <= 3600.0))
-    return core::invalid_input("a duration of " + std::to_string(duration) + " s: give more than 0 and at most 3600");
+    return core::invalid_input("a duration of " + core::rounded_text(duration) +
+                               " s: give more than 0 and at most 3600");
   if (!context.make_simulator) return core::unavailable("no simulator: this service was set up without one");
 
   Foresight foresight;
   PRESCENE_TRY(foresight.simulator, context.make_simulator(scene));
+  if (duration < foresight.simulator->step_size())
+    return core::invalid_input("a duration of " + core::rounded_text(duration) +
+                               " s: give at least one step of the simulator, " +
+                               core::rounded_text(foresight.simulator->step_size()) + " s, and at most 3600 s");
   foresight.request.actions = scene->actions;
   foresight.request.stop.duration = duration;
   foresight.request.stop.stop_at_rest = scene->stop_at_rest;

@@ -10,6 +10,7 @@
 namespace prescene::queries {
 namespace {
 
+using Kind = belief::ModelError::Kind;
 using Classes = std::vector<std::vector<int>>;
 
 constexpr double kDisplacement = 0.1;  // standard deviations
@@ -55,6 +56,7 @@ const Parameter kParameters[] = {
 
 /// A way in which the model could be otherwise.
 struct Variant {
+  Kind kind = Kind::kPrior;
   std::string what;
   double step_factor = 1.0;
   std::shared_ptr<const belief::Scene> scene;
@@ -95,8 +97,8 @@ void add_support_ends(const std::shared_ptr<const belief::Scene>& scene, const s
         const double value = belief::draw(prior, std::span(&end, 1));
         auto changed = std::make_shared<belief::Scene>(*scene);
         changed->supports[s].contact.*member = belief::FixedScalar{value};
-        variants.push_back(
-            {scene->supports[s].name + ": " + name + " at " + core::rounded_text(value), 1.0, changed, starts});
+        variants.push_back({Kind::kPrior, scene->supports[s].name + ": " + name + " at " + core::rounded_text(value),
+                            1.0, changed, starts});
       }
     }
   }
@@ -181,8 +183,8 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
   const std::size_t count = std::min(kRepeated, foresight.estimate.instances.size());
   const std::vector<belief::WorldState> starts =
       simulation::starts_of(prior.starts, foresight.estimate, count, prior.stream, *context.pool);
-  std::vector<Variant> variants = {{"half the step", 0.5, foresight.scene, starts},
-                                   {"twice the step", 2.0, foresight.scene, starts}};
+  std::vector<Variant> variants = {{Kind::kStep, "half the step", 0.5, foresight.scene, starts},
+                                   {Kind::kStep, "twice the step", 2.0, foresight.scene, starts}};
   add_object_ends(*foresight.scene, starts, foresight.scene, variants);
   add_support_ends(foresight.scene, starts, variants);
 
@@ -197,7 +199,7 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
     const auto after = simulation::classes_from(*simulator, variant.starts, foresight.variables, foresight.request,
                                                 prior.stream, nullptr, *context.pool, context.cancellation);
     if (!after) return std::optional<belief::ModelError>();
-    error.variants.push_back({variant.what, shifts_of(foresight, before, *after, confidence)});
+    error.variants.push_back({variant.kind, variant.what, shifts_of(foresight, before, *after, confidence)});
   }
   return std::optional(std::move(error));
 }

@@ -22,12 +22,6 @@ std::string full_name(const std::string& group, const std::string& outcome) {
   return group.empty() ? outcome : group + " = " + outcome;
 }
 
-/// The variant that shifts an outcome most, of those that surely shift it.
-struct Worst {
-  const belief::ModelError::Shift* shift = nullptr;
-  std::string what;
-};
-
 /// How much wider an interval has to be to hold for all of so many comparisons at once [Bonferroni].
 double widening(const belief::ModelError& error, std::size_t outcomes, double confidence) {
   const double comparisons = static_cast<double>(std::max<std::size_t>(1, error.variants.size() * outcomes));
@@ -35,9 +29,17 @@ double widening(const belief::ModelError& error, std::size_t outcomes, double co
          core::inverse_normal_cdf(0.5 + 0.5 * confidence);
 }
 
-Worst worst_for(const belief::ModelError& error, const belief::OutcomeProbability& outcome, double wider) {
+/// The variant of a kind that shifts an outcome most, of those that surely shift it.
+struct Worst {
+  const belief::ModelError::Shift* shift = nullptr;
+  std::string what;
+};
+
+Worst worst_for(const belief::ModelError& error, belief::ModelError::Kind kind,
+                const belief::OutcomeProbability& outcome, double wider) {
   Worst worst;
   for (const belief::ModelError::Variant& variant : error.variants) {
+    if (variant.kind != kind) continue;
     for (const belief::ModelError::Shift& shift : variant.shifts) {
       const bool sure = std::abs(shift.shift) > wider * 0.5 * (shift.high - shift.low);
       if (!sure || shift.outcome != outcome.name || shift.group != outcome.group) continue;
@@ -48,9 +50,9 @@ Worst worst_for(const belief::ModelError& error, const belief::OutcomeProbabilit
   return worst;
 }
 
-void remark_on_model(const belief::PredictAnswer& answer, double confidence, std::vector<std::string>& remarks) {
-  const belief::ModelError& error = *answer.model_error;
-  const double wider = widening(error, answer.outcomes.size(), confidence);
+/// "upright (interval +-1.2 points; half the step shifts it by ...); ...": those that shift beyond their interval, the
+/// farthest first; empty if none.
+std::string beyond_intervals(const belief::PredictAnswer& answer, belief::ModelError::Kind kind, double wider) {
   struct Narrow {
     double excess;
     std::string text;
@@ -58,7 +60,7 @@ void remark_on_model(const belief::PredictAnswer& answer, double confidence, std
   std::vector<Narrow> narrow;
   for (const belief::OutcomeProbability& outcome : answer.outcomes) {
     const double half = 0.5 * (outcome.high - outcome.low);
-    const Worst worst = worst_for(error, outcome, wider);
+    const Worst worst = worst_for(*answer.model_error, kind, outcome, wider);
     if (!worst.shift || std::abs(worst.shift->shift) <= half) continue;
     narrow.push_back({std::abs(worst.shift->shift) - half,
                       full_name(outcome.group, outcome.name) + " (interval +-" + fixed_text(100.0 * half, 1) +
@@ -66,24 +68,43 @@ void remark_on_model(const belief::PredictAnswer& answer, double confidence, std
                           points(worst.shift->low) + " to " + points(worst.shift->high) + ")"});
   }
   std::stable_sort(narrow.begin(), narrow.end(), [](const Narrow& a, const Narrow& b) { return a.excess > b.excess; });
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMostNamed, narrow.size()); ++i) text += (i > 0 ? "; " : "") + narrow[i].text;
+  if (narrow.size() > kMostNamed) text += "; and " + std::to_string(narrow.size() - kMostNamed) + " more";
+  return text;
+}
+
+void remark_on_model(const belief::PredictAnswer& answer, double confidence, std::vector<std::string>& remarks) {
+  using Kind = belief::ModelError::Kind;
+  const belief::ModelError& error = *answer.model_error;
+  const double wider = widening(error, answer.outcomes.size(), confidence);
+  const std::string steps = beyond_intervals(answer, Kind::kStep, wider);
+  if (!steps.empty())
+    remarks.push_back(
+        "The model's step: the intervals tell what more instances would change, and are narrower than what the "
+        "simulator itself is wrong by: " +
+        steps + ".");
+  const std::string priors = beyond_intervals(answer, Kind::kPrior, wider);
+  if (!priors.empty())
+    remarks.push_back(
+        "What the scene says is not known: the probabilities are taken over all of its values; with one of them known "
+        "they would be others: " +
+        priors + ".");
+  const bool any_prior =
+      std::any_of(error.variants.begin(), error.variants.end(),
+                  [](const belief::ModelError::Variant& variant) { return variant.kind == Kind::kPrior; });
+  std::string small = steps.empty() ? "neither half nor double step" : "";
+  if (any_prior && priors.empty())
+    small += (small.empty() ? "no" : " and no") + std::string(" end of what the scene says is not known");
+  if (small.empty()) return;
   double resolved = 0.0;  // how small a shift these instances can show
   for (const belief::ModelError::Variant& variant : error.variants)
     for (const belief::ModelError::Shift& shift : variant.shifts)
       resolved = std::max(resolved, wider * 0.5 * (shift.high - shift.low));
-  if (narrow.empty()) {
-    remarks.push_back(
-        "No variant of the model was found to shift a probability by more than the half width of its "
-        "interval; shifts below " +
-        fixed_text(100.0 * resolved, 1) + " points are not seen with " + std::to_string(error.instances) +
-        " instances.");
-    return;
-  }
-  std::string text =
-      "The intervals tell what more instances would change, and are narrower than what the model does not "
-      "know: ";
-  for (std::size_t i = 0; i < std::min(kMostNamed, narrow.size()); ++i) text += (i > 0 ? "; " : "") + narrow[i].text;
-  if (narrow.size() > kMostNamed) text += "; and " + std::to_string(narrow.size() - kMostNamed) + " more";
-  remarks.push_back(text + ".");
+  remarks.push_back("Model error: " + small +
+                    " was found to shift a probability by more than the half width of its interval; shifts below " +
+                    fixed_text(100.0 * resolved, 1) + " points are not seen with " + std::to_string(error.instances) +
+                    (error.instances == 1 ? " instance." : " instances."));
 }
 
 }  // namespace

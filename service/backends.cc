@@ -55,7 +55,11 @@ core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(co
   auto lockstep = simulation::make_lockstep_simulator(scene, shapes_, lockstep_options(options));
   if (!lockstep) {
     const bool other_stepper = settings_.stepper == Stepper::kAutomatic;
-    if (!other_stepper || lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
+    if (lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
+    if (!other_stepper)
+      return core::unsupported(
+          lockstep.status().message() +
+          "; use '--stepper bullet', or 'automatic', which takes Bullet by itself where it has to");
     return simulation::make_bullet_simulator(scene, shapes_, options);
   }
   PRESCENE_TRY(auto bullet, simulation::make_bullet_simulator(scene, shapes_, options));

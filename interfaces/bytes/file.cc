@@ -26,16 +26,22 @@ std::string reason(int error) { return std::generic_category().message(error); }
 Status open_error(const std::filesystem::path& path, int error) {
   const std::string place = path.string() + ": ";
   if (error == ENOENT) return core::not_found(place + "no such file; check the path");
-  if (error == EACCES) return core::unavailable(place + "permission denied; change the file's permissions or the user");
+  if (error == EACCES || error == EPERM)
+    return core::invalid_input(place + "permission denied; change the file's permissions or the user");
+  if (error == ENOTDIR || error == ELOOP || error == ENAMETOOLONG)
+    return core::invalid_input(place + "cannot be opened: " + reason(error) + "; check the path");
   return core::unavailable(place + "cannot be opened: " + reason(error));
 }
 
 Status write_error(const std::filesystem::path& path, int error) {
-  const std::string text = path.string() + ": cannot be written: " + reason(error);
-  if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
-    return core::resource_exhausted(text + "; free some space or choose another disk");
-  }
-  return core::unavailable(text);
+  const std::filesystem::path folder = path.parent_path();
+  std::error_code ignored;
+  if (error == ENOENT && !folder.empty() && !std::filesystem::is_directory(folder, ignored))
+    return core::unavailable(path.string() + ": its folder does not exist; make it first");
+  std::string remedy;
+  if (error == ENOSPC || error == EDQUOT || error == EFBIG) remedy = "; free some space or choose another disk";
+  if (error == EACCES || error == EPERM || error == EROFS || error == ENOENT) remedy = "; choose another folder";
+  return core::unavailable(path.string() + ": cannot be written: " + reason(error) + remedy);
 }
 
 }  // namespace
@@ -73,14 +79,9 @@ Status write_file(const std::filesystem::path& path, std::span<const std::uint8_
   partial += ".partial";
   Status status;
   {
-    Result<OutputFile> file = OutputFile::create(partial);
-    if (!file) {
-      // Named as it was asked for.
-      const bool has_folder = target.parent_path().empty() || std::filesystem::is_directory(target.parent_path());
-      return has_folder ? file.status() : core::not_found(path.string() + ": its folder does not exist; make it first");
-    }
-    status = file->write(bytes);
-    if (const Status closed = file->close(); status.ok()) status = closed;
+    PRESCENE_TRY(OutputFile file, OutputFile::create(partial, path));
+    status = file.write(bytes);
+    if (const Status closed = file.close(); status.ok()) status = closed;
   }
   std::error_code error;
   if (status.ok()) {
@@ -97,10 +98,13 @@ Status write_file(const std::filesystem::path& path, std::string_view text) {
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+    : path_(std::move(other.path_)),
+      named_(std::move(other.named_)),
+      descriptor_(std::exchange(other.descriptor_, -1)) {}
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(path_, other.path_);
+  std::swap(named_, other.named_);
   std::swap(descriptor_, other.descriptor_);
   return *this;
 }
@@ -109,14 +113,13 @@ OutputFile::~OutputFile() {
   if (is_open()) ::close(descriptor_);
 }
 
-Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
+Result<OutputFile> OutputFile::create(const std::filesystem::path& path, const std::filesystem::path& named) {
   OutputFile file;
   file.path_ = path;
+  file.named_ = named.empty() ? path : named;
   file.descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file.descriptor_ >= 0) return file;
-  const int error = errno;
-  if (error == ENOENT) return core::not_found(path.string() + ": its folder does not exist; make it first");
-  return write_error(path, error);
+  return write_error(file.named_, errno);
 }
 
 Status OutputFile::write(std::span<const std::uint8_t> bytes) {
@@ -125,7 +128,7 @@ Status OutputFile::write(std::span<const std::uint8_t> bytes) {
     const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
     if (written < 0) {
       if (errno == EINTR) continue;
-      return write_error(path_, errno);
+      return write_error(named_, errno);
     }
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
@@ -135,13 +138,13 @@ Status OutputFile::write(std::span<const std::uint8_t> bytes) {
 Status OutputFile::sync() {
   PRESCENE_CHECK(is_open());
   // Pipes and character devices cannot be synchronised; that is not a loss.
-  if (::fdatasync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) return write_error(path_, errno);
+  if (::fdatasync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) return write_error(named_, errno);
   return core::ok_status();
 }
 
 Status OutputFile::close() {
   if (!is_open()) return core::ok_status();
-  if (::close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) return write_error(path_, errno);
+  if (::close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) return write_error(named_, errno);
   return core::ok_status();
 }
 

@@ -14,11 +14,13 @@
 
 namespace prescene::interfaces {
 
-/// The whole content of a regular file. kNotFound when there is none, kInvalidInput for a folder, kResourceExhausted
-/// above `max_bytes`, kUnavailable when it can't be opened or read; the text begins with the path.
+/// The whole content of a regular file. kNotFound when there is none, kInvalidInput for a folder or a path that can't
+/// be opened by this user, kResourceExhausted above `max_bytes`, kUnavailable when the system can't open or read it
+/// now; the text begins with the path.
 core::Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::size_t max_bytes);
 
 /// Writes beside the target and renames at the end: the old content stays when anything fails. Makes no folders.
+/// Whatever keeps a file from being written is kUnavailable, with the path as it was given and the system's reason.
 core::Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 core::Status write_file(const std::filesystem::path& path, std::string_view text);
 
@@ -32,19 +34,19 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
   ~OutputFile();  ///< Closes; errors are lost, so call close() first.
 
-  /// Truncates an existing file.
-  static core::Result<OutputFile> create(const std::filesystem::path& path);
+  /// Truncates an existing file. Errors speak of `named`, if any, in place of the path.
+  static core::Result<OutputFile> create(const std::filesystem::path& path, const std::filesystem::path& named = {});
 
   bool is_open() const { return descriptor_ >= 0; }
   const std::filesystem::path& path() const { return path_; }
-  /// All bytes or an error (disk full: kResourceExhausted).
+  /// All bytes or an error (kUnavailable, as of a full disk).
   core::Status write(std::span<const std::uint8_t> bytes);
   /// Waits until the bytes are on the disk.
   core::Status sync();
   core::Status close();
 
  private:
-  std::filesystem::path path_;
+  std::filesystem::path path_, named_;
   int descriptor_ = -1;
 };
 

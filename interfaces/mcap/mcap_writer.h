@@ -27,7 +27,7 @@ struct McapWriterOptions {
   bool sync = false;
 };
 
-/// Not thread-safe. Every write to the file is checked: a full disk is kResourceExhausted, naming the file, and what
+/// Not thread-safe. Every write to the file is checked: a full disk is kUnavailable, naming the file, and what
 /// was in closed chunks stays readable.
 class McapWriter {
  public:

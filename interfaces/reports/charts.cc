@@ -220,7 +220,7 @@ std::string tornado_svg(const TornadoBlock& block) {
     out += rectangle(std::min(large, base), top + 6.0, std::abs(large - base), kLane - 12.0, hex(series_color(0)),
                      "highest fifth: " + percent(row.large));
     out += text_at(kWidth - kRight + 14.0, middle + 4.0,
-                   percent(row.share) + " \u00b1 " + decimal(100.0 * row.standard_error, 1), "tick");
+                   percent(row.share) + " \u00b1 " + decimal(std::max(0.1, 100.0 * row.standard_error), 1), "tick");
   }
   out += line(x(block.overall), kTop, x(block.overall), bottom, "whisker");
   out += rectangle(kLeft, 4.0, 12.0, 10.0, hex(series_color(1)), "");

@@ -93,6 +93,11 @@ std::optional<ChartBlock> settling_chart(const belief::PredictAnswer& answer, co
   return chart;
 }
 
+std::string rest_text(const belief::DecidingInputs& inputs, int instances) {
+  if (inputs.by_several) return "several together decide about " + percent(*inputs.by_several);
+  return std::to_string(instances) + " instances are too few to say what decides the rest";
+}
+
 void add_deciding(const belief::PredictAnswer& answer, std::vector<ReportSection>& sections) {
   constexpr std::size_t kMostRows = 8;
   if (answer.inputs.empty()) return;
@@ -106,8 +111,8 @@ void add_deciding(const belief::PredictAnswer& answer, std::vector<ReportSection
     if (!shown || shown->probability > 0.98 || shown->probability < 0.02) continue;
     TornadoBlock tornado;
     tornado.caption = full_name(shown->group, shown->name) + " (" + percent(shown->probability) +
-                      "): what one uncertain input makes of it; several together decide " +
-                      percent(std::max(0.0, 1.0 - one.explained_by_single)) + " of " + one.about;
+                      "): what one uncertain input makes of it; " + rest_text(one, answer.instances) + " of " +
+                      one.about;
     tornado.overall = shown->probability;
     for (const belief::InputShare& input : one.inputs) {
       if (tornado.rows.size() == kMostRows) break;
@@ -162,6 +167,29 @@ void add_contacts(const belief::PredictAnswer& answer, std::vector<ReportSection
   section.blocks.push_back(std::move(chart));
 }
 
+void add_shifts(const belief::ModelError& error, belief::ModelError::Kind kind, const std::string& caption,
+                const std::vector<const belief::OutcomeProbability*>& shown, ReportSection& section) {
+  TableBlock table;
+  table.caption = caption + " (" + std::to_string(error.instances) + " instances each)";
+  table.columns = {"model"};
+  for (const auto* outcome : shown) table.columns.push_back(full_name(outcome->group, outcome->name));
+  for (const belief::ModelError::Variant& variant : error.variants) {
+    if (variant.kind != kind) continue;
+    std::vector<std::string>& row = table.rows.emplace_back(std::vector<std::string>{variant.what});
+    for (const auto* outcome : shown) {
+      const auto found =
+          std::find_if(variant.shifts.begin(), variant.shifts.end(), [&](const belief::ModelError::Shift& shift) {
+            return shift.outcome == outcome->name && shift.group == outcome->group;
+          });
+      row.push_back(found == variant.shifts.end()
+                        ? ""
+                        : decimal(100.0 * found->shift, 1) + " (" + decimal(100.0 * found->low, 1) + " to " +
+                              decimal(100.0 * found->high, 1) + ")");
+    }
+  }
+  if (!table.rows.empty()) section.blocks.push_back(std::move(table));
+}
+
 void add_doubts(const belief::PredictAnswer& answer, std::vector<ReportSection>& sections) {
   constexpr std::size_t kMostOutcomes = 6;
   if (answer.chaos.empty() && !answer.model_error) return;
@@ -184,25 +212,15 @@ void add_doubts(const belief::PredictAnswer& answer, std::vector<ReportSection>&
   std::stable_sort(shown.begin(), shown.end(),
                    [](const auto* a, const auto* b) { return a->probability > b->probability; });
   if (shown.size() > kMostOutcomes) shown.resize(kMostOutcomes);
-  TableBlock table;
-  table.caption = "Shift of the probability, percentage points with its interval, when the model is otherwise (" +
-                  std::to_string(answer.model_error->instances) + " instances each)";
-  table.columns = {"model"};
-  for (const auto* outcome : shown) table.columns.push_back(full_name(outcome->group, outcome->name));
-  for (const belief::ModelError::Variant& variant : answer.model_error->variants) {
-    std::vector<std::string>& row = table.rows.emplace_back(std::vector<std::string>{variant.what});
-    for (const auto* outcome : shown) {
-      const auto found =
-          std::find_if(variant.shifts.begin(), variant.shifts.end(), [&](const belief::ModelError::Shift& shift) {
-            return shift.outcome == outcome->name && shift.group == outcome->group;
-          });
-      row.push_back(found == variant.shifts.end()
-                        ? ""
-                        : decimal(100.0 * found->shift, 1) + " (" + decimal(100.0 * found->low, 1) + " to " +
-                              decimal(100.0 * found->high, 1) + ")");
-    }
-  }
-  section.blocks.push_back(std::move(table));
+  add_shifts(
+      *answer.model_error, belief::ModelError::Kind::kStep,
+      "The simulator's own error, which the intervals do not contain: shift of the probability, percentage points "
+      "with its interval",
+      shown, section);
+  add_shifts(
+      *answer.model_error, belief::ModelError::Kind::kPrior,
+      "What the scene says is not known, which the probabilities are taken over: their shift with one value known",
+      shown, section);
 }
 
 }  // namespace

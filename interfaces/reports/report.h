@@ -107,7 +107,7 @@ struct ReportContents {
 
 /// The page as text.
 std::string report_html(const ReportContents& contents);
-/// Writes it; fails with kUnavailable or kResourceExhausted when the file can't be written, and keeps what was there.
+/// Writes it; fails with kUnavailable when the file can't be written, and keeps what was there.
 core::Status write_report(const std::filesystem::path& path, const ReportContents& contents);
 
 /// Sections that show an answer: outcomes, heat maps (with the outlines of the scene's supports), final poses,

@@ -31,6 +31,30 @@ void read_contact(Binder& binder, ContactProperties& contact) {
   binder.read("edge_radius", contact.edge_radius, kLever);
 }
 
+// A radius larger than half of the thinnest part would round away more than there is.
+void check_edges(Binder& binder, const BodyShape& shape, const ContactProperties& contact) {
+  const LocatedValue* at = binder.find("edge_radius");
+  if (!at) return;
+  for (const belief::CollisionShape& part : shape.collision) {
+    belief::CollisionShape own = part;
+    std::visit([](auto& placed) { placed.X_OS = {}; }, own);
+    const geometry::TriangleMesh mesh = belief::collision_mesh({own});
+    if (mesh.vertices.empty()) continue;
+    Vector3d low = mesh.vertices.front(), high = low;
+    for (const Vector3d& vertex : mesh.vertices) {
+      low = low.cwiseMin(vertex);
+      high = high.cwiseMax(vertex);
+    }
+    const double half = 0.5 * (high - low).minCoeff();
+    if (contact.edge_radius <= half * (1.0 + 1e-6)) continue;
+    binder.problems().add(at->place, at->path,
+                          number_text(contact.edge_radius) + " m is more than half the size of the shape, " +
+                              core::rounded_text(half) + " m where it is thinnest",
+                          "give a smaller radius");
+    return;
+  }
+}
+
 // Whether the product of any two of the rotations is one of them or the identity.
 bool is_group(const std::vector<geometry::Quaterniond>& rotations) {
   constexpr double kSame = 0.02;  // rad: hand-written digits
@@ -267,6 +291,7 @@ belief::ObjectModel read_object_model(const LocatedValue& value, const std::stri
   read_mass(binder, shape, model);
   read_inertia(binder, shape, model);
   read_contact(binder, model.contact);
+  check_edges(binder, shape, model.contact);
   if (const LocatedValue* at = binder.find("symmetry")) model.symmetry = read_symmetry(*at, context.problems);
   if (const LocatedValue* at = binder.find("color")) model.color = read_color(*at, context.problems);
   static const std::vector<std::pair<std::string, belief::SurfaceKind>> kSurfaces{
@@ -284,11 +309,12 @@ belief::Support read_support(const LocatedValue& value, const std::string& name,
   Binder binder(value, context.problems);
   BodyShape shape = read_body_shape(binder, kSupportSize, false, context);
   check_hulls(shape, context.problems);
+  if (const LocatedValue* at = binder.find("pose")) support.X_WS = read_pose(*at, context.problems);
+  read_contact(binder, support.contact);
+  check_edges(binder, shape, support.contact);
   support.collision = std::move(shape.collision);
   support.visual = std::move(shape.visual);
   support.hollow = shape.hollow;
-  if (const LocatedValue* at = binder.find("pose")) support.X_WS = read_pose(*at, context.problems);
-  read_contact(binder, support.contact);
   if (const LocatedValue* at = binder.find("color")) support.color = read_color(*at, context.problems);
   return support;
 }
@@ -300,9 +326,10 @@ belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::
   Binder binder(value, problems);
   BodyShape shape = read_body_shape(binder, kObjectSize, true, context);
   check_hulls(shape, problems);
+  read_contact(binder, body.contact);
+  check_edges(binder, shape, body.contact);
   body.collision = std::move(shape.collision);
   body.visual = std::move(shape.visual);
-  read_contact(binder, body.contact);
   if (const LocatedValue* at = binder.find("color")) body.color = read_color(*at, problems);
   std::string which;
   const LocatedValue* at = binder.one_of({"pose", "timeline"}, "give 'pose', or 'timeline' if it moves", false, &which);

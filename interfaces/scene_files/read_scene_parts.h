@@ -37,6 +37,9 @@ belief::Outcome read_outcome(const LocatedValue& value, const std::string& name,
                              SceneContext& context);
 belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::string& name, SceneContext& context);
 
+/// Reports objects whose mean start lies wholly inside one solid of a support. The scene is valid.
+void refuse_starts_inside(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
+
 /// Shapes of a body and what comes with them.
 struct BodyShape {
   std::vector<belief::CollisionShape> collision;

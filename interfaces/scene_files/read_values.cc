@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -35,6 +36,21 @@ NumberRange deviation_range(const NumberRange& range) {
           "give a standard deviation of at least 0, no larger than the value itself may be", range.unit};
 }
 
+constexpr double kLeastMass = 1e-4;  // of a cut normal distribution: 3.7 deviations from the mean
+
+double mass_between(const NormalScalar& normal) {
+  if (normal.standard_deviation <= 0.0) return normal.mean >= normal.low && normal.mean <= normal.high ? 1.0 : 0.0;
+  return core::normal_cdf((normal.high - normal.mean) / normal.standard_deviation) -
+         core::normal_cdf((normal.low - normal.mean) / normal.standard_deviation);
+}
+
+std::string limits_text(const NormalScalar& normal) {
+  const auto text = [](double limit, const char* none) {
+    return std::abs(limit) < 1e300 ? core::rounded_text(limit) : none;
+  };
+  return "its min (" + text(normal.low, "none") + ") and its max (" + text(normal.high, "none") + ")";
+}
+
 ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const NumberRange& range, bool cut_low,
                                bool cut_high) {
   Problems& problems = binder.problems();
@@ -50,6 +66,12 @@ ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const 
   }
   normal.mean = read_number(value.items[0], problems, range).value_or(0.0);
   normal.standard_deviation = read_number(value.items[1], problems, deviation_range(range)).value_or(0.0);
+  if (normal.low <= normal.high && mass_between(normal) < kLeastMass)
+    problems.add(value.place, value.path,
+                 "hardly anything of a normal distribution of mean " + core::rounded_text(normal.mean) +
+                     " and deviation " + core::rounded_text(normal.standard_deviation) + " lies between " +
+                     limits_text(normal),
+                 "give a min below the mean and a max above it, or another mean");
   return normal;
 }
 

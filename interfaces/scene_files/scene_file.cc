@@ -237,6 +237,7 @@ core::Result<Scene> parse_scene(std::string_view text, const std::string& file, 
     if (const core::Status status = belief::validate(scene); !status.ok())
       problems.add({document->place.file, 0, 0}, "", status.message(), "correct it");
   }
+  if (problems.empty()) refuse_starts_inside(*document, scene, problems);
   if (problems.empty()) warn_of_oddities(*document, scene, problems);
   if (report) *report = {problems.errors(), problems.warnings()};
   if (!problems.empty()) return problems.status();

@@ -29,7 +29,7 @@ prescene::core::Status run(const prescene::service::Verb& verb, prescene::servic
   try {
     return verb.run(context);
   } catch (const std::bad_alloc&) {
-    return prescene::core::resource_exhausted("the memory is used up: give smaller images, meshes or limits");
+    return prescene::core::unavailable("the memory is used up: give smaller images, meshes or limits");
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -39,19 +40,23 @@ nlohmann::ordered_json document_of(const belief::Scene& scene, std::uint64_t see
 }
 
 /// "where is decided by carton: position x (57 +-4 %), ...": inputs whose share is surely more than nothing.
-std::string deciding_text(const belief::DecidingInputs& inputs) {
+std::string deciding_text(const belief::DecidingInputs& inputs, int instances) {
   constexpr std::size_t kShown = 3;
   std::string text;
   std::size_t shown = 0;
   for (const belief::InputShare& input : inputs.inputs) {
     if (shown == kShown || input.share < 0.02 || input.share < 2.0 * input.standard_error) break;
     text += (shown++ > 0 ? ", " : "") + input.input + " (" + fixed_text(100.0 * input.share, 0) + " +-" +
-            fixed_text(100.0 * input.standard_error, 0) + " %)";
+            fixed_text(std::ceil(100.0 * input.standard_error), 0) + " %)";  // rather too large, and never 0
   }
-  return inputs.about + " is decided by " +
-         (text.empty() ? "no single uncertain input\n"
-                       : text + "; by several together " +
-                             fixed_text(100.0 * std::max(0.0, 1.0 - inputs.explained_by_single), 0) + " %\n");
+  const std::string about = inputs.about + " is decided by ";
+  if (text.empty()) return about + "no single uncertain input that " + std::to_string(instances) + " instances show\n";
+  text = about + text;
+  if (!inputs.by_several)
+    return text + "; the rest is unexplained (" + std::to_string(instances) + " instances are too few to say)\n";
+  if (*inputs.by_several > 0.02)
+    text += "; by several together about " + fixed_text(100.0 * *inputs.by_several, 0) + " %";
+  return text + "\n";
 }
 
 std::string cost_text(const belief::PredictAnswer& predicted) {
@@ -90,7 +95,7 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
       return (outcome.group.empty() ? outcome.name : outcome.group) == inputs.about && outcome.probability > 0.02 &&
              outcome.probability < 0.98;
     });
-    if (open) text += deciding_text(inputs);
+    if (open) text += deciding_text(inputs, predicted.instances);
   }
   text += cost_text(predicted);
   for (const std::string& remark : predicted.remarks) text += "Note: " + remark + "\n";
@@ -133,6 +138,10 @@ belief::PredictDetail detail_of(const Options& options, bool json) {
 }
 
 core::Status run(const Options& options, VerbContext& context) {
+  if (options.outcomes_only && (!context.options().json || !options.report.empty() || !options.heat_map.empty()))
+    return core::invalid_input(
+        "--outcomes-only is for --json without --report and --heat-map, which show where things end: leave it out (the "
+        "text without --json works out no more than outcomes by itself)");
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene}));
   std::error_code none;
@@ -192,12 +201,15 @@ Verb add_predict_verb(CLI::App& app) {
                    "Wall time, s, after which no more instances begin; the answer then depends on the machine's speed")
       ->check(positive_number());
   verb->add_option("--budget", options->budget,
-                   "The same with a unit, as 0.1s, 100ms or 2min; what takes further instances is left out")
+                   "The same with a unit, as 0.1s, 100ms or 2min (a number alone is seconds); what takes further "
+                   "instances is left out")
       ->excludes("--max-seconds")
       ->check(CLI::Validator(
           [](std::string& text) {
             return seconds_of(text) ? std::string()
-                                    : "'" + text + "' is no time above 0: give one as 0.1s, 100ms or 2min";
+                                    : "'" + text +
+                                          "' is no time above 0 and up to 1000000 s: give one as 0.1s, 100ms or 2min; "
+                                          "a number alone is seconds";
           },
           "TIME"));
   verb->add_flag("--outcomes-only", options->outcomes_only,

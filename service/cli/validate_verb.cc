@@ -14,6 +14,10 @@ struct Checked {
   std::string text;
 };
 
+std::string counted(std::size_t number, const std::string& thing) {
+  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
+}
+
 Checked bad(const std::string& file, const core::Status& status) {
   return {status, {{"file", file}, {"valid", false}, {"errors", status.message()}}, status.message()};
 }
@@ -30,8 +34,8 @@ Checked check_scene(const std::string& file, VerbContext& context) {
            {"objects", (*scene)->objects.size()},
            {"actions", (*scene)->actions.size()},
            {"uncertain_dimensions", dimensions}},
-          file + ": valid: " + std::to_string((*scene)->objects.size()) + " objects, " + std::to_string(dimensions) +
-              " uncertain dimensions"};
+          file + ": valid: " + counted((*scene)->objects.size(), "object") + ", " +
+              counted(static_cast<std::size_t>(dimensions), "uncertain dimension")};
 }
 
 Checked check_model(const std::string& file, VerbContext& context) {

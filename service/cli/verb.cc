@@ -66,9 +66,9 @@ ExitCode exit_code_of(const core::Status& status) {
     case core::StatusCode::kNotFound:
     case core::StatusCode::kDataLoss:
     case core::StatusCode::kUnsupported:
+    case core::StatusCode::kResourceExhausted:  // by what was given: larger than a limit
       return ExitCode::kBadInput;
     case core::StatusCode::kUnavailable:
-    case core::StatusCode::kResourceExhausted:
     case core::StatusCode::kCancelled:
       return ExitCode::kFailed;
   }

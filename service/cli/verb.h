@@ -25,7 +25,8 @@ class Validator;
 
 namespace prescene::service {
 
-/// 0 = done, 1 = could not do it, 2 = bad arguments or bad input.
+/// 0 = done, 1 = could not do it (stopped, an output that can't be written, no memory), 2 = bad arguments or bad input
+/// (a file that is not there, can't be opened or read as what it should be, or is larger than a limit).
 enum class ExitCode { kDone = 0, kFailed = 1, kBadInput = 2 };
 ExitCode exit_code_of(const core::Status& status);
 /// {"error": text} and a line's end.
@@ -101,8 +102,8 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
 /// `settings` (of a recording) with those of the options above that were on the command line.
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given);
 
-/// An answer's error as a status: what begins with "cancelled: ", "unavailable: " or "resource exhausted: " could not
-/// be done, everything else is a bad question. `place` goes in front of the text.
+/// An answer's error as a status: what begins with "cancelled: " or "unavailable: " could not be done, everything else
+/// is a bad question. `place` goes in front of the text.
 core::Status status_of_error(const std::string& place, const std::string& error);
 
 /// An answer as JSON, for a person; what has no short form stays JSON.

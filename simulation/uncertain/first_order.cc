@@ -129,7 +129,16 @@ InputEffect first_order_effect(std::span<const double> input, std::span<const in
   double squares = 0.0;
   for (double one : without) squares += (one - mean) * (one - mean);
   effect.share = std::clamp(share_of(all), 0.0, 1.0);
-  effect.standard_error = std::sqrt(squares * (kBlocks - 1.0) / kBlocks);
+  // Blocks that agree to the last (a share of nothing or of all) do not make it certain: the chance that is taken off
+  // scatters by itself, as chi squared with one degree of freedom less than intervals.
+  double weight = 0.0, weight_squares = 0.0;
+  for (const Cell& cell : all) {
+    weight += cell.weight;
+    weight_squares += cell.squares;
+  }
+  const double by_chance =
+      weight > 0.0 ? std::sqrt(2.0 * (static_cast<double>(count) - 1.0)) * weight_squares / (weight * weight) : 1.0;
+  effect.standard_error = std::hypot(std::sqrt(squares * (kBlocks - 1.0) / kBlocks), by_chance);
   return effect;
 }
 

@@ -15,7 +15,8 @@ namespace prescene::simulation {
 struct InputEffect {
   /// Var(E[class | input]) / Var(class), summed over the classes' indicators above and below the line, in [0, 1].
   double share = 0.0;
-  /// From leaving out each of 16 blocks of the instances in turn; too large rather than too small for nets.
+  /// From leaving out each of 16 blocks of the instances in turn, and from chance among the intervals (never 0 where
+  /// the input varies); too large rather than too small for nets.
   double standard_error = 0.0;
   std::vector<double> low_fifth, high_fifth;  ///< Per class: its probability where the input is that small, that large.
 };

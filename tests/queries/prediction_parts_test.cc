@@ -16,7 +16,10 @@ namespace {
 using belief::Answer;
 using belief::PredictAnswer;
 using belief::PredictQuery;
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
 using tests::context_with;
 using tests::slide;
 using tests::sliding_scene;
@@ -117,7 +120,14 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
   EXPECT_NEAR(shift(2).shift, 1.0 - p, 0.02);  // slippery: all slide
   EXPECT_NEAR(shift(3).shift, -p, 0.02);
   ASSERT_FALSE(answer.remarks.empty());
-  EXPECT_THAT(answer.remarks.front(), HasSubstr("narrower than what the model does not know"));
+  // The simulator's own error and what the scene says is not known are two things.
+  EXPECT_EQ(answer.model_error->variants[1].kind, belief::ModelError::Kind::kStep);
+  EXPECT_EQ(answer.model_error->variants[2].kind, belief::ModelError::Kind::kPrior);
+  EXPECT_THAT(answer.remarks[0], StartsWith("The model's step"));
+  EXPECT_THAT(answer.remarks[0], AllOf(HasSubstr("twice the step"), Not(HasSubstr("friction at"))));
+  ASSERT_GE(answer.remarks.size(), 2u);
+  EXPECT_THAT(answer.remarks[1], StartsWith("What the scene says is not known"));
+  EXPECT_THAT(answer.remarks[1], AllOf(HasSubstr("carton: friction at"), Not(HasSubstr("the step"))));
 }
 
 TEST(Chaos, IsToldApartFromABoundary) {

@@ -99,6 +99,88 @@ TEST(CommandLine, OutputThatCannotBeWrittenIsAFailure) {
   EXPECT_EQ(run_program_writing_to("/dev/full", {"--help"}), 1);
 }
 
+constexpr const char* kOneBox =
+    "name: box\nduration: 0.2\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\n"
+    "supports:\n  floor: {ground: {size: 4}}\n"
+    "objects:\n  box: {model: box, pose: {position: [{normal: [0, 0.01]}, 0, 0.05]}}\n"
+    "outcomes:\n  low: {object: box, below: 0.2}\n";
+
+TEST(CommandLine, InputThatCannotBeUsedEndsWithTwo) {
+  const ScratchDir folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  write_file(file("large.yaml"), "# " + std::string(20u << 20, 'x') + "\n");
+  write_file(file("bad.yaml"), "name: [\n");
+  write_file(file("bad.ply"), "ply\nnonsense\n");
+  write_file(file("bad.mcap"), "nonsense");
+  std::filesystem::create_directory(file("folder.yaml"));
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"validate", file("none.yaml")},
+                                             {"validate", file("large.yaml")},
+                                             {"validate", file("bad.yaml")},
+                                             {"validate", file("folder.yaml")},
+                                             {"validate", file("bad.yaml/x.yaml")},
+                                             {"predict", file("none.yaml")},
+                                             {"predict", file("large.yaml")},
+                                             {"predict", file("bad.yaml")},
+                                             {"inspect", file("none.ply")},
+                                             {"inspect", file("bad.ply")},
+                                             {"replay", file("none.mcap")},
+                                             {"replay", file("bad.mcap")},
+                                             {"record", "--simulate", file("large.yaml"), "-o", file("r.mcap")},
+                                             {"serve", "--scene", file("large.yaml")},
+                                             {"ask", "--question", "{"},
+                                             {"evaluate", "cube_tosses", "--data", file("none")},
+                                             {"calibrate", file("none"), "-o", file("o.yaml")}}) {
+    const Finished finished = run_program(args, {own_domain()});
+    EXPECT_EQ(finished.exit_code, 2) << args[0] << " " << args[1] << ": " << finished.err;
+    EXPECT_NE(finished.err.find("prescene " + args[0]), std::string::npos) << finished.err;
+  }
+}
+
+TEST(CommandLine, OutputThatCannotBeWrittenEndsWithOneAndIsNamed) {
+  const ScratchDir folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  write_file(file("box.yaml"), kOneBox);
+  write_file(file("box.ply"),
+             "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+             "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+             "0 0 0\n0.1 0 0\n0 0.1 0\n0 0 0.1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  for (const std::string& out : {file("no/such"), std::string("/proc/out")}) {
+    for (const std::vector<std::string>& args :
+         std::vector<std::vector<std::string>>{{"predict", file("box.yaml"), "--heat-map", out + ".png"},
+                                               {"predict", file("box.yaml"), "--report", out + ".html"},
+                                               {"inspect", file("box.ply"), "-o", out + ".yaml"},
+                                               {"inspect", file("box.ply"), "--report", out + ".html"},
+                                               {"record", "--simulate", file("box.yaml"), "-o", out + ".mcap"}}) {
+      const Finished finished = run_program(args);
+      EXPECT_EQ(finished.exit_code, 1) << args[0] << " " << args[2] << ": " << finished.err;
+      EXPECT_NE(finished.err.find(args.back() + ": "), std::string::npos) << finished.err;
+      EXPECT_EQ(finished.err.find(".partial"), std::string::npos) << finished.err;
+    }
+  }
+}
+
+TEST(CommandLine, PredictRefusesWhatMeansNothingAndSaysWhatWould) {
+  const ScratchDir folder;
+  const std::string scene = (folder.path() / "box.yaml").string();
+  write_file(scene, kOneBox);
+  const auto refused = [&](std::vector<std::string> more, const std::string& remedy) {
+    more.insert(more.begin(), {"predict", scene});
+    const Finished finished = run_program(more);
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_NE(finished.err.find(remedy), std::string::npos) << finished.err;
+  };
+  refused({"--outcomes-only"}, "leave it out");
+  refused({"--outcomes-only", "--json", "--report", (folder.path() / "r.html").string()}, "leave it out");
+  refused({"--duration", "1e-12"}, "at least one step of the simulator, 0.00");
+  refused({"--max-instances", "0"}, "1");
+  refused({"--budget", "1e9"}, "up to 1000000 s");
+  EXPECT_EQ(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).exit_code, 2);
+  EXPECT_NE(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).err.find("--stepper bullet"),
+            std::string::npos);
+  EXPECT_NE(run_program({"validate", scene}).out.find("1 object, "), std::string::npos);
+}
+
 TEST(CommandLine, TooLittleTimeIsNoBadInput) {
   const ScratchDir folder;
   // 200 boxes in heaps: one instance takes minutes, most of it to see whether they rest.

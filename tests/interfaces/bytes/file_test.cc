@@ -49,8 +49,17 @@ TEST(ReadFile, NamesThePathAndTheRemedy) {
 TEST(WriteFile, SaysThatTheFolderIsMissing) {
   const tests::ScratchDir dir;
   const auto status = write_file(dir.path() / "no" / "a", "x");
-  EXPECT_EQ(status.code(), StatusCode::kNotFound);
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
   EXPECT_NE(status.message().find("folder does not exist"), std::string::npos) << status.message();
+}
+
+TEST(WriteFile, NamesTheFileThatWasAskedForAndTheSystemsReason) {
+  if (!std::filesystem::is_directory("/proc")) GTEST_SKIP() << "this system has no /proc";
+  const auto status = write_file("/proc/picture.png", "x");  // a folder that takes no new files
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+  EXPECT_NE(status.message().find("/proc/picture.png: cannot be written: "), std::string::npos) << status.message();
+  EXPECT_EQ(status.message().find(".partial"), std::string::npos) << status.message();
+  EXPECT_EQ(status.message().find("does not exist"), std::string::npos) << status.message();
 }
 
 TEST(WriteFile, WritesToAPipeAndLeavesItThere) {
@@ -85,7 +94,7 @@ TEST(OutputFile, ReportsAFullDisk) {
   auto file = OutputFile::create("/dev/full");
   ASSERT_TRUE(file.ok()) << file.status().message();
   const auto status = file->write(bytes_of("x"));
-  EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
   EXPECT_NE(status.message().find("/dev/full: cannot be written"), std::string::npos) << status.message();
 }
 

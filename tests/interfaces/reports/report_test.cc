@@ -272,18 +272,20 @@ TEST(AnswerSections, ShowEveryKindOfAnswer) {
   predict.simulated_seconds = 768.0;
   predict.remarks = {"The intervals are wider than asked for."};
   predict.history = {{64, {{0.5, 0.4, 0.6}}}, {384, {{0.6, 0.57, 0.63}}}};
-  predict.inputs = {{"where", {{"carton: position x", 0.4, 0.05, {{"in_bin", 0.9, 0.2}}}}, 0.4}};
+  predict.inputs = {{"where", {{"carton: position x", 0.4, 0.05, {{"in_bin", 0.9, 0.2}}}}, 0.4, std::nullopt}};
   predict.contact_times = {0.0, 1.0};
   predict.contacts = {{"carton", "bin", 0.8, 0.75, 0.85, {0.1, 0.2, 0.3}, {0.25, 0.5, 0.875}, {0.0, 0.8}}};
   predict.chaos = {{"where", 64, 0.1, 0.5, 0.4, 0.6, true}};
-  predict.model_error = belief::ModelError{256, {{"half the step", {{"in_bin", "where", 0.031, 0.01, 0.052}}}}};
+  predict.model_error = belief::ModelError{
+      256, {{belief::ModelError::Kind::kStep, "half the step", {{"in_bin", "where", 0.031, 0.01, 0.052}}}}};
   belief::Answer answer;
   answer.what = predict;
   const std::string predicted = page_of(answer);
   for (const char* shown :
        {"in_bin", "60.0 %", "384 simulated instances", "Where carton ends", "carton falls", "wider than asked",
         "192000 steps of 4.00 ms", "probability against instances", "carton: position x", "40.0 % \u00b1 5.0",
-        "carton and bin", "0.25 to 0.88", "half the step", "3.1 (1.0 to 5.2)", "Every instance ran to rest"})
+        "carton and bin", "0.25 to 0.88", "half the step", "own error, which the intervals do not contain",
+        "384 instances are too few", "3.1 (1.0 to 5.2)", "Every instance ran to rest"})
     EXPECT_THAT(predicted, HasSubstr(shown));
 
   belief::StabilityAnswer stability;

@@ -134,7 +134,7 @@ TEST(ModelFile, OfAFittedModelHasEverythingElseAsItsSceneDescribesIt) {
     for (belief::ObjectModel model : scene->models) {
       model.contact.friction = belief::NormalScalar{0.3, 0.01, 0.0, 2.0};
       model.contact.impact_friction = belief::FixedScalar{0.25};
-      model.contact.edge_radius = 0.0021;
+      model.contact.edge_radius = 0.0009;
       model.center_of_mass.y = belief::NormalScalar{0.001, 2e-4};
       model.unit_inertia *= 1.1;
       const auto yaml = fitted_model_yaml(folder.path() / "scene.yaml", model.name, model, elsewhere, {"a remark"});

@@ -19,6 +19,7 @@ namespace {
 using belief::Scene;
 using geometry::Pose;
 using geometry::Vector3d;
+using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -276,6 +277,54 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
               HasSubstr("a.obj: no such file"));
   EXPECT_THAT(error_of("name: x\n"), HasSubstr("the key 'objects' is missing"));
   EXPECT_THAT(error_of("[1, 2]\n"), HasSubstr("this is a list of 2: give a map of keys"));
+}
+
+TEST(SceneFile, RefusesDistributionsOfWhichHardlyAnythingIsLeft) {
+  const auto error = [](const std::string& friction) {
+    return error_of("models:\n  m:\n    sphere: 0.1\n    mass: 1\n    friction: " + friction +
+                    "\nobjects:\n  o: {model: m, pose: {}}\n");
+  };
+  EXPECT_THAT(error("{normal: [0.3, 0.01], min: 0.5}"),
+              AllOf(HasSubstr(":5:"), HasSubstr("mean 0.3 and deviation 0.01"), HasSubstr("its min (0.5)"),
+                    HasSubstr("give a min below the mean")));
+  EXPECT_THAT(error("{normal: [0.3, 0.01], max: 0.2}"), HasSubstr("its max (0.2)"));
+  EXPECT_THAT(error("{normal: [0.3, 0], min: 0.5}"), HasSubstr("hardly anything"));
+  EXPECT_EQ(error("{normal: [0.3, 0.1], min: 0.5}"), "");
+  EXPECT_EQ(error("{normal: [0.3, 0.1], min: 0.2, max: 0.4}"), "");
+}
+
+TEST(SceneFile, RefusesEdgesRounderThanTheShape) {
+  const auto error = [](const std::string& shape) {
+    return error_of("models:\n  m:\n    mass: 1\n    " + shape + "\nobjects:\n  o: {model: m, pose: {}}\n");
+  };
+  EXPECT_THAT(error("box: [0.1, 0.1, 0.04]\n    edge_radius: 0.03"),
+              AllOf(HasSubstr(":5:"), HasSubstr("0.02 m where it is thinnest"), HasSubstr("give a smaller radius")));
+  EXPECT_EQ(error("box: [0.1, 0.1, 0.04]\n    edge_radius: 0.02"), "");
+  // A part that is turned is as thin as before.
+  EXPECT_THAT(
+      error(
+          "parts:\n      - {box: [0.2, 0.2, 0.01], rotation: {axis_angle_deg: [1, 0, 0, 45]}}\n    edge_radius: 0.01"),
+      HasSubstr("0.005 m where it is thinnest"));
+}
+
+TEST(SceneFile, RefusesStartsInsideSupports) {
+  const auto error = [](const std::string& support, const std::string& z) {
+    return error_of("models:\n  m: {box: [0.05, 0.05, 0.05], mass: 0.1}\nsupports:\n  s: {" + support +
+                    "}\nobjects:\n  o: {model: m, pose: {position: [0, 0, " + z + "]}}\n");
+  };
+  for (const char* support :
+       {"box: [1, 1, 0.4]", "cylinder: {radius: 0.4, length: 0.4}", "capsule: {radius: 0.1, length: 0.2}",
+        "cone: {radius: 0.4, length: 0.4}", "sphere: 0.2", "ground: {size: 2}",
+        "gable_carton: {base: [0.2, 0.2], shoulder_height: 0.3, height: 0.4}"}) {
+    const std::string z = std::string(support).starts_with("ground") ? "-0.05" : "0.0";
+    const std::string inside = error(support, z);
+    EXPECT_THAT(inside, AllOf(HasSubstr(":6:"), HasSubstr("wholly inside the support 's'"), HasSubstr("move it out")))
+        << support;
+    EXPECT_EQ(error(support, "0.225"), "") << support;  // on it, or above
+    EXPECT_EQ(error(support, "0.19"), "") << support;   // partly in it: parted, and told
+  }
+  // In the hollow of a bin is not in its walls.
+  EXPECT_EQ(error("open_bin: {inner: [0.3, 0.3, 0.3], wall: 0.01}", "0.05"), "");
 }
 
 TEST(SceneFile, HollowObjectsCollideAsSpheresWhereNothingElseIsSaid) {

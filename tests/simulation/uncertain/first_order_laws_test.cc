@@ -92,6 +92,26 @@ TEST(FirstOrderLaws, OfChaosNothingIsExplained) {
   for (std::size_t axis = 0; axis < 6; ++axis) EXPECT_LT(effect_of(chaos, found, axis).share, 0.04);
 }
 
+TEST(FirstOrderLaws, NoErrorIsNothing) {
+  // An input that decides all, and one of which the share is cut at 0: each block says the same.
+  for (const std::size_t instances : {128u, 1024u, 4096u}) {
+    std::vector<double> input(instances), idle(instances);
+    std::vector<int> classes(instances);
+    const std::vector<double> weights(instances, 1.0);
+    for (std::size_t i = 0; i < instances; ++i) {
+      input[i] = static_cast<double>(i % 2);
+      idle[i] = static_cast<double>(i / 2 % 16);
+      classes[i] = static_cast<int>(i % 2);
+    }
+    const InputEffect all = first_order_effect(input, classes, 2, weights);
+    EXPECT_NEAR(all.share, 1.0, 0.01);
+    EXPECT_GE(all.standard_error, 2.0 / static_cast<double>(instances));
+    const InputEffect none = first_order_effect(idle, classes, 2, weights);
+    EXPECT_EQ(none.share, 0.0);
+    EXPECT_GE(none.standard_error, 2.0 / static_cast<double>(instances));
+  }
+}
+
 TEST(FirstOrderLaws, WhatDoesNotVaryHasNoShareAndWhatFailedIsLeftOut) {
   std::vector<double> constant(64, 3.0), rising(64);
   std::iota(rising.begin(), rising.end(), 0.0);
