@@ -17,6 +17,7 @@ constexpr double kTimelineInterval = 1.0 / 30.0;
 // Where nothing is asked but where things end, as many instances as a heat map of good quality takes.
 constexpr int kUnaskedInstances = 256;
 constexpr int kMostInstances = 1 << 24;
+constexpr double kLongest = 3600.0;  // s
 
 core::Status check_effort(const belief::Effort& effort) {
   if (!(effort.tolerance > 0.0 && effort.tolerance < 1.0))
@@ -51,17 +52,15 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
                                 const belief::Effort& effort, const QueryContext& context,
                                 const ForesightDetail& detail) {
   PRESCENE_RETURN_IF_ERROR(check_effort(effort));
-  if (!(duration > 0.0 && duration <= 3600.0))
-    return core::invalid_input("a duration of " + core::rounded_text(duration) +
-                               " s: give more than 0 and at most 3600");
   if (!context.make_simulator) return core::unavailable("no simulator: this service was set up without one");
 
   Foresight foresight;
   PRESCENE_TRY(foresight.simulator, context.make_simulator(scene));
-  if (duration < foresight.simulator->step_size())
+  const double step = foresight.simulator->step_size();
+  if (!(duration >= step && duration <= kLongest))
     return core::invalid_input("a duration of " + core::rounded_text(duration) +
-                               " s: give at least one step of the simulator, " +
-                               core::rounded_text(foresight.simulator->step_size()) + " s, and at most 3600 s");
+                               " s: give at least one step of the simulator, " + core::rounded_text(step) +
+                               " s, and at most 3600 s");
   foresight.request.actions = scene->actions;
   foresight.request.stop.duration = duration;
   foresight.request.stop.stop_at_rest = scene->stop_at_rest;

@@ -57,9 +57,8 @@ core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(co
     const bool other_stepper = settings_.stepper == Stepper::kAutomatic;
     if (lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
     if (!other_stepper)
-      return core::unsupported(
-          lockstep.status().message() +
-          "; use '--stepper bullet', or 'automatic', which takes Bullet by itself where it has to");
+      return core::unsupported(lockstep.status().message() +
+                               "; '--stepper bullet' can, and 'automatic' chooses by itself");
     return simulation::make_bullet_simulator(scene, shapes_, options);
   }
   PRESCENE_TRY(auto bullet, simulation::make_bullet_simulator(scene, shapes_, options));

@@ -148,8 +148,9 @@ std::string error_document(const std::string& text) {
 
 core::Status status_of_error(const std::string& place, const std::string& error) {
   using core::StatusCode;
-  for (const StatusCode code : {StatusCode::kInvalidInput, StatusCode::kNotFound, StatusCode::kCancelled,
-                                StatusCode::kUnavailable, StatusCode::kResourceExhausted}) {
+  for (const StatusCode code :
+       {StatusCode::kInvalidInput, StatusCode::kNotFound, StatusCode::kDataLoss, StatusCode::kUnsupported,
+        StatusCode::kCancelled, StatusCode::kUnavailable, StatusCode::kResourceExhausted}) {
     const std::string prefix = std::string(core::to_string(code)) + ": ";
     if (error.starts_with(prefix)) return {code, place + error.substr(prefix.size())};
   }

@@ -151,8 +151,9 @@ TEST(CommandLine, OutputThatCannotBeWrittenEndsWithOneAndIsNamed) {
                                                {"predict", file("box.yaml"), "--report", out + ".html"},
                                                {"inspect", file("box.ply"), "-o", out + ".yaml"},
                                                {"inspect", file("box.ply"), "--report", out + ".html"},
-                                               {"record", "--simulate", file("box.yaml"), "-o", out + ".mcap"}}) {
-      const Finished finished = run_program(args);
+                                               {"record", "-o", out + ".mcap"},
+                                               {"serve", "--scene", file("box.yaml"), "--record", out + ".mcap"}}) {
+      const Finished finished = run_program(args, {own_domain()});
       EXPECT_EQ(finished.exit_code, 1) << args[0] << " " << args[2] << ": " << finished.err;
       EXPECT_NE(finished.err.find(args.back() + ": "), std::string::npos) << finished.err;
       EXPECT_EQ(finished.err.find(".partial"), std::string::npos) << finished.err;
