@@ -20,6 +20,7 @@ using interfaces::TextAlign;
 
 constexpr std::size_t kMostBars = 8, kMostLines = 6;
 constexpr int kBarApart = 23, kLineApart = 17, kFirst = 30, kLeast = 196;
+constexpr const char* kOtherwise = "otherwise";
 constexpr double kName = 11.5, kNote = 10.0;  // letters' height
 
 /// Items one after the other, in lines no wider than `width`; those beyond the last line are counted.
@@ -70,7 +71,8 @@ HeatMapLegend::HeatMapLegend(const belief::Scene& scene, const belief::PredictAn
 }
 
 int HeatMapLegend::height() const {
-  const int outcomes = kFirst + kBarApart * static_cast<int>(bars_) + kLineApart * static_cast<int>(lines_.size()) + 36;
+  const int outcomes = kFirst + kBarApart * (static_cast<int>(bars_) + (part_.is_open() ? 1 : 0)) +
+                       kLineApart * static_cast<int>(lines_.size()) + 36;
   const int notes = kFirst + 88 + 20 * static_cast<int>(notes_.size()) + 20;
   return std::max({kLeast, outcomes, notes});
 }
@@ -116,7 +118,7 @@ void HeatMapLegend::draw_outcomes(double x, double y, ColorImage& canvas) const 
   interfaces::draw_text(part_.endings.empty() ? "The scene names no outcomes for it"
                                               : "How it ends" + (part_.group.empty() ? "" : " (" + part_.group + ")"),
                         {x, y}, kName, kInk, canvas);
-  double name_width = 0.0;
+  double name_width = part_.is_open() ? interfaces::text_width(kOtherwise, kName) : 0.0;
   for (const HeatMapPart::Ending& ending : part_.endings)
     name_width = std::max(name_width, interfaces::text_width(ending.name, kName));
   const double bar = x + 34.0 + name_width, bar_end = x + kPanelWidth - 190.0;
@@ -125,19 +127,23 @@ void HeatMapLegend::draw_outcomes(double x, double y, ColorImage& canvas) const 
     interfaces::fill_rectangle(static_cast<int>(from), static_cast<int>(y) - 11, static_cast<int>(to),
                                static_cast<int>(y) + 1, color, opacity, canvas);
   };
-  for (std::size_t i = 0; i < bars_; ++i) {
-    const HeatMapPart::Ending& ending = part_.endings[i];
-    const belief::OutcomeProbability& p = *ending.probability;
+  const auto row = [&](const std::string& name, double probability, double low, double high,
+                       const geometry::Rgb& color) {
     y += kBarApart;
-    fill(x, x + 14.0, ending.color, 1.0);
-    interfaces::draw_text(ending.name, {x + 24.0, y}, kName, kInk, canvas);
+    fill(x, x + 14.0, color, 1.0);
+    interfaces::draw_text(name, {x + 24.0, y}, kName, kInk, canvas);
     fill(bar, bar_end, {232, 234, 238}, 1.0);
-    fill(bar, at(p.probability), ending.color, 0.85);
-    const std::array<Vector2d, 2> whisker{Vector2d(at(p.low), y - 5.0), Vector2d(at(p.high), y - 5.0)};
+    fill(bar, at(probability), color, 0.85);
+    const std::array<Vector2d, 2> whisker{Vector2d(at(low), y - 5.0), Vector2d(at(high), y - 5.0)};
     interfaces::draw_line(whisker, 2.0, kInk, 1.0, canvas);
-    interfaces::draw_text(percent_text(p.probability), {bar_end + 14.0, y}, kName, kInk, canvas);
-    interfaces::draw_text("(" + fixed_text(100.0 * p.low, 1) + " to " + fixed_text(100.0 * p.high, 1) + ")",
+    interfaces::draw_text(percent_text(probability), {bar_end + 14.0, y}, kName, kInk, canvas);
+    interfaces::draw_text("(" + fixed_text(100.0 * low, 1) + " to " + fixed_text(100.0 * high, 1) + ")",
                           {bar_end + 78.0, y}, kNote, kSoft, canvas);
+  };
+  for (std::size_t i = 0; i < bars_; ++i) {
+    const belief::OutcomeProbability& p = *part_.endings[i].probability;
+    row(part_.endings[i].name, p.probability, p.low, p.high, part_.endings[i].color);
+    if (part_.is_open()) row(kOtherwise, 1.0 - p.probability, 1.0 - p.high, 1.0 - p.low, kSoft);
   }
   y += 8.0;
   for (const std::string& line : lines_) {

@@ -69,6 +69,16 @@ HeatMapPart heat_map_part(const belief::Scene& scene, const belief::PredictAnswe
     for (const belief::TypicalRun& run : answer.typical_runs)
       if (run.group == part.group && run.outcome == outcome->name && run.share >= kLeastShown) ending.run = &run;
   }
+  double elsewhere = 0.0;
+  for (const belief::PoseComponent& component : poses.components) {
+    const bool drawn = std::any_of(part.endings.begin(), part.endings.end(), [&](const HeatMapPart::Ending& ending) {
+      return ending.run && ending.name == component.outcome;
+    });
+    if (drawn) continue;
+    elsewhere += component.weight;
+    if (!part.otherwise) part.otherwise = component.mean;  // the heaviest comes first
+  }
+  if (elsewhere < kLeastShown) part.otherwise.reset();
   return part;
 }
 
@@ -102,8 +112,7 @@ ShownSpace shown_space(const belief::Scene& scene, const HeatMapPart& part) {
     add_mesh(mesh, run->states[begin_of(*run, part.object)].objects[part.object].X_WO);
   for (const HeatMapPart::Ending& ending : part.endings)
     if (ending.run) add_mesh(mesh, ending.run->trajectory.final().objects[part.object].X_WO);
-  if (shown.points.empty())
-    for (const belief::PoseComponent& component : part.poses->components) add_mesh(mesh, component.mean);
+  if (part.otherwise) add_mesh(mesh, *part.otherwise);
   if (const std::optional<GroundDensity::Rectangle> heat = most_ends(*part.poses)) {
     const double ground = shown.box.low.z();
     for (const double x : {heat->low.x(), heat->high.x()}) {

@@ -2,6 +2,7 @@
 // What a heat map's picture tells of one object: its endings, and what of the scene has to be seen.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,14 @@ struct HeatMapPart {
     geometry::Rgb color{};
   };
   std::vector<Ending> endings;
+  /// Where most of what no drawn ending covers ends; nothing if that is hardly anything.
+  std::optional<geometry::Pose> otherwise;
   /// The answer's other outcomes, of any object; an "other" that never happened is left out.
   std::vector<const belief::OutcomeProbability*> further;
   std::vector<const belief::ObjectPath*> paths;
 
+  /// Whether its one outcome leaves it open what happens else.
+  bool is_open() const { return group.empty() && endings.size() == 1; }
   /// Null where none is drawn.
   const belief::Trajectory* likeliest_run() const;
 };

@@ -49,6 +49,8 @@ void draw_object(const belief::Scene& scene, const HeatMapPart& part, bool with_
     keep(view.outline(scene, part.object, run.final().objects[part.object].X_WO, ending.color, with_labels ? 0.55 : 0.0,
                       false, backends));
   }
+  if (part.otherwise)
+    keep(view.outline(scene, part.object, *part.otherwise, kSoft, with_labels ? 0.4 : 0.0, false, backends));
   if (!with_labels) return;
   for (const HeatMapPart::Ending& ending : part.endings) {
     if (!ending.run) continue;
@@ -137,6 +139,9 @@ void draw_names(const HeatMapPart& part, const SceneView& view, int x0, int y0, 
     label(run->states[begin].objects[part.object].X_WO.translation, 62.0,
           begin > 0 ? part.poses->object + " let go here" : part.poses->object + " starts here", kInk);
   }
+  if (part.otherwise && part.is_open())
+    label(part.otherwise->translation, -46.0,
+          "otherwise " + percent_text(1.0 - part.endings.front().probability->probability), kSoft);
   for (const HeatMapPart::Ending& ending : part.endings) {
     if (!ending.run) continue;
     label(ending.run->trajectory.final().objects[part.object].X_WO.translation, -46.0,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "prescene/service/ground_density.h"
+#include "prescene/service/load_scene.h"
 
 namespace prescene::service {
 namespace {
@@ -75,6 +76,46 @@ TEST(GroundDensity, ARectangleHoldsEveryDensePlace) {
   EXPECT_GT(rectangle->high.y(), 0.5);
   EXPECT_LT(rectangle->low.x(), -0.15);
   EXPECT_FALSE(GroundDensity({}, Vector2d::Constant(-1.0), Vector2d::Constant(1.0), 0.02).rectangle_of(0.98));
+}
+
+/// Pixels in the colours of the map: far more red than blue.
+int warm_pixels(const belief::Scene& scene, const belief::PredictAnswer& answer, Backends& backends) {
+  const auto picture = heat_map_picture(scene, answer, backends);
+  EXPECT_TRUE(picture.ok()) << picture.status().message();
+  int warm = 0;
+  for (int y = 150; y < 700; ++y)
+    for (int x = 0; x < picture->width() / 2; ++x) warm += (*picture)(x, y)[0] > (*picture)(x, y)[2] + 60 ? 1 : 0;
+  return warm;
+}
+
+TEST(HeatMapPicture, NeighboursHideNothing) {
+  const auto loaded = load_scene_text(
+      "name: pair\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\n  flat: {box: [0.3, 0.3, 0.02], mass: 0.4}\n"
+      "supports:\n  floor: {ground: {size: 4}}\n"
+      "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
+      "  b: {model: flat, pose: {position: [0, 0, 0.11]}}\noutcomes:\n  stays: {object: a, below: 1}\n",
+      "test.yaml", {});
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const belief::Scene& scene = **loaded;
+  belief::PredictAnswer answer;
+  answer.outcomes = {{"stays", "", 1.0, 0.9, 1.0}};
+  belief::FinalPoses& poses = answer.final_poses.emplace_back();
+  poses.object = "a";
+  poses.components = {blob(1.0, 0.0, 0.0, wide(0.02, 0.02))};
+  poses.components[0].mean.translation.z() = 0.05;
+  poses.components[0].outcome = "stays";
+  poses.heat_map = {0.02, -0.1, -0.1, 10, 10, std::vector<double>(100, 0.01)};
+  belief::TypicalRun& run = answer.typical_runs.emplace_back();
+  run.outcome = "stays";
+  run.share = 1.0;
+  run.trajectory.states = {belief::mean_start(scene)};
+  core::ThreadPool pool(2);
+  Backends backends(pool);
+  const int covered = warm_pixels(scene, answer, backends);
+  run.trajectory.states[0].objects[1].X_WO.translation.x() = 3.0;
+  const int open = warm_pixels(scene, answer, backends);
+  EXPECT_GT(open, 2000);
+  EXPECT_GT(covered, 0.5 * open);  // its edges, and the plate that the picture makes room for, take some
 }
 
 }  // namespace
