@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "prescene/core/text.h"
 
@@ -144,6 +145,22 @@ Status check_shapes(const std::vector<CollisionShape>& shapes) {
     }
   }
   return {};
+}
+
+double thinnest_half(const std::vector<CollisionShape>& shapes) {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (CollisionShape shape : shapes) {
+    std::visit([](auto& placed) { placed.X_OS = {}; }, shape);
+    const geometry::TriangleMesh mesh = collision_mesh({shape});
+    if (mesh.vertices.empty()) continue;
+    Vector3d low = mesh.vertices.front(), high = low;
+    for (const Vector3d& vertex : mesh.vertices) {
+      low = low.cwiseMin(vertex);
+      high = high.cwiseMax(vertex);
+    }
+    thinnest = std::min(thinnest, 0.5 * (high - low).minCoeff());
+  }
+  return thinnest;
 }
 
 Status check_contact(const ContactProperties& contact) {

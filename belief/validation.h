@@ -36,6 +36,9 @@ core::Status check_pose(const Pose& pose);
 core::Status check_pose(const PoseDistribution& distribution);
 /// At least one; sizes positive and finite; meshes there and not empty.
 core::Status check_shapes(const std::vector<CollisionShape>& shapes);
+/// Half the smallest extent, along its own axes, of the thinnest of the shapes, m: no edge can be rounder. Infinite
+/// where there is none.
+double thinnest_half(const std::vector<CollisionShape>& shapes);
 core::Status check_contact(const ContactProperties& contact);
 core::Status check_color(const Color& color);
 

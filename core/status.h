@@ -21,7 +21,7 @@ enum class StatusCode {
   kDataLoss,           ///< A file or message is cut or corrupt.
   kUnsupported,        ///< Valid, but this build or version can't do it.
   kUnavailable,        ///< A device, driver, peer or package is missing now; trying again later may help.
-  kResourceExhausted,  ///< A size cap, the disk or the memory.
+  kResourceExhausted,  ///< More than a limit of this program.
   kCancelled,          ///< Stopped on request.
 };
 

@@ -35,24 +35,12 @@ void read_contact(Binder& binder, ContactProperties& contact) {
 void check_edges(Binder& binder, const BodyShape& shape, const ContactProperties& contact) {
   const LocatedValue* at = binder.find("edge_radius");
   if (!at) return;
-  for (const belief::CollisionShape& part : shape.collision) {
-    belief::CollisionShape own = part;
-    std::visit([](auto& placed) { placed.X_OS = {}; }, own);
-    const geometry::TriangleMesh mesh = belief::collision_mesh({own});
-    if (mesh.vertices.empty()) continue;
-    Vector3d low = mesh.vertices.front(), high = low;
-    for (const Vector3d& vertex : mesh.vertices) {
-      low = low.cwiseMin(vertex);
-      high = high.cwiseMax(vertex);
-    }
-    const double half = 0.5 * (high - low).minCoeff();
-    if (contact.edge_radius <= half * (1.0 + 1e-6)) continue;
-    binder.problems().add(at->place, at->path,
-                          number_text(contact.edge_radius) + " m is more than half the size of the shape, " +
-                              core::rounded_text(half) + " m where it is thinnest",
-                          "give a smaller radius");
-    return;
-  }
+  const double half = belief::thinnest_half(shape.collision);
+  if (contact.edge_radius <= half * (1.0 + 1e-6)) return;
+  binder.problems().add(at->place, at->path,
+                        number_text(contact.edge_radius) + " m is more than half the size of the shape, " +
+                            core::rounded_text(half) + " m where it is thinnest",
+                        "give a smaller radius");
 }
 
 // Whether the product of any two of the rotations is one of them or the identity.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "motion_judge.h"
+#include "prescene/belief/validation.h"
 #include "prescene/simulation/calibration/evolution_search.h"
 #include "prescene/simulation/calibration/keep_untold.h"
 #include "varied_parameters.h"
@@ -196,7 +197,7 @@ belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCali
         if (!untold) model.unit_inertia *= std::exp(p.value);
         break;
       case MotionParameter::kEdgeRadius:
-        if (!untold) model.contact.edge_radius = std::max(0.0, p.value);
+        if (!untold) model.contact.edge_radius = std::clamp(p.value, 0.0, belief::thinnest_half(model.collision));
         break;
       case MotionParameter::kCenterOfMassX:
         model.center_of_mass.x = fitted(model.center_of_mass.x, -infinity, infinity);

@@ -245,6 +245,14 @@ TEST_F(MotionCalibrationTest, KeepsDistributionsThatNothingIsToldOf) {
   EXPECT_NEAR(belief::variance(fitted.center_of_mass.x), 0.006 * 0.006, 1e-12);
 }
 
+TEST_F(MotionCalibrationTest, EdgesAreNoRounderThanTheThinnestPart) {
+  belief::ObjectModel coin = box_scene({}).models[0];
+  coin.collision = {belief::PrimitiveShape{geometry::Cylinder{0.012, 0.002}, {}}};
+  MotionCalibration found;
+  found.parameters = {{MotionParameter::kEdgeRadius, 0.0018, 0.0002, 0.1}};
+  EXPECT_NEAR(calibrated_model(coin, found).contact.edge_radius, 0.001, 1e-9);
+}
+
 TEST_F(MotionCalibrationTest, StopsWhenTold) {
   const auto motions = begun(tosses({}, 8));
   ASSERT_TRUE(motions.ok());
