@@ -219,9 +219,12 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
   PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, make_simulator,
                                                core::RandomStream(options.seed, core::Purpose::kEvaluation),
                                                backends.pool(), motion, progress, cancellation));
-  // Of what was believed before the flights too.
   for (simulation::CalibratedParameter& p : found.motion.parameters) {
     const simulation::MotionBelief& before = found.prior[place_of(p.parameter)];
+    // What flights tell was the prior; their frames also begin the simulated motions.
+    const double flown = prior[place_of(p.parameter)].deviation;
+    if (found.flight && flown < before.deviation)
+      p.standard_error = simulation::error_of_shared_frames(flown, p.standard_error);
     if (p.standard_error >= simulation::kUntold * before.deviation) {
       p.value = before.mean;
       p.standard_error = before.deviation;

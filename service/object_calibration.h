@@ -22,7 +22,7 @@ namespace prescene::service {
 
 struct ObjectCalibrationOptions {
   std::uint64_t seed = 1;
-  int max_evaluations = 1000;     ///< Of the search, > 0.
+  int max_evaluations = 1500;     ///< Of the search, > 0.
   int samples = 16;               ///< Simulated starts a recording, > 1.
   std::vector<std::string> keep;  ///< Names of parameters that stay as the model has them.
 };

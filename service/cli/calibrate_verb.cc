@@ -179,7 +179,7 @@ Verb add_calibrate_verb(CLI::App& app) {
   verb->add_option("--samples", options->samples, "Simulated starts a recording; 16, of cube_tosses 24")
       ->check(CLI::Range(2, 4096));
   verb->add_option("--max-evaluations", options->max_evaluations,
-                   "Models that the search tries at most; 1000, of cube_tosses 150")
+                   "Models that the search tries at most; 1500, of cube_tosses 150")
       ->check(CLI::Range(1, 100000));
   verb->add_option("--data", options->data, "cube_tosses: folder that holds the data sets' folders");
   verb->add_option("--from", options->start,

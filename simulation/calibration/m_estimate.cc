@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "point_response.h"
 #include "prescene/core/check.h"
@@ -28,6 +29,8 @@ constexpr double kLongestMove = 2.0;  // Of all steps of a round together.
 constexpr double kMostChange = 3.0;
 // Of the trials, in the first ones' scales.
 constexpr double kLeastSpread = 0.1;
+// Of rounds that do not settle, as many are taken together.
+constexpr std::size_t kUnsettledRounds = 8;
 // Of the mean score, a logarithm: by less it differs by chance.
 constexpr double kWorse = 0.1;
 
@@ -147,8 +150,9 @@ RoundEstimate estimate_of(const PointResponse& response, const Neighbourhood& ar
   return {around.center + around.factor * u, around.factor * step.covariance * around.factor.transpose()};
 }
 
-/// Their mean; its error by how much they differ is added.
-void combine(const std::vector<RoundEstimate>& rounds, Estimate* result) {
+/// Their mean; its error by how much they differ is added. Of rounds that did not settle, which may follow each other,
+/// this is how much one differs.
+void combine(std::span<const RoundEstimate> rounds, bool settled, Estimate* result) {
   const auto count = static_cast<double>(rounds.size());
   result->value = VectorXd::Zero(result->value.size());
   result->covariance = MatrixXd::Zero(result->value.size(), result->value.size());
@@ -159,7 +163,7 @@ void combine(const std::vector<RoundEstimate>& rounds, Estimate* result) {
   if (rounds.size() < 2) return;
   for (const RoundEstimate& round : rounds) {
     const VectorXd off = round.value - result->value;
-    result->covariance += off * off.transpose() / (count * (count - 1.0));
+    result->covariance += off * off.transpose() / ((settled ? count : 1.0) * (count - 1.0));
   }
 }
 
@@ -188,9 +192,9 @@ core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& paramet
   Neighbourhood best = around;
   double best_score = std::numeric_limits<double>::infinity();
   Estimate result;
-  std::vector<RoundEstimate> settled;
-  for (int round = 0; round < options.most_rounds && static_cast<int>(settled.size()) < options.settled_rounds;
-       ++round) {
+  std::vector<RoundEstimate> rounds;
+  std::size_t settled = 0;  // The last of them.
+  for (int round = 0; round < options.most_rounds && static_cast<int>(settled) < options.settled_rounds; ++round) {
     const MatrixXd trials = trials_in(around, problem, count, stream.next_u64());
     std::vector<MatrixXd> simulated;
     for (Index trial = 0; trial < count; ++trial) {
@@ -206,7 +210,7 @@ core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& paramet
       // Too long a move: once more from the best, with closer trials.
       best.factor *= 0.5;
       around = best;
-      settled.clear();
+      settled = 0;
       continue;
     }
     if (score < best_score) {
@@ -215,14 +219,15 @@ core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& paramet
     }
     const RoundEstimate found = estimate_of(PointResponse(observations, trials, simulated), around, problem);
     const double moved = rms(found.covariance.llt().matrixL().solve(found.value - around.center));
-    if (!settled.empty() || (round > 0 && moved < options.accuracy)) settled.push_back(found);
-    result.value = found.value;
-    result.covariance = found.covariance;
+    if (settled > 0 || (round > 0 && moved < options.accuracy)) ++settled;
+    rounds.push_back(found);
     around =
         about(found.value.cwiseMax(problem.low).cwiseMin(problem.high), around, found.covariance, options.reach, least);
   }
-  result.settled = static_cast<int>(settled.size()) == options.settled_rounds;
-  if (!settled.empty()) combine(settled, &result);
+  result.settled = static_cast<int>(settled) == options.settled_rounds;
+  const std::size_t kept = result.settled ? settled : std::min(rounds.size(), kUnsettledRounds);
+  result.value = VectorXd::Zero(n);
+  combine(std::span(rounds).last(kept), result.settled, &result);
   result.score = best_score;
   return result;
 }

@@ -145,6 +145,14 @@ std::vector<CalibratedParameter> told(const Estimate& estimate, const VariedPara
 
 double least_center_error(double position_noise) { return std::max(kCommonError * position_noise, kLeastCenterError); }
 
+double error_of_shared_frames(double before, double after) {
+  if (!(after < before)) return after;
+  // Precisions add to 1 / after^2; errors 1 / sqrt(precision), weighted by precision, add as they are.
+  const double first = 1.0 / (before * before);
+  const double both = 1.0 / (after * after);
+  return (std::sqrt(first) + std::sqrt(both - first)) / both;
+}
+
 std::string to_string(MotionParameter parameter) {
   static constexpr std::array<const char*, kMotionParameters> kNames = {
       "friction",    "impact_friction",  "restitution",      "inertia_size",

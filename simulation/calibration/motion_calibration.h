@@ -65,7 +65,7 @@ MotionPrior motion_prior(const belief::ObjectModel& model);
 
 struct MotionCalibrationOptions {
   int samples = 16;              ///< Simulated starts a recording, > 1.
-  int max_evaluations = 1000;    ///< Of the search, > 0; the estimate takes some 400 more.
+  int max_evaluations = 1500;    ///< Of the search, > 0; the estimate takes some 400 more.
   double horizon = 0.6;          ///< s after the start that are compared, at most, > 0.
   int checkpoints = 6;           ///< Times within the horizon, > 0.
   int fit_frames = 10;           ///< Most of the beginning that the start is fitted to, >= 5.
@@ -96,6 +96,10 @@ struct MotionCalibration {
 /// Of the centre of mass: no number of frames with this noise of a coordinate, m, tells it better.
 double least_center_error(double position_noise);
 
+/// Of what was known with the error `before`, and with the error `after` once more was seen: its error where both may
+/// be off for the same reason, such as noise of frames that both use, instead of independently. Between `after` and
+/// sqrt(2) times that. Takes 0 < after; returns `after` where it is not less than `before`.
+double error_of_shared_frames(double before, double after);
 /// A copy of the model with the values as means and the errors as deviations; what is untold stays as it is, plain
 /// numbers with the prior's deviation.
 belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCalibration& found);

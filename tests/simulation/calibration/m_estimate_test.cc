@@ -114,6 +114,26 @@ TEST(MEstimate, WhatDoesNothingKeepsItsPrior) {
   EXPECT_NEAR(found.standard_error(2), 2.0, 0.05);
 }
 
+TEST(MEstimate, RoundsThatDoNotSettleCountByHowTheyDiffer) {
+  // Jumps that change with any value, many times as large as what the recordings tell.
+  const Lines lines(1, 1.0, 2.0, 1e-3);
+  const auto simulate = [&](std::span<const double> values) -> core::Result<Eigen::MatrixXd> {
+    PRESCENE_TRY(Eigen::MatrixXd points, lines.simulated(values));
+    for (int i = 0; i < kRecordings; ++i) {
+      const double place = 1e4 * (values[0] + values[1]) + i;
+      points.block(0, i * kSamples, 1, kSamples).array() += 0.1 * std::sin(place * place);
+    }
+    return points;
+  };
+  simulation::EstimateOptions options;
+  options.accuracy = 1e-3;
+  const auto found = m_estimate(three_parameters(), lines.observations, simulate,
+                                core::RandomStream(3, core::Purpose::kTest), options);
+  ASSERT_TRUE(found.ok());
+  EXPECT_FALSE(found->settled);
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(found->value[i], 1.0 + i, 4.0 * found->standard_error(i));
+}
+
 TEST(MEstimate, OneStrangeRecordingHardlyCounts) {
   Lines lines(6);
   const Estimate before = estimated(lines, 5);

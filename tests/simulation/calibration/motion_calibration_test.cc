@@ -223,6 +223,16 @@ TEST_F(MotionCalibrationTest, ASearchThatWasCutHasNotSettled) {
   EXPECT_LE(whole->cost, cut->cost + 0.1);
 }
 
+TEST_F(MotionCalibrationTest, SharedFramesCountOnce) {
+  using simulation::error_of_shared_frames;
+  // The same told twice: the mean of two equal errors is as large as each.
+  EXPECT_NEAR(error_of_shared_frames(1.0, std::sqrt(0.5)), 1.0, 1e-12);
+  // Little known before, or little added.
+  EXPECT_NEAR(error_of_shared_frames(1e6, 0.01), 0.01, 1e-6);
+  EXPECT_NEAR(error_of_shared_frames(1.0, 1.0 - 1e-10), 1.0, 1e-4);
+  EXPECT_EQ(error_of_shared_frames(1.0, 1.5), 1.5);
+}
+
 TEST_F(MotionCalibrationTest, KeepsDistributionsThatNothingIsToldOf) {
   belief::ObjectModel model = box_scene({}).models[0];
   model.contact.friction = belief::NormalScalar{0.5, 0.2, 0.05, 2.0};
