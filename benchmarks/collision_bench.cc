@@ -82,9 +82,6 @@ std::vector<Algorithm> chosen_algorithms(const Arguments& arguments) {
   return algorithms;
 }
 
-/// The best instruction set that the machine has and the kernels are compiled for.
-std::string simd_target() { return hwy::TargetName(hwy::SupportedAndGeneratedTargets().front()); }
-
 /// Queries run on one processor, the first that this program may use.
 void stay_on_one_processor() {
   cpu_set_t allowed;
@@ -230,7 +227,7 @@ void add_raw_figures(const Results& results, Report* report) {
 }
 
 int run(const Arguments& arguments) {
-  Report report("collision", simd_target());
+  Report report("collision", best_simd_target());
   const Results results = measure_all(arguments, &report);
   print(report, results);
   if (arguments.out.empty()) return 0;

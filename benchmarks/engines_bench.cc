@@ -98,7 +98,7 @@ double same(const std::vector<int>& a, const std::vector<int>& b) {
 bool disagree(double p, double q, double n) { return std::abs(p - q) > half_width(p, n) + half_width(q, n); }
 
 int run(int instances, const std::string& out) {
-  Report report("engines", "MuJoCo 2.2.2, step 1/2000 s");
+  Report report("engines", best_simd_target());
   report.note("Scenes of tests/support/engine_scenes.cc, " + std::to_string(instances) +
               " starts each; a class disagrees where shares differ by more than both 90 % intervals.");
   Table classes{"classes",

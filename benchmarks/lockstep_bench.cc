@@ -94,7 +94,7 @@ void compare(const std::string& name, const belief::Scene& scene, int count, Tab
                           bullet_seconds / seconds, steps / count, static_cast<double>(same) / count});
     return bullet_seconds / seconds;
   };
-  const std::string best = hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets());
+  const std::string best = best_simd_target();
   for (const std::size_t together : {starts.size(), std::size_t{64}, std::size_t{16}}) {
     Target target;
     target.work = "CPU time an instance, scene " + name + ", " + std::to_string(together) + " starts a call";
@@ -112,7 +112,7 @@ void compare(const std::string& name, const belief::Scene& scene, int count, Tab
 }
 
 int run(int count, const std::string& scenarios, const std::string& out) {
-  Report report("lockstep", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets()));
+  Report report("lockstep", best_simd_target());
   Table table{
       "instances",
       {"scene", "instructions", "starts a call", "Bullet us", "lockstep us", "ratio", "steps", "same class as Bullet"},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/benchmarks/report.h"
 
+#include <hwy/highway.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -124,6 +125,8 @@ bool meets(const Target& target, const Goal& goal) {
   }
   return false;
 }
+
+std::string best_simd_target() { return hwy::TargetName(hwy::SupportedAndGeneratedTargets().front()); }
 
 Report::Report(std::string name, std::string simd_target)
     : name_(std::move(name)), simd_target_(std::move(simd_target)), machine_(machine_name()) {}

@@ -57,9 +57,12 @@ struct Table {
   std::vector<std::vector<Figure>> rows;  ///< As many as columns (checked).
 };
 
+/// The best instruction set that the machine has and the kernels are compiled for.
+std::string best_simd_target();
+
 class Report {
  public:
-  /// `simd_target`: the widest instruction set that the kernels ran with.
+  /// `simd_target`: the widest instruction set that the kernels ran with, or what else they ran on.
   Report(std::string name, std::string simd_target);
 
   /// Checks that a target without a figure says why.

@@ -207,7 +207,7 @@ void add_tosses(Report* report) {
 }
 
 int run(const Arguments& arguments) {
-  Report report("uncertain", "none");
+  Report report("uncertain", best_simd_target());
   report.note("Scenes A to D of tests/support/uncertain_scenes.cc, 240 Hz, one thread but for wall times.");
   Tables tables;
   int certified = 0, wrong = 0;
