@@ -8,8 +8,8 @@ namespace {
 
 ProjectedPoint projected(const Vector3f& p_C, const geometry::PinholeCamera& camera) {
   const float inverse_depth = 1.0f / p_C.z();
-  return {{static_cast<float>(camera.fx) * p_C.x() * inverse_depth + static_cast<float>(camera.cx),
-           static_cast<float>(camera.fy) * p_C.y() * inverse_depth + static_cast<float>(camera.cy)},
+  return {snapped(static_cast<float>(camera.fx) * p_C.x() * inverse_depth + static_cast<float>(camera.cx),
+                  static_cast<float>(camera.fy) * p_C.y() * inverse_depth + static_cast<float>(camera.cy)),
           inverse_depth};
 }
 
@@ -48,20 +48,18 @@ void ObjectRaster::project(const RenderMesh& mesh, const geometry::Pose& X_CO, c
     rect_ = {0, 0, width_ - 1, height_ - 1};
     return;
   }
-  constexpr float kFar = std::numeric_limits<float>::max();
-  float x_min = kFar, x_max = -kFar, y_min = kFar, y_max = -kFar;
+  constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
+  ScreenPoint low{kFar, kFar}, high{-kFar, -kFar};
   for (std::size_t i = 0; i < count; ++i) {
     const Vector3f p_C = R_CO * mesh.vertices[i] + p_CO;
     const ProjectedPoint point = projected(p_C, camera);
-    const ScreenPoint<float>& pixel = point.pixel;
+    const ScreenPoint& pixel = point.pixel;
     points_C_[i] = p_C;
     projected_[i] = point;
-    x_min = std::min(x_min, pixel.x);
-    x_max = std::max(x_max, pixel.x);
-    y_min = std::min(y_min, pixel.y);
-    y_max = std::max(y_max, pixel.y);
+    low = {std::min(low.x, pixel.x), std::min(low.y, pixel.y)};
+    high = {std::max(high.x, pixel.x), std::max(high.y, pixel.y)};
   }
-  rect_ = {ceil_from(x_min, 0), ceil_from(y_min, 0), floor_to(x_max, width_ - 1), floor_to(y_max, height_ - 1)};
+  rect_ = pixels_between(low, high, {0, 0, width_ - 1, height_ - 1});
 }
 
 void ObjectRaster::clear(const geometry::PinholeCamera& camera) {

@@ -19,7 +19,7 @@ struct FacePlane {
 
 /// Where a point is seen.
 struct ProjectedPoint {
-  ScreenPoint<float> pixel;
+  ScreenPoint pixel;
   float inverse_depth;
 };
 

@@ -22,9 +22,9 @@ struct ZBuffer {
   geometry::Image<Vector3f>* normals;  ///< Null = not wanted.
 };
 
-ScreenPoint<double> projected(const Vector3d& p_C, const geometry::PinholeCamera& camera) {
+ScreenPoint projected(const Vector3d& p_C, const geometry::PinholeCamera& camera) {
   const Eigen::Vector2d pixel = camera.project(p_C);
-  return {pixel.x(), pixel.y()};
+  return snapped(pixel.x(), pixel.y());
 }
 
 void draw_triangle(const Vector3d (&corners)[3], const geometry::PinholeCamera& camera, const RenderOptions& options,
@@ -45,9 +45,9 @@ void draw_triangle(const Vector3d (&corners)[3], const geometry::PinholeCamera& 
   const Vector3f towards_camera = (distance > 0.0 ? Vector3d(-normal) : normal).cast<float>();
   const PixelRect image = {0, 0, camera.width - 1, camera.height - 1};
   for (int k = 2; k < count; ++k) {
-    const ScreenPoint<double> a = projected(polygon[0], camera);
-    const ScreenPoint<double> b = projected(polygon[k - 1], camera);
-    const ScreenPoint<double> c = projected(polygon[k], camera);
+    const ScreenPoint a = projected(polygon[0], camera);
+    const ScreenPoint b = projected(polygon[k - 1], camera);
+    const ScreenPoint c = projected(polygon[k], camera);
     for_each_covered_pixel(a, b, c, bounding_pixels(a, b, c, image), [&](int x, int y) {
       const double linear = normal.dot(camera.unproject(x, y, 1.0)) / distance;
       // Faces almost edge-on would leave the depths of their own corners.

@@ -1,20 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which pixels a triangle covers: those whose centre is inside, with the top-left rule for centres exactly on an edge,
-// so that two triangles that share an edge cover each pixel along it once.
+// Which pixels a triangle covers: corners are snapped to 1/256 pixel, and a pixel is covered when its centre is inside
+// of the snapped triangle, with the top-left rule for centres exactly on an edge. All of it is integers: two triangles
+// that share an edge cover each pixel along it once, and whoever snaps alike covers the same pixels.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 namespace prescene::rendering {
 
-/// A point of the image plane in pixels; pixel centres are at integers.
-template <class Scalar>
+inline constexpr int kSubpixels = 256;
+
+/// A point of the image plane in 1/256 pixel; pixel centres are at multiples of 256.
 struct ScreenPoint {
-  Scalar x;
-  Scalar y;
+  std::int32_t x = 0;
+  std::int32_t y = 0;
 };
+
+/// The nearest point (ties to even) of a place in pixels. Beyond two million pixels it stays there.
+inline ScreenPoint snapped(double x, double y) {
+  constexpr double kEnd = 2e6 * kSubpixels;
+  return {static_cast<std::int32_t>(std::nearbyint(std::clamp(x * kSubpixels, -kEnd, kEnd))),
+          static_cast<std::int32_t>(std::nearbyint(std::clamp(y * kSubpixels, -kEnd, kEnd)))};
+}
+/// The same for places within 16,000 pixels, without a call of the library.
+inline ScreenPoint snapped(float x, float y) {
+  const auto nearest = [](float value) {
+    constexpr float kEnd = 16000.0f * kSubpixels;
+    constexpr float kWhole = 12582912.0f;  // 1.5 * 2^23: what is added to it has no fraction left
+    return static_cast<std::int32_t>((std::clamp(value * kSubpixels, -kEnd, kEnd) + kWhole) - kWhole);
+  };
+  return {nearest(x), nearest(y)};
+}
 
 /// Pixels from first to last, both included; empty when last < first.
 struct PixelRect {
@@ -27,83 +46,81 @@ struct PixelRect {
 };
 
 /// The side of the directed line through two points that a pixel lies on: > 0 to the right (y points down).
-/// The value for b -> a is exactly minus that for a -> b, because both are computed from the same end.
-template <class Scalar>
 class EdgeFunction {
  public:
-  EdgeFunction(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b) {
-    dx_ = b.x - a.x;
-    dy_ = b.y - a.y;
+  EdgeFunction(ScreenPoint a, ScreenPoint b) : origin_(a), dx_(b.x - a.x), dy_(b.y - a.y) {
     owns_line_ = dy_ < 0 || (dy_ == 0 && dx_ > 0);  // a left edge, or a top edge, of a triangle on its right side
-    origin_ = b.x < a.x || (b.x == a.x && b.y < a.y) ? b : a;
   }
 
-  void set_row(int y) { row_ = dx_ * (static_cast<Scalar>(y) - origin_.y); }
+  void set_row(int y) { row_ = dx_ * (std::int64_t{y} * kSubpixels - origin_.y); }
   /// Whether the pixel of the current row is on the right side. Without a branch: near small triangles nothing could
   /// predict it.
   bool inside(int x) const {
-    const Scalar value = row_ - dy_ * (static_cast<Scalar>(x) - origin_.x);
+    const std::int64_t value = row_ - dy_ * (std::int64_t{x} * kSubpixels - origin_.x);
     return (value > 0) | ((value == 0) & owns_line_);
   }
   /// Whether the pixels inside lie to the right of the line along each row, or to its left.
   bool bounds_left() const { return dy_ < 0; }
   bool bounds_right() const { return dy_ > 0; }
-  /// About where the line crosses the current row; for lines that are not along it.
-  Scalar crossing() const { return origin_.x + row_ / dy_; }
+  /// About where the line crosses the current row, pixels; for lines that are not along it.
+  double crossing() const {
+    return (origin_.x + static_cast<double>(row_) / static_cast<double>(dy_)) * (1.0 / kSubpixels);
+  }
 
  private:
-  ScreenPoint<Scalar> origin_;
-  Scalar dx_;
-  Scalar dy_;
-  Scalar row_ = 0;
+  ScreenPoint origin_;
+  std::int64_t dx_;
+  std::int64_t dy_;
+  std::int64_t row_ = 0;
   bool owns_line_;
 };
 
 /// The smallest integer >= value, at least `limit`; for any finite value. (The library's ceil is a call on the baseline
 /// instruction set, and there are six of them a triangle.)
-template <class Scalar>
-int ceil_from(Scalar value, int limit) {
-  if (value <= static_cast<Scalar>(limit)) return limit;
-  if (value > Scalar(1e6)) return 1000000;
+inline int ceil_from(double value, int limit) {
+  if (value <= limit) return limit;
+  if (value > 1e6) return 1000000;
   const int truncated = static_cast<int>(value);
-  return truncated + (static_cast<Scalar>(truncated) < value ? 1 : 0);
+  return truncated + (truncated < value ? 1 : 0);
 }
 
 /// The largest integer <= value, at most `limit`.
-template <class Scalar>
-int floor_to(Scalar value, int limit) {
-  if (value >= static_cast<Scalar>(limit)) return limit;
-  if (value < Scalar(-1e6)) return -1000000;
+inline int floor_to(double value, int limit) {
+  if (value >= limit) return limit;
+  if (value < -1e6) return -1000000;
   const int truncated = static_cast<int>(value);
-  return truncated - (static_cast<Scalar>(truncated) > value ? 1 : 0);
+  return truncated - (truncated > value ? 1 : 0);
+}
+
+/// The pixels of `rect` whose centres lie within the bounding box of points between `low` and `high`.
+inline PixelRect pixels_between(ScreenPoint low, ScreenPoint high, const PixelRect& rect) {
+  // A shift rounds down, of negative numbers too.
+  return {std::max(rect.x_first, (low.x + kSubpixels - 1) >> 8), std::max(rect.y_first, (low.y + kSubpixels - 1) >> 8),
+          std::min(rect.x_last, high.x >> 8), std::min(rect.y_last, high.y >> 8)};
 }
 
 /// The pixels of `rect` whose centres lie within the triangle's bounding box.
-template <class Scalar>
-PixelRect bounding_pixels(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b, ScreenPoint<Scalar> c, const PixelRect& rect) {
-  return {ceil_from(std::min(a.x, std::min(b.x, c.x)), rect.x_first),
-          ceil_from(std::min(a.y, std::min(b.y, c.y)), rect.y_first),
-          floor_to(std::max(a.x, std::max(b.x, c.x)), rect.x_last),
-          floor_to(std::max(a.y, std::max(b.y, c.y)), rect.y_last)};
+inline PixelRect bounding_pixels(ScreenPoint a, ScreenPoint b, ScreenPoint c, const PixelRect& rect) {
+  return pixels_between({std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y})},
+                        {std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y})}, rect);
 }
 
 /// Calls fill(x, y) for each pixel that the triangle covers; either orientation. `box` is from bounding_pixels.
-template <class Scalar, class Fill>
-void for_each_covered_pixel(ScreenPoint<Scalar> a, ScreenPoint<Scalar> b, ScreenPoint<Scalar> c, const PixelRect& box,
-                            Fill&& fill) {
-  const Scalar area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+template <class Fill>
+void for_each_covered_pixel(ScreenPoint a, ScreenPoint b, ScreenPoint c, const PixelRect& box, Fill&& fill) {
+  const std::int64_t area = std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
   if (area == 0) return;
   if (area < 0) std::swap(b, c);
-  EdgeFunction<Scalar> ab(a, b);
-  EdgeFunction<Scalar> bc(b, c);
-  EdgeFunction<Scalar> ca(c, a);
+  EdgeFunction ab(a, b);
+  EdgeFunction bc(b, c);
+  EdgeFunction ca(c, a);
   // On wide triangles, rows are narrowed to a pixel beyond where the lines cross them; the exact test decides there.
   constexpr int kWide = 8;
   const bool wide = box.x_last - box.x_first >= kWide;
   for (int y = box.y_first; y <= box.y_last; ++y) {
     int x_begin = box.x_first;
     int x_end = box.x_last;
-    for (EdgeFunction<Scalar>* edge : {&ab, &bc, &ca}) {
+    for (EdgeFunction* edge : {&ab, &bc, &ca}) {
       edge->set_row(y);
       if (!wide) continue;
       if (edge->bounds_left()) x_begin = ceil_from(edge->crossing() - 1, x_begin);
