@@ -7,6 +7,35 @@
 #include "prescene/geometry/mass_properties.h"
 
 namespace prescene::rendering {
+namespace {
+
+MeshLanes lanes_of(const RenderMesh& mesh) {
+  MeshLanes lanes;
+  const auto filled = [](std::size_t count) {
+    return (count + MeshLanes::kMultiple - 1) / MeshLanes::kMultiple * MeshLanes::kMultiple;
+  };
+  for (std::size_t i = 0; i < filled(mesh.vertices.size()); ++i) {
+    const Vector3f& p = mesh.vertices[std::min(i, mesh.vertices.size() - 1)];
+    lanes.x.push_back(p.x());
+    lanes.y.push_back(p.y());
+    lanes.z.push_back(p.z());
+  }
+  for (std::size_t i = 0; i < filled(mesh.triangles.size()); ++i) {
+    const bool there = i < mesh.triangles.size();
+    const std::array<std::uint32_t, 3> corners = there ? mesh.triangles[i] : std::array<std::uint32_t, 3>{0, 0, 0};
+    lanes.a.push_back(static_cast<std::int32_t>(corners[0]));
+    lanes.b.push_back(static_cast<std::int32_t>(corners[1]));
+    lanes.c.push_back(static_cast<std::int32_t>(corners[2]));
+    const Vector3f normal = there ? mesh.normals[i] : Vector3f(0.0f, 0.0f, 0.0f);
+    lanes.normal_x.push_back(normal.x());
+    lanes.normal_y.push_back(normal.y());
+    lanes.normal_z.push_back(normal.z());
+    lanes.offset.push_back(there ? mesh.offsets[i] : 0.0f);
+  }
+  return lanes;
+}
+
+}  // namespace
 
 MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh) {
   auto result = std::make_shared<RenderMesh>();
@@ -21,8 +50,10 @@ MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh) {
     if (!(twice_area > 0.0)) continue;
     result->triangles.push_back(triangle);
     result->normals.push_back((cross / twice_area).cast<float>());
+    result->offsets.push_back(static_cast<float>(cross.dot(a) / twice_area));
   }
   if (result->triangles.empty()) return result;
+  result->lanes = lanes_of(*result);
 
   const geometry::Box box = geometry::bounding_box(mesh);
   const geometry::Vector3d centre = box.center();

@@ -20,11 +20,23 @@ namespace prescene::rendering {
 
 using Eigen::Vector3f;
 
+/// A mesh's vertices and triangles coordinate by coordinate, filled up to multiples of kMultiple with the last vertex
+/// and with triangles of one vertex.
+struct MeshLanes {
+  static constexpr std::size_t kMultiple = 16;
+
+  std::vector<float> x, y, z;                               ///< Vertices.
+  std::vector<std::int32_t> a, b, c;                        ///< Corners of the triangles.
+  std::vector<float> normal_x, normal_y, normal_z, offset;  ///< Of the triangles.
+};
+
 /// A triangle mesh in single precision as renderers want it; immutable once made, shared by handle.
 struct RenderMesh {
   std::vector<Vector3f> vertices;                       ///< Metres, mesh frame M.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
   std::vector<Vector3f> normals;                        ///< One outward unit normal a triangle, mesh frame.
+  std::vector<float> offsets;                           ///< normal . p of a triangle's plane, metres.
+  MeshLanes lanes;                                      ///< The same once more.
   Vector3f centre = Vector3f::Zero();                   ///< Of a bounding sphere, mesh frame.
   float radius = 0.0f;                                  ///< Of that sphere, metres.
   bool closed =

@@ -118,11 +118,14 @@ void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, cons
   faces_.reserve(2 * mesh.triangles.size());  // a cut face is drawn in two
 
   const Rotation R_CO(X_CO);
+  const Vector3f from_camera_O = (X_CO.rotation.conjugate() * X_CO.translation).cast<float>();
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& triangle = mesh.triangles[i];
     const Vector3f& a = points_C_[triangle[0]];
-    Vector3f normal = R_CO * mesh.normals[i];
-    float distance = normal.dot(a);
+    const Vector3f& normal_O = mesh.normals[i];
+    Vector3f normal = R_CO * normal_O;
+    float distance = normal_O.x() * from_camera_O.x() + normal_O.y() * from_camera_O.y() +
+                     normal_O.z() * from_camera_O.z() + mesh.offsets[i];
     // Seen from behind: never visible on a closed mesh that the near plane leaves whole.
     if (distance > 0.0f) {
       if (mesh.closed && !cut) continue;

@@ -7,7 +7,7 @@
 
 #include "prescene/geometry/camera.h"
 #include "prescene/rendering/render_scene.h"
-#include "triangle_raster.h"
+#include "prescene/rendering/triangle_raster.h"
 
 namespace prescene::rendering {
 

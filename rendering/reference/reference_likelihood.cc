@@ -7,6 +7,7 @@
 
 #include "object_raster.h"
 #include "prescene/core/check.h"
+#include "prescene/rendering/pixel_classes.h"
 #include "prescene/rendering/portable_math.h"
 
 namespace prescene::rendering {
@@ -15,69 +16,9 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-/// A visible or matching pixel is within this many standard deviations of the predicted surface.
-constexpr float kMatchSigmas = 3.0f;
-
-/// No pixel counts more against a pose than this, even when a material is said to have no outliers.
-constexpr float kMinRatio = 1e-12f;
-
 class ReferenceWorkspace final : public LikelihoodWorkspace {
  public:
   ObjectRaster raster;
-};
-
-/// The parts of a pixel's mixture that depend only on the material and the class of the pixel (docs/sensor_model.md).
-struct PixelClass {
-  float hit;  ///< Weight over sqrt(2 pi).
-  float occluder;
-  float behind;
-  float outlier_density;  ///< 1/m
-  float missing;
-  float returned;            ///< 1 - missing.
-  float returned_ratio;      ///< Return against an opaque surface's, for backgrounds whose share is not known.
-  double log_missing_ratio;  ///< The same of no return.
-};
-
-/// The classes of one material: four of incidence, inside and at the outline.
-class PixelClasses {
- public:
-  PixelClasses(const SensorModel& model, const SurfaceMaterial& material, int step) {
-    const auto& bounds = model.options().incidence_cosine;
-    for (std::size_t i = 0; i < bounds.size(); ++i) bounds_[i] = static_cast<float>(bounds[i]);
-    for (std::size_t i = 0; i < kIncidences; ++i) {
-      const double cosine = i < bounds.size() ? bounds[i] : 1.0;
-      // A reduced pixel with an empty neighbour is half a reduced pixel from the outline, on average.
-      classes_[2 * i] = make(model, material, {1.0, cosine});
-      classes_[2 * i + 1] = make(model, material, {1.0, cosine, 0.5 * step});
-    }
-  }
-
-  const PixelClass& at(float cosine, bool outline) const {
-    std::size_t i = 0;
-    for (const float bound : bounds_) i += cosine > bound ? 1 : 0;
-    return classes_[2 * i + (outline ? 1 : 0)];
-  }
-
- private:
-  static constexpr std::size_t kIncidences = 4;
-
-  static PixelClass make(const SensorModel& model, const SurfaceMaterial& material, const PixelGeometry& pixel) {
-    constexpr double kInverseSqrt2Pi = 0.3989422804014327;
-    const PixelMixture m = model.mixture(material, pixel);
-    PixelClass c;
-    c.hit = static_cast<float>(m.hit * kInverseSqrt2Pi);
-    c.occluder = static_cast<float>(m.occluder);
-    c.behind = static_cast<float>(m.behind);
-    c.outlier_density = static_cast<float>(m.outlier / model.range());
-    c.missing = static_cast<float>(m.missing);
-    c.returned = static_cast<float>(1.0 - m.missing);
-    c.returned_ratio = static_cast<float>((1.0 - m.missing) / (1.0 - m.missing_opaque));
-    c.log_missing_ratio = portable_log(m.missing / m.missing_opaque);
-    return c;
-  }
-
-  std::array<float, 3> bounds_;
-  std::array<PixelClass, 2 * kIncidences> classes_;
 };
 
 /// The logarithm of a product of many numbers with one logarithm in a while.
@@ -144,8 +85,7 @@ class EvidenceSum {
     const float sigma = sigma_scale_ * pixel.depth * pixel.depth * std::clamp(knee_ / pixel.cosine, 1.0f, max_growth_);
     const float deviation = (pixel.measured - pixel.depth) / sigma;
     float density = c.outlier_density;
-    // Ten standard deviations off, the hit is nothing beside the outliers.
-    if (std::abs(deviation) < 10.0f) {
+    if (std::abs(deviation) < kHitSigmas) {
       const float hit = c.hit / sigma * portable_exp(-0.5f * deviation * deviation);
       density += color_ratio_ != nullptr ? hit * (*color_ratio_)(pixel.x, pixel.y) : hit;
     }
@@ -253,8 +193,7 @@ template <class Visit>
 int for_each_pixel(const FrameTerms& frame, const PoseHypothesis& hypothesis, ObjectRaster& raster, Visit&& visit) {
   const geometry::PinholeCamera& camera = frame.camera;
   const SensorModelOptions& options = frame.model.options();
-  // A hair beyond the range's start, where the occluder's interval has no length.
-  raster.draw(*hypothesis.mesh, hypothesis.X_CO, camera, static_cast<float>(options.min_depth) + 1e-4f);
+  raster.draw(*hypothesis.mesh, hypothesis.X_CO, camera, nearest_drawn(options));
   const auto max_depth = static_cast<float>(options.max_depth);
   const auto inverse_fx = static_cast<float>(1.0 / camera.fx);
   const auto inverse_fy = static_cast<float>(1.0 / camera.fy);

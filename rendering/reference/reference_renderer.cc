@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "prescene/core/check.h"
-#include "triangle_raster.h"
+#include "prescene/rendering/triangle_raster.h"
 
 namespace prescene::rendering {
 namespace {

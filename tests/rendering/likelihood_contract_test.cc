@@ -11,6 +11,7 @@
 #include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/rendering/simulated_camera.h"
 #include "prescene/tests/support/allocations.h"
 #include "scenes.h"
@@ -30,7 +31,8 @@ struct Backend {
   double log_ratio_tolerance;  ///< Of the sum, beside 1e-4 of it: what single precision costs.
 };
 
-const Backend kBackends[] = {{"reference", make_reference_likelihood_batch, 0.02}};
+const Backend kBackends[] = {{"reference", make_reference_likelihood_batch, 0.02},
+                             {"simd", make_simd_likelihood_batch, 0.02}};
 
 /// A frame of a carton before a wall, seen by a simulated camera.
 class LikelihoodContract : public testing::TestWithParam<Backend> {
@@ -354,6 +356,59 @@ TEST_P(LikelihoodContract, GivesTheSameBitsInAnyBatchAndOnAnyThreads) {
       EXPECT_EQ(actual[i].log_ratio, expected[i].log_ratio);
       EXPECT_EQ(actual[i].visible, expected[i].visible);
     }
+  }
+}
+
+TEST_P(LikelihoodContract, SaysWhatTheReferenceSaysOfTenThousandHypotheses) {
+  const auto reference = make_reference_likelihood_batch();
+  const auto its_workspace = reference->make_workspace();
+  ColorModel colors;
+  core::RandomStream of_colors(3, core::Purpose::kTest);
+  for (float& ratio : colors.log_ratio) ratio = static_cast<float>(of_colors.uniform(-3.0, 3.0));
+  // Round, open and with faces from less than a pixel to more than the image.
+  const MeshHandle meshes[] = {
+      mesh_, make_render_mesh(geometry::make_mesh(geometry::Sphere{0.09}, 48)),
+      make_render_mesh(geometry::make_open_bin({0.2, 0.15, 0.1}, 0.008)), wall_mesh(),
+      make_render_mesh(geometry::make_lathe({{0.0, 0.0}, {0.04, 0.0}, {0.05, 0.1}, {0.045, 0.1}, {0.03, 0.01}}, 24))};
+  const SurfaceMaterial materials[] = {SurfaceMaterial::opaque(), SurfaceMaterial::transparent(),
+                                       SurfaceMaterial::mirror()};
+  for (const int width : {40, 80, 160, 320}) {
+    const FrameTerms frame = noisy_terms(width, std::span(&colors, 1));
+    core::RandomStream stream(11, core::Purpose::kTest);
+    std::vector<PoseHypothesis> hypotheses;
+    for (int i = 0; i < 2500; ++i) {
+      // Some partly out of view, some cut by the near plane, some behind the camera.
+      PoseHypothesis h = hypothesis(disturbed(i % 10 == 0 ? 0.5 : 0.05, 0.5, stream));
+      h.X_CO.rotation = geometry::uniform_rotation(stream);
+      h.mesh = meshes[i % 5].get();
+      h.material = &materials[i % 3];
+      h.color_model = i % 2 - 1;
+      hypotheses.push_back(h);
+    }
+    std::vector<PoseEvidence> evidences(hypotheses.size()), expected(hypotheses.size());
+    batch_->evaluate(frame, hypotheses, *workspace_, evidences);
+    reference->evaluate(frame, hypotheses, *its_workspace, expected);
+    std::vector<PoseLinearisation> equations(hypotheses.size()), their_equations(hypotheses.size());
+    batch_->linearise(frame, hypotheses, {}, *workspace_, equations);
+    reference->linearise(frame, hypotheses, {}, *its_workspace, their_equations);
+    int seen = 0;
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      const auto near = [](double a, double b) { return std::abs(a - b) <= 1e-4 * std::max(1.0, std::abs(b)); };
+      ASSERT_PRED2(near, evidences[i].log_ratio, expected[i].log_ratio) << width << " " << i;
+      ASSERT_PRED2(near, evidences[i].visible_log_ratio, expected[i].visible_log_ratio) << width << " " << i;
+      ASSERT_PRED2(near, evidences[i].tempered, expected[i].tempered) << width << " " << i;
+      ASSERT_EQ(evidences[i].in_view, expected[i].in_view) << width << " " << i;
+      ASSERT_EQ(evidences[i].covered, expected[i].covered) << width << " " << i;
+      ASSERT_EQ(evidences[i].measured, expected[i].measured) << width << " " << i;
+      ASSERT_EQ(evidences[i].visible, expected[i].visible) << width << " " << i;
+      ASSERT_EQ(evidences[i].hits, expected[i].hits) << width << " " << i;
+      ASSERT_EQ(equations[i].pixels, their_equations[i].pixels) << width << " " << i;
+      ASSERT_LE((equations[i].H - their_equations[i].H).norm(), 1e-4 * their_equations[i].H.norm()) << i;
+      ASSERT_LE((equations[i].g - their_equations[i].g).norm(), 1e-4 * their_equations[i].g.norm() + 1e-3) << i;
+      seen += expected[i].covered > 0 ? 1 : 0;
+    }
+    EXPECT_GT(seen, 1500);
+    EXPECT_LT(seen, 2490);
   }
 }
 

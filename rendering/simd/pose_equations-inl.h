@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// The Gauss-Newton equations of a drawn hypothesis, in lanes: the operations on a pixel are those of the reference
+// backend's EquationSum. Lanes are summed in single precision over a few blocks, then in double.
+#if defined(PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_
+#undef PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_
+#else
+#define PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+
+#include "pose_evidence-inl.h"
+#include "pose_kernels.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace prescene::rendering::HWY_NAMESPACE {
+
+class EquationLanes {
+ public:
+  EquationLanes(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
+                const LineariseOptions& options)
+      : seen_(seen),
+        tile_(tile),
+        two_over_gate_(static_cast<float>(2.0 / options.gate)),
+        min_cosine_(static_cast<float>(options.min_cosine)),
+        sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)) {}
+
+  HWY_INLINE void add(std::size_t place, const Pixels& p) {
+    const DF d;
+    const F zero = hn::Zero(d);
+    const M used = hn::AndNot(hn::Or(hn::Eq(p.measured, zero), hn::Lt(p.cosine, set(min_cosine_))), p.covered);
+    if (hn::AllFalse(d, used)) return;
+    pixels_ += hn::CountTrue(d, used);
+    const F residual = hn::Mul(p.slope, hn::Sub(p.measured, p.depth));
+    const F scaled = hn::Mul(set(two_over_gate_), residual);
+    const F root = hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Mul(scaled, scaled)));
+    const F robust = hn::IfThenElseZero(used, hn::Mul(root, root));
+    const F sigma = hn::Mul(hn::Mul(set(sigma_scale_), p.depth), p.depth);
+    const F weight = hn::IfThenElseZero(used, hn::Div(robust, hn::Mul(sigma, sigma)));
+    const F zeroed = hn::IfThenElseZero(used, residual);
+    const F n[3] = {hn::GatherIndex(d, tile_.normal_x.data(), p.face),
+                    hn::GatherIndex(d, tile_.normal_y.data(), p.face),
+                    hn::GatherIndex(d, tile_.normal_z.data(), p.face)};
+    const F depth = hn::IfThenElseZero(used, p.depth);
+    const F to[3] = {hn::Sub(hn::Mul(p.ray_x, depth), set(seen_.translation[0])),
+                     hn::Sub(hn::Mul(p.ray_y, depth), set(seen_.translation[1])),
+                     hn::Sub(depth, set(seen_.translation[2]))};
+    const F row[6] = {hn::Sub(hn::Mul(to[1], n[2]), hn::Mul(to[2], n[1])),
+                      hn::Sub(hn::Mul(to[2], n[0]), hn::Mul(to[0], n[2])),
+                      hn::Sub(hn::Mul(to[0], n[1]), hn::Mul(to[1], n[0])),
+                      n[0],
+                      n[1],
+                      n[2]};
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < 6; ++i) {
+      const F weighted = hn::Mul(weight, row[i]);
+      for (std::size_t j = i; j < 6; ++j) add_to(k++, place, hn::Mul(weighted, row[j]));
+      add_to(kRight + i, place, hn::Mul(weighted, zeroed));
+    }
+    add_to(kWeight, place, robust);
+    add_to(kSquares, place, hn::Mul(hn::Mul(robust, zeroed), zeroed));
+    if (++blocks_ == 16) flush();
+  }
+
+  void finish(CameraEquations* equations) {
+    flush();
+    for (std::size_t k = 0; k < kRight; ++k) equations->H[k] = totals_[k];
+    for (std::size_t i = 0; i < 6; ++i) equations->g[i] = totals_[kRight + i];
+    equations->pixels = static_cast<int>(pixels_);
+    equations->weight = totals_[kWeight];
+    equations->squares = totals_[kSquares];
+  }
+
+ private:
+  static constexpr std::size_t kRight = 21;  // of the equations' right side, after H
+  static constexpr std::size_t kWeight = 27;
+  static constexpr std::size_t kSquares = 28;
+  static constexpr std::size_t kSums = 29;
+
+  HWY_INLINE void add_to(std::size_t sum, std::size_t place, F value) {
+    const DF d;
+    float* lanes = sums_[sum] + place;
+    hn::Store(hn::Add(hn::Load(d, lanes), value), d, lanes);
+  }
+  void flush() {
+    blocks_ = 0;
+    for (std::size_t k = 0; k < kSums; ++k) {
+      double sum = 0.0;
+      for (float& lane : sums_[k]) {
+        sum += static_cast<double>(lane);
+        lane = 0.0f;
+      }
+      totals_[k] += sum;
+    }
+  }
+
+  const PoseProjection& seen_;
+  const PoseTile& tile_;
+  float two_over_gate_, min_cosine_, sigma_scale_;
+  HWY_ALIGN float sums_[kSums][kBlock] = {};
+  double totals_[kSums] = {};
+  int blocks_ = 0;
+  std::size_t pixels_ = 0;
+};
+
+void equations_kernel(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
+                      const LineariseOptions& options, CameraEquations* equations) {
+  EquationLanes lanes(frame, seen, tile, options);
+  for_each_block(frame, seen, tile,
+                 [&](int, int, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(place, p); });
+  lanes.finish(equations);
+}
+
+}  // namespace prescene::rendering::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/rendering/simd/simd_likelihood.h"
+
+#include <optional>
+
+#include "cut_mesh.h"
+#include "pose_kernels.h"
+#include "prescene/core/check.h"
+#include "prescene/rendering/reference/reference_likelihood.h"
+
+namespace prescene::rendering {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::Vector6d;
+
+/// The classes of the last material, which is nearly always the next one's, too.
+class LastClasses {
+ public:
+  const PixelClasses& of(const SensorModel& model, const SurfaceMaterial& material, int step) {
+    if (!classes_ || step != step_ || !(material == material_) || !(model.options() == options_)) {
+      classes_.emplace(model, material, step);
+      step_ = step;
+      material_ = material;
+      options_ = model.options();
+    }
+    return *classes_;
+  }
+
+ private:
+  std::optional<PixelClasses> classes_;
+  SensorModelOptions options_;
+  SurfaceMaterial material_;
+  int step_ = 0;
+};
+
+class SimdWorkspace final : public LikelihoodWorkspace {
+ public:
+  explicit SimdWorkspace(std::unique_ptr<LikelihoodWorkspace> of_reference) : reference(std::move(of_reference)) {}
+
+  PoseTile tile;
+  LastClasses classes;
+  std::unique_ptr<LikelihoodWorkspace> reference;
+};
+
+/// The sums with rotations turned from camera axes to the body's.
+void turn_to_body(const CameraEquations& sums, const geometry::Pose& X_CO, PoseLinearisation* result) {
+  Matrix6d H;
+  Vector6d g;
+  std::size_t k = 0;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    g[i] = sums.g[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = i; j < 6; ++j) H(i, j) = H(j, i) = sums.H[k++];
+  }
+  Matrix6d to_body = Matrix6d::Identity();
+  to_body.topLeftCorner<3, 3>() = X_CO.rotation.toRotationMatrix().transpose();
+  const Matrix6d turned = to_body * H * to_body.transpose();
+  result->H = 0.5 * (turned + turned.transpose());
+  result->g = to_body * g;
+  result->pixels = sums.pixels;
+  result->weight = sums.weight;
+  result->squares = sums.squares;
+}
+
+class SimdLikelihoodBatch final : public LikelihoodBatch {
+ public:
+  LikelihoodBatchInfo info() const override { return {"simd", true}; }
+
+  std::unique_ptr<LikelihoodWorkspace> make_workspace() const override {
+    return std::make_unique<SimdWorkspace>(reference_->make_workspace());
+  }
+
+  void evaluate(const FrameTerms& frame, std::span<const PoseHypothesis> hypotheses, LikelihoodWorkspace& workspace,
+                std::span<PoseEvidence> evidences) const override {
+    PRESCENE_CHECK(hypotheses.size() == evidences.size());
+    auto& scratch = static_cast<SimdWorkspace&>(workspace);
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      switch (way_of(frame, hypotheses[i])) {
+        case Way::kUnseen:
+          evidences[i] = PoseEvidence{};
+          break;
+        case Way::kNarrow:
+          reference_->evaluate(frame, hypotheses.subspan(i, 1), *scratch.reference, evidences.subspan(i, 1));
+          break;
+        case Way::kLanes: {
+          const PoseProjection seen = drawn(frame, hypotheses[i], scratch);
+          evidences[i] = evidence_of(frame, hypotheses[i], seen, scratch);
+          break;
+        }
+      }
+    }
+  }
+
+  void linearise(const FrameTerms& frame, std::span<const PoseHypothesis> hypotheses, const LineariseOptions& options,
+                 LikelihoodWorkspace& workspace, std::span<PoseLinearisation> linearisations) const override {
+    PRESCENE_CHECK(hypotheses.size() == linearisations.size());
+    PRESCENE_CHECK(options.gate > 0.0);
+    auto& scratch = static_cast<SimdWorkspace&>(workspace);
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      switch (way_of(frame, hypotheses[i])) {
+        case Way::kUnseen:
+          linearisations[i] = PoseLinearisation{};
+          break;
+        case Way::kNarrow:
+          reference_->linearise(frame, hypotheses.subspan(i, 1), options, *scratch.reference,
+                                linearisations.subspan(i, 1));
+          break;
+        case Way::kLanes: {
+          const PoseProjection seen = drawn(frame, hypotheses[i], scratch);
+          CameraEquations sums;
+          sum_equations(frame, seen, scratch.tile, options, &sums);
+          linearisations[i] = PoseLinearisation{};
+          turn_to_body(sums, hypotheses[i].X_CO, &linearisations[i]);
+          if (options.with_evidence) linearisations[i].evidence = evidence_of(frame, hypotheses[i], seen, scratch);
+          break;
+        }
+      }
+    }
+  }
+
+ private:
+  enum class Way { kUnseen, kNarrow, kLanes };
+
+  static Way way_of(const FrameTerms& frame, const PoseHypothesis& hypothesis) {
+    const RenderMesh& mesh = *hypothesis.mesh;
+    if (mesh.triangles.empty() || centre_depth(hypothesis) + mesh.radius <= nearest_drawn(frame.model.options()))
+      return Way::kUnseen;
+    return frame.camera.width < kBlock ? Way::kNarrow : Way::kLanes;
+  }
+  static float centre_depth(const PoseHypothesis& hypothesis) {
+    return static_cast<float>((hypothesis.X_CO * hypothesis.mesh->centre.cast<double>().eval()).z());
+  }
+
+  static PoseProjection drawn(const FrameTerms& frame, const PoseHypothesis& hypothesis, SimdWorkspace& scratch) {
+    const RenderMesh& mesh = *hypothesis.mesh;
+    const PoseProjection seen(hypothesis.X_CO, frame.camera);
+    scratch.tile.reserve(mesh, frame.camera.width, frame.camera.height);
+    const float near_depth = nearest_drawn(frame.model.options());
+    if (centre_depth(hypothesis) - mesh.radius < near_depth) {
+      draw_cut(mesh, seen, near_depth, &scratch.tile);
+    } else {
+      draw(mesh, seen, &scratch.tile);
+    }
+    return seen;
+  }
+
+  static PoseEvidence evidence_of(const FrameTerms& frame, const PoseHypothesis& hypothesis, const PoseProjection& seen,
+                                  SimdWorkspace& scratch) {
+    EvidenceTerms terms;
+    terms.frame = &frame;
+    terms.classes = &scratch.classes.of(frame.model, *hypothesis.material, frame.step);
+    if (hypothesis.color_model >= 0 && !frame.color_ratio.empty()) {
+      PRESCENE_CHECK(static_cast<std::size_t>(hypothesis.color_model) < frame.color_ratio.size());
+      terms.color_ratio = &frame.color_ratio[static_cast<std::size_t>(hypothesis.color_model)];
+    }
+    PoseEvidence evidence;
+    sum_evidence(terms, seen, scratch.tile, &evidence);
+    const double pixels = hypothesis.tempering_pixels > 0.0 ? hypothesis.tempering_pixels : evidence.measured;
+    evidence.tempered = tempering(frame.tempering.weight_pixels, pixels) * evidence.log_ratio;
+    return evidence;
+  }
+
+  std::unique_ptr<LikelihoodBatch> reference_ = make_reference_likelihood_batch();
+};
+
+}  // namespace
+
+std::unique_ptr<LikelihoodBatch> make_simd_likelihood_batch() { return std::make_unique<SimdLikelihoodBatch>(); }
+
+}  // namespace prescene::rendering
