@@ -29,6 +29,13 @@ using I = hn::Vec<DI>;
 HWY_INLINE F set(float value) { return hn::Set(DF(), value); }
 HWY_INLINE I set(std::int32_t value) { return hn::Set(DI(), value); }
 
+/// Stores the lanes of the mask side by side, and others behind them: a whole vector, since storing a part of one is
+/// slow on some processors.
+template <class D, class V>
+HWY_INLINE void store_chosen(V values, hn::Mask<D> chosen, D d, hn::TFromD<D>* to) {
+  hn::StoreU(hn::Compress(values, chosen), d, to);
+}
+
 HWY_INLINE hn::Mask<DI> not_above(I a, I b) { return hn::Not(hn::Gt(a, b)); }
 
 /// Row `row` of the rotation times (x, y, z).
@@ -95,12 +102,13 @@ HWY_INLINE void turn_faces(const RenderMesh& mesh, const PoseProjection& seen, P
       const F normal = rotated(seen, row, x, y, z);
       return hn::IfThenElse(behind, hn::Neg(normal), normal);
     };
-    hn::CompressStore(turned(0), faces_us, d, tile->normal_x.data() + count);
-    hn::CompressStore(turned(1), faces_us, d, tile->normal_y.data() + count);
-    hn::CompressStore(turned(2), faces_us, d, tile->normal_z.data() + count);
-    hn::CompressStore(hn::Neg(hn::Abs(distance)), faces_us, d, tile->distance.data() + count);
+    store_chosen(turned(0), faces_us, d, tile->normal_x.data() + count);
+    store_chosen(turned(1), faces_us, d, tile->normal_y.data() + count);
+    store_chosen(turned(2), faces_us, d, tile->normal_z.data() + count);
+    store_chosen(hn::Neg(hn::Abs(distance)), faces_us, d, tile->distance.data() + count);
     const I index = hn::Iota(di, static_cast<std::int32_t>(i));
-    count += hn::CompressStore(index, hn::RebindMask(di, faces_us), di, tile->triangle.data() + count);
+    store_chosen(index, hn::RebindMask(di, faces_us), di, tile->triangle.data() + count);
+    count += hn::CountTrue(d, faces_us);
   }
   tile->faces = count;
 }
@@ -230,9 +238,10 @@ class FaceDrawer {
         const auto inside = hn::AndNot(outside, hn::And(in_rows, not_above(set(column), columns)));
         if (!hn::AllFalse(di, inside)) {
           const F x = hn::ConvertTo(d, hn::Add(x_first, set(column)));
-          const std::size_t count = hn::CompressStore(hn::Add(row_start, set(column)), inside, di, places);
-          hn::CompressStore(face, inside, di, drawn);
-          hn::CompressStore(depths.at(seen_, x, y), hn::RebindMask(d, inside), d, nearness);
+          const std::size_t count = hn::CountTrue(di, inside);
+          store_chosen(hn::Add(row_start, set(column)), inside, di, places);
+          store_chosen(face, inside, di, drawn);
+          store_chosen(depths.at(seen_, x, y), hn::RebindMask(d, inside), d, nearness);
           for (std::size_t k = 0; k < count; ++k)
             draw_pixel(nearness[k], drawn[k], depth_of + places[k], face_of + places[k]);
         }
@@ -263,7 +272,8 @@ class FaceDrawer {
     hn::Store(depths.along_y, d, along_y);
     hn::Store(depths.low, d, low);
     hn::Store(depths.high, d, high);
-    const std::size_t count = hn::CompressStore(hn::Iota(di, 0), wide, di, chosen);
+    const std::size_t count = hn::CountTrue(di, wide);
+    store_chosen(hn::Iota(di, 0), wide, di, chosen);
     for (std::size_t k = 0; k < count; ++k) {
       const auto lane = static_cast<std::size_t>(chosen[k]);
       draw_one(first + lane,
