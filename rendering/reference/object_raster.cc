@@ -6,11 +6,9 @@
 namespace prescene::rendering {
 namespace {
 
-ProjectedPoint projected(const Vector3f& p_C, const geometry::PinholeCamera& camera) {
-  const float inverse_depth = 1.0f / p_C.z();
-  return {snapped(static_cast<float>(camera.fx) * p_C.x() * inverse_depth + static_cast<float>(camera.cx),
-                  static_cast<float>(camera.fy) * p_C.y() * inverse_depth + static_cast<float>(camera.cy)),
-          inverse_depth};
+ScreenPoint projected(const Vector3f& p_C, float inverse_depth, const geometry::PinholeCamera& camera) {
+  return snapped(static_cast<float>(camera.fx) * p_C.x() * inverse_depth + static_cast<float>(camera.cx),
+                 static_cast<float>(camera.fy) * p_C.y() * inverse_depth + static_cast<float>(camera.cy));
 }
 
 /// A rotation that the compiler inlines where it is used; it does not do that with products of fixed matrices.
@@ -34,7 +32,7 @@ class Rotation {
 }  // namespace
 
 void ObjectRaster::project(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera,
-                           bool cut) {
+                           float near_depth, bool cut) {
   const Rotation R_CO(X_CO);
   const Vector3f p_CO = X_CO.translation.cast<float>();
   const std::size_t count = mesh.vertices.size();
@@ -44,18 +42,27 @@ void ObjectRaster::project(const RenderMesh& mesh, const geometry::Pose& X_CO, c
   }
   if (cut) {
     // Corners behind the camera have no pixel: faces are projected as they are cut.
-    for (std::size_t i = 0; i < count; ++i) points_C_[i] = R_CO * mesh.vertices[i] + p_CO;
+    most_inverse_depth_ = least_inverse_depth_ = 1.0f / near_depth;
+    for (std::size_t i = 0; i < count; ++i) {
+      points_C_[i] = R_CO * mesh.vertices[i] + p_CO;
+      if (points_C_[i].z() >= near_depth)
+        least_inverse_depth_ = std::min(least_inverse_depth_, 1.0f / points_C_[i].z());
+    }
     rect_ = {0, 0, width_ - 1, height_ - 1};
     return;
   }
   constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
   ScreenPoint low{kFar, kFar}, high{-kFar, -kFar};
+  least_inverse_depth_ = std::numeric_limits<float>::max();
+  most_inverse_depth_ = 0.0f;
   for (std::size_t i = 0; i < count; ++i) {
     const Vector3f p_C = R_CO * mesh.vertices[i] + p_CO;
-    const ProjectedPoint point = projected(p_C, camera);
-    const ScreenPoint& pixel = point.pixel;
+    const float inverse_depth = 1.0f / p_C.z();
+    const ScreenPoint pixel = projected(p_C, inverse_depth, camera);
     points_C_[i] = p_C;
-    projected_[i] = point;
+    projected_[i] = pixel;
+    least_inverse_depth_ = std::min(least_inverse_depth_, inverse_depth);
+    most_inverse_depth_ = std::max(most_inverse_depth_, inverse_depth);
     low = {std::min(low.x, pixel.x), std::min(low.y, pixel.y)};
     high = {std::max(high.x, pixel.x), std::max(high.y, pixel.y)};
   }
@@ -76,22 +83,19 @@ void ObjectRaster::clear(const geometry::PinholeCamera& camera) {
               inverse_depth_.begin() + static_cast<std::ptrdiff_t>(index(x_last, y)) + 1, 0.0f);
 }
 
-void ObjectRaster::fill(const ProjectedPoint& a, const ProjectedPoint& b, const ProjectedPoint& c,
-                        const FacePlane& plane) {
-  const PixelRect box = bounding_pixels(a.pixel, b.pixel, c.pixel, rect_);
+void ObjectRaster::fill(const ScreenPoint& a, const ScreenPoint& b, const ScreenPoint& c, const FacePlane& plane) {
+  const PixelRect box = bounding_pixels(a, b, c, rect_);
   if (box.empty()) return;
   const auto face = static_cast<std::uint32_t>(faces_.size());
   faces_.push_back(plane);
-  // 1/z is linear over the image: n . ray / distance. Kept between the corners' own, which edge-on faces would leave.
+  // 1/z is linear over the image: n . ray / distance. Kept within the object's, which edge-on faces would leave.
   const float scale = 1.0f / plane.distance;
   const float along_x = plane.normal.x() * inverse_fx_ * scale;
   const float along_y = plane.normal.y() * inverse_fy_ * scale;
   const float at_centre = plane.normal.z() * scale;
-  const float low = std::min(a.inverse_depth, std::min(b.inverse_depth, c.inverse_depth));
-  const float high = std::max(a.inverse_depth, std::max(b.inverse_depth, c.inverse_depth));
-  for_each_covered_pixel(a.pixel, b.pixel, c.pixel, box, [&](int x, int y) {
+  for_each_covered_pixel(a, b, c, box, [&](int x, int y) {
     const float linear = at_centre + along_x * (static_cast<float>(x) - cx_) + along_y * (static_cast<float>(y) - cy_);
-    const float inverse_depth = std::max(low, std::min(high, linear));
+    const float inverse_depth = std::max(least_inverse_depth_, std::min(most_inverse_depth_, linear));
     const std::size_t i = index(x, y);
     if (inverse_depth <= inverse_depth_[i]) return;
     inverse_depth_[i] = inverse_depth;
@@ -112,7 +116,7 @@ void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, cons
   const auto centre_z = static_cast<float>((X_CO * mesh.centre.cast<double>().eval()).z());
   if (mesh.triangles.empty() || centre_z + mesh.radius <= near_depth) return;
   const bool cut = centre_z - mesh.radius < near_depth;
-  project(mesh, X_CO, camera, cut);
+  project(mesh, X_CO, camera, near_depth, cut);
   if (rect_.empty()) return;
   clear(camera);
   faces_.reserve(2 * mesh.triangles.size());  // a cut face is drawn in two
@@ -140,9 +144,8 @@ void ObjectRaster::draw(const RenderMesh& mesh, const geometry::Pose& X_CO, cons
     const Vector3f corners[3] = {a, points_C_[triangle[1]], points_C_[triangle[2]]};
     Vector3f polygon[4];
     const int count = clip_to_near(corners, near_depth, polygon);
-    for (int k = 2; k < count; ++k)
-      fill(projected(polygon[0], camera), projected(polygon[k - 1], camera), projected(polygon[k], camera),
-           {normal, distance});
+    const auto corner = [&](int k) { return projected(polygon[k], 1.0f / polygon[k].z(), camera); };
+    for (int k = 2; k < count; ++k) fill(corner(0), corner(k - 1), corner(k), {normal, distance});
   }
 }
 

@@ -17,12 +17,6 @@ struct FacePlane {
   float distance;
 };
 
-/// Where a point is seen.
-struct ProjectedPoint {
-  ScreenPoint pixel;
-  float inverse_depth;
-};
-
 /// Draws objects. draw() overwrites what the previous one left; allocates only while it grows.
 class ObjectRaster {
  public:
@@ -43,9 +37,10 @@ class ObjectRaster {
   std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
-  void project(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera, bool cut);
+  void project(const RenderMesh& mesh, const geometry::Pose& X_CO, const geometry::PinholeCamera& camera,
+               float near_depth, bool cut);
   void clear(const geometry::PinholeCamera& camera);
-  void fill(const ProjectedPoint& a, const ProjectedPoint& b, const ProjectedPoint& c, const FacePlane& plane);
+  void fill(const ScreenPoint& a, const ScreenPoint& b, const ScreenPoint& c, const FacePlane& plane);
 
   int width_ = 0;
   int height_ = 0;
@@ -54,8 +49,11 @@ class ObjectRaster {
   float cx_ = 0.0f;
   float cy_ = 0.0f;
   PixelRect rect_;
+  // Of the part that is drawn: faces almost edge-on would leave it.
+  float least_inverse_depth_ = 0.0f;
+  float most_inverse_depth_ = 0.0f;
   std::vector<Vector3f> points_C_;
-  std::vector<ProjectedPoint> projected_;
+  std::vector<ScreenPoint> projected_;
   std::vector<FacePlane> faces_;
   std::vector<float> inverse_depth_;
   std::vector<std::uint32_t> face_of_pixel_;

@@ -13,32 +13,24 @@ Vector3f rotated(const PoseProjection& seen, const Vector3f& p) {
           r[6] * p.x() + r[7] * p.y() + r[8] * p.z()};
 }
 
-struct Corner {
-  ScreenPoint pixel;
-  float inverse_depth;
-};
-
-Corner projected(const PoseProjection& seen, const Vector3f& p_C) {
+ScreenPoint projected(const PoseProjection& seen, const Vector3f& p_C) {
   const float inverse_depth = 1.0f / p_C.z();
-  return {snapped(seen.fx * p_C.x() * inverse_depth + seen.cx, seen.fy * p_C.y() * inverse_depth + seen.cy),
-          inverse_depth};
+  return snapped(seen.fx * p_C.x() * inverse_depth + seen.cx, seen.fy * p_C.y() * inverse_depth + seen.cy);
 }
 
-void draw_part(const Corner& a, const Corner& b, const Corner& c, const PoseProjection& seen, std::int32_t face,
+void draw_part(ScreenPoint a, ScreenPoint b, ScreenPoint c, const PoseProjection& seen, std::int32_t face,
                PoseTile* tile) {
   const auto index = static_cast<std::size_t>(face);
   const float scale = 1.0f / tile->distance[index];
   const float along_x = tile->normal_x[index] * seen.inverse_fx * scale;
   const float along_y = tile->normal_y[index] * seen.inverse_fy * scale;
   const float at_centre = tile->normal_z[index] * scale;
-  const float low = std::min({a.inverse_depth, b.inverse_depth, c.inverse_depth});
-  const float high = std::max({a.inverse_depth, b.inverse_depth, c.inverse_depth});
-  const PixelRect box = bounding_pixels(a.pixel, b.pixel, c.pixel, tile->rect);
+  const PixelRect box = bounding_pixels(a, b, c, tile->rect);
   if (box.empty()) return;
-  for_each_covered_pixel(a.pixel, b.pixel, c.pixel, box, [&](int x, int y) {
+  for_each_covered_pixel(a, b, c, box, [&](int x, int y) {
     const float linear =
         at_centre + along_x * (static_cast<float>(x) - seen.cx) + along_y * (static_cast<float>(y) - seen.cy);
-    const float inverse_depth = std::max(low, std::min(high, linear));
+    const float inverse_depth = std::max(tile->least_inverse_depth, std::min(tile->most_inverse_depth, linear));
     float& nearest = tile->inverse_depth(y)[x];
     if (inverse_depth <= nearest) return;
     nearest = inverse_depth;
@@ -53,6 +45,11 @@ void draw_cut(const RenderMesh& mesh, const PoseProjection& seen, float near_dep
   tile->clear();
   tile->faces = 0;
   const Vector3f p_CO(seen.translation[0], seen.translation[1], seen.translation[2]);
+  tile->most_inverse_depth = tile->least_inverse_depth = 1.0f / near_depth;
+  for (const Vector3f& vertex : mesh.vertices) {
+    const float z = (rotated(seen, vertex) + p_CO).z();
+    if (z >= near_depth) tile->least_inverse_depth = std::min(tile->least_inverse_depth, 1.0f / z);
+  }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const Vector3f& normal_O = mesh.normals[i];
     const float distance = normal_O.x() * seen.from_camera_O[0] + normal_O.y() * seen.from_camera_O[1] +

@@ -58,6 +58,7 @@ HWY_INLINE void project_vertices(const RenderMesh& mesh, const PoseProjection& s
   const MeshLanes& lanes = mesh.lanes;
   I low_x = set(std::numeric_limits<std::int32_t>::max()), low_y = low_x;
   I high_x = hn::Neg(low_x), high_y = high_x;
+  F least = set(std::numeric_limits<float>::max()), most = hn::Zero(d);
   for (std::size_t i = 0; i < lanes.x.size(); i += hn::Lanes(d)) {
     const F x = hn::LoadU(d, lanes.x.data() + i);
     const F y = hn::LoadU(d, lanes.y.data() + i);
@@ -68,7 +69,8 @@ HWY_INLINE void project_vertices(const RenderMesh& mesh, const PoseProjection& s
     const F inverse_depth = hn::Div(set(1.0f), z_C);
     const I u = snapped_lanes(hn::Add(hn::Mul(hn::Mul(set(seen.fx), x_C), inverse_depth), set(seen.cx)));
     const I v = snapped_lanes(hn::Add(hn::Mul(hn::Mul(set(seen.fy), y_C), inverse_depth), set(seen.cy)));
-    hn::StoreU(inverse_depth, d, tile->vertex_inverse_depth.data() + i);
+    least = hn::Min(least, inverse_depth);
+    most = hn::Max(most, inverse_depth);
     hn::StoreU(u, di, tile->screen_x.data() + i);
     hn::StoreU(v, di, tile->screen_y.data() + i);
     low_x = hn::Min(low_x, u);
@@ -79,6 +81,17 @@ HWY_INLINE void project_vertices(const RenderMesh& mesh, const PoseProjection& s
   const ScreenPoint low{hn::GetLane(hn::MinOfLanes(di, low_x)), hn::GetLane(hn::MinOfLanes(di, low_y))};
   const ScreenPoint high{hn::GetLane(hn::MaxOfLanes(di, high_x)), hn::GetLane(hn::MaxOfLanes(di, high_y))};
   tile->rect = pixels_between(low, high, {0, 0, seen.width - 1, seen.height - 1});
+  tile->least_inverse_depth = hn::GetLane(hn::MinOfLanes(d, least));
+  tile->most_inverse_depth = hn::GetLane(hn::MaxOfLanes(d, most));
+  constexpr std::int32_t kMost = 65535;
+  tile->packed = high.x - low.x <= kMost && high.y - low.y <= kMost;
+  tile->packed_from = low;
+  if (!tile->packed) return;
+  for (std::size_t i = 0; i < lanes.x.size(); i += hn::Lanes(d)) {
+    const I u = hn::Sub(hn::LoadU(di, tile->screen_x.data() + i), set(low.x));
+    const I v = hn::Sub(hn::LoadU(di, tile->screen_y.data() + i), set(low.y));
+    hn::StoreU(hn::Or(u, hn::ShiftLeft<16>(v)), di, tile->screen.data() + i);
+  }
 }
 
 /// Lists the faces that are turned to the camera; those of a mesh that is not closed are all turned.
@@ -106,21 +119,23 @@ HWY_INLINE void turn_faces(const RenderMesh& mesh, const PoseProjection& seen, P
     store_chosen(turned(1), faces_us, d, tile->normal_y.data() + count);
     store_chosen(turned(2), faces_us, d, tile->normal_z.data() + count);
     store_chosen(hn::Neg(hn::Abs(distance)), faces_us, d, tile->distance.data() + count);
-    const I index = hn::Iota(di, static_cast<std::int32_t>(i));
-    store_chosen(index, hn::RebindMask(di, faces_us), di, tile->triangle.data() + count);
+    const auto chosen = hn::RebindMask(di, faces_us);
+    store_chosen(hn::LoadU(di, lanes.a.data() + i), chosen, di, tile->a.data() + count);
+    store_chosen(hn::LoadU(di, lanes.b.data() + i), chosen, di, tile->b.data() + count);
+    store_chosen(hn::LoadU(di, lanes.c.data() + i), chosen, di, tile->c.data() + count);
     count += hn::CountTrue(d, faces_us);
   }
   tile->faces = count;
 }
 
-/// 1/z over the image of faces in lanes: a plane, kept between the depths of its corners.
+/// 1/z over the image of faces in lanes: a plane, kept within the object's depths.
 struct FaceDepths {
-  F at_centre, along_x, along_y, low, high;
+  F at_centre, along_x, along_y, least, most;
 
   HWY_INLINE F at(const PoseProjection& seen, F x, F y) const {
     const F linear = hn::Add(hn::Add(at_centre, hn::Mul(along_x, hn::Sub(x, set(seen.cx)))),
                              hn::Mul(along_y, hn::Sub(y, set(seen.cy))));
-    return hn::Max(low, hn::Min(high, linear));
+    return hn::Max(least, hn::Min(most, linear));
   }
 };
 
@@ -163,24 +178,21 @@ HWY_INLINE void draw_pixel(float inverse_depth, std::int32_t face, float* depth,
 /// Draws faces, kBlock or fewer at a time.
 class FaceDrawer {
  public:
-  FaceDrawer(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile)
-      : mesh_(mesh), seen_(seen), tile_(*tile) {}
+  FaceDrawer(const PoseProjection& seen, PoseTile* tile) : seen_(seen), tile_(*tile) {}
 
+  template <bool kPacked>
   HWY_INLINE void draw(std::size_t first) {
     const DF d;
     const DI di;
     const auto there = hn::FirstN(di, tile_.faces - first);
-    const I triangle = hn::IfThenElseZero(there, hn::LoadU(di, tile_.triangle.data() + first));
-    const I a = hn::GatherIndex(di, mesh_.lanes.a.data(), triangle);
-    I b = hn::GatherIndex(di, mesh_.lanes.b.data(), triangle);
-    I c = hn::GatherIndex(di, mesh_.lanes.c.data(), triangle);
-    const std::int32_t* screen_x = tile_.screen_x.data();
-    const std::int32_t* screen_y = tile_.screen_y.data();
-    const I ax = hn::GatherIndex(di, screen_x, a), ay = hn::GatherIndex(di, screen_y, a);
-    I bx = hn::GatherIndex(di, screen_x, b), by = hn::GatherIndex(di, screen_y, b);
-    I cx = hn::GatherIndex(di, screen_x, c), cy = hn::GatherIndex(di, screen_y, c);
-    const I low_x = hn::Min(ax, hn::Min(bx, cx)), high_x = hn::Max(ax, hn::Max(bx, cx));
-    const I low_y = hn::Min(ay, hn::Min(by, cy)), high_y = hn::Max(ay, hn::Max(by, cy));
+    const auto corners = [&](const std::vector<std::int32_t>& vertices) HWY_ATTR {
+      return place_of<kPacked>(hn::IfThenElseZero(there, hn::LoadU(di, vertices.data() + first)));
+    };
+    const Places a = corners(tile_.a);
+    Places b = corners(tile_.b);
+    Places c = corners(tile_.c);
+    const I low_x = hn::Min(a.x, hn::Min(b.x, c.x)), high_x = hn::Max(a.x, hn::Max(b.x, c.x));
+    const I low_y = hn::Min(a.y, hn::Min(b.y, c.y)), high_y = hn::Max(a.y, hn::Max(b.y, c.y));
     const I up = set(kSubpixels - 1);
     const I x_first = hn::Max(set(tile_.rect.x_first), hn::ShiftRight<8>(hn::Add(low_x, up)));
     const I y_first = hn::Max(set(tile_.rect.y_first), hn::ShiftRight<8>(hn::Add(low_y, up)));
@@ -192,7 +204,8 @@ class FaceDrawer {
     const I extent = hn::Max(hn::Sub(high_x, low_x), hn::Sub(high_y, low_y));
     const auto wide = hn::And(seen, hn::Gt(extent, set(kLane * kSubpixels)));
     seen = hn::AndNot(wide, seen);
-    const I area = hn::Sub(hn::Mul(hn::Sub(bx, ax), hn::Sub(cy, ay)), hn::Mul(hn::Sub(by, ay), hn::Sub(cx, ax)));
+    const I area =
+        hn::Sub(hn::Mul(hn::Sub(b.x, a.x), hn::Sub(c.y, a.y)), hn::Mul(hn::Sub(b.y, a.y), hn::Sub(c.x, a.x)));
     seen = hn::And(seen, hn::Ne(area, hn::Zero(di)));
     const auto swap = hn::Lt(area, hn::Zero(di));
     const auto exchange = [&](I& p, I& q) HWY_ATTR {
@@ -200,23 +213,21 @@ class FaceDrawer {
       p = hn::IfThenElse(swap, q, p);
       q = hn::IfThenElse(swap, kept, q);
     };
-    exchange(bx, cx);
-    exchange(by, cy);
+    exchange(b.x, c.x);
+    exchange(b.y, c.y);
 
     const F scale = hn::Div(set(1.0f), hn::LoadU(d, tile_.distance.data() + first));
-    const auto corner = [&](I index) HWY_ATTR { return hn::GatherIndex(d, tile_.vertex_inverse_depth.data(), index); };
-    const F at_a = corner(a), at_b = corner(b), at_c = corner(c);
     const FaceDepths depths = {
         hn::Mul(hn::LoadU(d, tile_.normal_z.data() + first), scale),
         hn::Mul(hn::Mul(hn::LoadU(d, tile_.normal_x.data() + first), set(seen_.inverse_fx)), scale),
         hn::Mul(hn::Mul(hn::LoadU(d, tile_.normal_y.data() + first), set(seen_.inverse_fy)), scale),
-        hn::Min(at_a, hn::Min(at_b, at_c)), hn::Max(at_a, hn::Max(at_b, at_c))};
+        set(tile_.least_inverse_depth), set(tile_.most_inverse_depth)};
     if (!hn::AllFalse(di, wide)) draw_wide(first, wide, depths);
     if (hn::AllFalse(di, seen)) return;
 
-    Side ab = side_of(ax, ay, bx, by, x_first, y_first);
-    Side bc = side_of(bx, by, cx, cy, x_first, y_first);
-    Side ca = side_of(cx, cy, ax, ay, x_first, y_first);
+    Side ab = side_of(a.x, a.y, b.x, b.y, x_first, y_first);
+    Side bc = side_of(b.x, b.y, c.x, c.y, x_first, y_first);
+    Side ca = side_of(c.x, c.y, a.x, a.y, x_first, y_first);
     const I columns = hn::IfThenElseZero(seen, hn::Sub(x_last, x_first));
     const I rows = hn::IfThenElseZero(seen, hn::Sub(y_last, y_first));
     const std::int32_t most_columns = hn::GetLane(hn::MaxOfLanes(di, columns));
@@ -262,34 +273,45 @@ class FaceDrawer {
   // The same with numbers that 32 bits hold.
   static constexpr std::int32_t kExact = 60;
 
+  struct Places {
+    I x, y;
+  };
+  template <bool kPacked>
+  HWY_INLINE Places place_of(I vertices) const {
+    const DI di;
+    if constexpr (!kPacked)
+      return {hn::GatherIndex(di, tile_.screen_x.data(), vertices),
+              hn::GatherIndex(di, tile_.screen_y.data(), vertices)};
+    const I both = hn::GatherIndex(di, tile_.screen.data(), vertices);
+    const auto unsigned_both = hn::BitCast(hn::RebindToUnsigned<DI>(), both);
+    return {hn::Add(hn::And(both, set(0xffff)), set(tile_.packed_from.x)),
+            hn::Add(hn::BitCast(di, hn::ShiftRight<16>(unsigned_both)), set(tile_.packed_from.y))};
+  }
+
   void draw_wide(std::size_t first, hn::Mask<DI> wide, const FaceDepths& depths) {
     const DF d;
     const DI di;
-    HWY_ALIGN float at_centre[kBlock], along_x[kBlock], along_y[kBlock], low[kBlock], high[kBlock];
+    HWY_ALIGN float at_centre[kBlock], along_x[kBlock], along_y[kBlock];
     HWY_ALIGN std::int32_t chosen[2 * kBlock];
     hn::Store(depths.at_centre, d, at_centre);
     hn::Store(depths.along_x, d, along_x);
     hn::Store(depths.along_y, d, along_y);
-    hn::Store(depths.low, d, low);
-    hn::Store(depths.high, d, high);
     const std::size_t count = hn::CountTrue(di, wide);
     store_chosen(hn::Iota(di, 0), wide, di, chosen);
     for (std::size_t k = 0; k < count; ++k) {
       const auto lane = static_cast<std::size_t>(chosen[k]);
-      draw_one(first + lane,
-               {set(at_centre[lane]), set(along_x[lane]), set(along_y[lane]), set(low[lane]), set(high[lane])});
+      draw_one(first + lane, {set(at_centre[lane]), set(along_x[lane]), set(along_y[lane]), depths.least, depths.most});
     }
   }
 
   void draw_one(std::size_t index, const FaceDepths& depths) {
-    const auto triangle = static_cast<std::size_t>(tile_.triangle[index]);
     const auto corner = [&](const std::vector<std::int32_t>& corners) {
-      const auto vertex = static_cast<std::size_t>(corners[triangle]);
+      const auto vertex = static_cast<std::size_t>(corners[index]);
       return ScreenPoint{tile_.screen_x[vertex], tile_.screen_y[vertex]};
     };
-    const ScreenPoint a = corner(mesh_.lanes.a);
-    ScreenPoint b = corner(mesh_.lanes.b);
-    ScreenPoint c = corner(mesh_.lanes.c);
+    const ScreenPoint a = corner(tile_.a);
+    ScreenPoint b = corner(tile_.b);
+    ScreenPoint c = corner(tile_.c);
     const PixelRect box = bounding_pixels(a, b, c, tile_.rect);
     const std::int64_t area = std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
     if (area == 0) return;
@@ -337,7 +359,6 @@ class FaceDrawer {
     for_each_covered_pixel(a, b, c, box, [&](int x, int y) { draw_block(hn::FirstN(di, 1), x, y, face, depths); });
   }
 
-  const RenderMesh& mesh_;
   const PoseProjection& seen_;
   PoseTile& tile_;
 };
@@ -348,8 +369,14 @@ void draw_kernel(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* t
   if (tile->rect.empty()) return;
   tile->clear();
   turn_faces(mesh, seen, tile);
-  FaceDrawer drawer(mesh, seen, tile);
-  for (std::size_t first = 0; first < tile->faces; first += hn::Lanes(DF())) drawer.draw(first);
+  FaceDrawer drawer(seen, tile);
+  for (std::size_t first = 0; first < tile->faces; first += hn::Lanes(DF())) {
+    if (tile->packed) {
+      drawer.draw<true>(first);
+    } else {
+      drawer.draw<false>(first);
+    }
+  }
 }
 
 }  // namespace prescene::rendering::HWY_NAMESPACE

@@ -28,11 +28,11 @@ void PoseTile::reserve(const RenderMesh& mesh, int width, int height) {
   if (screen_x.size() < vertices) {
     screen_x.resize(vertices);
     screen_y.resize(vertices);
-    vertex_inverse_depth.resize(vertices);
+    screen.resize(vertices);
   }
   const std::size_t triangles = mesh.lanes.a.size() + kSlack;
-  if (triangle.size() < triangles) {
-    triangle.resize(triangles);
+  if (a.size() < triangles) {
+    for (std::vector<std::int32_t>* corners : {&a, &b, &c}) corners->resize(triangles);
     for (std::vector<float>* values : {&distance, &normal_x, &normal_y, &normal_z}) values->resize(triangles);
   }
   if (width == width_ && height == height_) return;

@@ -45,12 +45,19 @@ class PoseTile {
 
   PixelRect rect;  ///< That the object is within.
 
+  /// Of the part that is drawn.
+  float least_inverse_depth = 0.0f;
+  float most_inverse_depth = 0.0f;
+
   // Of vertices.
   std::vector<std::int32_t> screen_x, screen_y;  ///< 1/256 pixel
-  std::vector<float> vertex_inverse_depth;
+  /// The same from `packed_from`, 16 bits each, x below; of objects that are not larger than 16 bits.
+  std::vector<std::int32_t> screen;
+  ScreenPoint packed_from;
+  bool packed = false;
   // Of faces turned to the camera, in the order of the mesh: n . p = distance < 0 in C.
   std::size_t faces = 0;
-  std::vector<std::int32_t> triangle;
+  std::vector<std::int32_t> a, b, c;  ///< Corners.
   std::vector<float> distance, normal_x, normal_y, normal_z;
 
  private:
