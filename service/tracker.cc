@@ -10,7 +10,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/hash.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
-#include "prescene/rendering/reference/reference_likelihood.h"
+#include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
@@ -64,7 +64,7 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
                  Backends& backends, std::unique_ptr<rendering::Renderer> renderer)
     : settings_(settled(settings)),
       renderer_(std::move(renderer)),
-      likelihood_(rendering::make_reference_likelihood_batch()),
+      likelihood_(rendering::make_simd_likelihood_batch()),
       filter_(*likelihood_, *renderer_, backends.pool(), settings.filter,
               [&backends](const belief::Scene& simulated) {
                 auto simulator = backends.make_simulator(simulated);

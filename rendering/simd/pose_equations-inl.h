@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The Gauss-Newton equations of a drawn hypothesis, in lanes: the operations on a pixel are those of the reference
-// backend's EquationSum. Lanes are summed in single precision over a few blocks, then in double.
+// backend's EquationSum. Lanes are summed in single precision over a few rows, then in double.
 #if defined(PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_
 #undef PRESCENE_RENDERING_POSE_EQUATIONS_INL_H_
@@ -28,8 +28,12 @@ class EquationLanes {
         min_cosine_(static_cast<float>(options.min_cosine)),
         sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)) {}
 
-  HWY_INLINE void add(std::size_t place, const Pixels& p) {
+  HWY_INLINE void add(int y, std::size_t place, const Pixels& p) {
     const DF d;
+    if (y / kRows != rows_) {
+      flush();
+      rows_ = y / kRows;
+    }
     const F zero = hn::Zero(d);
     const M used = hn::AndNot(hn::Or(hn::Eq(p.measured, zero), hn::Lt(p.cosine, set(min_cosine_))), p.covered);
     if (hn::AllFalse(d, used)) return;
@@ -62,7 +66,6 @@ class EquationLanes {
     }
     add_to(kWeight, place, robust);
     add_to(kSquares, place, hn::Mul(hn::Mul(robust, zeroed), zeroed));
-    if (++blocks_ == 16) flush();
   }
 
   void finish(CameraEquations* equations) {
@@ -75,6 +78,7 @@ class EquationLanes {
   }
 
  private:
+  static constexpr int kRows = 4;            // that are summed in single precision
   static constexpr std::size_t kRight = 21;  // of the equations' right side, after H
   static constexpr std::size_t kWeight = 27;
   static constexpr std::size_t kSquares = 28;
@@ -86,7 +90,6 @@ class EquationLanes {
     hn::Store(hn::Add(hn::Load(d, lanes), value), d, lanes);
   }
   void flush() {
-    blocks_ = 0;
     for (std::size_t k = 0; k < kSums; ++k) {
       double sum = 0.0;
       for (float& lane : sums_[k]) {
@@ -102,7 +105,7 @@ class EquationLanes {
   float two_over_gate_, min_cosine_, sigma_scale_;
   HWY_ALIGN float sums_[kSums][kBlock] = {};
   double totals_[kSums] = {};
-  int blocks_ = 0;
+  int rows_ = 0;
   std::size_t pixels_ = 0;
 };
 
@@ -110,7 +113,7 @@ void equations_kernel(const FrameTerms& frame, const PoseProjection& seen, const
                       const LineariseOptions& options, CameraEquations* equations) {
   EquationLanes lanes(frame, seen, tile, options);
   for_each_block(frame, seen, tile,
-                 [&](int, int, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(place, p); });
+                 [&](int, int y, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(y, place, p); });
   lanes.finish(equations);
 }
 

@@ -13,8 +13,8 @@
 #include "prescene/filter/pose_search.h"
 #include "prescene/geometry/pose_error.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/service/evaluate/pose_auc.h"
 #include "prescene/service/evaluate/ycb_data.h"
 
@@ -40,7 +40,7 @@ struct Model {
 class Bench {
  public:
   Bench(core::ThreadPool& threads)
-      : batch_(rendering::make_reference_likelihood_batch()),
+      : batch_(rendering::make_simd_likelihood_batch()),
         renderer_(rendering::make_reference_renderer()),
         search_(*batch_, threads),
         tools_{&search_, renderer_.get(), &meshes_} {}
