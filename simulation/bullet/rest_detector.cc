@@ -8,8 +8,8 @@
 namespace prescene::simulation {
 namespace {
 
-// m/s. A body that stands firmly, calm for the rest rule's time, and still faster slides on a slope that friction hardly
-// holds it on.
+// m/s. A body that stands firmly, calm for the rest rule's time, and still faster slides on a slope that friction
+// hardly holds it on.
 constexpr double kCreep = 1e-3;
 // rad. A body that half a degree topples is not at rest: tables shake more.
 constexpr double kNudge = 0.0087;

@@ -95,7 +95,8 @@ LaneFooting footing_of(LaneEngine& engine, int slot, int object) {
 
 bool NudgeTest::slides(LaneEngine& engine, int slot) const {
   for (int object = 0; object < engine.objects(); ++object)
-    if (engine.free(slot, object) && engine.velocity(slot, object).norm() > kCreep && footing_of(engine, slot, object).firm)
+    if (engine.free(slot, object) && engine.velocity(slot, object).norm() > kCreep &&
+        footing_of(engine, slot, object).firm)
       return true;
   return false;
 }
