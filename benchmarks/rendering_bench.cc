@@ -1,149 +1,273 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pose hypothesis costs at 80 x 60, against the baseline of casting one ray by Embree at each pixel that the
-// object covers, and what a full image costs on either backend.
-#include <benchmark/benchmark.h>
+// What a pose hypothesis costs: weights and Gauss-Newton steps in vector instructions, against the reference backend
+// and against a draw and a read-back of the graphics library. One thread, scattered poses near the truth.
+//
+//   bench_rendering [--quick] [--benchmark_out=PATH]
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "prescene/benchmarks/report.h"
+#include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/egl/egl_renderer.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/rendering/simulated_camera.h"
-#include "prescene/tests/peers/ray_caster.h"
+#include "prescene/tests/support/target_test.h"
 
-namespace prescene {
+namespace prescene::benchmarks {
 namespace {
 
 using geometry::Pose;
 using geometry::Vector3d;
 using namespace rendering;
 
-/// A bottle of some 400 triangles before a wall, as a simulated camera sees it, and scattered poses near the truth.
-struct Scene {
-  geometry::PinholeCamera camera = {640, 480, 600.0, 600.0, 319.5, 239.5};
-  geometry::TriangleMesh triangles = geometry::make_lathe({{0.03, 0.0},
-                                                           {0.035, 0.02},
-                                                           {0.035, 0.06},
-                                                           {0.035, 0.10},
-                                                           {0.033, 0.13},
-                                                           {0.02, 0.16},
-                                                           {0.013, 0.18},
-                                                           {0.013, 0.21}},
-                                                          25);
-  MeshHandle mesh = make_render_mesh(triangles);
-  Pose X_CO = Pose::from_translation({0.0, 0.0, 0.9});
-  RenderScene scene;
-  SurfaceMaterial material;
-  FrameTerms frame;
-  std::vector<PoseHypothesis> hypotheses;
+constexpr int kHypotheses = 500;
 
-  Scene() {
+/// A vase of `rings` times `segments` times two triangles.
+geometry::TriangleMesh vase(int rings, int segments, double size) {
+  std::vector<Eigen::Vector2d> profile = {{0.0, 0.0}};
+  for (int i = 0; i < rings; ++i) {
+    const double t = static_cast<double>(i) / (rings - 1);
+    profile.emplace_back(size * (0.175 + 0.05 * std::sin(3.0 * t)), size * t);
+  }
+  profile.emplace_back(0.0, size);
+  return geometry::make_lathe(profile, segments);
+}
+
+/// The vase before a wall, as a simulated camera of 640 x 480 sees it.
+struct Scene {
+  Scene(const geometry::TriangleMesh& triangles, double size, double distance, int width)
+      : mesh(make_render_mesh(triangles)) {
     X_CO.rotation = geometry::exp_rotation({1.2, 0.3, 0.2});
-    const MeshHandle wall = make_render_mesh(geometry::make_mesh(geometry::BoxShape{{3.0, 3.0, 0.1}}));
-    scene.instances = {{mesh, X_CO, material, false}, {wall, Pose::from_translation({0, 0, 1.2}), material, false}};
+    X_CO.translation = Vector3d(0.0, 0.0, distance) - X_CO.rotation * Vector3d(0.0, 0.0, 0.5 * size);
+    const MeshHandle wall = make_render_mesh(geometry::make_mesh(geometry::BoxShape{{4.0, 4.0, 0.1}}));
+    scene.instances = {{mesh, X_CO, material, false},
+                       {wall, Pose::from_translation({0.0, 0.0, distance + 0.6}), material, false}};
     RenderOptions options;
     options.normals = true;
     RenderedView view;
-    if (!make_reference_renderer()->render(scene, camera, Pose::identity(), options, &view).ok()) std::abort();
-    geometry::DepthImage depth;
+    PRESCENE_CHECK(make_reference_renderer()->render(scene, camera, Pose::identity(), options, &view).ok());
     SimulatedCamera(SensorModel{}, {})
         .sample(scene, view, nullptr, camera, Pose::identity(), core::RandomStream(1, core::Purpose::kSensorNoise), 0,
                 &depth, nullptr);
-    const SupportRegion support = {{Vector3d(0, 0, -1), 1.15}, {}};
+    support = {{Vector3d(0.0, 0.0, -1.0), distance + 0.55}, {}};
+    make_terms(width);
+    core::RandomStream stream(2, core::Purpose::kTest);
+    for (int i = 0; i < kHypotheses; ++i) {
+      geometry::Vector6d d;
+      d << 0.1 * geometry::normal_vector(stream), 0.01 * geometry::normal_vector(stream);
+      hypotheses.push_back({mesh.get(), geometry::box_plus(X_CO, d), &material});
+    }
+  }
+
+  void make_terms(int width) {
     FrameTermsInput input;
     input.camera = camera;
     input.depth = depth.view();
     input.supports = std::span(&support, 1);
-    if (!make_frame_terms(input, {}, SensorModel{}, &frame).ok()) std::abort();
-    core::RandomStream stream(2, core::Purpose::kTest);
-    for (int i = 0; i < 500; ++i) {
-      geometry::Vector6d d;
-      d << 0.3 * geometry::normal_vector(stream), 0.03 * geometry::normal_vector(stream);
-      hypotheses.push_back({mesh.get(), geometry::box_plus(X_CO, d), &material});
-    }
+    FrameTermsOptions options;
+    options.target_width = width;
+    PRESCENE_CHECK(make_frame_terms(input, options, SensorModel{}, &frame).ok());
   }
+
+  geometry::PinholeCamera camera = {640, 480, 600.0, 600.0, 319.5, 239.5};
+  MeshHandle mesh;
+  Pose X_CO;
+  SurfaceMaterial material;
+  RenderScene scene;
+  geometry::DepthImage depth;
+  SupportRegion support;
+  FrameTerms frame;
+  std::vector<PoseHypothesis> hypotheses;
 };
 
-const Scene& scene() {
-  static const Scene kScene;
-  return kScene;
+/// Processor seconds of this thread.
+double processor_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-void set_counters(benchmark::State& state) {
-  state.counters["triangles"] = static_cast<double>(scene().mesh->triangles.size());
-  state.counters["us_per_pose"] =
-      benchmark::Counter(static_cast<double>(scene().hypotheses.size()) * 1e-6,
-                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
-}
-
-void evaluate(benchmark::State& state) {
-  const auto batch = make_reference_likelihood_batch();
-  const auto workspace = batch->make_workspace();
-  std::vector<PoseEvidence> evidences(scene().hypotheses.size());
-  for (auto _ : state) batch->evaluate(scene().frame, scene().hypotheses, *workspace, evidences);
-  double pixels = 0.0;
-  for (const PoseEvidence& evidence : evidences) pixels += evidence.in_view;
-  set_counters(state);
-  state.counters["pixels_per_pose"] = pixels / static_cast<double>(evidences.size());
-}
-BENCHMARK(evaluate)->Unit(benchmark::kMillisecond);
-
-void linearise(benchmark::State& state) {
-  const auto batch = make_reference_likelihood_batch();
-  const auto workspace = batch->make_workspace();
-  std::vector<PoseLinearisation> linearisations(scene().hypotheses.size());
-  for (auto _ : state) batch->linearise(scene().frame, scene().hypotheses, {}, *workspace, linearisations);
-  set_counters(state);
-}
-BENCHMARK(linearise)->Unit(benchmark::kMillisecond);
-
-/// The baseline: only the rays, through the bounding box of what the object covers; no likelihood.
-void cast_rays(benchmark::State& state) {
-  tests::RayCaster rays;
-  rays.add(scene().triangles);
-  const geometry::PinholeCamera& camera = scene().frame.camera;
-  for (auto _ : state) {
-    for (const PoseHypothesis& h : scene().hypotheses) {
-      Eigen::AlignedBox2d box;
-      for (const Vector3d& p : scene().triangles.vertices) box.extend(camera.project(h.X_CO * p));
-      const Pose X_OC = h.X_CO.inverse();
-      const auto x_end = static_cast<int>(std::min<double>(camera.width - 1, box.max().x()));
-      const auto y_end = static_cast<int>(std::min<double>(camera.height - 1, box.max().y()));
-      for (int y = static_cast<int>(std::max(0.0, std::ceil(box.min().y()))); y <= y_end; ++y)
-        for (int x = static_cast<int>(std::max(0.0, std::ceil(box.min().x()))); x <= x_end; ++x)
-          benchmark::DoNotOptimize(rays.cast(X_OC.translation, X_OC.rotation * camera.unproject(x, y, 1.0), 0.3, 2.5));
-    }
+/// Processor time of a call, s: the least of several rounds of at least a fifth of a second.
+double cost_of(const std::function<void()>& work, int rounds) {
+  work();
+  double least = 1e30;
+  for (int round = 0; round < rounds; ++round) {
+    const double begin = processor_seconds();
+    int calls = 0;
+    double spent = 0.0;
+    do {
+      work();
+      ++calls;
+      spent = processor_seconds() - begin;
+    } while (spent < 0.2);
+    least = std::min(least, spent / calls);
   }
-  set_counters(state);
-}
-BENCHMARK(cast_rays)->Unit(benchmark::kMillisecond);
-
-void full_image(benchmark::State& state, Renderer& renderer) {
-  RenderedView view;
-  for (auto _ : state)
-    if (!renderer.render(scene().scene, scene().camera, Pose::identity(), {}, &view).ok()) std::abort();
+  return least;
 }
 
-void reference_image(benchmark::State& state) {
-  const auto renderer = make_reference_renderer();
-  full_image(state, *renderer);
-}
-BENCHMARK(reference_image)->Unit(benchmark::kMillisecond);
+struct Costs {
+  double weight = 0.0;  ///< s a hypothesis
+  double step = 0.0;
+  double pixels = 0.0;  ///< That it covers.
+};
 
-void egl_image(benchmark::State& state) {
+Costs costs_of(const LikelihoodBatch& batch, const Scene& scene, int rounds) {
+  const auto workspace = batch.make_workspace();
+  std::vector<PoseEvidence> evidences(scene.hypotheses.size());
+  std::vector<PoseLinearisation> equations(scene.hypotheses.size());
+  Costs costs;
+  costs.weight =
+      cost_of([&] { batch.evaluate(scene.frame, scene.hypotheses, *workspace, evidences); }, rounds) / kHypotheses;
+  costs.step =
+      cost_of([&] { batch.linearise(scene.frame, scene.hypotheses, {}, *workspace, equations); }, rounds) / kHypotheses;
+  for (const PoseEvidence& evidence : evidences) costs.pixels += evidence.in_view;
+  costs.pixels /= kHypotheses;
+  return costs;
+}
+
+/// One draw and read-back of the reduced image on the graphics library, s; nothing where there is none.
+std::optional<double> drawn_and_read(const Scene& scene, std::string* device) {
+  // The software renderer alone on this thread.
+  setenv("LP_NUM_THREADS", "0", 1);
   const auto renderer = make_egl_renderer();
-  if (!renderer) {
-    state.SkipWithError(renderer.status().message().c_str());
-    return;
-  }
-  full_image(state, **renderer);
+  if (!renderer) return std::nullopt;
+  *device = (*renderer)->info().device;
+  RenderScene alone;
+  alone.instances = {scene.scene.instances[0]};
+  RenderedView view;
+  return cost_of(
+      [&] { PRESCENE_CHECK((*renderer)->render(alone, scene.frame.camera, Pose::identity(), {}, &view).ok()); }, 2);
 }
-BENCHMARK(egl_image)->Unit(benchmark::kMillisecond);
+
+Target rate(const std::string& work, double must, double aim, double seconds) {
+  Target target;
+  target.work = work;
+  target.must = at_least(must);
+  target.aim = at_least(aim);
+  target.reached = 1.0 / seconds;
+  target.unit = "1/s";
+  target.n = kHypotheses;
+  target.baseline = "none, one thread";
+  return target;
+}
+
+Target open(const std::string& work, std::optional<double> must, double aim, const std::string& why) {
+  Target target;
+  target.work = work;
+  if (must) target.must = at_least(*must);
+  target.aim = at_least(aim);
+  target.unit = "x";
+  target.why = why;
+  return target;
+}
+
+int run(int rounds, const std::string& out) {
+  Report report("rendering", best_simd_target());
+  report.note("A vase before a wall, simulated camera; 500 poses of 6 degrees and 1 cm of scatter, one thread.");
+  Table table{"costs", {"scene", "backend", "triangles", "pixels", "weight us", "Gauss-Newton us"}, {}};
+  const auto measured = [&](const std::string& name, const std::string& backend, const Scene& scene,
+                            const LikelihoodBatch& batch) {
+    const Costs costs = costs_of(batch, scene, rounds);
+    table.rows.push_back({name, backend, static_cast<std::int64_t>(scene.mesh->triangles.size()), costs.pixels,
+                          1e6 * costs.weight, 1e6 * costs.step});
+    return costs;
+  };
+  const auto reference = make_reference_likelihood_batch();
+  const auto simd = make_simd_likelihood_batch();
+  const bool wide = best_simd_target().starts_with("AVX3");
+  const std::string best = "simd, " + best_simd_target();
+
+  Scene large(vase(51, 100, 0.55), 0.55, 0.8, 160);
+  const Costs of_large = measured("10k triangles, 160 x 120", best, large, *simd);
+  const Costs slow = measured("10k triangles, 160 x 120", "reference", large, *reference);
+  std::string device = "none";
+  const std::optional<double> drawn = drawn_and_read(large, &device);
+  Target against_draws = open("10k triangles: one draw and read-back a hypothesis", 40, 80, "no EGL device here");
+  if (drawn) {
+    against_draws.reached = *drawn / of_large.weight;
+    against_draws.n = kHypotheses;
+    against_draws.baseline = device + ", one thread, depth and labels read back, no likelihood";
+    against_draws.why.clear();
+  }
+  report.add(std::move(against_draws));
+  report.add(open("10k triangles: rays of Embree and the same likelihood", 8, 15, "rays in packets are not built yet"));
+  report.add(rate("10k triangles, 160 x 120, hypotheses, " + best_simd_target(), wide ? 25e3 : 15e3, wide ? 60e3 : 30e3,
+                  of_large.weight));
+  if (wide) {
+    const collision::UseTarget narrower(HWY_AVX2);
+    report.add(rate("10k triangles, 160 x 120, hypotheses, AVX2", 15e3, 30e3,
+                    measured("10k triangles, 160 x 120", "simd, AVX2", large, *simd).weight));
+  }
+  Scene middle(vase(15, 50, 0.3), 0.3, 1.0, 160);
+  measured("1500 triangles, 160 x 120", "reference", middle, *reference);
+  report.add(rate("1500 triangles, 40 x 40 pixels, hypotheses", 150e3, 400e3,
+                  measured("1500 triangles, 160 x 120", best, middle, *simd).weight));
+  Scene small(vase(7, 25, 0.2), 0.2, 1.0, 80);
+  measured("400 triangles, 80 x 60", "reference", small, *reference);
+  const Costs of_small = measured("400 triangles, 80 x 60", best, small, *simd);
+  report.add(rate("400 triangles, 80 x 60, hypotheses", 250e3, 600e3, of_small.weight));
+  report.add(rate("400 triangles, 80 x 60, Gauss-Newton steps", 100e3, 300e3, of_small.step));
+  Target tracking = open("5 objects of 10k triangles at 30 Hz, share of a core", std::nullopt, 0.0,
+                         "levels of detail are not built yet");
+  tracking.better = Better::kLower;
+  tracking.must = at_most(0.6);
+  tracking.aim = at_most(0.25);
+  tracking.unit = "";
+  report.add(std::move(tracking));
+  Target terms;
+  terms.work = "frame terms, 640 x 480 to 160 x 120";
+  terms.better = Better::kLower;
+  terms.must = at_most(1.0);
+  terms.aim = at_most(0.3);
+  terms.reached = 1e3 * cost_of([&] { large.make_terms(160); }, rounds);
+  terms.unit = "ms";
+  terms.n = rounds;
+  terms.baseline = "none, one thread";
+  report.add(std::move(terms));
+  report.add(open("10k triangles on a graphics processor", std::nullopt, 500e3, "compute shaders are not built yet"));
+  Target against_reference;
+  against_reference.work = "10k triangles: the reference backend";
+  against_reference.reached = slow.weight / of_large.weight;
+  against_reference.unit = "x";
+  against_reference.n = kHypotheses;
+  against_reference.baseline = "rendering/reference, one thread";
+  report.add(std::move(against_reference));
+  std::fputs(report.text().c_str(), stdout);
+  std::printf("%s\n", text_of(table).c_str());
+  report.add(std::move(table));
+  return report.finish(out);
+}
 
 }  // namespace
-}  // namespace prescene
+}  // namespace prescene::benchmarks
 
-BENCHMARK_MAIN();
+int main(int count, char** words) {
+  std::string out;
+  int rounds = 5;
+  for (int i = 1; i < count; ++i) {
+    const std::string_view word = words[i];
+    if (word == "--quick") {
+      rounds = 1;
+    } else if (word.starts_with("--benchmark_out=")) {
+      out = word.substr(word.find('=') + 1);
+    } else {
+      std::fprintf(stderr, "usage: %s [--quick] [--benchmark_out=PATH]\n", words[0]);
+      return 2;
+    }
+  }
+  return prescene::benchmarks::run(rounds, out);
+}
