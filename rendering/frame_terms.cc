@@ -93,7 +93,7 @@ float absent_density(const SensorModel& model, const AbsentMixture& absent, floa
   if (depth <= 0.0f) return 0.0f;
   // The range's ends as rounded to single precision may lie outside of it.
   const double z = std::clamp(static_cast<double>(depth), model.options().min_depth, model.options().max_depth);
-  return static_cast<float>(portable_exp(model.log_density(absent, z)));
+  return static_cast<float>(model.density(absent, z));
 }
 
 void sample_colors(const FrameTermsInput& input, int step, int offset, double exponent, FrameTerms* terms) {

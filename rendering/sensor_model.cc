@@ -113,10 +113,14 @@ PixelMixture SensorModel::mixture(const SurfaceMaterial& material, const PixelGe
   return m;
 }
 
-double SensorModel::log_density(const AbsentMixture& absent, double z) const {
+double SensorModel::density(const AbsentMixture& absent, double z) const {
   double density = z >= options_.min_depth && z <= options_.max_depth ? (1.0 - absent.peak_weight) / range() : 0.0;
   if (absent.peak_weight > 0.0) density += absent.peak_weight * normal_density(z, absent.peak_depth, absent.peak_sigma);
-  return portable_log(density);
+  return density;
+}
+
+double SensorModel::log_density(const AbsentMixture& absent, double z) const {
+  return portable_log(density(absent, z));
 }
 
 double SensorModel::log_density(const PixelMixture& m, double z, const AbsentMixture& absent) const {
@@ -124,7 +128,7 @@ double SensorModel::log_density(const PixelMixture& m, double z, const AbsentMix
   double density = m.hit * normal_density(z, m.depth, m.sigma);
   if (in_range && z < m.depth) density += m.occluder / (m.depth - options_.min_depth);
   if (in_range) density += m.outlier / range();
-  if (m.behind > 0.0) density += m.behind * portable_exp(log_density(absent, z));
+  if (m.behind > 0.0) density += m.behind * this->density(absent, z);
   return portable_log(density);
 }
 

@@ -108,6 +108,8 @@ class SensorModel {
   /// ends.
   double log_density(const PixelMixture& mixture, double z, const AbsentMixture& absent) const;
   double log_density(const AbsentMixture& absent, double z) const;
+  /// The density itself, 1/m.
+  double density(const AbsentMixture& absent, double z) const;
 
   /// log of p(z, c | object there) / p(z, c | absent), missing returns (z = 0) included. `color_ratio` is
   /// p(c | object) / p(c | not object), 1 = no colour; it multiplies the hit alone: an occluded pixel says nothing
