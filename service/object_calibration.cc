@@ -35,6 +35,8 @@ constexpr double kScaleRemark = 0.003;
 constexpr double kScaleRefused = 2.0;
 // Times as uncertain as frames show, that starts may be before the fit is called poor.
 constexpr double kPoorFit = 10.0;
+// Nothing that a lab throws or pushes has less friction.
+constexpr double kNoFriction = 0.02;
 constexpr double kLeastFrameRate = 100.0;  // Hz
 
 std::size_t place_of(MotionParameter parameter) { return static_cast<std::size_t>(parameter); }
@@ -134,6 +136,14 @@ void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
     found->remarks.push_back("these recordings say " +
                              std::string(p.left_of_prior >= simulation::kUntold ? "nothing" : "little") + " about " +
                              words(p.parameter) + ": " + what_tells(p.parameter));
+  }
+  for (const simulation::CalibratedParameter& p : found->motion.parameters) {
+    const bool friction = p.parameter == simulation::MotionParameter::kFriction ||
+                          p.parameter == simulation::MotionParameter::kImpactFriction;
+    if (!friction || p.left_of_prior >= kLittle || p.value > kNoFriction) continue;
+    found->remarks.push_back(words(p.parameter) +
+                             " came out as next to nothing: something that is not in the scene moves the object, as a "
+                             "hand that still pushes it; cut recordings to where it moves by itself");
   }
   if (!found->motion.search_settled)
     found->remarks.emplace_back("the search had not settled when it ended: values may be wrong; give more " +

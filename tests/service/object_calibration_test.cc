@@ -161,6 +161,34 @@ TEST_F(ObjectCalibrationTest, SaysThatAFitIsPoor) {
   EXPECT_THAT(found->remarks, Contains(HasSubstr("the fit is poor")));
 }
 
+TEST_F(ObjectCalibrationTest, SaysThatAHandStillPushes) {
+  std::vector<SimulatedMotion> motions(8);
+  core::RandomStream stream(3, core::Purpose::kTest);
+  const double height = geometry::bounding_box(belief::collision_mesh(box_scene({}).models[0])).sizes().z() / 2.0;
+  for (SimulatedMotion& motion : motions) {
+    const double speed = stream.uniform(0.2, 0.4);
+    for (int i = 0; i < 120; ++i) {
+      const double t = i / 120.0;
+      const auto noise = [&] { return 2e-4 * stream.normal(); };
+      motion.times.push_back(t);
+      motion.X_WO.push_back(
+          geometry::Pose::from_translation({speed * t + noise(), noise(), height - 3e-4 + 0.3 * noise()}));
+    }
+  }
+  write("scene.yaml", box_scene_yaml({}));
+  write("tosses.csv", motion_table(motions));
+  const auto dataset = read_motion_dataset(folder_, {});
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  service::ObjectCalibrationOptions options;
+  options.samples = 8;
+  options.max_evaluations = 100;
+  options.keep = {"impact_friction",  "restitution",      "inertia_size",    "edge_radius",
+                  "center_of_mass_x", "center_of_mass_y", "center_of_mass_z"};
+  const auto found = calibrate_object(*dataset, backends_, options);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_THAT(found->remarks, Contains(HasSubstr("a hand that still pushes it")));
+}
+
 TEST_F(ObjectCalibrationTest, OtherUnitsAreRefusedWithTheirRemedy) {
   const belief::Scene scene = box_scene({});
   write("scene.yaml", box_scene_yaml({}));
