@@ -18,6 +18,7 @@ PixelClass class_of(const SensorModel& model, const SurfaceMaterial& material, c
   c.returned = static_cast<float>(1.0 - m.missing);
   c.returned_ratio = static_cast<float>((1.0 - m.missing) / (1.0 - m.missing_opaque));
   c.log_missing_ratio = portable_log(m.missing / m.missing_opaque);
+  c.missing_ratio = static_cast<float>(portable_exp(c.log_missing_ratio));
   return c;
 }
 

@@ -30,6 +30,7 @@ struct PixelClass {
   float returned = 0.0f;           ///< 1 - missing.
   float returned_ratio = 0.0f;     ///< Return against an opaque surface's, for backgrounds whose share is not known.
   double log_missing_ratio = 0.0;  ///< The same of no return.
+  float missing_ratio = 1.0f;      ///< exp of that.
 };
 
 /// The classes of one material in images of which every `step`th pixel is taken: four of incidence, inside and at the

@@ -7,14 +7,12 @@
 
 #include "object_raster.h"
 #include "prescene/core/check.h"
+#include "prescene/rendering/camera_equations.h"
 #include "prescene/rendering/pixel_classes.h"
 #include "prescene/rendering/portable_math.h"
 
 namespace prescene::rendering {
 namespace {
-
-using geometry::Matrix6d;
-using geometry::Vector6d;
 
 class ReferenceWorkspace final : public LikelihoodWorkspace {
  public:
@@ -151,30 +149,16 @@ class EquationSum {
     std::size_t k = 0;
     for (std::size_t i = 0; i < 6; ++i) {
       const float weighted = weight * row[i];
-      g_[i] += static_cast<double>(weighted * residual);
-      for (std::size_t j = i; j < 6; ++j) H_[k++] += static_cast<double>(weighted * row[j]);
+      sums_.g[i] += static_cast<double>(weighted * residual);
+      for (std::size_t j = i; j < 6; ++j) sums_.H[k++] += static_cast<double>(weighted * row[j]);
     }
-    ++result_.pixels;
-    result_.weight += static_cast<double>(robust);
-    result_.squares += static_cast<double>(robust * residual * residual);
+    ++sums_.pixels;
+    sums_.weight += static_cast<double>(robust);
+    sums_.squares += static_cast<double>(robust * residual * residual);
   }
 
   /// The sums with rotations turned from camera axes to the body's.
-  PoseLinearisation result() {
-    Matrix6d H;
-    Vector6d g;
-    std::size_t k = 0;
-    for (Eigen::Index i = 0; i < 6; ++i) {
-      g[i] = g_[static_cast<std::size_t>(i)];
-      for (Eigen::Index j = i; j < 6; ++j) H(i, j) = H(j, i) = H_[k++];
-    }
-    Matrix6d to_body = Matrix6d::Identity();
-    to_body.topLeftCorner<3, 3>() = X_CO_.rotation.toRotationMatrix().transpose();
-    const Matrix6d turned = to_body * H * to_body.transpose();
-    result_.H = 0.5 * (turned + turned.transpose());
-    result_.g = to_body * g;
-    return result_;
-  }
+  PoseLinearisation result() const { return in_body_axes(sums_, X_CO_); }
 
  private:
   geometry::Pose X_CO_;
@@ -182,9 +166,7 @@ class EquationSum {
   float two_over_gate_;
   float min_cosine_;
   float sigma_scale_;
-  std::array<double, 21> H_{};
-  std::array<double, 6> g_{};
-  PoseLinearisation result_;
+  CameraEquations sums_;
 };
 
 /// Draws a hypothesis and calls visit(pixel) for each pixel that it covers before the end of the range and that no

@@ -145,8 +145,8 @@ class ClassValues {
   template <class Value>
   ClassValues(const PixelClasses& classes, Value value) {
     for (std::size_t i = 0; i < PixelClasses::kIncidences; ++i) {
-      inside_[i] = static_cast<float>(value(classes.of_incidence(i, false)));
-      outline_[i] = static_cast<float>(value(classes.of_incidence(i, true)));
+      inside_[i] = value(classes.of_incidence(i, false));
+      outline_[i] = value(classes.of_incidence(i, true));
     }
   }
   HWY_INLINE F at(const M (&beyond)[PixelClasses::kIncidences - 1], M outline) const {
@@ -171,7 +171,7 @@ class EvidenceLanes {
         missing_(*terms.classes, [](const PixelClass& c) { return c.missing; }),
         returned_(*terms.classes, [](const PixelClass& c) { return c.returned; }),
         returned_ratio_(*terms.classes, [](const PixelClass& c) { return c.returned_ratio; }),
-        missing_ratio_(*terms.classes, [](const PixelClass& c) { return portable_exp(c.log_missing_ratio); }),
+        missing_ratio_(*terms.classes, [](const PixelClass& c) { return c.missing_ratio; }),
         min_depth_(static_cast<float>(frame_.model.options().min_depth)),
         sigma_scale_(static_cast<float>(frame_.model.options().sigma_per_depth_squared)),
         knee_(static_cast<float>(frame_.model.options().incidence_knee)),

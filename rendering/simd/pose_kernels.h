@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pose_tile.h"
+#include "prescene/rendering/camera_equations.h"
 #include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/pixel_classes.h"
 
@@ -24,14 +25,6 @@ void draw(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile);
 /// Sums over the pixels that are drawn; counts and log ratios of `evidence`, not `tempered`.
 void sum_evidence(const EvidenceTerms& terms, const PoseProjection& seen, const PoseTile& tile, PoseEvidence* evidence);
 
-/// The equations in camera axes, about p_CO: H is the upper half of the matrix row by row.
-struct CameraEquations {
-  double H[21] = {};
-  double g[6] = {};
-  int pixels = 0;
-  double weight = 0.0;
-  double squares = 0.0;
-};
 void sum_equations(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
                    const LineariseOptions& options, CameraEquations* equations);
 

@@ -11,9 +11,6 @@
 namespace prescene::rendering {
 namespace {
 
-using geometry::Matrix6d;
-using geometry::Vector6d;
-
 /// The classes of the last material, which is nearly always the next one's, too.
 class LastClasses {
  public:
@@ -42,25 +39,6 @@ class SimdWorkspace final : public LikelihoodWorkspace {
   LastClasses classes;
   std::unique_ptr<LikelihoodWorkspace> reference;
 };
-
-/// The sums with rotations turned from camera axes to the body's.
-void turn_to_body(const CameraEquations& sums, const geometry::Pose& X_CO, PoseLinearisation* result) {
-  Matrix6d H;
-  Vector6d g;
-  std::size_t k = 0;
-  for (Eigen::Index i = 0; i < 6; ++i) {
-    g[i] = sums.g[static_cast<std::size_t>(i)];
-    for (Eigen::Index j = i; j < 6; ++j) H(i, j) = H(j, i) = sums.H[k++];
-  }
-  Matrix6d to_body = Matrix6d::Identity();
-  to_body.topLeftCorner<3, 3>() = X_CO.rotation.toRotationMatrix().transpose();
-  const Matrix6d turned = to_body * H * to_body.transpose();
-  result->H = 0.5 * (turned + turned.transpose());
-  result->g = to_body * g;
-  result->pixels = sums.pixels;
-  result->weight = sums.weight;
-  result->squares = sums.squares;
-}
 
 class SimdLikelihoodBatch final : public LikelihoodBatch {
  public:
@@ -109,8 +87,7 @@ class SimdLikelihoodBatch final : public LikelihoodBatch {
           const PoseProjection seen = drawn(frame, hypotheses[i], scratch);
           CameraEquations sums;
           sum_equations(frame, seen, scratch.tile, options, &sums);
-          linearisations[i] = PoseLinearisation{};
-          turn_to_body(sums, hypotheses[i].X_CO, &linearisations[i]);
+          linearisations[i] = in_body_axes(sums, hypotheses[i].X_CO);
           if (options.with_evidence) linearisations[i].evidence = evidence_of(frame, hypotheses[i], seen, scratch);
           break;
         }
