@@ -49,6 +49,14 @@ struct Problem {
   RunRequest request;
 };
 
+/// How many instances have other classes than in the other estimate of the same.
+int classed_otherwise(const OutcomeEstimate& certified, const OutcomeEstimate& whole) {
+  int wrong = 0;
+  for (std::size_t i = 0; i < whole.instances.size(); ++i)
+    wrong += whole.instances[i].classes != certified.instances[i].classes;
+  return wrong;
+}
+
 class Certificates : public testing::TestWithParam<int> {};
 
 TEST_P(Certificates, AreRightWhenInstancesRunOnToRest) {
@@ -59,9 +67,7 @@ TEST_P(Certificates, AreRightWhenInstancesRunOnToRest) {
   ASSERT_TRUE(certifier);
   const OutcomeEstimate whole = problem.run_exactly(count, nullptr, 0.0);
   const OutcomeEstimate certified = problem.run_exactly(count, certifier.get(), 0.0);
-  int wrong = 0;
-  for (std::size_t i = 0; i < whole.instances.size(); ++i)
-    wrong += whole.instances[i].classes != certified.instances[i].classes;
+  const int wrong = classed_otherwise(certified, whole);
   EXPECT_LE(wrong, 1) << named.name;
   EXPECT_GE(certified.certificates.certified, count * 8 / 10) << named.name;
   // They end a good deal earlier, or certificates are not worth their name.
@@ -111,9 +117,7 @@ TEST(Certificates, ThatTakeEnergyForLessAreCaughtAndRepaired) {
     const Careless careless(*certifier);
     const OutcomeEstimate whole = problem.run_exactly(1024, nullptr, 0.0);
     const OutcomeEstimate certified = problem.run_exactly(1024, &careless, 0.0);
-    int wrong = 0;
-    for (std::size_t i = 0; i < whole.instances.size(); ++i)
-      wrong += whole.instances[i].classes != certified.instances[i].classes;
+    const int wrong = classed_otherwise(certified, whole);
     EXPECT_GT(wrong, 10) << named.name;
     // One in forty is wrong in C: an audit of 2 % would have to be lucky.
     const OutcomeEstimate audited = problem.run_exactly(1024, &careless, 0.2);
@@ -222,9 +226,7 @@ TEST_P(CertificatesOfSpheres, AreRightWhenInstancesRunOnToRest) {
   ASSERT_TRUE(certifier);
   const OutcomeEstimate whole = problem.run_exactly(count, nullptr, 0.0);
   const OutcomeEstimate certified = problem.run_exactly(count, certifier.get(), 0.0);
-  int wrong = 0;
-  for (std::size_t i = 0; i < whole.instances.size(); ++i)
-    wrong += whole.instances[i].classes != certified.instances[i].classes;
+  const int wrong = classed_otherwise(certified, whole);
   EXPECT_LE(wrong, 0) << problem.scene->name;
   EXPECT_GE(certified.certificates.certified, count * 6 / 10) << problem.scene->name;
   EXPECT_LT(certified.simulated_seconds, 0.85 * whole.simulated_seconds) << problem.scene->name;
