@@ -25,8 +25,10 @@ using Eigen::Vector3d;
 // Patches reach a little further than the farthest dart that they kept away.
 constexpr double kReachRoom = 1.15;
 constexpr int kMostShrinks = 40;
-// Share of the body's size: no sphere is smaller.
+// Share of the body's size: where no larger sphere has room (on an edge, in a notch), one that is hardly more than its
+// point stands for the surface, so that it sticks out nowhere.
 constexpr double kLeastRadius = 1e-5;
+constexpr double kPointRadius = 1e-7;
 
 class Cover {
  public:
@@ -99,10 +101,29 @@ class Cover {
     return radius;
   }
 
+  /// Samples of a round surface may lie over the edge of the face that ends it, where that does not bound their
+  /// spheres: its plane does.
+  double room_beside_edges(const SurfaceSample& sample) const {
+    double room = size_;
+    for (const SharpEdge& edge : features_.edges) {
+      if (!(sample.rise > 0.0)) break;
+      const Vector3d along = edge.to - edge.from;
+      const double at = along.dot(sample.point - edge.from) / along.squaredNorm();
+      if (at < 0.0 || at > 1.0 || (edge.from + at * along - sample.point).norm() > sample.spacing) continue;
+      const bool on_a = sample.normal.dot(edge.normal_a) > sample.normal.dot(edge.normal_b);
+      const Vector3d& beyond = on_a ? edge.normal_b : edge.normal_a;
+      if (sample.normal.dot(on_a ? edge.normal_a : edge.normal_b) < 0.9) continue;
+      const double depth = std::max(0.0, beyond.dot(edge.from - sample.point));
+      room = std::min(room, depth / (1.0 - beyond.dot(sample.normal)));
+    }
+    return room;
+  }
+
   bool make_patch(const SurfaceSample& sample, SurfacePatch* patch) const {
     // Surfaces inside of the body (parts that overlap) are met by nothing.
     if (winding_number(tree_, sample.point + (sample.rise + 1e-4 * spacing_) * sample.normal) > 0) return false;
-    const double radius = std::max(room_at(sample.point, sample.normal, sample.rise), kLeastRadius * size_);
+    const double room = std::min(room_at(sample.point, sample.normal, sample.rise), room_beside_edges(sample));
+    const double radius = room < kLeastRadius * size_ ? kPointRadius * size_ : room;
     patch->radius = static_cast<float>(radius);
     patch->centre = (sample.point - radius * sample.normal).cast<float>();
     patch->point = sample.point.cast<float>();
