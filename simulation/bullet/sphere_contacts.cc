@@ -7,18 +7,22 @@
 
 #include "prescene/collision/point_queries.h"
 #include "sphere_patch.h"
+#include "support_polygon.h"
 
 namespace prescene::simulation {
 namespace {
 
 using collision::SphereTree;
 using collision::SurfaceSpheres;
+using Eigen::Vector2d;
 
 // Points whose gaps at the end of the step are within the first (m) of the least bear; within the second they may.
 constexpr double kBearing = 3e-5;
 constexpr double kNearlyBearing = 2e-4;
 constexpr std::size_t kMostBearing = 6;
 constexpr std::size_t kMostNearlyBearing = 10;
+// Contacts bear on one plane when their normals differ by less than this (rad).
+constexpr double kSameWay = 0.01;
 // Contacts nearer to each other than this (m) are one.
 constexpr double kSamePlace = 3e-4;
 // What a change of direction (the difference of two normals) counts as in metres when contacts are spread.
@@ -62,6 +66,48 @@ void SphereContactFinder::add(const ContactPoint& point, const MovingFrame& A, c
   found_.push_back({point, point.gap + dt * std::min(0.0, speed + kSlow), 0.0});
 }
 
+void SphereContactFinder::take(std::size_t index, std::vector<ContactPoint>& contacts) {
+  const ContactPoint& last = found_[index].point;
+  contacts.push_back(last);
+  for (Found& f : found_) {
+    const double bend = (f.point.normal - last.normal).squaredNorm();
+    f.spread = std::min(f.spread, (f.point.position - last.position).squaredNorm() + kTurnLength * kTurnLength * bend);
+  }
+}
+
+std::size_t SphereContactFinder::take_support_polygon(std::size_t first, double bearing,
+                                                      std::vector<ContactPoint>& contacts) {
+  const ContactPoint from = found_[first].point;
+  const Vector3d x_axis = from.normal.unitOrthogonal();
+  const Vector3d y_axis = from.normal.cross(x_axis);
+  flat_.clear();
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    const ContactPoint& point = found_[i].point;
+    if (found_[i].at_end > bearing || (point.normal - from.normal).squaredNorm() > kSameWay * kSameWay) continue;
+    const Vector3d to = point.position - from.position;
+    flat_.push_back({{x_axis.dot(to), y_axis.dot(to)}, i, 0.0});
+  }
+  SupportPolygon<kMostBearing> polygon;
+  polygon.add(Vector2d::Zero());
+  take(first, contacts);
+  std::size_t taken = 1;
+  for (; taken < kMostBearing; ++taken) {
+    const Flat* outermost = nullptr;
+    double most = kSamePlace;
+    // What is inside of the polygon stays there.
+    std::erase_if(flat_, [&](Flat& flat) { return !((flat.outside = polygon.distance(flat.place)) > kSamePlace); });
+    for (const Flat& flat : flat_) {
+      if (flat.outside <= most * (1.0 + 1e-6)) continue;
+      most = flat.outside;
+      outermost = &flat;
+    }
+    if (!outermost) break;
+    polygon.add(outermost->place);
+    take(outermost->index, contacts);
+  }
+  return taken;
+}
+
 void SphereContactFinder::reduce(const Frame& X_WA, std::vector<ContactPoint>& contacts) {
   if (found_.empty()) return;
   double least = std::numeric_limits<double>::infinity();
@@ -70,14 +116,17 @@ void SphereContactFinder::reduce(const Frame& X_WA, std::vector<ContactPoint>& c
   // direction of the body that is none of its edges'.
   const Vector3d outwards = X_WA.R * Vector3d(0.36, 0.48, 0.8);
   double outermost = -std::numeric_limits<double>::infinity();
-  std::size_t next = 0;
+  std::size_t first = 0;
   for (std::size_t i = 0; i < found_.size(); ++i) {
     found_[i].spread = std::numeric_limits<double>::infinity();
     const double out = outwards.dot(found_[i].point.position - X_WA.p);
     if (found_[i].at_end > least + kBearing || out <= outermost) continue;
     outermost = out;
-    next = i;
+    first = i;
   }
+  // What the body stands on with its weight is kept to the corner; then again and again the one farthest from all that
+  // were taken, a tier at a time.
+  std::size_t taken = take_support_polygon(first, least + kBearing, contacts);
   struct Tier {
     double at_end;
     std::size_t most;
@@ -85,21 +134,8 @@ void SphereContactFinder::reduce(const Frame& X_WA, std::vector<ContactPoint>& c
   const Tier tiers[] = {{least + kBearing, kMostBearing},
                         {std::max(0.0, least + kNearlyBearing), kMostNearlyBearing},
                         {std::numeric_limits<double>::infinity(), kMaxPoints}};
-  // Then again and again the one farthest from all that were taken, a tier at a time.
-  std::size_t taken = 0;
-  const auto take = [&](std::size_t i) {
-    const ContactPoint& last = found_[i].point;
-    contacts.push_back(last);
-    ++taken;
-    for (Found& f : found_) {
-      const double bend = (f.point.normal - last.normal).squaredNorm();
-      f.spread =
-          std::min(f.spread, (f.point.position - last.position).squaredNorm() + kTurnLength * kTurnLength * bend);
-    }
-  };
-  take(next);
   for (const Tier& tier : tiers) {
-    while (taken < tier.most) {
+    for (; taken < tier.most; ++taken) {
       std::size_t farthest = found_.size();
       double most = kSamePlace * kSamePlace;
       for (std::size_t i = 0; i < found_.size(); ++i) {
@@ -108,7 +144,7 @@ void SphereContactFinder::reduce(const Frame& X_WA, std::vector<ContactPoint>& c
         farthest = i;
       }
       if (farthest == found_.size()) break;
-      take(farthest);
+      take(farthest, contacts);
     }
   }
 }
@@ -136,8 +172,10 @@ void SphereContactFinder::spheres_convex(const SurfaceSpheres& a, const MovingFr
     const Vector3d on_sphere = patch.lowest(nearest.normal);
     const bool faces = patch.is_edge() || patch.normal.dot(nearest.normal) < 0.0;
     if (!nearest.flat && !patch.is_edge()) {
-      // An edge, a corner or a round side of B: its nearest place against the patch.
-      const Vector3d on_b = patch.centre - (nearest.distance - b.radius()) * nearest.normal;
+      // An edge, a corner or a round side of B: its place nearest to the patch, on the side of its rounding that faces
+      // the patch.
+      const Vector3d core = patch.centre - nearest.distance * nearest.normal;
+      const Vector3d on_b = core - b.radius() * patch.normal_at(core + b.radius() * nearest.normal);
       const auto height = patch.height_of(on_b);
       if (!height || !faces || height->gap < -2.0 * patch.radius) return;
       contact = {on_b - 0.5 * height->gap * height->normal, -height->normal, height->gap};

@@ -55,12 +55,22 @@ class SphereContactFinder {
     double at_end = 0.0;  // the gap at the end of the step if nothing were in the way, m
     double spread = 0.0;
   };
+  struct Flat {
+    Eigen::Vector2d place;
+    std::size_t index = 0;
+    double outside = 0.0;  // of what is taken, m
+  };
   void add(const ContactPoint& point, const MovingFrame& A, const MovingFrame& B, double dt);
   void reduce(const Frame& X_WA, std::vector<ContactPoint>& contacts);
+  /// Takes a few of those that bear on one plane with the first, so that they stand on as much of it as all together;
+  /// returns how many.
+  std::size_t take_support_polygon(std::size_t first, double bearing, std::vector<ContactPoint>& contacts);
+  void take(std::size_t index, std::vector<ContactPoint>& contacts);
   struct Pairs;
 
   std::vector<std::uint32_t> stack_;
   std::vector<Found> found_;
+  std::vector<Flat> flat_;
   collision::SphereScratch scratch_;
   std::unique_ptr<Pairs> pairs_;
 };

@@ -81,7 +81,7 @@ struct SphereContactFinder::Pairs {
     if (travel > 0.1 * patch.reach) to += shift_of(p, patch, up, sign);
     const double away = to.squaredNorm();
     if (away - up * up > patch.reach * patch.reach) return std::nullopt;
-    if (patch.ends_before(patch.X->R.transpose() * to)) return std::nullopt;
+    if (patch.ends_before(patch.X->R.transpose() * to, std::max(0.0, -up))) return std::nullopt;
     return away;
   }
 

@@ -12,6 +12,9 @@ namespace prescene::simulation {
 
 /// A patch ends this far (m) beyond its edge, so that things flush with it find it.
 inline constexpr double kPatchRoom = 1e-6;
+/// Share of a patch's reach: places deeper below it are inside of the body only if they are inside of its sphere.
+/// (Below a wall there may be the body's floor, and below that nothing.)
+inline constexpr double kShallow = 0.25;
 /// m: facets of round things overlap by this much when they roll.
 inline constexpr double kRollingOverlap = 5e-5;
 
@@ -41,11 +44,27 @@ struct PlacedPatch {
   /// Of a point over the patch; nothing beside it.
   std::optional<Height> height_of(const Vector3d& p) const {
     const Vector3d to_F = p - point;
-    const double up = normal.dot(to_F);
-    if (to_F.squaredNorm() - up * up > reach * reach) return std::nullopt;
+    const double up = normal.dot(to_F), over = to_F.squaredNorm() - up * up;
+    if (over > reach * reach) return std::nullopt;
     const Vector3d to = X->R.transpose() * to_F;
-    if (ends_before(to)) return std::nullopt;
-    if (patch->bend[0] == 0.0F && patch->bend[1] == 0.0F && patch->bend[2] == 0.0F) return Height{up, normal};
+    const Height height = bent_height(to, up);
+    const double depth = std::max(0.0, -height.gap);
+    if (ends_before(to, depth)) return std::nullopt;
+    const double shallow = std::max(0.0, 1.0 - depth / (kShallow * reach));
+    const bool in_sphere = (p - centre).squaredNorm() <= radius * radius;
+    if (!in_sphere && over > reach * reach * shallow) return std::nullopt;
+    return height;
+  }
+
+  /// Of the patch, or its continuation, below a place.
+  Vector3d normal_at(const Vector3d& p) const {
+    const Vector3d to_F = p - point;
+    return bent_height(X->R.transpose() * to_F, normal.dot(to_F)).normal;
+  }
+
+  /// Of a place given from the patch's point in the body's frame, `up` over its tangent plane.
+  Height bent_height(const Vector3d& to, double up) const {
+    if (patch->bend[0] == 0.0F && patch->bend[1] == 0.0F && patch->bend[2] == 0.0F) return {up, normal};
     const Vector3d tangent = widened(patch->tangent), bitangent = widened(patch->bitangent);
     const double u = tangent.dot(to), v = bitangent.dot(to);
     const auto b0 = static_cast<double>(patch->bend[0]), b1 = static_cast<double>(patch->bend[1]),
@@ -54,13 +73,16 @@ struct PlacedPatch {
     const Vector3d slope = (b0 * u + 0.5 * b1 * v) * tangent + (0.5 * b1 * u + b2 * v) * bitangent;
     const Vector3d tilted = widened(patch->normal) - slope;
     const double length = tilted.norm();
-    return Height{(up - z) / length, X->R * (tilted / length)};
+    return {(up - z) / length, X->R * (tilted / length)};
   }
 
-  /// Whether a sharp edge ends the patch before a place, given from its point in the body's frame.
-  bool ends_before(const Vector3d& to) const {
+  /// Whether a sharp edge ends the patch before a place, given from its point in the body's frame. Places below the
+  /// patch belong to it as far as they are deeper below what is beyond the edge.
+  bool ends_before(const Vector3d& to, double depth) const {
     for (const collision::SurfacePatch::Limit& limit : patch->limits)
-      if (widened(limit.out).dot(to) > static_cast<double>(limit.distance) + kPatchRoom) return true;
+      if (limit.out.squaredNorm() > 0.0F &&
+          widened(limit.out).dot(to) > static_cast<double>(limit.distance) + kPatchRoom - depth)
+        return true;
     return false;
   }
 
