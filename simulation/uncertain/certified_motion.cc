@@ -71,7 +71,7 @@ std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model
 }  // namespace
 
 std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene& scene,
-                                                             const CertifierOptions& options) {
+                                                             const CertifierOptions& options, double world_radius) {
   const Vector3d& gravity = scene.gravity_W;
   if (gravity.x() != 0.0 || gravity.y() != 0.0 || !(gravity.z() < 0.0)) return nullptr;
   // Between spheres of a fixed thing others come lower than its faces, hulls and water levels say.
@@ -79,6 +79,7 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
     if (collides_as_spheres(support.collision)) return nullptr;
   auto made = std::make_unique<MotionCertifier>();
   made->options_ = options;
+  made->world_radius_ = world_radius;
   made->gravity_ = -gravity.z();
   made->robot_ = !scene.robot.empty();
   for (const belief::SceneObject& object : scene.objects) {
@@ -131,6 +132,8 @@ bool MotionCertifier::assess(const belief::WorldState& state, double seconds_lef
   }
   stand(state, motions);
   bound_heights(motions);
+  for (std::size_t i = 0; i < motions.size(); ++i)
+    if (!stays_in_world(motions[i], objects_[i])) return false;
   if (!robot_ && seconds_left >= kFallTime)
     for (std::size_t i = 0; i < motions.size(); ++i)
       if (state.objects[i].physical.restitution <= kBouncy) motions[i].landing = landing_of(motions, i);
@@ -220,6 +223,10 @@ void MotionCertifier::bound_heights(std::vector<SureMotion>& motions) const {
   }
 }
 
+bool MotionCertifier::stays_in_world(const SureMotion& motion, const CertifiedObject& known) const {
+  return motion.center.norm() + (motion.trap ? motion.reach : 0.0) + known.outer_radius < world_radius_;
+}
+
 std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>& motions, std::size_t object) const {
   const SureMotion& motion = motions[object];
   double floor = -std::numeric_limits<double>::infinity();
@@ -240,7 +247,16 @@ std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>&
   const double rebound = floor + kKeptInLanding * (motion.highest - floor);
   if (!(floor < motion.box.min().z() && (std::isinf(floor) || rebound < lowest_beside + objects_[object].inner_radius)))
     return std::nullopt;
-  return floor;
+  // It is still in the world when it gets there.
+  const double landing = std::max(floor, -0.5 * world_radius_);
+  const double height = motion.center.z() - landing;
+  if (!(height > 0.0)) return std::nullopt;
+  const double up = motion.velocity.z();
+  const double time = (up + std::sqrt(up * up + 2.0 * gravity_ * height)) / gravity_;
+  const double sideways = motion.center.head<2>().norm() + time * motion.velocity.head<2>().norm();
+  const double farthest_up = std::max(std::abs(motion.highest), std::abs(landing));
+  if (std::hypot(sideways, farthest_up) + objects_[object].outer_radius >= world_radius_) return std::nullopt;
+  return landing;
 }
 
 bool MotionCertifier::alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const {

@@ -41,17 +41,18 @@ struct SureMotion {
   double plane = 0.0;  ///< z of that plane.
   int base = -1;       ///< Body whose plane it is, numbered as in ContactInterval.
   double reach = 0.0;  ///< How far the centre of mass may still go sideways, m.
-  /// It has fallen past what is higher than this, and will not come up again.
+  /// It has fallen past what is higher than this, and will not come up again: it lands here, or leaves the world below.
   std::optional<double> landing;
 };
 
 class MotionCertifier {
  public:
-  /// Null where the scene is not understood.
-  static std::unique_ptr<const MotionCertifier> make(const belief::Scene& scene, const CertifierOptions& options);
+  /// Null where the scene is not understood. `world_radius` is that of the instances' StopRule, m.
+  static std::unique_ptr<const MotionCertifier> make(const belief::Scene& scene, const CertifierOptions& options,
+                                                     double world_radius);
 
   const std::vector<CertifiedObject>& objects() const { return objects_; }
-  /// Into `motions`; false where something is held, or not as the scene says.
+  /// Into `motions`; false where something is held, not as the scene says, or may leave the world.
   bool assess(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
   /// Nothing but `motions[object].base` is near enough to be touched while it stays there.
   bool alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const;
@@ -70,9 +71,11 @@ class MotionCertifier {
 
   void stand(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
   void bound_heights(std::vector<SureMotion>& motions) const;
+  bool stays_in_world(const SureMotion& motion, const CertifiedObject& known) const;
   std::optional<double> landing_of(const std::vector<SureMotion>& motions, std::size_t object) const;
 
   CertifierOptions options_;
+  double world_radius_ = 0.0;
   double gravity_ = 0.0;
   std::vector<CertifiedObject> objects_;
   std::vector<geometry::Matrix3d> unit_inertias_;

@@ -256,7 +256,7 @@ std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const beli
   if (variables.empty() || !quiet_from || !request.stop.stop_at_rest ||
       !std::all_of(variables.begin(), variables.end(), [](const Variable& variable) { return understood(variable); }))
     return nullptr;
-  std::unique_ptr<const MotionCertifier> motions = MotionCertifier::make(*scene, options);
+  std::unique_ptr<const MotionCertifier> motions = MotionCertifier::make(*scene, options, request.stop.world_radius);
   if (!motions) return nullptr;
   const std::vector<CertifiedObject>& objects = motions->objects();
   std::vector<geometry::TriangleMesh> surfaces;

@@ -247,6 +247,28 @@ TEST(Certificates, ThatKnowOfNoSpheresAreNotGivenWhereThereAreSome) {
   EXPECT_FALSE(make_certifier(on_spheres, variables, {}, options));
 }
 
+TEST(Certificates, KnowWhereTheWorldEnds) {
+  // Some bottles fall from the table and for ever, until they leave the world and are frozen there.
+  auto scene = std::make_shared<belief::Scene>(tests::bottle_at_edge());
+  scene->supports.pop_back();
+  for (const double depth : {0.3, 0.8, 1.5}) {
+    scene->outcomes = {{"deep", scene->objects[0].name, {{belief::BelowHeight{-depth}}}}};
+    scene->exclusive_outcomes = {};
+    for (const double world_radius : {0.2, 0.5, 1.0, 4.0}) {
+      Problem problem(scene);
+      problem.request.stop.world_radius = world_radius;
+      const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+      ASSERT_TRUE(certifier);
+      const OutcomeEstimate whole = problem.run_exactly(200, nullptr, 0.0);
+      const OutcomeEstimate certified = problem.run_exactly(200, certifier.get(), 0.0);
+      EXPECT_EQ(classed_otherwise(certified, whole), 0) << depth << " m below in a world of " << world_radius << " m";
+      if (world_radius == 4.0) {
+        EXPECT_GT(certified.certificates.certified, 150);
+      }
+    }
+  }
+}
+
 TEST(Certificates, AreNeverGivenToWhatRolls) {
   // A bottle on its side rolls towards the edge, slowly; whether it gets there is not for its energy to say.
   const Problem problem(tests::uncertain_scenes()[1].scene);
