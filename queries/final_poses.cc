@@ -21,6 +21,11 @@ using geometry::Vector6d;
 // worse.
 constexpr double kMinAngle = 0.01, kMinLength = 0.001;
 constexpr double kLoneAngle = 0.1, kLoneLength = 0.01;
+// Instances on the two sides of an empty stretch ended in different places: it is at least as long as this many of
+// their standard deviations, and the longer the fewer there are on one side. (Beyond m of an exponential tail a stretch
+// of g deviations is empty with the probability exp(-g m).)
+constexpr double kEmptyStretch = 0.5;
+constexpr double kEmptyStretchOfOne = 6.0;
 
 struct Spread {
   Pose mean;
@@ -58,6 +63,43 @@ Matrix6d kernel_covariance(const Spread& spread, std::size_t count, double bandw
   return width.cwiseAbs2().asDiagonal();
 }
 
+/// Parts of a group with nothing between them, on any axis of the coordinates about its mean: split and split again.
+void split_apart(std::span<const FinalSample> samples, std::vector<std::size_t> members, const std::vector<Pose>& poses,
+                 std::vector<std::vector<std::size_t>>* parts) {
+  const Spread spread = spread_of(samples, members, poses);
+  double widest = 0.0;
+  std::vector<std::pair<double, std::size_t>> split;  // by the coordinate that parts the group best
+  std::size_t below = 0;
+  std::vector<std::pair<double, std::size_t>> line;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    const double least = axis < 3 ? kMinAngle : kMinLength;
+    line.clear();
+    for (std::size_t i : members) line.emplace_back(geometry::box_minus(poses[i], spread.mean)[axis], i);
+    std::sort(line.begin(), line.end());
+    std::size_t at = 0;
+    for (std::size_t k = 1; k < line.size(); ++k) {
+      const double stretch = (line[k].first - line[k - 1].first) / std::max(spread.deviation[axis], least);
+      const auto fewer = static_cast<double>(std::min(k, line.size() - k));
+      if (stretch <= widest || stretch < kEmptyStretch || stretch * fewer < kEmptyStretchOfOne) continue;
+      widest = stretch;
+      at = k;
+    }
+    if (at == 0) continue;
+    split = line;
+    below = at;
+  }
+  if (below == 0) {
+    parts->push_back(std::move(members));
+    return;
+  }
+  for (const auto& [from, to] : {std::pair(std::size_t{0}, below), std::pair(below, split.size())}) {
+    std::vector<std::size_t> side;
+    for (std::size_t k = from; k < to; ++k) side.push_back(split[k].second);
+    std::sort(side.begin(), side.end());
+    split_apart(samples, std::move(side), poses, parts);
+  }
+}
+
 }  // namespace
 
 int face_up(const Pose& X_WO) {
@@ -83,12 +125,16 @@ std::vector<Kernel> kernels(std::span<const FinalSample> samples, std::span<cons
 
   std::vector<Kernel> result(samples.size());
   int number = 0;
-  for (const auto& [key, members] : groups) {
-    const Matrix6d covariance =
-        kernel_covariance(spread_of(samples, members, poses), members.size(), options.bandwidth);
-    for (std::size_t i : members) {
-      result[i].component = {samples[i].weight, outcomes[static_cast<std::size_t>(key.first)], poses[i], covariance};
-      result[i].group = number;
+  for (const auto& [key, group] : groups) {
+    std::vector<std::vector<std::size_t>> parts;
+    split_apart(samples, group, poses, &parts);
+    for (const std::vector<std::size_t>& members : parts) {
+      const Matrix6d covariance =
+          kernel_covariance(spread_of(samples, members, poses), members.size(), options.bandwidth);
+      for (std::size_t i : members) {
+        result[i].component = {samples[i].weight, outcomes[static_cast<std::size_t>(key.first)], poses[i], covariance};
+        result[i].group = number;
+      }
     }
     ++number;
   }

@@ -94,6 +94,45 @@ TEST(Kernels, StandingAndLyingAreNotSmoothedTogether) {
   for (const Kernel& kernel : all) EXPECT_LT(std::sqrt(kernel.component.covariance(3, 3)), 0.002);
 }
 
+TEST(Kernels, PlacesFarApartAreAsWideAsEachAlone) {
+  // What one hump's instances give does not depend on another place that the same outcome has far away.
+  std::vector<FinalSample> samples = two_humps(512);
+  const std::vector<Kernel> apart = kernels(samples, kNames, {}, {});
+  for (FinalSample& sample : samples) sample.outcome = 0;
+  for (const Vector3d& shift : {Vector3d(0.5, 0.0, 0.0), Vector3d(0.0, 1.0, 0.0), Vector3d(0.5, -0.5, 0.3)}) {
+    std::vector<FinalSample> moved = samples;
+    for (std::size_t i = 0; i < moved.size(); ++i)
+      if (apart[i].component.outcome == kNames[1]) moved[i].X_WO.translation += shift;
+    const std::vector<Kernel> together = kernels(moved, kNames, {}, {});
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      EXPECT_LT((together[i].component.covariance - apart[i].component.covariance).norm(), 1e-9);
+      EXPECT_EQ(together[i].group, 0) << "they may still be merged";
+    }
+  }
+}
+
+TEST(Kernels, OneHumpIsNeverSplit) {
+  // Normal, uniform and heavy-tailed ends of few and of many instances keep one width each.
+  for (const int count : {8, 20, 64, 512, 4096}) {
+    const core::SobolNet net(1, 7);
+    for (int shape = 0; shape < 3; ++shape) {
+      std::vector<FinalSample> samples(static_cast<std::size_t>(count));
+      std::vector<double> u(1);
+      for (int i = 0; i < count; ++i) {
+        net.point(static_cast<std::uint64_t>(i), u);
+        FinalSample& sample = samples[static_cast<std::size_t>(i)];
+        sample.weight = 1.0 / count;
+        sample.X_WO.translation.x() = shape == 0   ? 0.05 * core::inverse_normal_cdf(u[0])
+                                      : shape == 1 ? 0.1 * u[0]
+                                                   : -0.05 * std::log(u[0] + 1e-12);
+      }
+      const std::vector<Kernel> all = kernels(samples, kNames, {}, {});
+      for (const Kernel& kernel : all)
+        EXPECT_EQ(kernel.component.covariance, all.front().component.covariance) << count << " of shape " << shape;
+    }
+  }
+}
+
 TEST(Kernels, SymmetricEquivalentsAreNoSpread) {
   std::vector<FinalSample> samples(8);
   for (std::size_t i = 0; i < 8; ++i) {
