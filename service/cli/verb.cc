@@ -189,6 +189,17 @@ core::Status check_output(const std::string& option, const std::string& output,
     if (output.empty() || input.empty() || !std::filesystem::equivalent(output, input, none)) continue;
     return core::invalid_input(option + " " + output + " is the input too and would be overwritten: name another file");
   }
+  if (output.empty()) return core::ok_status();
+  const std::string wont = option + " " + output + ": can't be written: ";
+  std::error_code none;
+  if (std::filesystem::is_directory(output, none)) return core::unavailable(wont + "it is a folder; name a file in it");
+  std::filesystem::path folder = std::filesystem::path(output).parent_path();
+  if (folder.empty()) folder = ".";
+  if (!std::filesystem::is_directory(folder, none))
+    return core::unavailable(wont + "there is no folder " + folder.string() + "; make it, or name another place");
+  const bool there = std::filesystem::exists(output, none);
+  if (access(there ? output.c_str() : folder.c_str(), W_OK) != 0)
+    return core::unavailable(wont + "no permission; name another place");
   return core::ok_status();
 }
 

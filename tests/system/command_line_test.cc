@@ -157,6 +157,10 @@ TEST(CommandLine, OutputThatCannotBeWrittenEndsWithOneAndIsNamed) {
       EXPECT_EQ(finished.exit_code, 1) << args[0] << " " << args[2] << ": " << finished.err;
       EXPECT_NE(finished.err.find(args.back() + ": "), std::string::npos) << finished.err;
       EXPECT_EQ(finished.err.find(".partial"), std::string::npos) << finished.err;
+      EXPECT_EQ(finished.out, "");
+      if (out == file("no/such")) {
+        EXPECT_EQ(finished.err.find("predicting"), std::string::npos) << "in vain: " << finished.err;
+      }
     }
   }
 }
