@@ -64,8 +64,9 @@ HeatMapLegend::HeatMapLegend(const belief::Scene& scene, const belief::PredictAn
   notes_ = {
       "Each instance counts as a Gaussian 0.6 s n^(-1/6) wide within its outcome and resting face "
       "(s their spread, n their number).",
-      "Outlines: the instance nearest to the middle of each outcome, with its way. Robot not shown. " +
-          std::to_string(answer.instances) + (answer.instances == 1 ? " instance." : " instances.")};
+      std::string("Outlines: the instance nearest to the middle of each outcome, with its way. ") +
+          (scene.robot.empty() ? "" : "Robot not shown. ") + std::to_string(answer.instances) +
+          (answer.instances == 1 ? " instance." : " instances.")};
   if (scene.objects.size() > 1 && part.likeliest_run())
     notes_.emplace_back("Grey, seen through: the other objects where the likeliest of these instances leaves them.");
 }
