@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
-#include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/belief_overlay.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
@@ -30,41 +30,6 @@ std::vector<std::string> robot_names(const belief::Scene& scene) {
   std::vector<std::string> names;
   for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
   return names;
-}
-
-/// The published objects that are not lost, then supports and the robot, as a scene to draw; supports that were found
-/// in the sequence count among the objects that are outlined.
-rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary& summary,
-                                const belief::Observation& observation, filter::MeshCache& meshes,
-                                std::size_t* objects) {
-  rendering::RenderScene drawn;
-  for (const ObjectSummary& object : summary.objects) {
-    const auto model =
-        std::find_if(scene.models.begin(), scene.models.end(), [&](const auto& m) { return m.name == object.model; });
-    if (model == scene.models.end() || object.state == belief::TrackState::kLost) continue;
-    drawn.instances.push_back({meshes.get(model->visual, model->collision, filter::MeshDetail::kDisplay), object.X_WO,
-                               filter::material_of(model->surface, model->color), false});
-  }
-  *objects = drawn.instances.size();
-  std::vector<geometry::Pose> X_WG;
-  for (const belief::KinematicBody& body : scene.robot) {
-    const auto known = observation.robot.find(body.name);
-    X_WG.push_back(known == observation.robot.end() ? belief::pose_at(body, 0.0) : known->second);
-  }
-  for (const belief::Support& support : scene.supports) {
-    if (support.name != filter::kFoundSupport) continue;
-    drawn.instances.push_back({meshes.get(support.visual, support.collision, filter::MeshDetail::kDisplay),
-                               support.X_WS, filter::material_of(belief::SurfaceKind::kOpaque, support.color), false});
-    ++*objects;
-  }
-  const filter::BeliefView around = filter::known_surroundings(scene, X_WG, filter::MeshDetail::kDisplay, meshes);
-  drawn.instances.insert(drawn.instances.end(), around.scene.instances.begin(), around.scene.instances.end());
-  return drawn;
-}
-
-geometry::ColorImage picture_of(const belief::Observation& observation) {
-  if (observation.frame.color) return *observation.frame.color;
-  return interfaces::depth_picture(*observation.frame.depth, 0.2, 2.0);
 }
 
 belief::Timeline timeline_from(const ordered_json& json) {
@@ -157,28 +122,19 @@ void SessionReport::add(const BeliefSummary& summary) { summaries_[summary.stamp
 
 interfaces::PictureBlock SessionReport::pictures(Backends& backends) const {
   interfaces::PictureBlock block;
-  const auto renderer = backends.make_renderer();
   std::vector<const belief::Observation*> usable;
   for (const belief::Observation& observation : observations_) {
     if (summaries_.contains(observation.stamp_ns)) usable.push_back(&observation);
   }
-  if (!renderer || usable.empty()) return block;
+  if (usable.empty()) return block;
   const core::TimeNs first_ns = summaries_.begin()->first;
   const std::size_t count = std::min(kPictures, usable.size());
   for (std::size_t i = 0; i < count; ++i) {
     const belief::Observation& observation = *usable[count > 1 ? i * (usable.size() - 1) / (count - 1) : 0];
-    std::size_t objects = 0;
-    const rendering::RenderScene drawn =
-        scene_at(*scene_, summaries_.at(observation.stamp_ns), observation, backends.meshes(), &objects);
-    rendering::RenderedView view;
-    if (!(*renderer)->render(drawn, observation.frame.camera, observation.X_WC, {}, &view).ok()) continue;
-    std::vector<std::optional<geometry::Rgb>> colors;
-    for (std::size_t object = 0; object < objects; ++object) colors.emplace_back(interfaces::series_color(object));
-    geometry::ColorImage picture = picture_of(observation);
-    interfaces::tint(view.labels, colors, 0.25, picture);
-    interfaces::draw_outlines(view.labels, colors, 2, picture);
+    auto picture = belief_overlay(*scene_, summaries_.at(observation.stamp_ns), observation, backends);
+    if (!picture) continue;
     block.pictures.push_back(
-        {fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", std::move(picture), false});
+        {fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", *std::move(picture), false});
   }
   return block;
 }

@@ -46,7 +46,34 @@ double largest_mass(const belief::HeatMap& map) {
   return map.mass.empty() ? 0.0 : *std::max_element(map.mass.begin(), map.mass.end());
 }
 
+/// A colour by lightness and the two chromatic axes of OKLab [Ottosson 2020], cut to what a screen shows.
+Rgb from_oklab(double L, double a, double b) {
+  const auto cubed = [](double v) { return v * v * v; };
+  const double l = cubed(L + 0.3963377774 * a + 0.2158037573 * b);
+  const double m = cubed(L - 0.1055613458 * a - 0.0638541728 * b);
+  const double s = cubed(L - 0.0894841775 * a - 1.2914855480 * b);
+  const double linear[3] = {4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s,
+                            -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s,
+                            -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s};
+  Rgb color;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double v = std::clamp(linear[c], 0.0, 1.0);
+    const double encoded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055;
+    color[c] = static_cast<std::uint8_t>(std::lround(255.0 * encoded));
+  }
+  return color;
+}
+
 }  // namespace
+
+Rgb divergence_color(double value) {
+  const double far = std::min(std::abs(value), 1.0);
+  // Lightness falls evenly from nearly white while colour grows with it, equally on both sides.
+  const double L = 0.96 - 0.44 * far;
+  const double chroma = 0.135 * std::min(1.0, 1.4 * far);
+  const double hue = value < 0.0 ? 4.45 : 0.85;  // rad; blue, orange
+  return from_oklab(L, chroma * std::cos(hue), chroma * std::sin(hue));
+}
 
 Rgb heat_color(double value) {
   // Eleven stops whose lightness L* grows from 12 to 91 in steps of 7 to 10, linear between.

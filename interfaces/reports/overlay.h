@@ -15,6 +15,9 @@ namespace prescene::interfaces {
 /// Colour of a value in [0, 1] (clamped) on a scale from dark blue over green to yellow whose lightness grows evenly,
 /// so that it reads alike in grey and for the colour-blind.
 geometry::Rgb heat_color(double value);
+/// Colour of a value in [-1, 1] (clamped): blue below 0, orange above, the nearer to 0 the lighter; at equal distance
+/// from 0 both are equally light.
+geometry::Rgb divergence_color(double value);
 /// The i-th of a series of colours that are easily told apart (repeats after eight).
 geometry::Rgb series_color(std::size_t i);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "object_raster.h"
 #include "prescene/core/check.h"
@@ -249,6 +250,18 @@ class ReferenceLikelihoodBatch final : public LikelihoodBatch {
 
 std::unique_ptr<LikelihoodBatch> make_reference_likelihood_batch() {
   return std::make_unique<ReferenceLikelihoodBatch>();
+}
+
+geometry::Image<float> log_ratio_map(const FrameTerms& frame, const PoseHypothesis& hypothesis) {
+  geometry::Image<float> map(frame.camera.width, frame.camera.height, std::numeric_limits<float>::quiet_NaN());
+  ObjectRaster raster;
+  const EvidenceSum nothing(frame, hypothesis);
+  for_each_pixel(frame, hypothesis, raster, [&](const Pixel& pixel) {
+    EvidenceSum one = nothing;
+    one.add(pixel, raster.at_outline(pixel.x, pixel.y));
+    map(pixel.x, pixel.y) = static_cast<float>(one.result(0, 0.0).log_ratio);
+  });
+  return map;
 }
 
 }  // namespace prescene::rendering

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <span>
 
+#include "inspect_recording.h"
 #include "prescene/core/text.h"
 #include "prescene/service/mesh_inspection.h"
 #include "prescene/service/prediction_report.h"
@@ -14,12 +17,33 @@ namespace {
 using core::fixed_text;
 
 struct Options {
-  std::string mesh;
+  std::string file;
   std::string model;
   std::string report;
   bool y_up = false;
   MeshInspectionOptions inspection;
+  RecordingInspection recording;
+  std::string scene;
+  const CLI::App* verb = nullptr;
 };
+
+constexpr const char* kMeshOptions[] = {"--output", "--density", "--scale", "--y-up", "--report"};
+constexpr const char* kRecordingOptions[] = {"--frame", "--scene", "--overlay", "--likelihood-map", "--depth-scale"};
+
+bool is_recording(const std::filesystem::path& path) {
+  return path.extension() == ".mcap" || std::filesystem::is_directory(path);
+}
+
+/// kInvalidInput for an option that is for the other kind of file.
+core::Status check_options(const Options& options, bool recording) {
+  for (const char* name :
+       recording ? std::span<const char* const>(kMeshOptions) : std::span<const char* const>(kRecordingOptions))
+    if (options.verb->count(name) > 0)
+      return core::invalid_input(
+          std::string(name) + " is for " + (recording ? "meshes" : "recordings") + ", and " + options.file + " is " +
+          (recording ? "a recording" : "no recording (.mcap, or a folder)") + ": leave it out, or name another file");
+  return core::ok_status();
+}
 
 std::string text_of(const MeshInspection& found) {
   const auto size = found.box.sizes();
@@ -57,11 +81,11 @@ std::string text_of(const MeshInspection& found) {
   return text;
 }
 
-core::Status run(Options& options, VerbContext& context) {
-  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.mesh, options.report}));
-  PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.mesh}));
+core::Status inspect_mesh(Options& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.file, options.report}));
+  PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.file}));
   if (options.y_up) options.inspection.read.up_axis = interfaces::UpAxis::kY;
-  PRESCENE_TRY(const MeshInspection found, inspect_mesh(options.mesh, options.inspection));
+  PRESCENE_TRY(const MeshInspection found, service::inspect_mesh(options.file, options.inspection));
   if (!options.model.empty()) {
     PRESCENE_TRY(const interfaces::ModelFile model, model_file(found, options.inspection, options.model));
     PRESCENE_RETURN_IF_ERROR(interfaces::write_model(options.model, model));
@@ -72,13 +96,26 @@ core::Status run(Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
+core::Status run(Options& options, VerbContext& context) {
+  const bool recording = is_recording(options.file);
+  PRESCENE_RETURN_IF_ERROR(check_options(options, recording));
+  if (!recording) return inspect_mesh(options, context);
+  options.recording.input.path = options.file;
+  options.recording.input.scene_file = options.scene;
+  return inspect_recording(options.recording, context);
+}
+
 }  // namespace
 
 Verb add_inspect_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
-      "inspect", "What a mesh holds (scale, closedness, mass, symmetry, how it can lie), and a model file of it");
+      "inspect",
+      "What a mesh holds (scale, closedness, mass, symmetry, how it can lie), and a model file of it; or what is "
+      "believed at a frame of a recording, and why");
   auto options = std::make_shared<Options>();
-  verb->add_option("MESH", options->mesh, "PLY, OBJ, STL, glTF or COLLADA file")->required();
+  verb->add_option("FILE", options->file,
+                   "Mesh (PLY, OBJ, STL, glTF, COLLADA), or recording (.mcap, or a folder of images)")
+      ->required();
   verb->add_option("-o,--output", options->model, "Write a model file that scene files can name");
   verb->add_option("--density", options->inspection.density, "kg/m^3")
       ->check(number_between(0.1, 25000.0))
@@ -89,7 +126,22 @@ Verb add_inspect_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_flag("--y-up", options->y_up, "The file's y axis points up");
   verb->add_option("--report", options->report, "Write an HTML page with pictures");
-  verb->footer("Example: prescene inspect cup.stl --scale 0.001 -o cup.yaml --report cup.html");
+  verb->add_option("--frame", options->recording.frame, "Of a recording: from 0, over the frames that can be used")
+      ->check(CLI::Range(0, 1 << 30))
+      ->capture_default_str();
+  verb->add_option("--scene", options->scene, "Of a recording: scene file; default: the one that it holds");
+  verb->add_option("--depth-scale", options->recording.input.metres_per_unit,
+                   "Of a folder: metres per unit of the depth images")
+      ->check(positive_number())
+      ->capture_default_str();
+  verb->add_option("--overlay", options->recording.overlay,
+                   "Of a recording: write a PNG of the camera's picture with the belief drawn over it");
+  verb->add_option("--likelihood-map", options->recording.likelihood_map,
+                   "Of a recording: write a PNG of what each pixel says for or against the poses believed");
+  options->verb = verb;
+  verb->footer(
+      "Examples: prescene inspect cup.stl --scale 0.001 -o cup.yaml --report cup.html\n"
+      "          prescene inspect milk.mcap --frame 40 --overlay seen.png --likelihood-map why.png");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "prescene/core/text.h"
 #include "prescene/service/bus_replay.h"
-#include "prescene/service/load_scene.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/service/replay.h"
+#include "prescene/service/replay_input.h"
 #include "prescene/service/session_report.h"
 #include "prescene/service/support_score.h"
 #include "prescene/service/tracking_score.h"
@@ -45,19 +43,8 @@ core::Result<TimedQuestion> timed_question(const std::string& text) {
   return TimedQuestion{at, text.substr(colon + 1)};
 }
 
-core::Result<interfaces::FrameFolder> open_folder(const Options& options) {
-  interfaces::FrameFolderOptions folder_options;
-  folder_options.metres_per_unit = options.depth_scale;
-  folder_options.frames_per_second = options.frame_rate;
-  folder_options.first_stamp_ns = 1'000'000'000;
-  return interfaces::FrameFolder::open(options.input, folder_options);
-}
-
-core::Result<std::shared_ptr<const belief::Scene>> scene_of(const Options& options, const RecordingInfo& info,
-                                                            VerbContext& context) {
-  if (!options.scene.empty()) return load_scene(options.scene, context.log());
-  if (!info.scene_text.empty()) return load_scene_text(info.scene_text, info.scene_file, context.log());
-  return core::invalid_input(options.input + " names no scene: give one with --scene FILE");
+ReplayInputOptions input_of(const Options& options) {
+  return {options.input, options.scene, options.depth_scale, options.frame_rate};
 }
 
 ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows) {
@@ -122,25 +109,23 @@ std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) 
 }
 
 /// What the recording was made with, but for what the command line says otherwise.
-core::Result<TrackerSettings> settings_of(const Options& options, const RecordingInfo& info) {
-  if (info.settings.empty()) return options.tracker;
-  auto recorded = with_recorded({}, parse_or_discard(info.settings));
-  if (!recorded) return recorded.status().at(options.input + ": recorded settings");
-  return with_given(*options.verb, *std::move(recorded), options.tracker);
+core::Result<TrackerSettings> settings_of(const Options& options, const ReplayInput& input) {
+  if (!input.has_settings()) return options.tracker;
+  PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
+  return with_given(*options.verb, std::move(recorded), options.tracker);
 }
 
 core::Status run_over_dds(Options& options, VerbContext& context) {
-  PRESCENE_TRY(const auto info_reader, RecordingReader::open(options.input));
-  PRESCENE_TRY(const auto scene, scene_of(options, info_reader->info(), context));
-  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, info_reader->info()));
+  PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
+  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   for (const std::string& text : options.questions) {
     PRESCENE_TRY(TimedQuestion question, timed_question(text));
     options.bus.questions.push_back(std::move(question));
   }
   std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
                    [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
-  TrackingScore score(scene);
-  SessionReport report(scene, settings.topics);
+  TrackingScore score(input.scene());
+  SessionReport report(input.scene(), settings.topics);
   PRESCENE_TRY(BusReplayResult result,
                replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
                                context.log(), [&](const RecordedEntry& entry) {
@@ -183,37 +168,16 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
-/// kInvalidInput with the reason if no frame was of use.
-core::Status check_steps(const ReplaySummary& summary, const InputTopics& topics) {
-  if (summary.steps > 0) return core::ok_status();
-  if (!summary.last_skip.empty()) return core::invalid_input("no frame could be used: " + summary.last_skip);
-  if (!summary.first_refusal.empty()) return core::invalid_input("no frame could be used: " + summary.first_refusal);
-  return core::invalid_input("no depth image on " + topics.depth + ": name the recording's topics (--help)");
-}
-
 core::Status run_here(Options& options, VerbContext& context) {
-  const bool is_folder = std::filesystem::is_directory(options.input);
-  RecordingInfo info;
-  std::optional<interfaces::FrameFolder> folder;
-  std::shared_ptr<const belief::Scene> scene;
-  if (is_folder) {
-    PRESCENE_TRY(folder, open_folder(options));
-    if (options.scene.empty()) scene = unknown_scene(options.input, folder->frames().front().X_WC);
-  } else {
-    PRESCENE_TRY(const auto reader, RecordingReader::open(options.input));
-    info = reader->info();
-  }
-  if (!scene) {
-    PRESCENE_TRY(scene, scene_of(options, info, context));
-  }
-  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, info));
+  PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
+  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   Backends backends(context.pool());
-  // A recording's own seed repeats its bits.
-  const std::uint64_t seed = context.options().seed_given || info.seed == 0 ? context.options().seed : info.seed;
-  PRESCENE_TRY(const auto tracker, Tracker::create(scene, settings, seed, backends));
-  TrackingScore score(scene);
+  const std::uint64_t seed =
+      context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
+  PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
+  TrackingScore score(input.scene());
   SupportScore supports;
-  SessionReport report(scene, settings.topics);
+  SessionReport report(input.scene(), settings.topics);
   ordered_json steps = ordered_json::array();
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
     const BeliefSummary summary = summary_of(*at.belief());
@@ -239,13 +203,8 @@ core::Status run_here(Options& options, VerbContext& context) {
     if (const auto truth = truth_from_json(json)) score.add(*truth);
     return core::ok_status();
   };
-  core::Result<ReplaySummary> summary = ReplaySummary{};
-  if (is_folder) {
-    summary = replay_folder(*folder, *tracker, context.cancellation(), context.progress("replaying"), on_step);
-  } else {
-    summary = replay_recording(options.input, *tracker, context.cancellation(), context.progress("replaying"), on_step,
-                               on_json);
-  }
+  const core::Result<ReplaySummary> summary =
+      input.replay(*tracker, context.cancellation(), context.progress("replaying"), on_step, on_json);
   context.end_progress();
   if (!summary) return summary.status();
   add_errors(score, steps);

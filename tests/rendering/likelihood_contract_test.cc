@@ -172,6 +172,26 @@ PoseEvidence evidence_by_pixels(const FrameTerms& frame, Renderer& renderer, con
   return sum;
 }
 
+TEST_P(LikelihoodContract, ItsPixelsAddUp) {
+  const FrameTerms frame = noisy_terms(160);
+  core::RandomStream stream(8, core::Purpose::kTest);
+  for (int i = 0; i < 50; ++i) {
+    const PoseHypothesis h = hypothesis(disturbed(0.02, 0.2, stream));
+    const PoseEvidence evidence = evaluate(frame, h);
+    const geometry::Image<float> map = log_ratio_map(frame, h);
+    double sum = 0.0;
+    int covered = 0;
+    for (std::size_t k = 0; k < map.size(); ++k) {
+      if (std::isnan(map.data()[k])) continue;
+      sum += static_cast<double>(map.data()[k]);
+      ++covered;
+    }
+    EXPECT_EQ(covered, evidence.covered);
+    EXPECT_NEAR(sum, evidence.log_ratio,
+                1e-4 * std::max(1.0, std::abs(evidence.log_ratio)) + GetParam().log_ratio_tolerance);
+  }
+}
+
 TEST_P(LikelihoodContract, IsTheSensorModelSummedOverPixels) {
   std::vector<ColorModel> colors(1);
   for (std::size_t bin = 0; bin < colors[0].log_ratio.size(); ++bin)

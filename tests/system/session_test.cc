@@ -5,6 +5,7 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
+#include "prescene/interfaces/images/png.h"
 #include "prescene/tests/support/paths.h"
 #include "program.h"
 
@@ -70,6 +71,51 @@ TEST_F(Session, ARecordingTracksToTheSameBytesOnAnyThreads) {
   EXPECT_GE(json["steps"].size(), 19u);
   EXPECT_LT(json["tracking"][0]["median_position_error_m"].get<double>(), 0.01) << json["tracking"].dump();
   EXPECT_NE(read_file(path("run.html")).find("<img"), std::string::npos);
+}
+
+TEST_F(Session, InspectShowsAFrameAndWhyItsPosesAreBelieved) {
+  const Finished found = run_program({"inspect", path("run.mcap"), "--frame", "6", "--overlay", path("seen.png"),
+                                      "--likelihood-map", path("why.png"), "--json"});
+  ASSERT_EQ(found.exit_code, 0) << found.err;
+  const ordered_json json = parsed(found);
+  const ordered_json& box = json["objects"][0];
+  EXPECT_EQ(box["name"], "box");
+  EXPECT_GT(box["evidence"]["log_ratio"].get<double>(), 100.0);
+  EXPECT_GT(box["evidence"]["hit_share"].get<double>(), 0.8);
+  // The belief is that of the replay's step.
+  const ordered_json replayed = parsed(run_program({"replay", path("run.mcap"), "--json"}));
+  EXPECT_EQ(replayed["steps"][6]["objects"][0]["pose"], box["pose"]);
+  EXPECT_EQ(replayed["steps"][6]["stamp_ns"], json["stamp_ns"]);
+
+  const auto seen = interfaces::read_png_color(path("seen.png"));
+  const auto why = interfaces::read_png_color(path("why.png"));
+  ASSERT_TRUE(seen && why);
+  EXPECT_EQ(seen->width(), 160);
+  EXPECT_EQ(seen->height(), 120);
+  // Orange speaks for the pose: most of what is coloured is.
+  int orange = 0, blue = 0;
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < why->width(); ++x) {
+      const geometry::Rgb& c = (*why)(x, y);
+      orange += c[0] > c[2] + 30;
+      blue += c[2] > c[0] + 30;
+    }
+  }
+  EXPECT_GT(orange, 200);
+  EXPECT_LT(blue, orange / 4);
+}
+
+TEST_F(Session, InspectSaysWhatIsAmiss) {
+  const auto refused = [&](std::vector<std::string> args, const std::string& reason) {
+    args.insert(args.begin(), "inspect");
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_NE(finished.err.find(reason), std::string::npos) << finished.err;
+  };
+  refused({path("run.mcap"), "--frame", "1000"}, "there is no frame 1000: it has ");
+  refused({path("run.mcap"), "--density", "500"}, "--density is for meshes");
+  refused({path("none.ply"), "--overlay", path("x.png")}, "--overlay is for recordings");
+  refused({path("run.mcap"), "--overlay", path("run.mcap")}, "is the input too");
 }
 
 TEST_F(Session, ACutRecordingIsReadToItsLastWholeMessage) {

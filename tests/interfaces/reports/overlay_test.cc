@@ -80,8 +80,32 @@ TEST(Overlay, TintMixes) {
   EXPECT_EQ(picture(0, 0), kGrey);
 }
 
+/// L* of CIELAB.
+double lightness(const Rgb& color) {
+  const double weights[3] = {0.2126, 0.7152, 0.0722};
+  double luminance = 0.0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double v = color[c] / 255.0;
+    luminance += weights[c] * (v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+  }
+  return luminance > 0.008856 ? 116.0 * std::cbrt(luminance) - 16.0 : 903.3 * luminance;
+}
+
+TEST(DivergenceColor, IsAsLightOnBothSidesAndDarkerAwayFromZero) {
+  for (int i = 0; i <= 100; ++i) {
+    const double below = lightness(divergence_color(-i / 100.0)), above = lightness(divergence_color(i / 100.0));
+    EXPECT_NEAR(below, above, 2.0) << i;
+    if (i > 0) {
+      EXPECT_LE(above, lightness(divergence_color((i - 1) / 100.0)));
+    }
+  }
+  EXPECT_GT(divergence_color(1.0)[0], divergence_color(1.0)[2]);
+  EXPECT_LT(divergence_color(-1.0)[0], divergence_color(-1.0)[2]);
+  EXPECT_EQ(divergence_color(-3.0), divergence_color(-1.0));
+  EXPECT_EQ(divergence_color(7.0), divergence_color(1.0));
+}
+
 TEST(HeatColor, GetsLighterAllTheWay) {
-  const auto lightness = [](const Rgb& c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; };
   for (int i = 1; i <= 100; ++i) EXPECT_GE(lightness(heat_color(i / 100.0)), lightness(heat_color((i - 1) / 100.0)));
   EXPECT_EQ(heat_color(-3.0), heat_color(0.0));
   EXPECT_EQ(heat_color(7.0), heat_color(1.0));

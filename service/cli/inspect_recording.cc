@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "inspect_recording.h"
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "prescene/core/text.h"
+#include "prescene/interfaces/images/png.h"
+#include "prescene/service/belief_overlay.h"
+#include "prescene/service/likelihood_picture.h"
+#include "prescene/service/tracker.h"
+
+namespace prescene::service {
+namespace {
+
+using core::fixed_text;
+using nlohmann::ordered_json;
+
+/// What is known when a frame has been looked at.
+struct InspectedFrame {
+  std::shared_ptr<const belief::Belief> belief;
+  belief::Observation observation;
+};
+
+core::Result<InspectedFrame> replay_to(int number, const ReplayInput& input, Tracker& tracker, VerbContext& context) {
+  core::Cancellation stop;
+  std::optional<InspectedFrame> found;
+  int seen = 0;
+  const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
+    if (context.cancellation().requested()) stop.request();
+    if (found || seen++ < number) return core::ok_status();
+    found = {at.belief(), step.observation};
+    stop.request();
+    return core::ok_status();
+  };
+  const JsonSink on_json = [](const std::string&, const std::string&, core::TimeNs) { return core::ok_status(); };
+  const auto summary = input.replay(tracker, stop, context.progress("replaying"), on_step, on_json);
+  context.end_progress();
+  if (!summary) return summary.status();
+  if (found) return *std::move(found);
+  if (context.cancellation().requested()) return core::cancelled("stopped on request");
+  PRESCENE_RETURN_IF_ERROR(check_steps(*summary, tracker.settings().topics));
+  return core::invalid_input("there is no frame " + std::to_string(number) + ": it has " + std::to_string(seen) +
+                             " that can be used, 0 to " + std::to_string(seen - 1));
+}
+
+ordered_json to_json(const rendering::PoseEvidence& evidence) {
+  return {{"log_ratio", evidence.log_ratio},           {"pixels_in_view", evidence.in_view},
+          {"pixels_not_hidden", evidence.covered},     {"pixels_measured", evidence.measured},
+          {"pixels_visible", evidence.visible},        {"pixels_on_surface", evidence.hits},
+          {"visible_share", evidence.visible_share()}, {"hit_share", evidence.hit_share()}};
+}
+
+std::string text_of(const BeliefSummary& summary, const std::vector<ObjectEvidence>& evidences) {
+  std::vector<std::vector<std::string>> rows = {
+      {"object", "state", "confidence", "log ratio, nats", "pixels", "visible", "on its surface"}};
+  for (const ObjectSummary& object : summary.objects) {
+    std::vector<std::string> row = {object.name, belief::to_string(object.state), fixed_text(object.confidence, 2)};
+    for (const ObjectEvidence& evidence : evidences) {
+      if (evidence.object != object.name) continue;
+      row.insert(row.end(), {fixed_text(evidence.evidence.log_ratio, 0), std::to_string(evidence.evidence.covered),
+                             fixed_text(100.0 * evidence.evidence.visible_share(), 0) + " %",
+                             fixed_text(100.0 * evidence.evidence.hit_share(), 0) + " %"});
+    }
+    row.resize(rows.front().size());
+    rows.push_back(std::move(row));
+  }
+  return summary.objects.empty() ? "nothing is believed to be there\n" : table(rows);
+}
+
+core::Status write_picture(const std::string& path, const geometry::ColorImage& picture, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(interfaces::write_png(path, picture.view()));
+  core::log(context.log(), core::LogLevel::kInfo, "picture written to " + path);
+  return core::ok_status();
+}
+
+}  // namespace
+
+core::Status inspect_recording(const RecordingInspection& options, VerbContext& context) {
+  const std::string place = options.input.path.string();
+  PRESCENE_RETURN_IF_ERROR(check_output("--overlay", options.overlay, {place}));
+  PRESCENE_RETURN_IF_ERROR(check_output("--likelihood-map", options.likelihood_map, {place}));
+  PRESCENE_TRY(const ReplayInput input, ReplayInput::open(options.input, context.log()));
+  PRESCENE_TRY(const TrackerSettings settings, input.recorded_settings());
+  Backends backends(context.pool());
+  const CommonOptions& common = context.options();
+  const std::uint64_t seed = common.seed_given ? common.seed : input.seed_or(common.seed);
+  PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
+  auto frame = replay_to(options.frame, input, *tracker, context);
+  if (!frame) return frame.status().at(place);
+
+  const BeliefSummary summary = summary_of(*frame->belief);
+  PRESCENE_TRY(
+      const std::vector<ObjectEvidence> evidences,
+      evidence_of_pixels(*frame->belief, frame->observation, settings.filter.colors, settings.filter.frame, backends));
+  if (!options.overlay.empty()) {
+    PRESCENE_TRY(const auto picture, belief_overlay(*frame->belief->scene, summary, frame->observation, backends));
+    PRESCENE_RETURN_IF_ERROR(write_picture(options.overlay, picture, context));
+  }
+  if (!options.likelihood_map.empty()) {
+    PRESCENE_RETURN_IF_ERROR(
+        write_picture(options.likelihood_map, likelihood_picture(frame->observation, evidences), context));
+  }
+  ordered_json belief = to_json(summary);
+  for (ordered_json& object : belief["objects"])
+    for (const ObjectEvidence& evidence : evidences)
+      if (object["name"] == evidence.object) object["evidence"] = to_json(evidence.evidence);
+  ordered_json document = {{"recording", place}, {"frame", options.frame}, {"seed", seed}};
+  document.update(belief);
+  context.print(document,
+                "frame " + std::to_string(options.frame) + " of " + place + "\n" + text_of(summary, evidences));
+  return core::ok_status();
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// One frame of a recording and what is believed of it.
+#pragma once
+
+#include <string>
+
+#include "prescene/core/status.h"
+#include "prescene/service/replay_input.h"
+#include "verb.h"
+
+namespace prescene::service {
+
+struct RecordingInspection {
+  ReplayInputOptions input;
+  int frame = 0;               ///< Counted from 0 over the frames that belief steps used.
+  std::string overlay;         ///< PNG to write; empty = none.
+  std::string likelihood_map;  ///< The same.
+};
+
+/// Replays up to the frame, prints what is believed there and writes the pictures. kInvalidInput where the recording is
+/// shorter.
+core::Status inspect_recording(const RecordingInspection& options, VerbContext& context);
+
+}  // namespace prescene::service
