@@ -18,7 +18,10 @@ find_package(Ceres REQUIRED)                   # Ceres::ceres
 find_package(assimp REQUIRED)                  # assimp::assimp
 find_package(Bullet64 REQUIRED)                # Bullet::float64, Bullet::hacd
 find_package(CycloneDDS REQUIRED)              # CycloneDDS::ddsc, idlc_generate()
-find_package(OpenGL REQUIRED COMPONENTS OpenGL EGL)  # OpenGL::OpenGL, OpenGL::EGL
+option(PRESCENE_EGL "Build what draws and computes on OpenGL" ON)
+if(PRESCENE_EGL)
+  find_package(OpenGL REQUIRED COMPONENTS OpenGL EGL)  # OpenGL::OpenGL, OpenGL::EGL
+endif()
 find_package(CLI11 REQUIRED)                   # CLI11::CLI11
 find_package(spdlog REQUIRED)                  # spdlog::spdlog
 

@@ -3,9 +3,9 @@
 
 #include <utility>
 
-#include "egl_context.h"
 #include "gl_views.h"
 #include "prescene/core/check.h"
+#include "prescene/rendering/egl/egl_context.h"
 
 namespace prescene::rendering {
 namespace {
@@ -49,8 +49,8 @@ class EglRenderer final : public Renderer {
 
 bool egl_compiled_in() { return true; }
 
-core::Result<std::unique_ptr<Renderer>> make_egl_renderer() {
-  PRESCENE_TRY(auto context, EglContext::make());
+core::Result<std::unique_ptr<Renderer>> make_egl_renderer(const DeviceChoice& choice) {
+  PRESCENE_TRY(auto context, EglContext::make({3, 3}, choice, "OpenGL renderer"));
   std::unique_ptr<GlViews> views;
   {
     const EglContext::Turn turn(*context);

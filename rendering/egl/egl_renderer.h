@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "prescene/core/status.h"
+#include "prescene/rendering/egl/graphics_devices.h"
 #include "prescene/rendering/renderer.h"
 
 namespace prescene::rendering {
@@ -15,6 +16,6 @@ bool egl_compiled_in();
 /// A renderer with a context of its own. Fails with kUnavailable when no driver gives an OpenGL 3.3 context without a
 /// display (the message names the Debian package to install), or when the build left EGL out. Images are reproducible
 /// within tolerance only. Calls from several threads take turns.
-core::Result<std::unique_ptr<Renderer>> make_egl_renderer();
+core::Result<std::unique_ptr<Renderer>> make_egl_renderer(const DeviceChoice& choice = {});
 
 }  // namespace prescene::rendering

@@ -5,7 +5,9 @@ namespace prescene::rendering {
 
 bool egl_compiled_in() { return false; }
 
-core::Result<std::unique_ptr<Renderer>> make_egl_renderer() {
+std::vector<GraphicsDevice> graphics_devices() { return {}; }
+
+core::Result<std::unique_ptr<Renderer>> make_egl_renderer(const DeviceChoice& /*choice*/) {
   return core::unavailable(
       "OpenGL renderer: this build left it out: configure with -DPRESCENE_EGL=ON (needs libegl-dev and libopengl-dev), "
       "or "

@@ -28,7 +28,7 @@ struct Backend {
 
 const Backend kBackends[] = {
     {"reference", [] { return core::Result<std::unique_ptr<Renderer>>(make_reference_renderer()); }},
-    {"egl", make_egl_renderer},
+    {"egl", [] { return make_egl_renderer(); }},
 };
 
 class RendererContract : public testing::TestWithParam<Backend> {
