@@ -137,6 +137,7 @@ class LikelihoodWorkspace {
 struct LikelihoodBatchInfo {
   const char* name = "";            ///< "reference", ...
   bool deterministic_bits = false;  ///< Results depend on nothing but the arguments, bit for bit.
+  std::size_t good_call = 1;        ///< Hypotheses a call from which on it is at its best.
 };
 
 /// Scores hypotheses. Immutable: any number of threads may call, each with a workspace of its own. Each hypothesis's

@@ -2,6 +2,7 @@
 #include "prescene/rendering/render_scene.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/mass_properties.h"
@@ -36,6 +37,16 @@ MeshLanes lanes_of(const RenderMesh& mesh) {
 }
 
 }  // namespace
+
+UniqueNumber::UniqueNumber() {
+  static std::atomic<std::uint64_t> last{0};
+  value_ = ++last;
+}
+
+UniqueNumber& UniqueNumber::operator=(const UniqueNumber&) {
+  value_ = UniqueNumber().value_;
+  return *this;
+}
 
 MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh) {
   auto result = std::make_shared<RenderMesh>();

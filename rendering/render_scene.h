@@ -30,6 +30,18 @@ struct MeshLanes {
   std::vector<float> normal_x, normal_y, normal_z, offset;  ///< Of the triangles.
 };
 
+/// A number that no other object of this process has or had; a copy gets one of its own.
+class UniqueNumber {
+ public:
+  UniqueNumber();
+  UniqueNumber(const UniqueNumber&) : UniqueNumber() {}
+  UniqueNumber& operator=(const UniqueNumber&);
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_;
+};
+
 /// A triangle mesh in single precision as renderers want it; immutable once made, shared by handle.
 struct RenderMesh {
   std::vector<Vector3f> vertices;                       ///< Metres, mesh frame M.
@@ -41,6 +53,7 @@ struct RenderMesh {
   float radius = 0.0f;                                  ///< Of that sphere, metres.
   bool closed =
       false;  ///< Watertight and consistently oriented: faces seen from behind are never visible from outside.
+  UniqueNumber number;  ///< By which devices know what they have already.
 };
 using MeshHandle = std::shared_ptr<const RenderMesh>;
 

@@ -8,6 +8,7 @@
 
 #include "prescene/core/parallel.h"
 #include "prescene/geometry/sampling.h"
+#include "prescene/rendering/compute/compute_likelihood.h"
 #include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
@@ -25,19 +26,27 @@ using geometry::Vector3d;
 using geometry::Vector6d;
 using tests::camera_of_width;
 
+using MadeBatch = core::Result<std::unique_ptr<LikelihoodBatch>>;
+
 struct Backend {
   const char* name;
-  std::function<std::unique_ptr<LikelihoodBatch>()> make;
+  std::function<MadeBatch()> make;
   double log_ratio_tolerance;  ///< Of the sum, beside 1e-4 of it: what single precision costs.
 };
 
-const Backend kBackends[] = {{"reference", make_reference_likelihood_batch, 0.02},
-                             {"simd", make_simd_likelihood_batch, 0.02}};
+MadeBatch on_device() {
+  PRESCENE_TRY(auto batch, make_compute_likelihood_batch(make_simd_likelihood_batch(), {}));
+  return std::unique_ptr<LikelihoodBatch>(std::move(batch));
+}
+
+const Backend kBackends[] = {{"reference", [] { return MadeBatch(make_reference_likelihood_batch()); }, 0.02},
+                             {"simd", [] { return MadeBatch(make_simd_likelihood_batch()); }, 0.02},
+                             {"compute", on_device, 0.02}};
 
 /// A frame of a carton before a wall, seen by a simulated camera.
 class LikelihoodContract : public testing::TestWithParam<Backend> {
  protected:
-  LikelihoodContract() : batch_(GetParam().make()), workspace_(batch_->make_workspace()) {
+  LikelihoodContract() {
     camera_ = camera_of_width(320);
     X_CO_.rotation = Eigen::AngleAxisd(2.0, Vector3d(0.4, -1.0, 0.3).normalized());
     X_CO_.translation = {0.03, -0.02, 0.85};
@@ -49,6 +58,25 @@ class LikelihoodContract : public testing::TestWithParam<Backend> {
     RenderOptions options;
     options.normals = true;
     EXPECT_TRUE(renderer_->render(scene_, camera_, Pose::identity(), options, &view_).ok());
+  }
+
+  void SetUp() override {
+    auto made = GetParam().make();
+    if (!made) {
+      ASSERT_EQ(made.status().code(), core::StatusCode::kUnavailable) << made.status().message();
+      GTEST_SKIP() << made.status().message();
+    }
+    batch_ = *std::move(made);
+    workspace_ = batch_->make_workspace();
+  }
+
+  void TearDown() override {
+    const auto* compute = dynamic_cast<const ComputeLikelihoodBatch*>(batch_.get());
+    if (compute == nullptr) return;
+    const ComputeHealth health = compute->health();
+    EXPECT_TRUE(health.last_failure.ok()) << health.last_failure.message();
+    EXPECT_EQ(health.lost, 0u);
+    EXPECT_GT(health.on_device + health.on_processor, 0u);
   }
 
   MeshHandle wall_mesh() const {
@@ -441,6 +469,7 @@ TEST_P(LikelihoodContract, AllocatesNothingOnceWarm) {
   std::vector<PoseEvidence> evidences(hypotheses.size());
   std::vector<PoseLinearisation> linearisations(hypotheses.size());
   batch_->evaluate(frame, std::span(hypotheses).first(1), *workspace_, std::span(evidences).first(1));
+  batch_->linearise(frame, std::span(hypotheses).first(1), {}, *workspace_, std::span(linearisations).first(1));
   const std::uint64_t before = tests::allocation_count();
   batch_->evaluate(frame, hypotheses, *workspace_, evidences);
   batch_->linearise(frame, hypotheses, {}, *workspace_, linearisations);

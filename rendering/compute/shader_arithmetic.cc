@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose_shader.h"
+
+namespace prescene::rendering {
+namespace {
+
+// OpenGL promises that additions, subtractions and multiplications are rounded correctly, and `precise` that they are
+// not fused. Of divisions and roots it promises about two units in the last place: the rest is found in integers, from
+// the remainder, of which the lowest 32 bits are all.
+constexpr const char* kArithmetic = R"(
+uint mantissa_of(uint bits) { return (bits & 0x007fffffu) | 0x00800000u; }
+int exponent_of(uint bits) { return int((bits >> 23) & 255u); }
+
+// Bits of q moved by whole units towards A / B, as far as one unit holds: at powers of two it changes.
+uint nearer_quotient(uint bits, uint A, uint B, int spread) {
+  uint Q = mantissa_of(bits);
+  int remainder = int((A << uint(spread - exponent_of(bits))) - Q * B);
+  int twice = 2 * remainder;
+  // Below a power of two floats are twice as dense.
+  int half_down = Q == 0x00800000u ? int(B >> 1) : int(B);
+  if (twice > int(B)) return bits + uint((twice + int(B)) / (2 * int(B)));
+  if (twice < -half_down) return bits - uint(max(1, (int(B) - twice) / (2 * int(B))));
+  return bits;
+}
+
+// The same towards the root of X, by one unit.
+uint nearer_root(uint bits, uint X, int spread) {
+  int S = int(mantissa_of(bits));
+  int remainder = int((X << uint(spread - 2 * exponent_of(bits))) - uint(S) * uint(S));
+  if (remainder > S) return bits + 1u;
+  if (remainder <= (S == 0x00800000 ? -(S >> 1) : -S)) return bits - 1u;
+  return bits;
+}
+
+float disturbed(float q) { return uintBitsToFloat(uint(int(floatBitsToUint(q)) + DIVISION_ERROR)); }
+
+// a / b, rounded as the processor does.
+float divided(float a, float b) {
+  precise float q = a / b;
+  int e = exponent_of(floatBitsToUint(q));
+  if (a == 0.0 || e < 2 || e > 252) return q;
+  uint A = mantissa_of(floatBitsToUint(a)), B = mantissa_of(floatBitsToUint(b));
+  int spread = exponent_of(floatBitsToUint(a)) - exponent_of(floatBitsToUint(b)) + 150;
+  uint bits = floatBitsToUint(disturbed(q));
+  return uintBitsToFloat(nearer_quotient(nearer_quotient(bits, A, B, spread), A, B, spread));
+}
+
+// The root of a number from 2^-100 to 2^100.
+float root_of(float x) {
+  uint X = mantissa_of(floatBitsToUint(x));
+  int spread = exponent_of(floatBitsToUint(x)) + 150;
+  uint bits = floatBitsToUint(disturbed(sqrt(x)));
+  bits = nearer_root(nearer_root(bits, X, spread), X, spread);
+  return uintBitsToFloat(nearer_root(nearer_root(bits, X, spread), X, spread));
+}
+
+// As snapped() of triangle_raster.h: 1/256 pixel, ties to even.
+int snapped(float place) {
+  const float kEnd = 4096000.0;
+  const float kWhole = 12582912.0;
+  precise float scaled = place * 256.0;
+  precise float up = clamp(scaled, -kEnd, kEnd) + kWhole;
+  precise float whole = up - kWhole;
+  return int(whole);
+}
+
+// As portable_exp(float).
+float exp_of(float x) {
+  if (x < -87.0) return 0.0;
+  precise float limited = min(x, 88.0);
+  precise float scaled = limited * 1.44269504;
+  precise float shifted = scaled + (scaled < 0.0 ? -0.5 : 0.5);
+  int k = int(shifted);
+  precise float kf = float(k);
+  precise float r = (limited - kf * 0.693359375) + kf * 2.12194440e-4;
+  precise float r2 = r * r;
+  precise float p = (1.0 + r) + r2 * ((0.5 + r * 0.16666667) +
+                                      r2 * ((0.041666667 + r * 0.0083333333) + r2 * 0.0013888889));
+  precise float result = p * uintBitsToFloat(uint(k + 127) << 23);
+  return result;
+}
+)";
+
+constexpr const char* kProbe = R"(
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) readonly buffer Inputs { float inputs[]; };
+layout(std430, binding = 5) writeonly buffer Outputs { uint outputs[]; };
+
+void main() {
+  uint i = gl_GlobalInvocationID.x;
+  float a = inputs[4u * i], b = inputs[4u * i + 1u], c = inputs[4u * i + 2u], d = inputs[4u * i + 3u];
+  precise float sum = a * b + c;
+  precise float dot = a * b + c * d + a * c;
+  precise float cross = a * d - b * c;
+  precise double wide = double(a) + double(b) * double(c);
+  uvec2 wide_bits = unpackDouble2x32(wide);
+  outputs[8u * i] = floatBitsToUint(sum);
+  outputs[8u * i + 1u] = floatBitsToUint(dot);
+  outputs[8u * i + 2u] = floatBitsToUint(cross);
+  outputs[8u * i + 3u] = floatBitsToUint(divided(a, b));
+  outputs[8u * i + 4u] = floatBitsToUint(root_of(abs(a)));
+  outputs[8u * i + 5u] = uint(snapped(c));
+  outputs[8u * i + 6u] = floatBitsToUint(exp_of(-abs(d)));
+  outputs[8u * i + 7u] = wide_bits.x ^ wide_bits.y;
+}
+)";
+
+}  // namespace
+
+std::string shader_arithmetic(int division_error) {
+  return "#version 430 core\n#define DIVISION_ERROR (" + std::to_string(division_error) + ")\n" + kArithmetic;
+}
+
+std::string probe_program(int division_error) { return shader_arithmetic(division_error) + kProbe; }
+
+}  // namespace prescene::rendering
