@@ -178,7 +178,9 @@ std::vector<PoseCandidate> PoseSearch::run(const rendering::FrameTerms& terms, c
                                            std::span<const Pose> starts_CO, const SearchOptions& options,
                                            const core::RandomStream& stream) {
   std::vector<PoseCandidate> candidates(starts_CO.size());
-  threads_->for_blocks(starts_CO.size(), kStartsInBlock, [&](std::size_t begin, std::size_t end) {
+  // Candidates do not depend on the blocks.
+  const std::size_t in_block = std::max(kStartsInBlock, batch_->info().good_call);
+  threads_->for_blocks(starts_CO.size(), in_block, [&](std::size_t begin, std::size_t end) {
     const rendering::WorkspacePool::Loan workspace(workspaces_);
     const auto block = scored(terms, target, starts_CO.subspan(begin, end - begin), options.refine, *workspace);
     std::copy(block.begin(), block.end(), candidates.begin() + static_cast<std::ptrdiff_t>(begin));

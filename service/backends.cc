@@ -70,6 +70,10 @@ core::Result<std::unique_ptr<rendering::Renderer>> Backends::make_renderer() {
   return rendering::make_reference_renderer();
 }
 
+core::Result<std::unique_ptr<rendering::LikelihoodBatch>> Backends::make_likelihood() {
+  return rendering::make_likelihood_batch(settings_.likelihood);
+}
+
 queries::QueryContext Backends::query_context(core::ThreadPool& pool) {
   queries::QueryContext context;
   context.make_simulator = [this](const std::shared_ptr<const belief::Scene>& scene) { return make_simulator(*scene); };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one place that chooses: Bullet simulates, or the lockstep stepper what it can, the reference renderer draws what
-// is recorded or answered, shapes and meshes are made once and kept.
+// The one place that chooses: Bullet simulates, or the lockstep stepper what it can, poses are scored by the processor
+// or a graphics card, the reference renderer draws what is recorded or answered, shapes and meshes are made once and
+// kept.
 //
 //   Backends backends(pool);
 //   auto simulator = backends.make_simulator(scene);
@@ -13,6 +14,7 @@
 #include "prescene/core/parallel.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/queries/query_engine.h"
+#include "prescene/rendering/compute/likelihood_choice.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/shape_store.h"
@@ -31,6 +33,8 @@ struct BackendSettings {
   simulation::BulletOptions bullet;
   /// Answers of the two differ by rounding, which chaotic scenes blow up to other draws of the same probabilities.
   Stepper stepper = Stepper::kAutomatic;
+  /// Who scores poses; the same bits whoever does.
+  rendering::LikelihoodChoice likelihood;
 };
 
 /// Safe to use from several threads.
@@ -45,6 +49,7 @@ class Backends {
   /// With steps so many times as long as the settings say.
   core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene,
                                                                       double step_factor = 1.0);
+  core::Result<std::unique_ptr<rendering::LikelihoodBatch>> make_likelihood();
   /// Deterministic bits: what is recorded, replayed or answered is drawn by it.
   core::Result<std::unique_ptr<rendering::Renderer>> make_renderer();
   /// For queries that run in `pool`.

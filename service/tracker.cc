@@ -10,7 +10,6 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/hash.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
-#include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
@@ -57,14 +56,17 @@ core::Result<std::unique_ptr<Tracker>> Tracker::create(std::shared_ptr<const bel
                                                        Backends& backends) {
   PRESCENE_RETURN_IF_ERROR(validate(*scene));
   PRESCENE_TRY(auto renderer, backends.make_renderer());
-  return std::unique_ptr<Tracker>(new Tracker(std::move(scene), settings, seed, backends, std::move(renderer)));
+  PRESCENE_TRY(auto likelihood, backends.make_likelihood());
+  return std::unique_ptr<Tracker>(
+      new Tracker(std::move(scene), settings, seed, backends, std::move(renderer), std::move(likelihood)));
 }
 
 Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
-                 Backends& backends, std::unique_ptr<rendering::Renderer> renderer)
+                 Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
+                 std::unique_ptr<rendering::LikelihoodBatch> likelihood)
     : settings_(settled(settings)),
       renderer_(std::move(renderer)),
-      likelihood_(rendering::make_simd_likelihood_batch()),
+      likelihood_(std::move(likelihood)),
       filter_(*likelihood_, *renderer_, backends.pool(), settings.filter,
               [&backends](const belief::Scene& simulated) {
                 auto simulator = backends.make_simulator(simulated);

@@ -56,7 +56,8 @@ class Tracker {
 
  private:
   Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
-          Backends& backends, std::unique_ptr<rendering::Renderer> renderer);
+          Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
+          std::unique_ptr<rendering::LikelihoodBatch> likelihood);
   /// Forgets the belief: after a jump of the sender's clock nothing is known of the time between.
   void start_again();
   core::Status take_control(const interfaces::ReceivedMessage& message);

@@ -53,6 +53,21 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
   group->add_flag("--rectified", assembler.rectified, "The images are rectified: use P of the camera info, not K");
 }
 
+void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice) {
+  const std::map<std::string, rendering::Weigher> names = {{"automatic", rendering::Weigher::kAutomatic},
+                                                           {"processor", rendering::Weigher::kProcessor},
+                                                           {"graphics", rendering::Weigher::kGraphics}};
+  verb.add_option_function<std::string>(
+          "--likelihood", [&choice, names](const std::string& name) { choice.weigher = names.at(name); },
+          "Who scores poses, with the same bits: the processor; graphics (OpenGL 4.3, also in software); automatic: a "
+          "graphics card where there is one")
+      ->check(CLI::IsMember({"automatic", "processor", "graphics"}))
+      ->default_str("automatic");
+  verb.add_option("--graphics-device", choice.device, "Which of EGL's devices, from 0 on; -1 = the first that will do")
+      ->check(CLI::Range(-1, 31))
+      ->capture_default_str();
+}
+
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given) {
   const auto take = [&verb](const char* option, auto& to, const auto& from) {
     if (verb.get_option(option)->count() > 0) to = from;

@@ -19,6 +19,7 @@ struct Options {
   std::string name;
   std::string data;
   std::string split = "report";
+  rendering::LikelihoodChoice likelihood;
 };
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
@@ -59,8 +60,10 @@ core::Status run(const Options& options, VerbContext& context) {
   nlohmann::ordered_json document;
   std::string text;
   if (options.name == "ycb_video") {
-    PRESCENE_TRY(const YcbReport report,
-                 evaluate_ycb_video(folder, context.options().seed, context.pool(), progress, &context.cancellation()));
+    YcbOptions ycb;
+    ycb.likelihood = options.likelihood;
+    PRESCENE_TRY(const YcbReport report, evaluate_ycb_video(folder, context.options().seed, context.pool(), progress,
+                                                            &context.cancellation(), ycb));
     document = to_json(report);
     text = text_of(report);
   } else {
@@ -88,6 +91,7 @@ Verb add_evaluate_verb(CLI::App& app) {
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(CLI::IsMember({"calibrate", "report", "all"}))
       ->capture_default_str();
+  add_likelihood_options(*verb, options->likelihood);
   verb->footer("Example: prescene evaluate ycb_video --data data --json");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

@@ -21,6 +21,7 @@ using nlohmann::ordered_json;
 
 struct Options {
   std::string input;
+  BackendSettings backends;
   std::string scene;
   std::string report;
   bool over_dds = false;
@@ -171,7 +172,7 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
 core::Status run_here(Options& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
   PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
-  Backends backends(context.pool());
+  Backends backends(context.pool(), options.backends);
   const std::uint64_t seed =
       context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
   PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
@@ -273,6 +274,7 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
   add_bus_options(*verb, options->bus.dds, options->tracker.topics);
   add_camera_options(*verb, options->tracker.assembler);
+  add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;
   verb->footer(
       "Examples: prescene replay milk.mcap --report milk.html\n"

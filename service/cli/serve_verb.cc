@@ -13,6 +13,7 @@ struct Options {
   std::string scene;
   std::string record;
   LiveSettings settings;
+  BackendSettings backends;
 };
 
 core::Status run(Options& options, VerbContext& context) {
@@ -25,7 +26,7 @@ core::Status run(Options& options, VerbContext& context) {
     PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed,
                                                                      to_json(options.settings.tracker).dump()}));
   }
-  Backends backends(context.pool());
+  Backends backends(context.pool(), options.backends);
   PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,
                                                        std::move(recording), context.log()));
   PRESCENE_RETURN_IF_ERROR(service->run(context.cancellation()));
@@ -51,6 +52,7 @@ Verb add_serve_verb(CLI::App& app) {
       ->capture_default_str();
   add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
   add_camera_options(*verb, options->settings.tracker.assembler);
+  add_likelihood_options(*verb, options->backends.likelihood);
   verb->footer(
       "Runs until Ctrl-C. Topics: docs/ros2.md\n"
       "Example: prescene serve --scene scenarios/milk_on_bin.yaml");

@@ -16,6 +16,7 @@
 #include "prescene/core/status.h"
 #include "prescene/geometry/pose.h"
 #include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/rendering/compute/likelihood_choice.h"
 #include "prescene/service/tracker_settings.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
@@ -99,6 +100,8 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
 /// --world-frame and --camera-pose.
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
+/// --likelihood and --graphics-device.
+void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice);
 /// `settings` (of a recording) with those of the options above that were on the command line.
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given);
 

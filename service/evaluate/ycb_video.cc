@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "prescene/core/clock.h"
 #include "prescene/filter/detection.h"
@@ -14,7 +15,6 @@
 #include "prescene/geometry/pose_error.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/service/evaluate/pose_auc.h"
 #include "prescene/service/evaluate/ycb_data.h"
 
@@ -39,8 +39,8 @@ struct Model {
 /// Frames, models and the tools of a search.
 class Bench {
  public:
-  Bench(core::ThreadPool& threads)
-      : batch_(rendering::make_simd_likelihood_batch()),
+  Bench(std::unique_ptr<rendering::LikelihoodBatch> batch, core::ThreadPool& threads)
+      : batch_(std::move(batch)),
         renderer_(rendering::make_reference_renderer()),
         search_(*batch_, threads),
         tools_{&search_, renderer_.get(), &meshes_} {}
@@ -128,7 +128,8 @@ Pose disturbed(const Pose& X_CO, const geometry::Vector3d& p_OQ, const YcbOption
 core::Result<YcbSection> evaluate_disturbed(const fs::path& dir, std::uint64_t seed, core::ThreadPool& threads,
                                             const YcbOptions& options, const core::ProgressSink& progress,
                                             const core::Cancellation* cancellation) {
-  Bench bench(threads);
+  PRESCENE_TRY(auto batch, rendering::make_likelihood_batch(options.likelihood));
+  Bench bench(std::move(batch), threads);
   PRESCENE_RETURN_IF_ERROR(bench.load(dir));
   const core::RandomStream stream(seed, core::Purpose::kEvaluation);
   YcbSection section;
@@ -169,9 +170,10 @@ core::Result<YcbSection> evaluate_disturbed(const fs::path& dir, std::uint64_t s
 }
 
 core::Result<YcbSection> evaluate_amortised(const fs::path& dir, std::uint64_t seed, core::ThreadPool& threads,
-                                            const YcbOptions&, const core::ProgressSink& progress,
+                                            const YcbOptions& options, const core::ProgressSink& progress,
                                             const core::Cancellation* cancellation) {
-  Bench bench(threads);
+  PRESCENE_TRY(auto batch, rendering::make_likelihood_batch(options.likelihood));
+  Bench bench(std::move(batch), threads);
   PRESCENE_RETURN_IF_ERROR(bench.load(dir));
   const core::RandomStream stream(seed, core::Purpose::kEvaluation);
   YcbSection section;

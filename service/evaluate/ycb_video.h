@@ -15,15 +15,17 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
+#include "prescene/rendering/compute/likelihood_choice.h"
 
 namespace prescene::service {
 
 struct YcbOptions {
-  int draws = 20;                    ///< Disturbed starts per object.
-  double shift = 0.05;               ///< m, exactly, in a uniform direction.
-  double turn = 0.5235987755982988;  ///< rad (30 degrees), exactly, about a uniform axis.
-  int starts = 64;                   ///< Of the search from a disturbed pose.
-  bool auc = true;                   ///< Also the evaluator's own test, which takes the longest.
+  int draws = 20;                          ///< Disturbed starts per object.
+  double shift = 0.05;                     ///< m, exactly, in a uniform direction.
+  double turn = 0.5235987755982988;        ///< rad (30 degrees), exactly, about a uniform axis.
+  int starts = 64;                         ///< Of the search from a disturbed pose.
+  bool auc = true;                         ///< Also the evaluator's own test, which takes the longest.
+  rendering::LikelihoodChoice likelihood;  ///< Who scores poses; nothing but times depend on it.
 };
 
 struct YcbObjectScore {
