@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a pose hypothesis costs: weights and Gauss-Newton steps in vector instructions, against the reference backend
-// and against a draw and a read-back of the graphics library. One thread, scattered poses near the truth.
+// and against a draw and a read-back of the graphics library; and in compute shaders on every device that EGL lists.
+// One thread, scattered poses near the truth.
 //
 //   bench_rendering [--quick] [--benchmark_out=PATH]
 #include <sys/resource.h>
@@ -17,8 +18,10 @@
 
 #include "prescene/benchmarks/report.h"
 #include "prescene/core/check.h"
+#include "prescene/core/clock.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
+#include "prescene/rendering/compute/compute_likelihood.h"
 #include "prescene/rendering/egl/egl_renderer.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
@@ -153,6 +156,57 @@ std::optional<double> drawn_and_read(const Scene& scene, std::string* device) {
       [&] { PRESCENE_CHECK((*renderer)->render(alone, scene.frame.camera, Pose::identity(), {}, &view).ok()); }, 2);
 }
 
+/// What hypotheses cost on one graphics device.
+struct DeviceCosts {
+  GraphicsDevice device;
+  std::string name;       ///< The driver's.
+  std::size_t calls = 0;  ///< Hypotheses a call.
+  double weight = 0.0;    ///< s a hypothesis, by the clock: the least of the rounds.
+  double step = 0.0;
+  double on_device = 0.0;  ///< Share; the rest went to the processor.
+};
+
+/// Each device that EGL lists and that has compute shaders. `why_not` of the others.
+std::vector<DeviceCosts> costs_on_devices(const Scene& scene, int rounds, std::string* why_not) {
+  std::vector<DeviceCosts> all;
+  for (const GraphicsDevice& device : graphics_devices()) {
+    ComputeOptions options;
+    options.device.device = device.index;
+    const auto batch = make_compute_likelihood_batch(make_simd_likelihood_batch(), options);
+    if (!batch) {
+      *why_not += batch.status().message() + "; ";
+      continue;
+    }
+    DeviceCosts costs{device, (*batch)->health().device};
+    // Enough to fill a card; the software renderer has the processor's number.
+    const std::size_t copies = device.software ? 1 : 16;
+    std::vector<PoseHypothesis> hypotheses;
+    for (std::size_t i = 0; i < copies; ++i)
+      hypotheses.insert(hypotheses.end(), scene.hypotheses.begin(), scene.hypotheses.end());
+    costs.calls = hypotheses.size();
+    const auto workspace = (*batch)->make_workspace();
+    std::vector<PoseEvidence> evidences(hypotheses.size());
+    std::vector<PoseLinearisation> equations(hypotheses.size());
+    const auto least_of = [&](const std::function<void()>& work) {
+      work();
+      double least = 1e30;
+      for (int round = 0; round < (device.software ? 1 : rounds); ++round) {
+        const core::Stopwatch watch;
+        work();
+        least = std::min(least, watch.seconds());
+      }
+      return least / static_cast<double>(hypotheses.size());
+    };
+    costs.weight = least_of([&] { (*batch)->evaluate(scene.frame, hypotheses, *workspace, evidences); });
+    costs.step = least_of([&] { (*batch)->linearise(scene.frame, hypotheses, {}, *workspace, equations); });
+    const ComputeHealth health = (*batch)->health();
+    costs.on_device =
+        static_cast<double>(health.on_device) / static_cast<double>(health.on_device + health.on_processor);
+    all.push_back(costs);
+  }
+  return all;
+}
+
 Target rate(const std::string& work, double must, double aim, double seconds) {
   Target target;
   target.work = work;
@@ -238,7 +292,29 @@ int run(int rounds, const std::string& out) {
   terms.n = rounds;
   terms.baseline = "none, one thread";
   report.add(std::move(terms));
-  report.add(open("10k triangles on a graphics processor", std::nullopt, 500e3, "compute shaders are not built yet"));
+  Table on_devices{"compute shaders, by the clock",
+                   {"scene", "device", "hypotheses a call", "weight us", "Gauss-Newton us", "share on the device"},
+                   {}};
+  std::string why_not;
+  Target on_card = open("10k triangles on a graphics card, hypotheses", std::nullopt, 500e3, "");
+  on_card.unit = "1/s";
+  const auto device_rows = [&](const std::string& name, const Scene& scene) {
+    const std::vector<DeviceCosts> all = costs_on_devices(scene, rounds, &why_not);
+    for (const DeviceCosts& costs : all)
+      on_devices.rows.push_back({name, costs.name, static_cast<std::int64_t>(costs.calls), 1e6 * costs.weight,
+                                 1e6 * costs.step, costs.on_device});
+    return all;
+  };
+  for (const DeviceCosts& costs : device_rows("10k triangles, 160 x 120", large)) {
+    if (costs.device.software || on_card.reached) continue;
+    on_card.reached = 1.0 / costs.weight;
+    on_card.n = static_cast<int>(costs.calls);
+    on_card.baseline = "none; " + costs.name + ", by the clock";
+  }
+  device_rows("1500 triangles, 160 x 120", middle);
+  device_rows("400 triangles, 80 x 60", small);
+  if (!on_card.reached) on_card.why = "no graphics card here, software renderers alone. " + why_not;
+  report.add(std::move(on_card));
   Target against_reference;
   against_reference.work = "10k triangles: the reference backend";
   against_reference.reached = slow.weight / of_large.weight;
@@ -248,7 +324,9 @@ int run(int rounds, const std::string& out) {
   report.add(std::move(against_reference));
   std::fputs(report.text().c_str(), stdout);
   std::printf("%s\n", text_of(table).c_str());
+  std::printf("%s\n", text_of(on_devices).c_str());
   report.add(std::move(table));
+  report.add(std::move(on_devices));
   return report.finish(out);
 }
 
