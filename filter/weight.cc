@@ -68,8 +68,8 @@ class ParticleUpdate {
         tools_(tools),
         context_(context),
         workspace_(workspace),
-        information_share_(rendering::tempering(terms.tempering.hessian_pixels, pixels)),
-        weight_share_(rendering::tempering(terms.tempering.weight_pixels, pixels)) {}
+        information_share_(rendering::tempering(terms.tempering.information, pixels, terms.step)),
+        weight_share_(rendering::tempering(terms.tempering.weight, pixels, terms.step)) {}
 
   /// Climbs from box_plus(predicted, start) on the tempered likelihood times the prediction.
   Mode climb(const Pose& X_WO_predicted, const Gaussian& predicted, const Vector6d& start) const {

@@ -114,7 +114,7 @@ struct LineariseOptions {
 /// Gauss-Newton equations of the depth residuals about a pose: minimise 1/2 d'Hd - g'd over d, then
 /// X_CO <- box_plus(X_CO, d). In the error coordinates of geometry::box_plus: rotation (rad) in the body frame, then
 /// translation (m) in C. In units of information, not tempered: add a prior's, with H and g times
-/// tempering(hessian_pixels, pixels).
+/// tempering(frame.tempering.information, pixels, frame.step).
 struct PoseLinearisation {
   geometry::Matrix6d H = geometry::Matrix6d::Zero();
   geometry::Vector6d g = geometry::Vector6d::Zero();

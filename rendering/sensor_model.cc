@@ -31,8 +31,10 @@ double excess(double missing, double base) { return std::max(0.0, (missing - bas
 
 }  // namespace
 
-double tempering(double effective_pixels, double pixels) {
-  return pixels > effective_pixels ? effective_pixels / pixels : 1.0;
+double tempering(const Tempering& tempering, double pixels, int step) {
+  const double area = static_cast<double>(step) * step;
+  const double shared = tempering.effective_pixels > 0.0 ? pixels / tempering.effective_pixels : 0.0;
+  return 1.0 / (1.0 + tempering.correlated_px2 / area + shared);
 }
 
 core::Status validate(const SensorModelOptions& o) {

@@ -43,16 +43,25 @@ struct SensorModelOptions {
   friend bool operator==(const SensorModelOptions&, const SensorModelOptions&) = default;
 };
 
-/// Pixels are correlated, so a sum of log ratios over n of them is worth less than n independent ones: it is multiplied
-/// by alpha = min(1, K / n).
+/// Pixels are correlated, so a sum of log ratios over n of them, `step` full-image pixels apart, is worth less than n
+/// independent ones: it is multiplied by alpha = 1 / (1 + correlated_px2 / step^2 + n / effective_pixels).
+struct Tempering {
+  double correlated_px2 = 0.0;    ///< Full-image pixels that share one error (an area): what noise is correlated over.
+  double effective_pixels = 0.0;  ///< No sum is worth more: errors that all pixels share. 0 = there are none.
+
+  friend bool operator==(const Tempering&, const Tempering&) = default;
+};
+/// alpha, in (0, 1].
+double tempering(const Tempering& tempering, double pixels, int step);
+
+/// The two sums that are tempered: log ratios, which weigh poses against each other, and the information of
+/// Gauss-Newton equations, which knows no silhouettes.
 struct TemperingOptions {
-  double weight_pixels = 20.0;    ///< K of weights; 20 for a well calibrated camera, 6 judged against hand-made labels.
-  double hessian_pixels = 200.0;  ///< K of Gauss-Newton information: it knows no silhouettes, and 20 is too wide.
+  Tempering weight = {75.0, 500.0};
+  Tempering information = {100.0, 0.0};
 
   friend bool operator==(const TemperingOptions&, const TemperingOptions&) = default;
 };
-/// min(1, K / pixels); 1 for no pixels.
-double tempering(double effective_pixels, double pixels);
 
 /// Where on a surface a pixel looks.
 struct PixelGeometry {

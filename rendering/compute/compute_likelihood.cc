@@ -44,7 +44,7 @@ PoseEvidence evidence_of(const DeviceResult& result, const FrameTerms& frame, co
   evidence.visible_log_ratio = log_of(0);
   evidence.log_ratio = evidence.visible_log_ratio + log_of(1) + log_of(2);
   const double pixels = hypothesis.tempering_pixels > 0.0 ? hypothesis.tempering_pixels : evidence.measured;
-  evidence.tempered = tempering(frame.tempering.weight_pixels, pixels) * evidence.log_ratio;
+  evidence.tempered = tempering(frame.tempering.weight, pixels, frame.step) * evidence.log_ratio;
   return evidence;
 }
 

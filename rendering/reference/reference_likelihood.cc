@@ -107,7 +107,7 @@ class EvidenceSum {
     evidence_.visible_log_ratio = visible_.log();
     evidence_.log_ratio = evidence_.visible_log_ratio + occluded_.log() + missing_;
     const double pixels = tempering_pixels > 0.0 ? tempering_pixels : evidence_.measured;
-    evidence_.tempered = tempering(frame_.tempering.weight_pixels, pixels) * evidence_.log_ratio;
+    evidence_.tempered = tempering(frame_.tempering.weight, pixels, frame_.step) * evidence_.log_ratio;
     return evidence_;
   }
 

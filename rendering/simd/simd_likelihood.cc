@@ -133,7 +133,7 @@ class SimdLikelihoodBatch final : public LikelihoodBatch {
     PoseEvidence evidence;
     sum_evidence(terms, seen, scratch.tile, &evidence);
     const double pixels = hypothesis.tempering_pixels > 0.0 ? hypothesis.tempering_pixels : evidence.measured;
-    evidence.tempered = tempering(frame.tempering.weight_pixels, pixels) * evidence.log_ratio;
+    evidence.tempered = tempering(frame.tempering.weight, pixels, frame.step) * evidence.log_ratio;
     return evidence;
   }
 

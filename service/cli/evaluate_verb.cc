@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/core/text.h"
+#include "prescene/service/evaluate/cleargrasp.h"
+#include "prescene/service/evaluate/credible_regions.h"
 #include "prescene/service/evaluate/cube_tosses.h"
 #include "prescene/service/evaluate/ycb_video.h"
 #include "verb.h"
@@ -20,6 +22,7 @@ struct Options {
   std::string data;
   std::string split = "report";
   rendering::LikelihoodChoice likelihood;
+  int frames = CredibleRegionOptions{}.frames;
 };
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
@@ -54,12 +57,59 @@ std::string text_of(const YcbReport& report) {
          core::rounded_text(largest) + " points\n";
 }
 
+std::string text_of(const ClearGraspReport& report) {
+  std::vector<std::vector<std::string>> rows = {
+      {"frame", "pixels of", "n", "better explained as transparent, %", "nats a pixel in favour"}};
+  const auto add = [&rows](const ClearGraspScore& score) {
+    for (const auto& [kind, share] : {std::pair{"the mask", &score.all},
+                                      {"no return", &score.missing},
+                                      {"a return from behind", &score.behind},
+                                      {"a return from the surface", &score.at_surface},
+                                      {"a return from in front", &score.in_front},
+                                      {"the painted twin", &score.painted}})
+      rows.push_back({score.frame, kind, std::to_string(share->n), fixed_text(100.0 * share->share(), 1),
+                      fixed_text(share->nats_per_pixel(), 2)});
+  };
+  for (const ClearGraspScore& score : report.frames) add(score);
+  add(report.total);
+  return table(rows) + std::to_string(report.total.all.n) + " of " + std::to_string(report.total.mask_pixels) +
+         " mask pixels have a surface known from the painted twin\n";
+}
+
+std::string text_of(const CredibleRegionReport& report) {
+  std::vector<std::vector<std::string>> rows = {{"frames", "n", "pixels", "tempering times", "truth in 90 % region, %",
+                                                 "in 50 %", "in 90 % ellipsoid, %", "in 50 %"}};
+  for (const CoverageRow& row : report.rows)
+    for (std::size_t k = 0; k < report.factors.size(); ++k) {
+      if (row.group != "all" && report.factors[k] != 1.0) continue;
+      rows.push_back({row.group, std::to_string(row.n), fixed_text(row.pixels, 0), fixed_text(report.factors[k], 1),
+                      fixed_text(100.0 * row.weights_90[k], 1), fixed_text(100.0 * row.weights_50[k], 1),
+                      fixed_text(100.0 * row.information_90[k], 1), fixed_text(100.0 * row.information_50[k], 1)});
+    }
+  return table(rows);
+}
+
 core::Status run(const Options& options, VerbContext& context) {
+  if (options.name != "credible_regions" && options.data.empty())
+    return core::invalid_input("evaluate " + options.name + " needs recorded data: name its folder with --data");
   const std::filesystem::path folder = std::filesystem::path(options.data) / options.name;
   const core::ProgressSink progress = context.progress("evaluating " + options.name);
   nlohmann::ordered_json document;
   std::string text;
-  if (options.name == "ycb_video") {
+  if (options.name == "credible_regions") {
+    CredibleRegionOptions regions;
+    regions.frames = options.frames;
+    PRESCENE_TRY(const auto frames,
+                 frame_posteriors(regions, context.options().seed, context.pool(), progress, &context.cancellation()));
+    const CredibleRegionReport report = coverage(frames, regions.factors);
+    document = to_json(report);
+    text = text_of(report);
+  } else if (options.name == "cleargrasp") {
+    PRESCENE_TRY(const ClearGraspReport report,
+                 evaluate_cleargrasp(folder, context.options().seed, progress, &context.cancellation()));
+    document = to_json(report);
+    text = text_of(report);
+  } else if (options.name == "ycb_video") {
     YcbOptions ycb;
     ycb.likelihood = options.likelihood;
     PRESCENE_TRY(const YcbReport report, evaluate_ycb_video(folder, context.options().seed, context.pool(), progress,
@@ -82,16 +132,23 @@ core::Status run(const Options& options, VerbContext& context) {
 }  // namespace
 
 Verb add_evaluate_verb(CLI::App& app) {
-  auto* verb = app.add_subcommand("evaluate", "Figures on real data (docs/accuracy.md)");
+  auto* verb = app.add_subcommand(
+      "evaluate", "Figures on real data, and of the likelihood's calibration on simulated frames (docs/accuracy.md)");
   auto options = std::make_shared<Options>();
-  verb->add_option("NAME", options->name, "cube_tosses or ycb_video")
+  verb->add_option("NAME", options->name,
+                   "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
+                   "the transparent material explains better than the opaque one), or credible_regions (tempering, on "
+                   "simulated frames: needs no data)")
       ->required()
-      ->check(CLI::IsMember({"cube_tosses", "ycb_video"}));
-  verb->add_option("--data", options->data, "Folder that holds the data sets' folders")->required();
+      ->check(CLI::IsMember({"cube_tosses", "ycb_video", "cleargrasp", "credible_regions"}));
+  verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(CLI::IsMember({"calibrate", "report", "all"}))
       ->capture_default_str();
   add_likelihood_options(*verb, options->likelihood);
+  verb->add_option("--frames", options->frames, "Of credible_regions: simulated frames")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
   verb->footer("Example: prescene evaluate ycb_video --data data --json");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

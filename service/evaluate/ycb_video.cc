@@ -93,7 +93,7 @@ core::Status prepare(const YcbFrame& frame, const core::RandomStream& stream, Pr
   input.depth = frame.depth.view();
   input.supports = std::span(&prepared->support, 1);
   rendering::FrameTermsOptions options;
-  options.tempering.weight_pixels = kLabelPixels;
+  options.tempering.weight.effective_pixels = kLabelPixels;
   return make_frame_terms(input, options, rendering::SensorModel(), &prepared->terms);
 }
 

@@ -233,9 +233,22 @@ TEST(SensorModel, SigmaGrowsWithDepthSquaredAndIncidence) {
 }
 
 TEST(SensorModel, TemperingWeighsNoMoreThanItsEffectivePixels) {
-  EXPECT_EQ(tempering(20.0, 0.0), 1.0);
-  EXPECT_EQ(tempering(20.0, 20.0), 1.0);
-  EXPECT_EQ(tempering(20.0, 200.0), 0.1);
+  EXPECT_EQ(tempering({0.0, 0.0}, 500.0, 8), 1.0);
+  EXPECT_EQ(tempering({0.0, 20.0}, 0.0, 8), 1.0);
+  EXPECT_NEAR(tempering({0.0, 20.0}, 180.0, 8), 0.1, 1e-15);
+  // One pixel in 64 of an area of 192 that shares its error: a quarter of each counts.
+  EXPECT_NEAR(tempering({192.0, 0.0}, 10.0, 8), 0.25, 1e-15);
+  // However finely a surface is sampled, it is worth no more than its area, and no more than the errors of all.
+  const Tempering both = {75.0, 500.0};
+  double last = 0.0;
+  for (const int step : {16, 8, 4, 2, 1}) {
+    const double pixels = 40000.0 / (step * step);
+    const double worth = pixels * tempering(both, pixels, step);
+    EXPECT_GT(worth, last);
+    EXPECT_LT(worth, 40000.0 / 75.0);
+    EXPECT_LT(worth, 500.0);
+    last = worth;
+  }
 }
 
 TEST(SensorModelOptions, AreRefusedByTheNameOfTheField) {
