@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/cleargrasp.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -10,60 +9,20 @@
 
 #include "prescene/filter/segmentation.h"
 #include "prescene/interfaces/images/png.h"
+#include "prescene/rendering/local_surface.h"
 
 namespace prescene::service {
 namespace {
 
 namespace fs = std::filesystem;
-using geometry::Vector3d;
-
 constexpr double kMetresPerUnit = 1e-4;  // of the depth images
-constexpr int kWindow = 3;               // pixels each way that tell where the surface is at the one in their middle
-constexpr double kSameSurface = 0.015;   // m: neighbours further from their median belong to another surface
-constexpr int kFewestNeighbours = 24;    // of the window's 48
-
-/// Where the surface is at a pixel, from its neighbours alone.
-struct Surface {
-  double depth = 0.0;
-  double cosine = 1.0;  ///< |n . ray|
-};
-
-/// The plane through the depths around a pixel of the mask, at that pixel; nothing where too few of one surface are
-/// measured.
-std::optional<Surface> surface_at(const ClearGraspFrame& frame, int x, int y) {
-  std::vector<Vector3d> offsets;  // (dx, dy, depth)
-  std::vector<double> depths;
-  for (int dy = -kWindow; dy <= kWindow; ++dy)
-    for (int dx = -kWindow; dx <= kWindow; ++dx) {
-      if ((dx == 0 && dy == 0) || x + dx < 0 || y + dy < 0 || x + dx >= frame.mask.width() ||
-          y + dy >= frame.mask.height())
-        continue;
-      const double depth = frame.painted(x + dx, y + dy);
-      if (frame.mask(x + dx, y + dy) == 0 || !(depth > 0.0)) continue;
-      offsets.emplace_back(dx, dy, depth);
-      depths.push_back(depth);
-    }
-  if (depths.size() < static_cast<std::size_t>(kFewestNeighbours)) return std::nullopt;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  geometry::Matrix3d H = geometry::Matrix3d::Zero();
-  Vector3d g = Vector3d::Zero();
-  int used = 0;
-  for (const Vector3d& offset : offsets) {
-    if (std::abs(offset.z() - *middle) > kSameSurface) continue;
-    const Vector3d row(1.0, offset.x(), offset.y());
-    H += row * row.transpose();
-    g += row * offset.z();
-    ++used;
-  }
-  if (used < kFewestNeighbours) return std::nullopt;
-  const Eigen::LDLT<geometry::Matrix3d> ldlt(H);
-  const Vector3d plane = ldlt.solve(g);  // depth, its change a pixel to the right, and down
-  if (!plane.allFinite() || std::abs(plane[0] - *middle) > kSameSurface) return std::nullopt;
-  const Vector3d ray = frame.camera.unproject(x, y, 1.0);
-  const Vector3d right = plane[1] * ray + plane[0] / frame.camera.fx * Vector3d::UnitX();
-  const Vector3d down = plane[2] * ray + plane[0] / frame.camera.fy * Vector3d::UnitY();
-  return Surface{plane[0], std::abs(right.cross(down).normalized().dot(ray.normalized()))};
+/// The painted twin without what is not of the mask.
+geometry::DepthImage painted_objects(const ClearGraspFrame& frame) {
+  geometry::DepthImage depth = frame.painted;
+  for (int y = 0; y < depth.height(); ++y)
+    for (int x = 0; x < depth.width(); ++x)
+      if (frame.mask(x, y) == 0) depth(x, y) = 0.0f;
+  return depth;
 }
 
 /// Distances to the nearest pixel that is not of the mask, by two sweeps (chamfer).
@@ -203,11 +162,12 @@ ClearGraspScore score_cleargrasp(const ClearGraspFrame& frame, const rendering::
   const std::optional<rendering::FrameTerms> terms = background(frame, model, seed);
   score.knows_plane = terms.has_value();
   const geometry::Image<float> outline = distance_to_outline(frame.mask);
+  const geometry::DepthImage objects = painted_objects(frame);
   for (int y = 0; y < frame.mask.height(); ++y) {
     for (int x = 0; x < frame.mask.width(); ++x) {
       if (frame.mask(x, y) == 0) continue;
       ++score.mask_pixels;
-      const std::optional<Surface> surface = surface_at(frame, x, y);
+      const std::optional<rendering::LocalSurface> surface = rendering::local_surface(objects, frame.camera, x, y);
       if (!surface || surface->depth <= model.options().min_depth || surface->depth >= model.options().max_depth)
         continue;
       rendering::AbsentMixture absent;

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// The surface at a pixel of a measured depth image, from its neighbours alone: what the pixel itself returned can then
+// be judged by it.
+#pragma once
+
+#include <optional>
+
+#include "prescene/geometry/camera.h"
+#include "prescene/geometry/image.h"
+
+namespace prescene::rendering {
+
+struct LocalSurfaceOptions {
+  int window = 3;               ///< Pixels each way.
+  double same_surface = 0.015;  ///< m; neighbours further than this from their median belong to another surface.
+  double fewest = 0.5;          ///< Share of the window's pixels that must be measured, of one surface.
+};
+
+struct LocalSurface {
+  double depth = 0.0;   ///< m, of the plane at the pixel.
+  double cosine = 1.0;  ///< |n . ray|
+};
+
+/// A plane of least squares over the neighbours of (x, y), without that pixel; 0 = not measured. Nothing where too few
+/// are of one surface.
+std::optional<LocalSurface> local_surface(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
+                                          int x, int y, const LocalSurfaceOptions& options = {});
+
+}  // namespace prescene::rendering
