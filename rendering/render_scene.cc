@@ -48,17 +48,24 @@ UniqueNumber& UniqueNumber::operator=(const UniqueNumber&) {
   return *this;
 }
 
-MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh) {
+MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh, const MeshLook& look) {
+  PRESCENE_CHECK(look.vertex_colors.empty() || look.vertex_colors.size() == mesh.vertices.size());
+  PRESCENE_CHECK(look.texture_places.empty() ||
+                 (look.texture_places.size() == mesh.triangles.size() && look.texture && !look.texture->empty()));
   auto result = std::make_shared<RenderMesh>();
+  result->look.vertex_colors = look.vertex_colors;
+  if (!look.texture_places.empty()) result->look.texture = look.texture;
   result->vertices.reserve(mesh.vertices.size());
   for (const geometry::Vector3d& vertex : mesh.vertices) result->vertices.push_back(vertex.cast<float>());
-  for (const auto& triangle : mesh.triangles) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& triangle = mesh.triangles[i];
     for (const std::uint32_t index : triangle)
       PRESCENE_CHECK_MSG(index < mesh.vertices.size(), "a mesh must be repaired before it is rendered");
     const geometry::Vector3d& a = mesh.vertices[triangle[0]];
     const geometry::Vector3d cross = (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
     const double twice_area = cross.norm();
     if (!(twice_area > 0.0)) continue;
+    if (!look.texture_places.empty()) result->look.texture_places.push_back(look.texture_places[i]);
     result->triangles.push_back(triangle);
     result->normals.push_back((cross / twice_area).cast<float>());
     result->offsets.push_back(static_cast<float>(cross.dot(a) / twice_area));

@@ -42,6 +42,17 @@ class UniqueNumber {
   std::uint64_t value_;
 };
 
+/// The colours of a mesh's surface, sRGB, for pictures; likelihoods look at none of it. Where nothing is given a thing
+/// has its material's colour.
+struct MeshLook {
+  std::vector<geometry::Rgb> vertex_colors;  ///< One a vertex, or empty. Blended over a triangle in linear light.
+  /// Places in the texture, one for each corner of each triangle, or empty: u to the right and v down, (0, 0) and
+  /// (1, 1) are corners of the image, which is repeated beyond. Goes before colours of vertices.
+  std::vector<std::array<Eigen::Vector2f, 3>> texture_places;
+  std::shared_ptr<const geometry::ColorImage>
+      texture;  ///< Needed with places. Read bilinearly, without smaller copies.
+};
+
 /// A triangle mesh in single precision as renderers want it; immutable once made, shared by handle.
 struct RenderMesh {
   std::vector<Vector3f> vertices;                       ///< Metres, mesh frame M.
@@ -53,12 +64,14 @@ struct RenderMesh {
   float radius = 0.0f;                                  ///< Of that sphere, metres.
   bool closed =
       false;  ///< Watertight and consistently oriented: faces seen from behind are never visible from outside.
+  MeshLook look;
   UniqueNumber number;  ///< By which devices know what they have already.
 };
 using MeshHandle = std::shared_ptr<const RenderMesh>;
 
-/// Triangles without area are left out; indices out of range are a bug (checked). An empty mesh renders nothing.
-MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh);
+/// Triangles without area are left out; indices out of range are a bug (checked), and so is a look of another size. An
+/// empty mesh renders nothing.
+MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh, const MeshLook& look = {});
 
 /// How depth cameras see a surface: shares of what a pixel on it returns, of the pixels that return anything.
 /// hit + occluder + behind + outlier = 1.

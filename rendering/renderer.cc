@@ -14,6 +14,11 @@ core::Status validate(const RenderJob& job, const RenderOptions& options) {
   if (!(options.near_depth > 0.0 && std::isfinite(options.far_depth) && options.far_depth > options.near_depth))
     return core::invalid_input("rendering: the clip range is " + std::to_string(options.near_depth) + " to " +
                                std::to_string(options.far_depth) + " m: give 0 < near_depth < far_depth");
+  const Lighting& light = options.lighting;
+  if (options.color && !(light.towards_light_W.allFinite() && light.towards_light_W.norm() > 0.0 &&
+                         light.ambient >= 0.0 && light.direct >= 0.0 && std::isfinite(light.ambient + light.direct)))
+    return core::invalid_input(
+        "rendering: the light has no direction or a share below 0: give a direction, and shares of 0 and more");
   constexpr std::size_t kMaxInstances = 65535;
   if (job.scene->instances.size() > kMaxInstances)
     return core::invalid_input("rendering: the scene has " + std::to_string(job.scene->instances.size()) +

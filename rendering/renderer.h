@@ -15,12 +15,22 @@
 
 namespace prescene::rendering {
 
+/// Light of pictures: some from everywhere, the rest from one side, in linear light.
+struct Lighting {
+  geometry::Vector3d towards_light_W = {0.35, -0.45, 0.82};  ///< Any length but 0.
+  double ambient = 0.35;                                     ///< Share of a surface's own colour in shadow ...
+  double direct = 0.65;                                      ///< ... and what is added where it faces the light.
+  geometry::Rgb background = {236, 238, 240};                ///< sRGB.
+};
+
 /// What is drawn of each view. Surfaces outside [near_depth, far_depth] (z in C, metres) are cut away; both sides of a
 /// triangle are drawn.
 struct RenderOptions {
   double near_depth = 0.02;
   double far_depth = 20.0;
   bool normals = false;
+  bool color = false;
+  Lighting lighting;
 };
 
 /// The images of one view, all of the camera's size. A pixel shows the nearest surface on the ray through its centre.
@@ -28,7 +38,9 @@ struct RenderedView {
   geometry::DepthImage depth;   ///< z in C, metres; 0 = nothing.
   geometry::LabelImage labels;  ///< 1 + index of the instance; 0 = nothing.
   geometry::Image<Vector3f>
-      normals;  ///< Unit, in C, of the flat triangle, turned towards the camera; empty unless asked.
+      normals;                 ///< Unit, in C, of the flat triangle, turned towards the camera; empty unless asked.
+  geometry::ColorImage color;  ///< sRGB: the surface's own colour (MeshLook, else the material's) by Lambert's law from
+                               ///< the flat triangle's normal; empty unless asked.
 };
 
 /// One view to render; `scene` must outlive the call.

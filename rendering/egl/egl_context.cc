@@ -248,7 +248,7 @@ EglContext::~EglContext() {
 }
 
 EglContext::Turn::Turn(EglContext& context) : context_(context), lock_(context.mutex_), api_before_(eglQueryAPI()) {
-  if (happens(context.faults_, &GraphicsFaults::losses)) {
+  if (context.context_ != EGL_NO_CONTEXT && happens(context.faults_, &GraphicsFaults::losses)) {
     eglDestroyContext(context.display_, context.context_);
     context.context_ = EGL_NO_CONTEXT;
   }

@@ -14,8 +14,12 @@ namespace prescene::rendering {
 bool egl_compiled_in();
 
 /// A renderer with a context of its own. Fails with kUnavailable when no driver gives an OpenGL 3.3 context without a
-/// display (the message names the Debian package to install), or when the build left EGL out. Images are reproducible
-/// within tolerance only. Calls from several threads take turns.
+/// display (the message names the Debian package to install), or when the build left EGL out; kInvalidInput for a
+/// device that EGL does not list. Images are reproducible within tolerance only. Calls from several threads take turns.
+///
+/// A context that is lost while it draws is made again, and the call with it; render() fails with kUnavailable when
+/// that fails too, and the next call tries anew. It also fails with kUnsupported for a texture that is larger than the
+/// device's.
 core::Result<std::unique_ptr<Renderer>> make_egl_renderer(const DeviceChoice& choice = {});
 
 }  // namespace prescene::rendering

@@ -6,28 +6,42 @@
 #include <GL/glext.h>
 
 #include <algorithm>
-#include <array>
+#include <cstring>
+#include <string>
 #include <type_traits>
+
+#include "prescene/rendering/surface_color.h"
 
 namespace prescene::rendering {
 namespace {
+
+enum ColorSource : GLint { kOfMaterial, kOfVertices, kOfTexture };
 
 // The point in C goes through unchanged: depth is its z, interpolated perspective-correct by the device. Image rows run
 // down, window rows up: the projection leaves v as it is, so that row 0 of the frame buffer is row 0 of the image.
 constexpr const char* kVertexShader = R"(#version 330 core
 layout(location = 0) in vec3 p_M;
 layout(location = 1) in vec3 normal_M;
+layout(location = 2) in vec3 color_srgb;
+layout(location = 3) in vec2 place_in;
 uniform mat3 R_CM;
 uniform vec3 p_CM;
 uniform vec4 projection;  // fx, fy, cx, cy in device coordinates
 uniform vec2 clip;        // z_clip = clip.x * z + clip.y
 out float depth;
 flat out vec3 normal;
+out vec3 vertex_color;
+out vec2 place;
+vec3 linear_of(vec3 c) {
+  return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
+}
 void main() {
   vec3 p_C = R_CM * p_M + p_CM;
   normal = R_CM * normal_M;
   if (dot(normal, p_C) > 0.0) normal = -normal;
   depth = p_C.z;
+  vertex_color = linear_of(color_srgb);
+  place = place_in;
   gl_Position = vec4(projection.x * p_C.x + projection.z * p_C.z, projection.y * p_C.y + projection.w * p_C.z,
                      clip.x * p_C.z + clip.y, p_C.z);
 }
@@ -36,14 +50,45 @@ void main() {
 constexpr const char* kFragmentShader = R"(#version 330 core
 in float depth;
 flat in vec3 normal;
+in vec3 vertex_color;
+in vec2 place;
 uniform uint label;
+uniform vec3 towards_light;  // in C, unit
+uniform vec2 shares;         // ambient, direct
+uniform int color_source;    // material, vertices, texture
+uniform vec3 material;       // linear
+uniform sampler2D surface;
 layout(location = 0) out float out_depth;
 layout(location = 1) out uint out_label;
 layout(location = 2) out vec4 out_normal;
+layout(location = 3) out vec4 out_color;
+vec3 linear_of(vec3 c) {
+  return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
+}
+vec3 srgb_of(vec3 c) {
+  return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
+}
+vec3 texel(ivec2 at, ivec2 size) {
+  ivec2 repeated = at - size * ivec2(floor(vec2(at) / vec2(size)));
+  return linear_of(texelFetch(surface, repeated, 0).rgb);
+}
+// Blended by hand, in linear light: samplers round their weights to 8 bits.
+vec3 texture_color() {
+  ivec2 size = textureSize(surface, 0);
+  vec2 at = fract(place) * vec2(size) - 0.5;
+  vec2 corner = floor(at);
+  vec2 share = at - corner;
+  ivec2 first = ivec2(corner);
+  return mix(mix(texel(first, size), texel(first + ivec2(1, 0), size), share.x),
+             mix(texel(first + ivec2(0, 1), size), texel(first + ivec2(1, 1), size), share.x), share.y);
+}
 void main() {
   out_depth = depth;
   out_label = label;
   out_normal = vec4(normal, 0.0);
+  vec3 own = color_source == 2 ? texture_color() : color_source == 1 ? max(vertex_color, 0.0) : material;
+  float light = shares.x + shares.y * max(0.0, dot(normal, towards_light));
+  out_color = vec4(srgb_of(clamp(own * light, 0.0, 1.0)), 1.0);
 }
 )";
 
@@ -69,12 +114,36 @@ core::Result<GLuint> compiled(GLenum kind, const char* source) {
   return status;
 }
 
+/// Where the images of a view lie in a pixel buffer, bytes; each at a multiple of 16.
+struct Layout {
+  Layout(int width, int height, const RenderOptions& options) {
+    const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    const auto next = [&](std::size_t bytes) {
+      const std::size_t at = size;
+      size += (pixels * bytes + 15) / 16 * 16;
+      return at;
+    };
+    depth = next(sizeof(float));
+    labels = next(sizeof(std::uint16_t));
+    if (options.normals) normals = next(sizeof(Vector3f));
+    if (options.color) color = next(sizeof(geometry::Rgb));
+  }
+
+  std::size_t depth = 0, labels = 0, normals = 0, color = 0, size = 0;
+};
+
+template <class Pixel>
+void copy_image(const std::uint8_t* from, int width, int height, const Pixel& empty_pixel,
+                geometry::Image<Pixel>* image) {
+  static_assert(std::is_trivially_destructible_v<Pixel>);
+  if (image->width() != width || image->height() != height) *image = geometry::Image<Pixel>(width, height, empty_pixel);
+  std::memcpy(static_cast<void*>(image->data()), from, image->size() * sizeof(Pixel));
+}
+
 }  // namespace
 
 core::Result<std::unique_ptr<GlViews>> GlViews::make() {
   std::unique_ptr<GlViews> views(new GlViews());
-  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  views->device_ = name != nullptr ? name : "unknown";
   std::array<GLint, 2> viewport{};
   GLint texture_size = 0;
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &texture_size);
@@ -83,6 +152,8 @@ core::Result<std::unique_ptr<GlViews>> GlViews::make() {
   PRESCENE_RETURN_IF_ERROR(views->make_program());
   return views;
 }
+
+int GlViews::uniform(const char* name) const { return glGetUniformLocation(program_, name); }
 
 core::Status GlViews::make_program() {
   PRESCENE_TRY(const GLuint vertex, compiled(GL_VERTEX_SHADER, kVertexShader));
@@ -100,16 +171,20 @@ core::Status GlViews::make_program() {
   GLint ok = GL_FALSE;
   glGetProgramiv(program_, GL_LINK_STATUS, &ok);
   if (ok != GL_TRUE) return gl_failure("the driver does not link our shaders");
-  rotation_ = glGetUniformLocation(program_, "R_CM");
-  translation_ = glGetUniformLocation(program_, "p_CM");
-  projection_ = glGetUniformLocation(program_, "projection");
-  clip_ = glGetUniformLocation(program_, "clip");
-  label_ = glGetUniformLocation(program_, "label");
+  rotation_ = uniform("R_CM");
+  translation_ = uniform("p_CM");
+  projection_ = uniform("projection");
+  clip_ = uniform("clip");
+  label_ = uniform("label");
+  light_ = uniform("towards_light");
+  shares_ = uniform("shares");
+  color_source_ = uniform("color_source");
+  material_ = uniform("material");
   return core::ok_status();
 }
 
 void GlViews::free_images() {
-  for (GLuint* image : {&depth_image_, &label_image_, &normal_image_, &depth_buffer_}) {
+  for (GLuint* image : {&depth_image_, &label_image_, &normal_image_, &color_image_, &depth_buffer_}) {
     glDeleteRenderbuffers(1, image);
     *image = 0;
   }
@@ -120,11 +195,8 @@ void GlViews::free_images() {
 }
 
 GlViews::~GlViews() {
-  for (const auto& [mesh, uploaded] : meshes_) {
-    glDeleteBuffers(1, &uploaded.buffer);
-    glDeleteVertexArrays(1, &uploaded.vertex_array);
-  }
   free_images();
+  for (const PixelBuffer& pixels : pixels_) glDeleteBuffers(1, &pixels.name);
   glDeleteProgram(program_);
 }
 
@@ -142,6 +214,7 @@ core::Status GlViews::set_size(int width, int height) {
   attach(&depth_image_, GL_R32F, GL_COLOR_ATTACHMENT0);
   attach(&label_image_, GL_R16UI, GL_COLOR_ATTACHMENT1);
   attach(&normal_image_, GL_RGBA32F, GL_COLOR_ATTACHMENT2);
+  attach(&color_image_, GL_RGBA8, GL_COLOR_ATTACHMENT3);
   attach(&depth_buffer_, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT);
   if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
     free_images();
@@ -153,54 +226,25 @@ core::Status GlViews::set_size(int width, int height) {
   return core::ok_status();
 }
 
-const GlViews::UploadedMesh& GlViews::uploaded(const MeshHandle& mesh) {
-  const auto known = meshes_.find(mesh.get());
-  if (known != meshes_.end()) {
-    if (known->second.mesh.lock() == mesh) return known->second;
-    // Another mesh at the address of one that is gone.
-    glDeleteBuffers(1, &known->second.buffer);
-    glDeleteVertexArrays(1, &known->second.vertex_array);
-    meshes_.erase(known);
-  }
-  // Corners are not shared, since normals belong to faces.
-  std::vector<float> data;
-  data.reserve(18 * mesh->triangles.size());
-  for (std::size_t i = 0; i < mesh->triangles.size(); ++i) {
-    for (const std::uint32_t index : mesh->triangles[i]) {
-      const Vector3f& p = mesh->vertices[index];
-      const Vector3f& n = mesh->normals[i];
-      data.insert(data.end(), {p.x(), p.y(), p.z(), n.x(), n.y(), n.z()});
+core::Status GlViews::render(std::span<const RenderJob> jobs, const RenderOptions& options,
+                             std::span<RenderedView> views) {
+  meshes_.forget_unused();
+  // The images of one view come back while the next one is drawn.
+  for (std::size_t i = 0; i <= jobs.size(); ++i) {
+    if (i < jobs.size()) {
+      PRESCENE_RETURN_IF_ERROR(draw(jobs[i], options));
+      send_back(options, &pixels_[i % 2]);
+    }
+    if (i > 0) {
+      PRESCENE_RETURN_IF_ERROR(take(options, pixels_[(i - 1) % 2], &views[i - 1]));
     }
   }
-  UploadedMesh entry;
-  entry.mesh = mesh;
-  entry.vertices = static_cast<int>(3 * mesh->triangles.size());
-  glGenVertexArrays(1, &entry.vertex_array);
-  glBindVertexArray(entry.vertex_array);
-  glGenBuffers(1, &entry.buffer);
-  glBindBuffer(GL_ARRAY_BUFFER, entry.buffer);
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(data.size() * sizeof(float)), data.data(), GL_STATIC_DRAW);
-  constexpr GLsizei kStride = 6 * sizeof(float);
-  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, kStride, nullptr);
-  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, kStride, reinterpret_cast<const void*>(3 * sizeof(float)));
-  glEnableVertexAttribArray(0);
-  glEnableVertexAttribArray(1);
-  return meshes_.emplace(mesh.get(), entry).first->second;
+  const GLenum error = glGetError();
+  if (error != GL_NO_ERROR) return gl_failure("OpenGL error " + std::to_string(error));
+  return core::ok_status();
 }
 
-void GlViews::forget_unused_meshes() {
-  for (auto i = meshes_.begin(); i != meshes_.end();) {
-    if (!i->second.mesh.expired()) {
-      ++i;
-      continue;
-    }
-    glDeleteBuffers(1, &i->second.buffer);
-    glDeleteVertexArrays(1, &i->second.vertex_array);
-    i = meshes_.erase(i);
-  }
-}
-
-core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options, RenderedView* view) {
+core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options) {
   const geometry::PinholeCamera& camera = job.camera;
   if (std::max(camera.width, camera.height) > max_image_size_)
     return core::unsupported("OpenGL renderer: an image of " + std::to_string(camera.width) + " x " +
@@ -209,19 +253,25 @@ core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options, R
   PRESCENE_RETURN_IF_ERROR(set_size(camera.width, camera.height));
   glBindFramebuffer(GL_FRAMEBUFFER, frame_);
   glViewport(0, 0, camera.width, camera.height);
-  constexpr std::array<GLenum, 3> kAll = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+  constexpr std::array<GLenum, 4> kAll = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
+                                          GL_COLOR_ATTACHMENT3};
   glDrawBuffers(static_cast<GLsizei>(kAll.size()), kAll.data());
   constexpr std::array<GLfloat, 4> kNothing = {0, 0, 0, 0};
   constexpr std::array<GLuint, 4> kNoLabel = {0, 0, 0, 0};
   constexpr GLfloat kFarthest = 1.0f;
+  const geometry::Rgb& back = options.lighting.background;
+  const std::array<GLfloat, 4> background = {static_cast<float>(back[0]) / 255.0f, static_cast<float>(back[1]) / 255.0f,
+                                             static_cast<float>(back[2]) / 255.0f, 1.0f};
   glClearBufferfv(GL_COLOR, 0, kNothing.data());
   glClearBufferuiv(GL_COLOR, 1, kNoLabel.data());
   glClearBufferfv(GL_COLOR, 2, kNothing.data());
+  glClearBufferfv(GL_COLOR, 3, background.data());
   glClearBufferfv(GL_DEPTH, 0, &kFarthest);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
   glDisable(GL_CULL_FACE);
   glDisable(GL_DITHER);
+  glDisable(GL_FRAMEBUFFER_SRGB);  // the shader does it
 
   glUseProgram(program_);
   // Pixel centres are at integers in our images, at halves in the device's.
@@ -233,46 +283,81 @@ core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options, R
   const double span = options.far_depth - options.near_depth;
   glUniform2f(clip_, static_cast<float>((options.far_depth + options.near_depth) / span),
               static_cast<float>(-2.0 * options.far_depth * options.near_depth / span));
+  const Vector3f light = (job.X_WC.rotation.conjugate() * options.lighting.towards_light_W.normalized()).cast<float>();
+  glUniform3fv(light_, 1, light.data());
+  glUniform2f(shares_, static_cast<float>(options.lighting.ambient), static_cast<float>(options.lighting.direct));
   const geometry::Pose X_CW = job.X_WC.inverse();
-  for (std::size_t i = 0; i < job.scene->instances.size(); ++i) {
-    const RenderInstance& instance = job.scene->instances[i];
-    if (instance.mesh->triangles.empty()) continue;
-    const geometry::Pose X_CM = X_CW * instance.X_WM;
-    const Eigen::Matrix3f rotation = X_CM.rotation.toRotationMatrix().cast<float>();
-    const Vector3f translation = X_CM.translation.cast<float>();
-    glUniformMatrix3fv(rotation_, 1, GL_FALSE, rotation.data());
-    glUniform3fv(translation_, 1, translation.data());
-    glUniform1ui(label_, static_cast<GLuint>(i + 1));
-    const UploadedMesh& mesh = uploaded(instance.mesh);
-    glBindVertexArray(mesh.vertex_array);
-    glDrawArrays(GL_TRIANGLES, 0, mesh.vertices);
-  }
-  read_back(options, view);
-  const GLenum error = glGetError();
-  if (error != GL_NO_ERROR) return gl_failure("OpenGL error " + std::to_string(error));
+  for (std::size_t i = 0; i < job.scene->instances.size(); ++i)
+    PRESCENE_RETURN_IF_ERROR(draw_instance(job.scene->instances[i], X_CW, static_cast<unsigned>(i + 1)));
   return core::ok_status();
 }
 
-void GlViews::read_back(const RenderOptions& options, RenderedView* view) {
-  const auto fit = [&](auto* image, const auto& empty_pixel) {
-    using Image = std::remove_reference_t<decltype(*image)>;
-    if (image->width() != width_ || image->height() != height_) *image = Image(width_, height_, empty_pixel);
-  };
-  fit(&view->depth, 0.0f);
-  fit(&view->labels, std::uint16_t{0});
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadBuffer(GL_COLOR_ATTACHMENT0);
-  glReadPixels(0, 0, width_, height_, GL_RED, GL_FLOAT, view->depth.data());
-  glReadBuffer(GL_COLOR_ATTACHMENT1);
-  glReadPixels(0, 0, width_, height_, GL_RED_INTEGER, GL_UNSIGNED_SHORT, view->labels.data());
-  if (!options.normals) {
-    view->normals = geometry::Image<Vector3f>();
-    return;
+core::Status GlViews::draw_instance(const RenderInstance& instance, const geometry::Pose& X_CW, unsigned label) {
+  if (instance.mesh->triangles.empty()) return core::ok_status();
+  PRESCENE_TRY(const GlMesh* mesh, meshes_.get(instance.mesh));
+  const geometry::Pose X_CM = X_CW * instance.X_WM;
+  const Eigen::Matrix3f rotation = X_CM.rotation.toRotationMatrix().cast<float>();
+  const Vector3f translation = X_CM.translation.cast<float>();
+  const Vector3f material = linear(instance.material.color).cast<float>();
+  glUniformMatrix3fv(rotation_, 1, GL_FALSE, rotation.data());
+  glUniform3fv(translation_, 1, translation.data());
+  glUniform1ui(label_, label);
+  glUniform1i(color_source_, mesh->texture != 0 ? kOfTexture : mesh->colored ? kOfVertices : kOfMaterial);
+  glUniform3fv(material_, 1, material.data());
+  glBindTexture(GL_TEXTURE_2D, mesh->texture);
+  glBindVertexArray(mesh->vertex_array);
+  glDrawArrays(GL_TRIANGLES, 0, mesh->vertices);
+  return core::ok_status();
+}
+
+void GlViews::send_back(const RenderOptions& options, PixelBuffer* pixels) const {
+  const Layout layout(width_, height_, options);
+  if (pixels->name == 0) glGenBuffers(1, &pixels->name);
+  glBindBuffer(GL_PIXEL_PACK_BUFFER, pixels->name);
+  if (layout.size > pixels->size) {
+    pixels->size = layout.size;
+    glBufferData(GL_PIXEL_PACK_BUFFER, static_cast<GLsizeiptr>(pixels->size), nullptr, GL_STREAM_READ);
   }
-  fit(&view->normals, Vector3f(Vector3f::Zero()));
-  static_assert(sizeof(Vector3f) == 3 * sizeof(float));
-  glReadBuffer(GL_COLOR_ATTACHMENT2);
-  glReadPixels(0, 0, width_, height_, GL_RGB, GL_FLOAT, view->normals.data());
+  pixels->width = width_;
+  pixels->height = height_;
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  const auto read = [&](GLenum from, GLenum format, GLenum type, std::size_t at) {
+    glReadBuffer(from);
+    glReadPixels(0, 0, width_, height_, format, type, reinterpret_cast<void*>(at));
+  };
+  read(GL_COLOR_ATTACHMENT0, GL_RED, GL_FLOAT, layout.depth);
+  read(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_SHORT, layout.labels);
+  if (options.normals) read(GL_COLOR_ATTACHMENT2, GL_RGB, GL_FLOAT, layout.normals);
+  if (options.color) read(GL_COLOR_ATTACHMENT3, GL_RGB, GL_UNSIGNED_BYTE, layout.color);
+  glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+}
+
+core::Status GlViews::take(const RenderOptions& options, const PixelBuffer& pixels, RenderedView* view) {
+  const Layout layout(pixels.width, pixels.height, options);
+  glBindBuffer(GL_PIXEL_PACK_BUFFER, pixels.name);
+  const auto* bytes = static_cast<const std::uint8_t*>(
+      glMapBufferRange(GL_PIXEL_PACK_BUFFER, 0, static_cast<GLsizeiptr>(layout.size), GL_MAP_READ_BIT));
+  if (bytes == nullptr) {
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    return gl_failure("the images can't be read");
+  }
+  static_assert(sizeof(Vector3f) == 3 * sizeof(float) && sizeof(geometry::Rgb) == 3);
+  copy_image(bytes + layout.depth, pixels.width, pixels.height, 0.0f, &view->depth);
+  copy_image(bytes + layout.labels, pixels.width, pixels.height, std::uint16_t{0}, &view->labels);
+  if (options.normals) {
+    copy_image(bytes + layout.normals, pixels.width, pixels.height, Vector3f(Vector3f::Zero()), &view->normals);
+  } else {
+    view->normals = geometry::Image<Vector3f>();
+  }
+  if (options.color) {
+    copy_image(bytes + layout.color, pixels.width, pixels.height, geometry::Rgb{}, &view->color);
+  } else {
+    view->color = geometry::ColorImage();
+  }
+  const bool kept = glUnmapBuffer(GL_PIXEL_PACK_BUFFER) == GL_TRUE;
+  glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+  if (!kept) return gl_failure("the images were lost on their way");
+  return core::ok_status();
 }
 
 }  // namespace prescene::rendering

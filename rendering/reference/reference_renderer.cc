@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/rendering/reference/reference_renderer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "prescene/core/check.h"
+#include "prescene/rendering/surface_color.h"
 #include "prescene/rendering/triangle_raster.h"
 
 namespace prescene::rendering {
@@ -19,7 +21,15 @@ constexpr int kMaxImageSize = 16384;
 struct ZBuffer {
   geometry::Image<double> inverse_depth;  ///< 0 = nothing.
   geometry::LabelImage* labels;
-  geometry::Image<Vector3f>* normals;  ///< Null = not wanted.
+  geometry::Image<Vector3f>* normals;    ///< Null = not wanted.
+  geometry::Image<std::uint32_t> faces;  ///< Of the instance's mesh; empty = not wanted.
+};
+
+/// A face as it is drawn.
+struct Face {
+  Vector3d corners_C[3];
+  std::uint16_t label;
+  std::uint32_t index;
 };
 
 ScreenPoint projected(const Vector3d& p_C, const geometry::PinholeCamera& camera) {
@@ -27,8 +37,9 @@ ScreenPoint projected(const Vector3d& p_C, const geometry::PinholeCamera& camera
   return snapped(pixel.x(), pixel.y());
 }
 
-void draw_triangle(const Vector3d (&corners)[3], const geometry::PinholeCamera& camera, const RenderOptions& options,
-                   std::uint16_t label, ZBuffer* buffer) {
+void draw_triangle(const Face& face, const geometry::PinholeCamera& camera, const RenderOptions& options,
+                   ZBuffer* buffer) {
+  const Vector3d(&corners)[3] = face.corners_C;
   Vector3d polygon[4];
   const int count = clip_to_near(corners, options.near_depth, polygon);
   if (count < 3) return;
@@ -54,7 +65,8 @@ void draw_triangle(const Vector3d (&corners)[3], const geometry::PinholeCamera& 
       const double inverse_depth = std::clamp(linear, 1.0 / z_max, 1.0 / z_min);
       if (inverse_depth <= buffer->inverse_depth(x, y) || inverse_depth * options.far_depth < 1.0) return;
       buffer->inverse_depth(x, y) = inverse_depth;
-      (*buffer->labels)(x, y) = label;
+      (*buffer->labels)(x, y) = face.label;
+      if (!buffer->faces.empty()) buffer->faces(x, y) = face.index;
       if (buffer->normals != nullptr) (*buffer->normals)(x, y) = towards_camera;
     });
   }
@@ -66,9 +78,32 @@ void draw_instance(const RenderInstance& instance, const geometry::Pose& X_CW, c
   std::vector<Vector3d> points_C;
   points_C.reserve(instance.mesh->vertices.size());
   for (const Vector3f& p_M : instance.mesh->vertices) points_C.push_back(X_CM * p_M.cast<double>().eval());
-  for (const auto& triangle : instance.mesh->triangles) {
-    const Vector3d corners[3] = {points_C[triangle[0]], points_C[triangle[1]], points_C[triangle[2]]};
-    draw_triangle(corners, camera, options, label, buffer);
+  for (std::size_t i = 0; i < instance.mesh->triangles.size(); ++i) {
+    const auto& triangle = instance.mesh->triangles[i];
+    const Face face = {
+        {points_C[triangle[0]], points_C[triangle[1]], points_C[triangle[2]]}, label, static_cast<std::uint32_t>(i)};
+    draw_triangle(face, camera, options, buffer);
+  }
+}
+
+/// The colours of what was drawn; its normals are there.
+void color_pixels(const RenderJob& job, const RenderOptions& options, const ZBuffer& buffer,
+                  geometry::ColorImage* color) {
+  const geometry::PinholeCamera& camera = job.camera;
+  *color = geometry::ColorImage(camera.width, camera.height, options.lighting.background);
+  const Vector3d towards_light = job.X_WC.rotation.conjugate() * options.lighting.towards_light_W.normalized();
+  std::vector<geometry::Pose> X_MC;
+  for (const RenderInstance& instance : job.scene->instances) X_MC.push_back(instance.X_WM.inverse() * job.X_WC);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const std::uint16_t label = (*buffer.labels)(x, y);
+      if (label == 0) continue;
+      const RenderInstance& instance = job.scene->instances[label - 1u];
+      const Vector3d p_C = camera.unproject(x, y, 1.0 / buffer.inverse_depth(x, y));
+      const LinearRgb own = own_color(*instance.mesh, buffer.faces(x, y), X_MC[label - 1u] * p_C, instance.material);
+      const double facing = std::max(0.0, (*buffer.normals)(x, y).cast<double>().dot(towards_light));
+      (*color)(x, y) = srgb(own * (options.lighting.ambient + options.lighting.direct * facing));
+    }
   }
 }
 
@@ -91,10 +126,10 @@ class ReferenceRenderer final : public Renderer {
     const int width = job.camera.width;
     const int height = job.camera.height;
     view->labels = geometry::LabelImage(width, height, 0);
-    view->normals =
-        options.normals ? geometry::Image<Vector3f>(width, height, Vector3f::Zero()) : geometry::Image<Vector3f>();
-    ZBuffer buffer{geometry::Image<double>(width, height, 0.0), &view->labels,
-                   options.normals ? &view->normals : nullptr};
+    const bool normals = options.normals || options.color;
+    view->normals = normals ? geometry::Image<Vector3f>(width, height, Vector3f::Zero()) : geometry::Image<Vector3f>();
+    ZBuffer buffer{geometry::Image<double>(width, height, 0.0), &view->labels, normals ? &view->normals : nullptr,
+                   options.color ? geometry::Image<std::uint32_t>(width, height) : geometry::Image<std::uint32_t>()};
     const geometry::Pose X_CW = job.X_WC.inverse();
     for (std::size_t i = 0; i < job.scene->instances.size(); ++i)
       draw_instance(job.scene->instances[i], X_CW, job.camera, options, static_cast<std::uint16_t>(i + 1), &buffer);
@@ -103,6 +138,9 @@ class ReferenceRenderer final : public Renderer {
     for (std::size_t i = 0; i < view->depth.size(); ++i)
       if (buffer.inverse_depth.data()[i] > 0.0)
         view->depth.data()[i] = static_cast<float>(1.0 / buffer.inverse_depth.data()[i]);
+    view->color = geometry::ColorImage();
+    if (options.color) color_pixels(job, options, buffer, &view->color);
+    if (!options.normals) view->normals = geometry::Image<Vector3f>();
   }
 };
 

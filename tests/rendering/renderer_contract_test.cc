@@ -301,6 +301,10 @@ TEST_P(RendererContract, RefusesWhatCanNotBeDrawn) {
   inside_out.far_depth = 1.0;
   EXPECT_EQ(renderer_->render(scene, camera, Pose::identity(), inside_out, &view).code(),
             core::StatusCode::kInvalidInput);
+  RenderOptions dark;
+  dark.color = true;
+  dark.lighting.towards_light_W = Vector3d::Zero();
+  EXPECT_EQ(renderer_->render(scene, camera, Pose::identity(), dark, &view).code(), core::StatusCode::kInvalidInput);
   Pose nowhere;
   nowhere.translation.x() = std::nan("");
   EXPECT_EQ(renderer_->render(scene, camera, nowhere, {}, &view).code(), core::StatusCode::kInvalidInput);
@@ -308,6 +312,158 @@ TEST_P(RendererContract, RefusesWhatCanNotBeDrawn) {
   const core::Status status = renderer_->render(scene, camera, Pose::identity(), {}, &view);
   EXPECT_EQ(status.code(), core::StatusCode::kInvalidInput);
   EXPECT_NE(status.message().find("65535"), std::string::npos);
+}
+
+/// Largest difference of a channel, and how many pixels differ by more than `step`, away from where labels change.
+struct ColorDifference {
+  int compared = 0;
+  int worst = 0;
+};
+
+ColorDifference compare_colors(const RenderedView& a, const RenderedView& b) {
+  ColorDifference result;
+  const auto label = [&](int x, int y) { return b.labels(x, y); };
+  for (int y = 1; y + 1 < b.labels.height(); ++y) {
+    for (int x = 1; x + 1 < b.labels.width(); ++x) {
+      // At silhouettes and edges either surface is right.
+      bool inside = a.labels(x, y) == label(x, y);
+      for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+        inside = inside && label(x + dx, y + dy) == label(x, y);
+        inside = inside && b.normals(x + dx, y + dy).dot(b.normals(x, y)) > 0.9999f * b.normals(x, y).squaredNorm();
+      }
+      if (!inside) continue;
+      ++result.compared;
+      for (std::size_t c = 0; c < 3; ++c)
+        result.worst = std::max(result.worst, std::abs(a.color(x, y)[c] - b.color(x, y)[c]));
+    }
+  }
+  return result;
+}
+
+/// A square of two triangles in the plane z = 0, its texture once over it.
+geometry::TriangleMesh square(double half) {
+  geometry::TriangleMesh mesh;
+  mesh.vertices = {{-half, -half, 0.0}, {half, -half, 0.0}, {half, half, 0.0}, {-half, half, 0.0}};
+  mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+  return mesh;
+}
+std::vector<std::array<Eigen::Vector2f, 3>> places_of(const geometry::TriangleMesh& mesh, double half, float repeats) {
+  std::vector<std::array<Eigen::Vector2f, 3>> places;
+  for (const auto& triangle : mesh.triangles) {
+    std::array<Eigen::Vector2f, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3d& p = mesh.vertices[triangle[k]];
+      corners[k] = repeats * ((p.head<2>() / half).cast<float>() * 0.5f + Eigen::Vector2f(0.5f, 0.5f));
+    }
+    places.push_back(corners);
+  }
+  return places;
+}
+
+RenderOptions colored() {
+  RenderOptions options;
+  options.color = true;
+  options.normals = true;
+  return options;
+}
+
+TEST_P(RendererContract, DrawsTheColorsOfTheReference) {
+  RandomStream stream(5, Purpose::kTest);
+  auto texture = std::make_shared<geometry::ColorImage>(23, 17);
+  for (std::size_t i = 0; i < texture->size(); ++i)
+    for (std::uint8_t& channel : texture->data()[i]) channel = static_cast<std::uint8_t>(stream.uniform(0.0, 256.0));
+  const auto reference = make_reference_renderer();
+  int compared = 0;
+  for (int view = 0; view < 12; ++view) {
+    RenderScene scene;
+    const geometry::PinholeCamera camera = camera_of_width(160);
+    const geometry::TriangleMesh sheet = tests::twenty_meshes()[17].mesh;
+    const geometry::TriangleMesh ball = geometry::make_mesh(geometry::Sphere{0.1}, 12);
+    const geometry::TriangleMesh flat = square(0.15);
+    MeshLook spotted, printed;
+    for (std::size_t i = 0; i < ball.vertices.size(); ++i) {
+      geometry::Rgb color;
+      for (std::uint8_t& channel : color) channel = static_cast<std::uint8_t>(stream.uniform(0.0, 256.0));
+      spotted.vertex_colors.push_back(color);
+    }
+    printed.texture_places = places_of(flat, 0.15, 1.7f);
+    printed.texture = texture;
+    Pose X_WC;
+    X_WC.rotation = geometry::uniform_rotation(stream);
+    X_WC.translation = geometry::normal_vector(stream);
+    for (const MeshHandle& mesh :
+         {make_render_mesh(sheet), make_render_mesh(ball, spotted), make_render_mesh(flat, printed)})
+      scene.instances.push_back({mesh, X_WC * tests::random_view_pose(camera, 0.4, 0.8, stream),
+                                 SurfaceMaterial::opaque({200, 90, 30}), false});
+    // Closer than the near plane in some: cut triangles have the same places.
+    RenderOptions options = colored();
+    options.near_depth = view % 3 == 0 ? 0.5 : 0.02;
+    RenderedView expected;
+    ASSERT_TRUE(reference->render(scene, camera, X_WC, options, &expected).ok());
+    const ColorDifference difference = compare_colors(render(scene, camera, X_WC, options), expected);
+    compared += difference.compared;
+    // Texels of random colours change by 255 within a few pixels, and devices compute in single precision.
+    EXPECT_LE(difference.worst, 2) << "view " << view;
+  }
+  EXPECT_GT(compared, 25000);
+}
+
+TEST_P(RendererContract, LightsInLinearLight) {
+  // By hand: half of the light of sRGB 255 is 188, of 128 is 92.
+  RenderScene scene;
+  Pose facing;
+  facing.rotation = Eigen::AngleAxisd(M_PI, Vector3d::UnitX());
+  facing.translation = {0.0, 0.0, 1.0};
+  scene.instances = {{make_render_mesh(square(0.2)), facing, SurfaceMaterial::opaque({255, 128, 0}), false}};
+  RenderOptions options = colored();
+  options.lighting.background = {10, 20, 30};
+  const geometry::PinholeCamera camera = camera_of_width(64);
+  const auto middle = [&](double ambient, double direct, const Vector3d& towards_light) {
+    options.lighting.ambient = ambient;
+    options.lighting.direct = direct;
+    options.lighting.towards_light_W = towards_light;
+    return render(scene, camera, Pose::identity(), options).color(32, 24);
+  };
+  const Vector3d from_camera(0.0, 0.0, -3.0);
+  EXPECT_EQ(middle(1.0, 0.0, from_camera), (geometry::Rgb{255, 128, 0}));
+  EXPECT_EQ(middle(0.5, 0.0, from_camera), (geometry::Rgb{188, 92, 0}));
+  EXPECT_EQ(middle(0.0, 0.5, from_camera), (geometry::Rgb{188, 92, 0}));
+  EXPECT_EQ(middle(0.25, 0.25, from_camera), (geometry::Rgb{188, 92, 0}));
+  // From 60 degrees to the side, and from behind.
+  EXPECT_EQ(middle(0.0, 1.0, {std::sqrt(3.0), 0.0, -1.0}), (geometry::Rgb{188, 92, 0}));
+  EXPECT_EQ(middle(0.0, 1.0, {0.0, 0.0, 1.0}), (geometry::Rgb{0, 0, 0}));
+  EXPECT_EQ(middle(5.0, 0.0, from_camera), (geometry::Rgb{255, 255, 0}));
+  EXPECT_EQ(render(scene, camera, Pose::identity(), options).color(0, 0), (geometry::Rgb{10, 20, 30}));
+  options.color = false;
+  EXPECT_TRUE(render(scene, camera, Pose::identity(), options).color.empty());
+}
+
+TEST_P(RendererContract, PutsTexturesTheRightWayUp) {
+  auto texture = std::make_shared<geometry::ColorImage>(2, 2);
+  (*texture)(0, 0) = {255, 0, 0};
+  (*texture)(1, 0) = {0, 255, 0};
+  (*texture)(0, 1) = {0, 0, 255};
+  (*texture)(1, 1) = {255, 255, 255};
+  const geometry::TriangleMesh flat = square(0.2);
+  MeshLook look;
+  look.texture_places = places_of(flat, 0.2, 1.0f);
+  look.texture = texture;
+  look.vertex_colors.assign(4, {1, 2, 3});  // the texture goes before
+  // Axes as the camera's: u to the right, v down.
+  RenderScene scene;
+  scene.instances = {{make_render_mesh(flat, look), Pose::from_translation({0.0, 0.0, 1.0}), {}, false}};
+  RenderOptions options = colored();
+  options.lighting.ambient = 1.0;
+  options.lighting.direct = 0.0;
+  const geometry::PinholeCamera camera = {101, 101, 100.0, 100.0, 50.0, 50.0};
+  const RenderedView view = render(scene, camera, Pose::identity(), options);
+  // 40 pixels wide: texel centres are 10 from the middle.
+  EXPECT_EQ(view.color(40, 40), (*texture)(0, 0));
+  EXPECT_EQ(view.color(60, 40), (*texture)(1, 0));
+  EXPECT_EQ(view.color(40, 60), (*texture)(0, 1));
+  EXPECT_EQ(view.color(60, 60), (*texture)(1, 1));
+  // Half-way between red and green, in linear light.
+  EXPECT_EQ(view.color(50, 40), (geometry::Rgb{188, 188, 0}));
 }
 
 TEST_P(RendererContract, GivesTheSameBitsAgainWhereItPromises) {
