@@ -50,8 +50,10 @@ core::Result<geometry::ColorImage> mesh_picture(const rendering::MeshHandle& mes
   options.near_depth = 0.1 * radius;
   options.far_depth = 10.0 * radius;
   options.normals = true;
+  options.color = !mesh->look.vertex_colors.empty();
   rendering::RenderedView view;
   PRESCENE_RETURN_IF_ERROR(renderer->render(scene, camera, X_WC, options, &view));
+  if (options.color) return std::move(view.color);
   geometry::ColorImage picture;
   rendering::shade(scene, view, X_WC, {}, &picture);
   return picture;
@@ -99,7 +101,7 @@ core::Status write_mesh_report(const std::filesystem::path& path, const MeshInsp
     contents.facts.emplace_back("mass",
                                 fixed_text(found.mass->mass, 4) + " kg at " + fixed_text(found.density, 0) + " kg/m^3");
 
-  const rendering::MeshHandle mesh = rendering::make_render_mesh(found.loaded.mesh);
+  const rendering::MeshHandle mesh = rendering::make_render_mesh(found.loaded.mesh, {found.loaded.colors, {}, nullptr});
   const geometry::Vector3d center = found.box.center();
   const double radius = 0.5 * found.box.diagonal().norm();
   interfaces::PictureBlock views;
