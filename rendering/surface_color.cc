@@ -39,12 +39,12 @@ double srgb_of_linear(double value) {
 }
 
 LinearRgb linear(const geometry::Rgb& color) {
-  static const std::array<double, 256> table = [] {
+  static const std::array<double, 256> kTable = [] {
     std::array<double, 256> values{};
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = linear_of_srgb(static_cast<double>(i) / 255.0);
     return values;
   }();
-  return {table[color[0]], table[color[1]], table[color[2]]};
+  return {kTable[color[0]], kTable[color[1]], kTable[color[2]]};
 }
 
 geometry::Rgb srgb(const LinearRgb& color) {
