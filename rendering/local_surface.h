@@ -3,6 +3,7 @@
 // be judged by it.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "prescene/geometry/camera.h"
@@ -11,9 +12,10 @@
 namespace prescene::rendering {
 
 struct LocalSurfaceOptions {
-  int window = 3;               ///< Pixels each way.
-  double same_surface = 0.015;  ///< m; neighbours further than this from their median belong to another surface.
-  double fewest = 0.5;          ///< Share of the window's pixels that must be measured, of one surface.
+  int window = 3;  ///< Pixels each way.
+  double same_surface =
+      0.015;            ///< m; neighbours further than this from a plane through their middle are of another surface.
+  double fewest = 0.5;  ///< Share of the window's pixels that must be measured, of one surface.
 };
 
 struct LocalSurface {
@@ -25,5 +27,9 @@ struct LocalSurface {
 /// are of one surface.
 std::optional<LocalSurface> local_surface(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                                           int x, int y, const LocalSurfaceOptions& options = {});
+
+/// Of each pixel, how far the nearest pixel that is not 0 in `marked` is, in pixels: by two sweeps over the eight
+/// neighbours (chamfer), exact along rows, columns and diagonals. 1e6 where none is marked.
+geometry::Image<float> distance_to_marked(const geometry::Image<std::uint8_t>& marked);
 
 }  // namespace prescene::rendering

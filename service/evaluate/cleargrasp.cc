@@ -15,7 +15,9 @@ namespace prescene::service {
 namespace {
 
 namespace fs = std::filesystem;
+
 constexpr double kMetresPerUnit = 1e-4;  // of the depth images
+
 /// The painted twin without what is not of the mask.
 geometry::DepthImage painted_objects(const ClearGraspFrame& frame) {
   geometry::DepthImage depth = frame.painted;
@@ -25,29 +27,12 @@ geometry::DepthImage painted_objects(const ClearGraspFrame& frame) {
   return depth;
 }
 
-/// Distances to the nearest pixel that is not of the mask, by two sweeps (chamfer).
+/// Distances to the nearest pixel that is not of the mask.
 geometry::Image<float> distance_to_outline(const geometry::LabelImage& mask) {
-  constexpr float kFar = 1e6f;
-  constexpr float kDiagonal = 1.41421356f;
-  geometry::Image<float> distance(mask.width(), mask.height(), kFar);
+  geometry::Image<std::uint8_t> outside(mask.width(), mask.height());
   for (int y = 0; y < mask.height(); ++y)
-    for (int x = 0; x < mask.width(); ++x)
-      if (mask(x, y) == 0) distance(x, y) = 0.0f;
-  const auto relax = [&](int x, int y, int from_x, int from_y, float length) {
-    if (from_x < 0 || from_y < 0 || from_x >= mask.width() || from_y >= mask.height()) return;
-    distance(x, y) = std::min(distance(x, y), distance(from_x, from_y) + length);
-  };
-  const auto sweep = [&](int x, int y, int back) {
-    relax(x, y, x + back, y, 1.0f);
-    relax(x, y, x, y + back, 1.0f);
-    relax(x, y, x + back, y + back, kDiagonal);
-    relax(x, y, x - back, y + back, kDiagonal);
-  };
-  for (int y = 0; y < mask.height(); ++y)
-    for (int x = 0; x < mask.width(); ++x) sweep(x, y, -1);
-  for (int y = mask.height() - 1; y >= 0; --y)
-    for (int x = mask.width() - 1; x >= 0; --x) sweep(x, y, 1);
-  return distance;
+    for (int x = 0; x < mask.width(); ++x) outside(x, y) = mask(x, y) == 0 ? 1 : 0;
+  return rendering::distance_to_marked(outside);
 }
 
 void add(double log_ratio, ClearGraspShare* share) {
