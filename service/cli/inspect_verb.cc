@@ -7,6 +7,7 @@
 
 #include "inspect_recording.h"
 #include "prescene/core/text.h"
+#include "prescene/service/depth_noise.h"
 #include "prescene/service/mesh_inspection.h"
 #include "prescene/service/prediction_report.h"
 #include "verb.h"
@@ -24,11 +25,13 @@ struct Options {
   MeshInspectionOptions inspection;
   RecordingInspection recording;
   std::string scene;
+  bool depth_noise = false;
   const CLI::App* verb = nullptr;
 };
 
 constexpr const char* kMeshOptions[] = {"--output", "--density", "--scale", "--y-up", "--report"};
-constexpr const char* kRecordingOptions[] = {"--frame", "--scene", "--overlay", "--likelihood-map", "--depth-scale"};
+constexpr const char* kRecordingOptions[] = {"--frame",          "--scene",       "--overlay",
+                                             "--likelihood-map", "--depth-scale", "--depth-noise"};
 
 bool is_recording(const std::filesystem::path& path) {
   return path.extension() == ".mcap" || std::filesystem::is_directory(path);
@@ -81,6 +84,30 @@ std::string text_of(const MeshInspection& found) {
   return text;
 }
 
+std::string text_of(const DepthNoise& noise) {
+  std::vector<std::vector<std::string>> rows = {{"class", "up to", "pixels", "sigma / depth^2, 1/m", "missing, %"}};
+  const auto add = [&rows](const char* name, const std::vector<DepthNoiseClass>& classes) {
+    for (const DepthNoiseClass& c : classes)
+      rows.push_back({name, fixed_text(c.limit, 2), std::to_string(c.pixels), fixed_text(c.sigma, 5),
+                      fixed_text(100.0 * c.missing, 1)});
+  };
+  add("depth, m", noise.by_depth);
+  add("cosine of incidence", noise.by_incidence);
+  add("pixels from an edge", noise.by_edge);
+  std::string text = std::to_string(noise.frames) + " frames, " + std::to_string(noise.pixels) + " pixels\n" +
+                     table(rows) + "\nsigma over time " + fixed_text(noise.sigma_over_time, 5) + " / m x depth^2, " +
+                     fixed_text(100.0 * noise.missing, 1) + " % missing, " + fixed_text(100.0 * noise.outliers, 2) +
+                     " % outliers (frontal, far from edges)\n";
+  if (noise.quantisation_per_depth_squared)
+    text += "steps of " + fixed_text(*noise.quantisation_per_depth_squared, 5) + " / m x depth^2\n";
+  if (noise.step) text += "steps of " + fixed_text(1e3 * *noise.step, 2) + " mm\n";
+  text += "settings of the sensor model (SensorModelOptions; FilterSettings::frame.sensor of the library):\n";
+  const auto json = to_json(noise)["settings"];
+  for (const auto& [name, value] : json.items()) text += "  " + name + " = " + value.dump() + "\n";
+  for (const std::string& remark : noise.remarks) text += "remark: " + remark + "\n";
+  return text;
+}
+
 core::Status inspect_mesh(Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.file, options.report}));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.file}));
@@ -100,6 +127,15 @@ core::Status run(Options& options, VerbContext& context) {
   const bool recording = is_recording(options.file);
   PRESCENE_RETURN_IF_ERROR(check_options(options, recording));
   if (!recording) return inspect_mesh(options, context);
+  if (options.depth_noise) {
+    for (const char* name : {"--frame", "--scene", "--overlay", "--likelihood-map"})
+      if (options.verb->count(name) > 0)
+        return core::invalid_input(std::string(name) + " does not go with --depth-noise: leave one of them out");
+    PRESCENE_TRY(const DepthNoise noise, depth_noise_of(options.file, options.recording.input.metres_per_unit,
+                                                        context.progress("reading"), context.cancellation()));
+    context.print(to_json(noise), text_of(noise));
+    return core::ok_status();
+  }
   options.recording.input.path = options.file;
   options.recording.input.scene_file = options.scene;
   return inspect_recording(options.recording, context);
@@ -134,6 +170,8 @@ Verb add_inspect_verb(CLI::App& app) {
                    "Of a folder: metres per unit of the depth images")
       ->check(positive_number())
       ->capture_default_str();
+  verb->add_flag("--depth-noise", options->depth_noise,
+                 "Of a recording in which nothing moves: the depth camera's noise, and the sensor model's settings");
   verb->add_option("--overlay", options->recording.overlay,
                    "Of a recording: write a PNG of the camera's picture with the belief drawn over it");
   verb->add_option("--likelihood-map", options->recording.likelihood_map,
