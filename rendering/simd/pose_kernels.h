@@ -2,6 +2,9 @@
 // What is compiled for each instruction set.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "pose_tile.h"
 #include "prescene/rendering/camera_equations.h"
 #include "prescene/rendering/likelihood_batch.h"
@@ -11,6 +14,18 @@ namespace prescene::rendering {
 
 /// Images are read in blocks of this many pixels, which end within the image: none may be narrower.
 inline constexpr int kBlock = 16;
+
+/// For each set of 8 lanes (a bit each) the numbers of its lanes in order, then of the others, 4 bits each.
+inline constexpr std::array<std::uint32_t, 256> kPackedLanes = [] {
+  std::array<std::uint32_t, 256> packed{};
+  for (std::uint32_t set = 0; set < 256; ++set) {
+    std::uint32_t place = 0;
+    for (const bool chosen : {true, false})
+      for (std::uint32_t lane = 0; lane < 8; ++lane)
+        if (((set >> lane & 1u) != 0) == chosen) packed[set] |= lane << (4 * place++);
+  }
+  return packed;
+}();
 
 /// What evidence is summed with.
 struct EvidenceTerms {

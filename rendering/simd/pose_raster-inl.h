@@ -29,11 +29,28 @@ using I = hn::Vec<DI>;
 HWY_INLINE F set(float value) { return hn::Set(DF(), value); }
 HWY_INLINE I set(std::int32_t value) { return hn::Set(DI(), value); }
 
+/// The lanes of the mask side by side, others behind them.
+template <class D, class V>
+HWY_INLINE V packed(V values, hn::Mask<D> chosen, [[maybe_unused]] D d) {
+#if HWY_TARGET == HWY_AVX2
+  // As the library's, but for its table, which compilers copy with each use.
+  const DI di;
+  HWY_ALIGN std::uint8_t bits[8];
+  hn::StoreMaskBits(d, chosen, bits);
+  const auto nibbles = hn::Set(hn::RebindToUnsigned<DI>(), kPackedLanes[bits[0]]);
+  const auto shifts = hn::BitCast(hn::RebindToUnsigned<DI>(), hn::ShiftLeft<2>(hn::Iota(di, 0)));
+  const auto places = hn::And(hn::Shr(nibbles, shifts), hn::Set(hn::RebindToUnsigned<DI>(), 7));
+  return hn::TableLookupLanes(values, hn::IndicesFromVec(d, hn::BitCast(di, places)));
+#else
+  return hn::Compress(values, chosen);
+#endif
+}
+
 /// Stores the lanes of the mask side by side, and others behind them: a whole vector, since storing a part of one is
 /// slow on some processors.
 template <class D, class V>
 HWY_INLINE void store_chosen(V values, hn::Mask<D> chosen, D d, hn::TFromD<D>* to) {
-  hn::StoreU(hn::Compress(values, chosen), d, to);
+  hn::StoreU(packed(values, chosen, d), d, to);
 }
 
 HWY_INLINE hn::Mask<DI> not_above(I a, I b) { return hn::Not(hn::Gt(a, b)); }
