@@ -16,6 +16,7 @@ find_package(LZ4 REQUIRED)                     # LZ4::lz4
 find_package(Zstd REQUIRED)                    # Zstd::zstd
 find_package(Ceres REQUIRED)                   # Ceres::ceres
 find_package(assimp REQUIRED)                  # assimp::assimp
+find_package(meshoptimizer REQUIRED)          # meshoptimizer::meshoptimizer
 find_package(Bullet64 REQUIRED)                # Bullet::float64, Bullet::hacd
 find_package(CycloneDDS REQUIRED)              # CycloneDDS::ddsc, idlc_generate()
 option(PRESCENE_EGL "Build what draws and computes on OpenGL" ON)

@@ -89,11 +89,11 @@ float measured_depth(float depth, const SensorModelOptions& options) {
   return std::clamp(depth, static_cast<float>(options.min_depth), static_cast<float>(options.max_depth));
 }
 
-float absent_density(const SensorModel& model, const AbsentMixture& absent, float depth) {
+float inverse_absent(const SensorModel& model, const AbsentMixture& absent, float depth) {
   if (depth <= 0.0f) return 0.0f;
   // The range's ends as rounded to single precision may lie outside of it.
   const double z = std::clamp(static_cast<double>(depth), model.options().min_depth, model.options().max_depth);
-  return static_cast<float>(model.density(absent, z));
+  return static_cast<float>(1.0 / model.density(absent, z));
 }
 
 void sample_colors(const FrameTermsInput& input, int step, int offset, double exponent, FrameTerms* terms) {
@@ -109,6 +109,13 @@ void sample_colors(const FrameTermsInput& input, int step, int offset, double ex
       for (int x = 0; x < image.width(); ++x)
         image(x, y) = ratio_of_bin[ColorHistogram::bin(input.color(offset + step * x, offset + step * y))];
   }
+}
+
+void measure_rays(const geometry::PinholeCamera& camera, geometry::Image<float>* inverse_ray) {
+  resize(inverse_ray, camera.width, camera.height);
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x)
+      (*inverse_ray)(x, y) = static_cast<float>(1.0 / camera.unproject(x, y, 1.0).norm());
 }
 
 }  // namespace
@@ -133,11 +140,13 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
   terms->model = model;
   terms->tempering = options.tempering;
   terms->step = step;
-  terms->camera = input.camera.subsampled(step, offset);
+  const geometry::PinholeCamera camera = input.camera.subsampled(step, offset);
+  if (!(terms->camera == camera) || terms->inverse_ray.empty()) measure_rays(camera, &terms->inverse_ray);
+  terms->camera = camera;
   const int width = terms->camera.width;
   const int height = terms->camera.height;
-  for (geometry::Image<float>* image :
-       {&terms->depth, &terms->absent, &terms->absent_peak, &terms->absent_missing, &terms->known})
+  for (geometry::Image<float>* image : {&terms->depth, &terms->inverse_absent, &terms->absent_peak,
+                                        &terms->absent_missing, &terms->inverse_returns, &terms->known})
     resize(image, width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -146,9 +155,10 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
       const AbsentMixture absent = absent_mixture(input, model, full_x, full_y);
       const float depth = measured_depth(input.depth(full_x, full_y), model.options());
       terms->depth(x, y) = depth;
-      terms->absent(x, y) = absent_density(model, absent, depth);
+      terms->inverse_absent(x, y) = inverse_absent(model, absent, depth);
       terms->absent_peak(x, y) = static_cast<float>(absent.peak_depth);
       terms->absent_missing(x, y) = static_cast<float>(absent.missing);
+      terms->inverse_returns(x, y) = static_cast<float>(1.0 / (1.0 - absent.missing));
       terms->known(x, y) = 0.0f;
     }
   }
@@ -170,7 +180,7 @@ void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& kn
       absent.peak_depth = nearest;
       absent.peak_sigma = background_sigma(frame.model, nearest);
       absent.peak_weight = options.background_weight;
-      terms->absent(x, y) = absent_density(frame.model, absent, terms->depth(x, y));
+      terms->inverse_absent(x, y) = inverse_absent(frame.model, absent, terms->depth(x, y));
       terms->absent_peak(x, y) = nearest;
       terms->absent_missing(x, y) = -1.0f;
     }

@@ -56,12 +56,14 @@ struct FrameTermsOptions {
 struct FrameTerms {
   SensorModel model;
   TemperingOptions tempering;
-  geometry::PinholeCamera camera;         ///< Of the reduced images.
-  int step = 1;                           ///< Full-image pixels between two sampled ones.
-  geometry::DepthImage depth;             ///< Measured, cut to the model's range; 0 = missing.
-  geometry::Image<float> absent;          ///< p(z | object absent), 1/m; 0 where missing.
-  geometry::Image<float> absent_peak;     ///< Depth that the absent model expects, 0 = none.
-  geometry::Image<float> absent_missing;  ///< Probability of no return when absent; negative = not known.
+  geometry::PinholeCamera camera;          ///< Of the reduced images.
+  int step = 1;                            ///< Full-image pixels between two sampled ones.
+  geometry::DepthImage depth;              ///< Measured, cut to the model's range; 0 = missing.
+  geometry::Image<float> inverse_ray;      ///< 1 / length of the ray through the pixel that has z = 1.
+  geometry::Image<float> inverse_absent;   ///< 1 / p(z | object absent), m; 0 where missing.
+  geometry::Image<float> absent_peak;      ///< Depth that the absent model expects, 0 = none.
+  geometry::Image<float> absent_missing;   ///< Probability of no return when absent; negative = not known.
+  geometry::Image<float> inverse_returns;  ///< 1 / (1 - that); without meaning where it is not known.
   geometry::DepthImage known;  ///< Nearest other known surface, 0 = none; what lies behind it carries no evidence.
   std::vector<geometry::Image<float>> color_ratio;  ///< One a colour model: (p(c|object) / p(c|rest))^beta.
 };

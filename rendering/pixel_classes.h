@@ -20,6 +20,16 @@ inline constexpr float kMinRatio = 1e-12f;
 /// Depth from which objects are drawn, m: a hair beyond the range's start, where the occluder's interval has no length.
 inline float nearest_drawn(const SensorModelOptions& options) { return static_cast<float>(options.min_depth) + 1e-4f; }
 
+/// 1 / sigma of a hit, 1/m: scale w^2 min(1, max(least, cosine * per_cosine)) at 1/z = w.
+struct HitPrecision {
+  explicit HitPrecision(const SensorModelOptions& options)
+      : scale(static_cast<float>(1.0 / options.sigma_per_depth_squared)),
+        per_cosine(static_cast<float>(1.0 / options.incidence_knee)),
+        least(static_cast<float>(1.0 / options.incidence_max_growth)) {}
+
+  float scale, per_cosine, least;
+};
+
 /// The parts of a pixel's mixture that depend only on the material and the class of the pixel.
 struct PixelClass {
   float hit = 0.0f;  ///< Weight over sqrt(2 pi).

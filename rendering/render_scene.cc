@@ -4,36 +4,17 @@
 #include <algorithm>
 #include <atomic>
 
+#include "mesh_clusters.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/mass_properties.h"
 
 namespace prescene::rendering {
 namespace {
 
-MeshLanes lanes_of(const RenderMesh& mesh) {
-  MeshLanes lanes;
-  const auto filled = [](std::size_t count) {
-    return (count + MeshLanes::kMultiple - 1) / MeshLanes::kMultiple * MeshLanes::kMultiple;
-  };
-  for (std::size_t i = 0; i < filled(mesh.vertices.size()); ++i) {
-    const Vector3f& p = mesh.vertices[std::min(i, mesh.vertices.size() - 1)];
-    lanes.x.push_back(p.x());
-    lanes.y.push_back(p.y());
-    lanes.z.push_back(p.z());
-  }
-  for (std::size_t i = 0; i < filled(mesh.triangles.size()); ++i) {
-    const bool there = i < mesh.triangles.size();
-    const std::array<std::uint32_t, 3> corners = there ? mesh.triangles[i] : std::array<std::uint32_t, 3>{0, 0, 0};
-    lanes.a.push_back(static_cast<std::int32_t>(corners[0]));
-    lanes.b.push_back(static_cast<std::int32_t>(corners[1]));
-    lanes.c.push_back(static_cast<std::int32_t>(corners[2]));
-    const Vector3f normal = there ? mesh.normals[i] : Vector3f(0.0f, 0.0f, 0.0f);
-    lanes.normal_x.push_back(normal.x());
-    lanes.normal_y.push_back(normal.y());
-    lanes.normal_z.push_back(normal.z());
-    lanes.offset.push_back(there ? mesh.offsets[i] : 0.0f);
-  }
-  return lanes;
+/// Normal to a triangle, as long as twice its area.
+geometry::Vector3d cross_of(const geometry::TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
+  const geometry::Vector3d& a = mesh.vertices[triangle[0]];
+  return (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
 }
 
 }  // namespace
@@ -57,21 +38,29 @@ MeshHandle make_render_mesh(const geometry::TriangleMesh& mesh, const MeshLook& 
   if (!look.texture_places.empty()) result->look.texture = look.texture;
   result->vertices.reserve(mesh.vertices.size());
   for (const geometry::Vector3d& vertex : mesh.vertices) result->vertices.push_back(vertex.cast<float>());
+  std::vector<TriangleCorners> triangles;
+  std::vector<std::size_t> sources;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& triangle = mesh.triangles[i];
     for (const std::uint32_t index : triangle)
       PRESCENE_CHECK_MSG(index < mesh.vertices.size(), "a mesh must be repaired before it is rendered");
-    const geometry::Vector3d& a = mesh.vertices[triangle[0]];
-    const geometry::Vector3d cross = (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
-    const double twice_area = cross.norm();
-    if (!(twice_area > 0.0)) continue;
-    if (!look.texture_places.empty()) result->look.texture_places.push_back(look.texture_places[i]);
-    result->triangles.push_back(triangle);
-    result->normals.push_back((cross / twice_area).cast<float>());
-    result->offsets.push_back(static_cast<float>(cross.dot(a) / twice_area));
+    if (!(cross_of(mesh, triangle).norm() > 0.0)) continue;
+    triangles.push_back(triangle);
+    sources.push_back(i);
   }
-  if (result->triangles.empty()) return result;
-  result->lanes = lanes_of(*result);
+  if (triangles.empty()) return result;
+  const std::vector<TriangleCluster> clusters = cluster_triangles(result->vertices, triangles);
+  for (const TriangleCluster& cluster : clusters) {
+    for (const std::size_t i : cluster.triangles) {
+      const geometry::Vector3d cross = cross_of(mesh, triangles[i]);
+      const double twice_area = cross.norm();
+      result->triangles.push_back(triangles[i]);
+      result->normals.push_back((cross / twice_area).cast<float>());
+      result->offsets.push_back(static_cast<float>(cross.dot(mesh.vertices[triangles[i][0]]) / twice_area));
+      if (!look.texture_places.empty()) result->look.texture_places.push_back(look.texture_places[sources[i]]);
+    }
+  }
+  result->clusters = clusters_of(*result, clusters);
 
   const geometry::Box box = geometry::bounding_box(mesh);
   const geometry::Vector3d centre = box.center();

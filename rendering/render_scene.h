@@ -20,14 +20,21 @@ namespace prescene::rendering {
 
 using Eigen::Vector3f;
 
-/// A mesh's vertices and triangles coordinate by coordinate, filled up to multiples of kMultiple with the last vertex
-/// and with triangles of one vertex.
-struct MeshLanes {
-  static constexpr std::size_t kMultiple = 16;
+/// A mesh in clusters of neighbouring triangles that look much the same way, coordinate by coordinate.
+struct MeshClusters {
+  static constexpr std::size_t kSize = 32;      ///< Triangles and vertices of a cluster have room for so many.
+  static constexpr std::size_t kMultiple = 16;  ///< Other arrays are filled up to a multiple.
 
+  std::size_t count = 0;
+  // kSize a cluster, first come first: filled up with its last vertex, and with triangles of no plane.
   std::vector<float> x, y, z;                               ///< Vertices.
-  std::vector<std::int32_t> a, b, c;                        ///< Corners of the triangles.
-  std::vector<float> normal_x, normal_y, normal_z, offset;  ///< Of the triangles.
+  std::vector<std::int32_t> a, b, c;                        ///< Corners of the triangles: vertices of their cluster.
+  std::vector<float> normal_x, normal_y, normal_z, offset;  ///< Planes of the triangles.
+  std::vector<std::uint8_t> triangles;                      ///< Of each cluster.
+  /// Of each cluster: from a camera at c all of its triangles are seen from behind if
+  /// (centre - c) . axis >= cutoff |centre - c| + radius.
+  std::vector<float> centre_x, centre_y, centre_z, radius, axis_x, axis_y, axis_z, cutoff;
+  std::vector<float> vertex_x, vertex_y, vertex_z;  ///< All vertices of the mesh once, filled up with the last.
 };
 
 /// A number that no other object of this process has or had; a copy gets one of its own.
@@ -59,7 +66,7 @@ struct RenderMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
   std::vector<Vector3f> normals;                        ///< One outward unit normal a triangle, mesh frame.
   std::vector<float> offsets;                           ///< normal . p of a triangle's plane, metres.
-  MeshLanes lanes;                                      ///< The same once more.
+  MeshClusters clusters;                                ///< The same once more, triangles in the same order.
   Vector3f centre = Vector3f::Zero();                   ///< Of a bounding sphere, mesh frame.
   float radius = 0.0f;                                  ///< Of that sphere, metres.
   bool closed =

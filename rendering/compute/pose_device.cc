@@ -9,6 +9,7 @@
 
 #include "arithmetic_probe.h"
 #include "prescene/core/check.h"
+#include "prescene/rendering/pixel_classes.h"
 
 namespace prescene::rendering {
 namespace {
@@ -164,9 +165,10 @@ void PoseDevice::set_frame(const FrameTerms& frame, const LineariseOptions& opti
   frame_.inverse_fy = static_cast<float>(1.0 / camera.fy);
   frame_.max_depth = static_cast<float>(model.max_depth);
   frame_.min_depth = static_cast<float>(model.min_depth);
-  frame_.sigma_scale = static_cast<float>(model.sigma_per_depth_squared);
-  frame_.knee = static_cast<float>(model.incidence_knee);
-  frame_.max_growth = static_cast<float>(model.incidence_max_growth);
+  const HitPrecision precision(model);
+  frame_.precision_scale = precision.scale;
+  frame_.precision_per_cosine = precision.per_cosine;
+  frame_.least_precision = precision.least;
   frame_.two_over_gate = static_cast<float>(2.0 / options.gate);
   frame_.most_turns = context_->software() ? kTurnsOfSoftware : kTurnsOfHardware;
   frame_.min_cosine = static_cast<float>(options.min_cosine);
@@ -180,9 +182,11 @@ void PoseDevice::set_frame(const FrameTerms& frame, const LineariseOptions& opti
     at += layer;
   };
   send(frame.depth);
-  send(frame.absent);
+  send(frame.inverse_absent);
   send(frame.absent_missing);
   send(frame.known);
+  send(frame.inverse_returns);
+  send(frame.inverse_ray);
   for (const geometry::Image<float>& ratio : frame.color_ratio) send(ratio);
 }
 

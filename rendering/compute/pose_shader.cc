@@ -33,7 +33,7 @@ layout(std430, binding = 1) readonly buffer Meshes { uint meshes[]; };
 layout(std430, binding = 2) readonly buffer Frame {
   int width, height;
   float fx, fy, cx, cy, inverse_fx, inverse_fy;
-  float max_depth, min_depth, sigma_scale, knee, max_growth;
+  float max_depth, min_depth, precision_scale, precision_per_cosine, least_precision;
   float two_over_gate, min_cosine;
   uint scratch_stride;
   int most_turns;

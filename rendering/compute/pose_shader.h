@@ -51,17 +51,18 @@ struct DeviceMaterial {
 };
 static_assert(sizeof(DeviceMaterial) == 39 * 4);
 
-/// What goes before the layers of a frame: depth, absent, absent_missing, known, and colours.
+/// What goes before the layers of a frame: depth, inverse_absent, absent_missing, known, inverse_returns, inverse_ray,
+/// and colours.
 struct DeviceFrame {
   std::int32_t width, height;
   float fx, fy, cx, cy, inverse_fx, inverse_fy;
-  float max_depth, min_depth, sigma_scale, knee, max_growth;
+  float max_depth, min_depth, precision_scale, precision_per_cosine, least_precision;
   float two_over_gate, min_cosine;
   std::uint32_t scratch_stride;  ///< Words of scratch memory a hypothesis.
   std::int32_t most_turns;       ///< Of loops, for one thread.
 };
 static_assert(sizeof(DeviceFrame) == 17 * 4);
-inline constexpr int kPlainLayers = 4;
+inline constexpr int kPlainLayers = 6;
 
 /// Words of scratch memory that a mesh needs.
 inline std::size_t scratch_words(std::size_t vertices, std::size_t faces) { return 2 * vertices + 2 * faces; }

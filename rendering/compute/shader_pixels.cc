@@ -11,7 +11,7 @@ namespace {
 constexpr const char* kPixels = R"(
 struct Pixel {
   vec2 ray;  // z = 1
-  float depth, measured, slope, cosine;
+  float depth, inverse_depth, measured, slope, cosine;
   vec3 normal;
 };
 
@@ -33,12 +33,13 @@ Pixel pixel_of(float depth, uint bits, uint face, int x, int y) {
   precise float ray_y = (float(y) - cy) * inverse_fy;
   Plane plane = plane_of(face);
   precise float slope = plane.distance * uintBitsToFloat(bits);
-  precise float squared = ray_x * ray_x + ray_y * ray_y + 1.0;
+  precise float cosine = -slope * layer(5, x, y);
   p.ray = vec2(ray_x, ray_y);
   p.depth = depth;
   p.measured = layer(0, x, y);
   p.slope = slope;
-  p.cosine = max(divided(-slope, root_of(squared)), LEAST_COSINE);
+  p.inverse_depth = uintBitsToFloat(bits);
+  p.cosine = max(cosine, LEAST_COSINE);
   p.normal = plane.normal;
   return p;
 }
@@ -59,22 +60,21 @@ uint ratio_of(Pixel p, int x, int y, bool outline, inout int measured, inout int
   float absent_missing = layer(2, x, y);
   if (p.measured == 0.0)
     return floatBitsToUint(absent_missing < 0.0 ? c.missing_ratio : divided(c.missing, absent_missing));
-  float growth = clamp(divided(knee, p.cosine), 1.0, max_growth);
-  precise float sigma = sigma_scale * p.depth * p.depth * growth;
-  precise float difference = p.measured - p.depth;
-  float deviation = divided(difference, sigma);
+  precise float tilt = p.cosine * precision_per_cosine;
+  precise float precision_here = precision_scale * p.inverse_depth * p.inverse_depth * clamp(tilt, least_precision, 1.0);
+  precise float deviation = (p.measured - p.depth) * precision_here;
   precise float density = materials[m].outlier_density;
   if (abs(deviation) < HIT_SIGMAS) {
     precise float power = -0.5 * deviation * deviation;
-    precise float hit = divided(materials[m].hit, sigma) * exp_of(power);
+    precise float hit = materials[m].hit * precision_here * exp_of(power);
     precise float colored = h.color < 0 ? hit : hit * layer(h.color, x, y);
     density = density + colored;
   }
   precise float before = p.depth - min_depth;
   if (deviation < 0.0) density = density + divided(materials[m].occluder, before);
-  precise float returns = 1.0 - absent_missing;
-  float returned = absent_missing < 0.0 ? c.returned_ratio : divided(c.returned, returns);
-  precise float ratio = returned * (divided(density, layer(1, x, y)) + materials[m].behind);
+  precise float share = c.returned * layer(4, x, y);
+  float returned = absent_missing < 0.0 ? c.returned_ratio : share;
+  precise float ratio = returned * (density * layer(1, x, y) + materials[m].behind);
   ratio = max(ratio, MIN_RATIO);
   ++measured;
   if (deviation < -MATCH_SIGMAS) return floatBitsToUint(ratio) | kOccluded;
@@ -144,9 +144,8 @@ void add_equations(Pixel p, inout float sums[29]) {
   precise float under = 1.0 + scaled * scaled;
   float root = divided(1.0, under);
   precise float robust = root * root;
-  precise float sigma = sigma_scale * p.depth * p.depth;
-  precise float squared = sigma * sigma;
-  float weight = divided(robust, squared);
+  precise float precision_here = precision_scale * p.inverse_depth * p.inverse_depth;
+  precise float weight = robust * precision_here * precision_here;
   vec3 n = p.normal;
   precise float to_x = p.ray.x * p.depth - h.translation[0];
   precise float to_y = p.ray.y * p.depth - h.translation[1];

@@ -49,8 +49,9 @@ class LogProduct {
 struct Pixel {
   int x;
   int y;
-  Vector3f ray;    ///< Through the pixel's centre, z = 1.
-  float depth;     ///< Rendered.
+  Vector3f ray;  ///< Through the pixel's centre, z = 1.
+  float depth;   ///< Rendered.
+  float inverse_depth;
   float measured;  ///< 0 = no return.
   float slope;     ///< n . ray of the ray with z = 1, < 0.
   float cosine;
@@ -63,10 +64,8 @@ class EvidenceSum {
   EvidenceSum(const FrameTerms& frame, const PoseHypothesis& hypothesis)
       : frame_(frame),
         classes_(frame.model, *hypothesis.material, frame.step),
-        min_depth_(static_cast<float>(frame.model.options().min_depth)),
-        sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)),
-        knee_(static_cast<float>(frame.model.options().incidence_knee)),
-        max_growth_(static_cast<float>(frame.model.options().incidence_max_growth)) {
+        precision_(frame.model.options()),
+        min_depth_(static_cast<float>(frame.model.options().min_depth)) {
     if (hypothesis.color_model < 0 || frame.color_ratio.empty()) return;
     PRESCENE_CHECK(static_cast<std::size_t>(hypothesis.color_model) < frame.color_ratio.size());
     color_ratio_ = &frame.color_ratio[static_cast<std::size_t>(hypothesis.color_model)];
@@ -81,17 +80,19 @@ class EvidenceSum {
           absent_missing < 0.0f ? c.log_missing_ratio : portable_log(static_cast<double>(c.missing / absent_missing));
       return;
     }
-    const float sigma = sigma_scale_ * pixel.depth * pixel.depth * std::clamp(knee_ / pixel.cosine, 1.0f, max_growth_);
-    const float deviation = (pixel.measured - pixel.depth) / sigma;
+    const float precision = precision_.scale * pixel.inverse_depth * pixel.inverse_depth *
+                            std::clamp(pixel.cosine * precision_.per_cosine, precision_.least, 1.0f);
+    const float deviation = (pixel.measured - pixel.depth) * precision;
     float density = c.outlier_density;
     if (std::abs(deviation) < kHitSigmas) {
-      const float hit = c.hit / sigma * portable_exp(-0.5f * deviation * deviation);
+      const float hit = c.hit * precision * portable_exp(-0.5f * deviation * deviation);
       density += color_ratio_ != nullptr ? hit * (*color_ratio_)(pixel.x, pixel.y) : hit;
     }
     const float occluder = c.occluder / (pixel.depth - min_depth_);
     density += deviation < 0.0f ? occluder : 0.0f;
-    const float returned = absent_missing < 0.0f ? c.returned_ratio : c.returned / (1.0f - absent_missing);
-    const float ratio = std::max(returned * (density / frame_.absent(pixel.x, pixel.y) + c.behind), kMinRatio);
+    const float returned =
+        absent_missing < 0.0f ? c.returned_ratio : c.returned * frame_.inverse_returns(pixel.x, pixel.y);
+    const float ratio = std::max(returned * (density * frame_.inverse_absent(pixel.x, pixel.y) + c.behind), kMinRatio);
     ++evidence_.measured;
     if (deviation < -kMatchSigmas) {
       occluded_.multiply(ratio);
@@ -115,10 +116,8 @@ class EvidenceSum {
   const FrameTerms& frame_;
   PixelClasses classes_;
   const geometry::Image<float>* color_ratio_ = nullptr;
+  HitPrecision precision_;
   float min_depth_;
-  float sigma_scale_;
-  float knee_;
-  float max_growth_;
   LogProduct visible_;
   LogProduct occluded_;
   double missing_ = 0.0;
@@ -133,7 +132,7 @@ class EquationSum {
         p_CO_(hypothesis.X_CO.translation.cast<float>()),
         two_over_gate_(static_cast<float>(2.0 / options.gate)),
         min_cosine_(static_cast<float>(options.min_cosine)),
-        sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)) {}
+        precision_(HitPrecision(frame.model.options()).scale) {}
 
   void add(const Pixel& pixel) {
     if (pixel.measured == 0.0f || pixel.cosine < min_cosine_) return;
@@ -142,8 +141,8 @@ class EquationSum {
     const float scaled = two_over_gate_ * residual;
     const float root = 1.0f / (1.0f + scaled * scaled);
     const float robust = root * root;
-    const float sigma = sigma_scale_ * pixel.depth * pixel.depth;
-    const float weight = robust / (sigma * sigma);
+    const float precision = precision_ * pixel.inverse_depth * pixel.inverse_depth;
+    const float weight = robust * precision * precision;
     const Vector3f& normal = pixel.face->normal;
     const Vector3f moment = (pixel.ray * pixel.depth - p_CO_).cross(normal);
     const std::array<float, 6> row = {moment.x(), moment.y(), moment.z(), normal.x(), normal.y(), normal.z()};
@@ -166,7 +165,7 @@ class EquationSum {
   Vector3f p_CO_;
   float two_over_gate_;
   float min_cosine_;
-  float sigma_scale_;
+  float precision_;  // of a frontal hit at 1 m
   CameraEquations sums_;
 };
 
@@ -195,8 +194,8 @@ int for_each_pixel(const FrameTerms& frame, const PoseHypothesis& hypothesis, Ob
       const float ray_x = (static_cast<float>(x) - static_cast<float>(camera.cx)) * inverse_fx;
       const FacePlane& face = raster.face(x, y);
       const float slope = face.distance * inverse_depth;
-      const float cosine = -slope / std::sqrt(ray_x * ray_x + ray_y * ray_y + 1.0f);
-      visit(Pixel{x, y, Vector3f(ray_x, ray_y, 1.0f), depth, frame.depth(x, y), slope, std::max(cosine, 1e-6f), &face});
+      const float cosine = std::max(-slope * frame.inverse_ray(x, y), 1e-6f);
+      visit(Pixel{x, y, Vector3f(ray_x, ray_y, 1.0f), depth, inverse_depth, frame.depth(x, y), slope, cosine, &face});
     }
   }
   return in_view;

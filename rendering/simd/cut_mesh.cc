@@ -18,13 +18,18 @@ ScreenPoint projected(const PoseProjection& seen, const Vector3f& p_C) {
   return snapped(seen.fx * p_C.x() * inverse_depth + seen.cx, seen.fy * p_C.y() * inverse_depth + seen.cy);
 }
 
-void draw_part(ScreenPoint a, ScreenPoint b, ScreenPoint c, const PoseProjection& seen, std::int32_t face,
-               PoseTile* tile) {
-  const auto index = static_cast<std::size_t>(face);
-  const float scale = 1.0f / tile->distance[index];
-  const float along_x = tile->normal_x[index] * seen.inverse_fx * scale;
-  const float along_y = tile->normal_y[index] * seen.inverse_fy * scale;
-  const float at_centre = tile->normal_z[index] * scale;
+/// A face's plane n . p = distance in C, n turned to the camera.
+struct Plane {
+  Vector3f normal;
+  float distance;
+};
+
+void draw_part(ScreenPoint a, ScreenPoint b, ScreenPoint c, const Plane& plane, const PoseProjection& seen,
+               std::int32_t face, PoseTile* tile) {
+  const float scale = 1.0f / plane.distance;
+  const float along_x = plane.normal.x() * seen.inverse_fx * scale;
+  const float along_y = plane.normal.y() * seen.inverse_fy * scale;
+  const float at_centre = plane.normal.z() * scale;
   const PixelRect box = bounding_pixels(a, b, c, tile->rect);
   if (box.empty()) return;
   for_each_covered_pixel(a, b, c, box, [&](int x, int y) {
@@ -43,34 +48,35 @@ void draw_part(ScreenPoint a, ScreenPoint b, ScreenPoint c, const PoseProjection
 void draw_cut(const RenderMesh& mesh, const PoseProjection& seen, float near_depth, PoseTile* tile) {
   tile->rect = {0, 0, seen.width - 1, seen.height - 1};
   tile->clear();
-  tile->faces = 0;
   const Vector3f p_CO(seen.translation[0], seen.translation[1], seen.translation[2]);
   tile->most_inverse_depth = tile->least_inverse_depth = 1.0f / near_depth;
   for (const Vector3f& vertex : mesh.vertices) {
     const float z = (rotated(seen, vertex) + p_CO).z();
     if (z >= near_depth) tile->least_inverse_depth = std::min(tile->least_inverse_depth, 1.0f / z);
   }
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const Vector3f& normal_O = mesh.normals[i];
+  const MeshClusters& clusters = mesh.clusters;
+  for (std::size_t i = 0; i < clusters.count * MeshClusters::kSize; ++i) {
+    const std::size_t cluster = i / MeshClusters::kSize, first = cluster * MeshClusters::kSize;
+    if (i - first >= clusters.triangles[cluster]) continue;
+    const Vector3f normal_O(clusters.normal_x[i], clusters.normal_y[i], clusters.normal_z[i]);
     const float distance = normal_O.x() * seen.from_camera_O[0] + normal_O.y() * seen.from_camera_O[1] +
-                           normal_O.z() * seen.from_camera_O[2] + mesh.offsets[i];
+                           normal_O.z() * seen.from_camera_O[2] + clusters.offset[i];
     // Once it is cut, the inside of a closed mesh may be seen, too.
     if (distance == 0.0f) continue;
-    Vector3f normal = rotated(seen, normal_O);
-    if (distance > 0.0f) normal = -normal;
-    Vector3f corners[3];
-    for (std::size_t k = 0; k < 3; ++k) corners[k] = rotated(seen, mesh.vertices[mesh.triangles[i][k]]) + p_CO;
+    Plane plane{rotated(seen, normal_O), -std::abs(distance)};
+    if (distance > 0.0f) plane.normal = -plane.normal;
+    const auto corner = [&](std::int32_t vertex) -> Vector3f {
+      const std::size_t v = first + static_cast<std::size_t>(vertex);
+      return rotated(seen, {clusters.x[v], clusters.y[v], clusters.z[v]}) + p_CO;
+    };
+    const Vector3f corners[3] = {corner(clusters.a[i]), corner(clusters.b[i]), corner(clusters.c[i])};
     Vector3f polygon[4];
     const int count = clip_to_near(corners, near_depth, polygon);
     if (count < 3) continue;
-    const std::size_t face = tile->faces++;
-    tile->distance[face] = -std::abs(distance);
-    tile->normal_x[face] = normal.x();
-    tile->normal_y[face] = normal.y();
-    tile->normal_z[face] = normal.z();
+    tile->distance[i] = plane.distance;
     for (int k = 2; k < count; ++k)
-      draw_part(projected(seen, polygon[0]), projected(seen, polygon[k - 1]), projected(seen, polygon[k]), seen,
-                static_cast<std::int32_t>(face), tile);
+      draw_part(projected(seen, polygon[0]), projected(seen, polygon[k - 1]), projected(seen, polygon[k]), plane, seen,
+                static_cast<std::int32_t>(i), tile);
   }
 }
 

@@ -20,13 +20,13 @@ namespace prescene::rendering::HWY_NAMESPACE {
 
 class EquationLanes {
  public:
-  EquationLanes(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
+  EquationLanes(const FrameTerms& frame, const MeshClusters& mesh, const PoseProjection& seen,
                 const LineariseOptions& options)
-      : seen_(seen),
-        tile_(tile),
+      : mesh_(mesh),
+        seen_(seen),
         two_over_gate_(static_cast<float>(2.0 / options.gate)),
         min_cosine_(static_cast<float>(options.min_cosine)),
-        sigma_scale_(static_cast<float>(frame.model.options().sigma_per_depth_squared)) {}
+        precision_(HitPrecision(frame.model.options()).scale) {}
 
   HWY_INLINE void add(int y, std::size_t place, const Pixels& p) {
     const DF d;
@@ -42,12 +42,11 @@ class EquationLanes {
     const F scaled = hn::Mul(set(two_over_gate_), residual);
     const F root = hn::Div(set(1.0f), hn::Add(set(1.0f), hn::Mul(scaled, scaled)));
     const F robust = hn::IfThenElseZero(used, hn::Mul(root, root));
-    const F sigma = hn::Mul(hn::Mul(set(sigma_scale_), p.depth), p.depth);
-    const F weight = hn::IfThenElseZero(used, hn::Div(robust, hn::Mul(sigma, sigma)));
+    const F precision = hn::Mul(hn::Mul(set(precision_), p.inverse_depth), p.inverse_depth);
+    const F weight = hn::IfThenElseZero(used, hn::Mul(hn::Mul(robust, precision), precision));
     const F zeroed = hn::IfThenElseZero(used, residual);
-    const F n[3] = {hn::GatherIndex(d, tile_.normal_x.data(), p.face),
-                    hn::GatherIndex(d, tile_.normal_y.data(), p.face),
-                    hn::GatherIndex(d, tile_.normal_z.data(), p.face)};
+    F n[3];
+    normal_at(p.face, n);
     const F depth = hn::IfThenElseZero(used, p.depth);
     const F to[3] = {hn::Sub(hn::Mul(p.ray_x, depth), set(seen_.translation[0])),
                      hn::Sub(hn::Mul(p.ray_y, depth), set(seen_.translation[1])),
@@ -84,6 +83,21 @@ class EquationLanes {
   static constexpr std::size_t kSquares = 28;
   static constexpr std::size_t kSums = 29;
 
+  /// Of faces turned to the camera, C.
+  HWY_INLINE void normal_at(I face, F (&n)[3]) const {
+    const DF d;
+    const F x = hn::GatherIndex(d, mesh_.normal_x.data(), face);
+    const F y = hn::GatherIndex(d, mesh_.normal_y.data(), face);
+    const F z = hn::GatherIndex(d, mesh_.normal_z.data(), face);
+    F distance = hn::Add(hn::Add(hn::Mul(x, set(seen_.from_camera_O[0])), hn::Mul(y, set(seen_.from_camera_O[1]))),
+                         hn::Mul(z, set(seen_.from_camera_O[2])));
+    distance = hn::Add(distance, hn::GatherIndex(d, mesh_.offset.data(), face));
+    const auto behind = hn::Gt(distance, hn::Zero(d));
+    for (int row = 0; row < 3; ++row) {
+      const F normal = rotated(seen_, row, x, y, z);
+      n[row] = hn::IfThenElse(behind, hn::Neg(normal), normal);
+    }
+  }
   HWY_INLINE void add_to(std::size_t sum, std::size_t place, F value) {
     const DF d;
     float* lanes = sums_[sum] + place;
@@ -100,18 +114,19 @@ class EquationLanes {
     }
   }
 
+  const MeshClusters& mesh_;
   const PoseProjection& seen_;
-  const PoseTile& tile_;
-  float two_over_gate_, min_cosine_, sigma_scale_;
+  float two_over_gate_, min_cosine_;
+  float precision_;  // of a frontal hit at 1 m
   HWY_ALIGN float sums_[kSums][kBlock] = {};
   double totals_[kSums] = {};
   int rows_ = 0;
   std::size_t pixels_ = 0;
 };
 
-void equations_kernel(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
+void equations_kernel(const FrameTerms& frame, const RenderMesh& mesh, const PoseProjection& seen, const PoseTile& tile,
                       const LineariseOptions& options, CameraEquations* equations) {
-  EquationLanes lanes(frame, seen, tile, options);
+  EquationLanes lanes(frame, mesh.clusters, seen, options);
   for_each_block(frame, seen, tile,
                  [&](int, int y, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(y, place, p); });
   lanes.finish(equations);

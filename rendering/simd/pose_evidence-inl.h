@@ -26,7 +26,7 @@ using M = hn::Mask<DF>;
 struct Pixels {
   M in_view, covered;
   F ray_x, ray_y;  ///< The ray has z = 1.
-  F depth, measured, slope, cosine;
+  F depth, inverse_depth, measured, slope, cosine;
   I face;
 };
 
@@ -67,8 +67,8 @@ HWY_INLINE int for_each_block(const FrameTerms& frame, const PoseProjection& see
         p.ray_y = ray_y;
         p.face = hn::IfThenElseZero(hn::RebindMask(di, p.covered), hn::LoadU(di, tile.face(y) + x));
         p.slope = hn::Mul(hn::GatherIndex(d, tile.distance.data(), p.face), inverse_depth);
-        const F length = hn::Sqrt(hn::Add(hn::Add(hn::Mul(p.ray_x, p.ray_x), hn::Mul(ray_y, ray_y)), set(1.0f)));
-        p.cosine = hn::Max(hn::Div(hn::Neg(p.slope), length), set(1e-6f));
+        p.inverse_depth = inverse_depth;
+        p.cosine = hn::Max(hn::Mul(hn::Neg(p.slope), hn::LoadU(d, &frame.inverse_ray(x, y))), set(1e-6f));
         p.measured = hn::LoadU(d, &frame.depth(x, y));
         visit(x, y, static_cast<std::size_t>(x - start), p);
       }
@@ -172,10 +172,8 @@ class EvidenceLanes {
         returned_(*terms.classes, [](const PixelClass& c) { return c.returned; }),
         returned_ratio_(*terms.classes, [](const PixelClass& c) { return c.returned_ratio; }),
         missing_ratio_(*terms.classes, [](const PixelClass& c) { return c.missing_ratio; }),
-        min_depth_(static_cast<float>(frame_.model.options().min_depth)),
-        sigma_scale_(static_cast<float>(frame_.model.options().sigma_per_depth_squared)),
-        knee_(static_cast<float>(frame_.model.options().incidence_knee)),
-        max_growth_(static_cast<float>(frame_.model.options().incidence_max_growth)) {}
+        precision_(frame_.model.options()),
+        min_depth_(static_cast<float>(frame_.model.options().min_depth)) {}
 
   /// `place` is where the vector begins in its block.
   HWY_INLINE void add(int x, int y, std::size_t place, const Pixels& p) {
@@ -195,7 +193,7 @@ class EvidenceLanes {
       const F ratio = hn::Div(missing_.at(beyond, outline), known);
       missing_log_.multiply(place, missing, hn::IfThenElse(not_known, missing_ratio_.at(beyond, outline), ratio));
     }
-    if (!hn::AllFalse(d, returns)) add_returns(x, y, place, p, returns, not_known, absent_missing, beyond, outline);
+    if (!hn::AllFalse(d, returns)) add_returns(x, y, place, p, returns, not_known, beyond, outline);
     if (++factors_ == 64) {
       factors_ = 0;
       for (Products* products : {&visible_log_, &occluded_log_, &missing_log_}) products->normalise();
@@ -223,28 +221,26 @@ class EvidenceLanes {
   }
 
   HWY_INLINE void add_returns(int x, int y, std::size_t place, const Pixels& p, M returns, M not_known,
-                              F absent_missing, const M (&beyond)[PixelClasses::kIncidences - 1], M outline) {
+                              const M (&beyond)[PixelClasses::kIncidences - 1], M outline) {
     const DF d;
     const F zero = hn::Zero(d);
-    const F one = set(1.0f);
-    const F growth = hn::Min(hn::Max(hn::Div(set(knee_), p.cosine), one), set(max_growth_));
-    const F sigma = hn::Mul(hn::Mul(hn::Mul(set(sigma_scale_), p.depth), p.depth), growth);
-    const F deviation = hn::Div(hn::Sub(p.measured, p.depth), sigma);
+    const F tilt = hn::Min(hn::Max(hn::Mul(p.cosine, set(precision_.per_cosine)), set(precision_.least)), set(1.0f));
+    const F precision = hn::Mul(hn::Mul(hn::Mul(set(precision_.scale), p.inverse_depth), p.inverse_depth), tilt);
+    const F deviation = hn::Mul(hn::Sub(p.measured, p.depth), precision);
     F density = set(constant_.outlier_density);
     const M hits = hn::And(returns, hn::Lt(hn::Abs(deviation), set(kHitSigmas)));
     if (!hn::AllFalse(d, hits)) {
-      F hit =
-          hn::Mul(hn::Div(set(constant_.hit), sigma), exp_lanes(hn::Mul(hn::Mul(set(-0.5f), deviation), deviation)));
+      F hit = hn::Mul(hn::Mul(set(constant_.hit), precision),
+                      exp_lanes(hn::Mul(hn::Mul(set(-0.5f), deviation), deviation)));
       if (colors_ != nullptr) hit = hn::Mul(hit, hn::LoadU(d, &(*colors_)(x, y)));
       density = hn::Add(density, hn::IfThenElseZero(hits, hit));
     }
     const F occluder = hn::Div(set(constant_.occluder), hn::Sub(p.depth, set(min_depth_)));
     density = hn::Add(density, hn::IfThenElseZero(hn::Lt(deviation, zero), occluder));
-    const F share = hn::IfThenElse(not_known, returned_ratio_.at(beyond, outline), returned_.at(beyond, outline));
-    const F returned = hn::Div(share, hn::IfThenElse(not_known, one, hn::Sub(one, absent_missing)));
-    const F absent = hn::LoadU(d, &frame_.absent(x, y));
-    const F ratio =
-        hn::Max(hn::Mul(returned, hn::Add(hn::Div(density, absent), set(constant_.behind))), set(kMinRatio));
+    const F share = hn::Mul(returned_.at(beyond, outline), hn::LoadU(d, &frame_.inverse_returns(x, y)));
+    const F returned = hn::IfThenElse(not_known, returned_ratio_.at(beyond, outline), share);
+    const F against_absent = hn::Mul(density, hn::LoadU(d, &frame_.inverse_absent(x, y)));
+    const F ratio = hn::Max(hn::Mul(returned, hn::Add(against_absent, set(constant_.behind))), set(kMinRatio));
     const M occluded = hn::And(returns, hn::Lt(deviation, set(-kMatchSigmas)));
     const M visible = hn::AndNot(occluded, returns);
     measured_ += hn::CountTrue(d, returns);
@@ -260,7 +256,8 @@ class EvidenceLanes {
   std::array<float, PixelClasses::kIncidences - 1> bounds_;
   PixelClass constant_;
   ClassValues missing_, returned_, returned_ratio_, missing_ratio_;
-  float min_depth_, sigma_scale_, knee_, max_growth_;
+  HitPrecision precision_;
+  float min_depth_;
   Products visible_log_, occluded_log_, missing_log_;
   int factors_ = 0;
   std::size_t covered_ = 0, measured_ = 0, visible_ = 0, hits_ = 0;

@@ -32,9 +32,9 @@ void sum_evidence(const EvidenceTerms& terms, const PoseProjection& seen, const 
   HWY_DYNAMIC_DISPATCH(evidence_kernel)(terms, seen, tile, evidence);
 }
 
-void sum_equations(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
+void sum_equations(const FrameTerms& frame, const RenderMesh& mesh, const PoseProjection& seen, const PoseTile& tile,
                    const LineariseOptions& options, CameraEquations* equations) {
-  HWY_DYNAMIC_DISPATCH(equations_kernel)(frame, seen, tile, options, equations);
+  HWY_DYNAMIC_DISPATCH(equations_kernel)(frame, mesh, seen, tile, options, equations);
 }
 
 }  // namespace prescene::rendering

@@ -40,7 +40,8 @@ void draw(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile);
 /// Sums over the pixels that are drawn; counts and log ratios of `evidence`, not `tempered`.
 void sum_evidence(const EvidenceTerms& terms, const PoseProjection& seen, const PoseTile& tile, PoseEvidence* evidence);
 
-void sum_equations(const FrameTerms& frame, const PoseProjection& seen, const PoseTile& tile,
+/// Of the mesh that is drawn.
+void sum_equations(const FrameTerms& frame, const RenderMesh& mesh, const PoseProjection& seen, const PoseTile& tile,
                    const LineariseOptions& options, CameraEquations* equations);
 
 }  // namespace prescene::rendering

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a mesh and a pose to the nearest face at each pixel: vertices in lanes, then faces in lanes, then each face's
-// pixels. The operations are those of the reference backend's ObjectRaster, one by one.
+// From a mesh and a pose to the nearest face at each pixel: clusters, their vertices and faces in lanes, then each
+// face's pixels. The operations are those of the reference backend's ObjectRaster, one by one.
 #if defined(PRESCENE_RENDERING_POSE_RASTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef PRESCENE_RENDERING_POSE_RASTER_INL_H_
 #undef PRESCENE_RENDERING_POSE_RASTER_INL_H_
@@ -69,81 +69,108 @@ HWY_INLINE I snapped_lanes(F value) {
   return hn::ConvertTo(DI(), hn::Sub(hn::Add(clamped, whole), whole));
 }
 
-HWY_INLINE void project_vertices(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile) {
+/// Bounds of 1/z over all vertices.
+HWY_INLINE void bound_depths(const MeshClusters& mesh, const PoseProjection& seen, PoseTile* tile) {
+  const DF d;
+  F nearest = set(std::numeric_limits<float>::max()), farthest = hn::Zero(d);
+  for (std::size_t i = 0; i < mesh.vertex_x.size(); i += hn::Lanes(d)) {
+    const F z = hn::Add(rotated(seen, 2, hn::LoadU(d, mesh.vertex_x.data() + i), hn::LoadU(d, mesh.vertex_y.data() + i),
+                                hn::LoadU(d, mesh.vertex_z.data() + i)),
+                        set(seen.translation[2]));
+    nearest = hn::Min(nearest, z);
+    farthest = hn::Max(farthest, z);
+  }
+  tile->most_inverse_depth = 1.0f / hn::GetLane(hn::MinOfLanes(d, nearest));
+  tile->least_inverse_depth = 1.0f / hn::GetLane(hn::MaxOfLanes(d, farthest));
+}
+
+/// Lists the clusters that may have a face turned to the camera.
+HWY_INLINE void list_clusters(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile) {
   const DF d;
   const DI di;
-  const MeshLanes& lanes = mesh.lanes;
+  const MeshClusters& clusters = mesh.clusters;
+  tile->listed = 0;
+  if (!mesh.closed) {
+    for (std::size_t i = 0; i < clusters.count; ++i) tile->cluster[tile->listed++] = static_cast<std::int32_t>(i);
+    return;
+  }
+  for (std::size_t i = 0; i < clusters.count; i += hn::Lanes(d)) {
+    const auto load = [&](const std::vector<float>& values) HWY_ATTR { return hn::LoadU(d, values.data() + i); };
+    const F x = hn::Add(load(clusters.centre_x), set(seen.from_camera_O[0]));
+    const F y = hn::Add(load(clusters.centre_y), set(seen.from_camera_O[1]));
+    const F z = hn::Add(load(clusters.centre_z), set(seen.from_camera_O[2]));
+    const F distance = hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)));
+    const F along = hn::Add(hn::Add(hn::Mul(x, load(clusters.axis_x)), hn::Mul(y, load(clusters.axis_y))),
+                            hn::Mul(z, load(clusters.axis_z)));
+    // With room for rounding: a face of a cluster that is left out is never turned to the camera.
+    const F least = hn::Add(hn::Mul(hn::Add(load(clusters.cutoff), set(1e-3f)), distance),
+                            hn::Mul(load(clusters.radius), set(1.001f)));
+    const auto there = hn::FirstN(di, clusters.count - i);
+    const auto listed = hn::And(there, hn::RebindMask(di, hn::Lt(along, least)));
+    const I numbers = hn::Iota(di, static_cast<std::int32_t>(i));
+    store_chosen(numbers, listed, di, tile->cluster.data() + tile->listed);
+    tile->listed += hn::CountTrue(di, listed);
+  }
+}
+
+/// Where the vertices of the listed clusters are seen, and their bounding box.
+HWY_INLINE void project_vertices(const MeshClusters& mesh, const PoseProjection& seen, PoseTile* tile) {
+  const DF d;
+  const DI di;
   I low_x = set(std::numeric_limits<std::int32_t>::max()), low_y = low_x;
   I high_x = hn::Neg(low_x), high_y = high_x;
-  F least = set(std::numeric_limits<float>::max()), most = hn::Zero(d);
-  for (std::size_t i = 0; i < lanes.x.size(); i += hn::Lanes(d)) {
-    const F x = hn::LoadU(d, lanes.x.data() + i);
-    const F y = hn::LoadU(d, lanes.y.data() + i);
-    const F z = hn::LoadU(d, lanes.z.data() + i);
-    const F x_C = hn::Add(rotated(seen, 0, x, y, z), set(seen.translation[0]));
-    const F y_C = hn::Add(rotated(seen, 1, x, y, z), set(seen.translation[1]));
-    const F z_C = hn::Add(rotated(seen, 2, x, y, z), set(seen.translation[2]));
-    const F inverse_depth = hn::Div(set(1.0f), z_C);
-    const I u = snapped_lanes(hn::Add(hn::Mul(hn::Mul(set(seen.fx), x_C), inverse_depth), set(seen.cx)));
-    const I v = snapped_lanes(hn::Add(hn::Mul(hn::Mul(set(seen.fy), y_C), inverse_depth), set(seen.cy)));
-    least = hn::Min(least, inverse_depth);
-    most = hn::Max(most, inverse_depth);
-    hn::StoreU(u, di, tile->screen_x.data() + i);
-    hn::StoreU(v, di, tile->screen_y.data() + i);
-    low_x = hn::Min(low_x, u);
-    high_x = hn::Max(high_x, u);
-    low_y = hn::Min(low_y, v);
-    high_y = hn::Max(high_y, v);
+  for (std::size_t n = 0; n < tile->listed; ++n) {
+    const std::size_t from = static_cast<std::size_t>(tile->cluster[n]) * MeshClusters::kSize;
+    const std::size_t to = n * MeshClusters::kSize;
+    for (std::size_t i = 0; i < MeshClusters::kSize; i += hn::Lanes(d)) {
+      const F x = hn::LoadU(d, mesh.x.data() + from + i);
+      const F y = hn::LoadU(d, mesh.y.data() + from + i);
+      const F z = hn::LoadU(d, mesh.z.data() + from + i);
+      const F x_C = hn::Add(rotated(seen, 0, x, y, z), set(seen.translation[0]));
+      const F y_C = hn::Add(rotated(seen, 1, x, y, z), set(seen.translation[1]));
+      const F z_C = hn::Add(rotated(seen, 2, x, y, z), set(seen.translation[2]));
+      const F inverse_depth = hn::Div(set(1.0f), z_C);
+      const I u = snapped_lanes(hn::Add(hn::Mul(hn::Mul(set(seen.fx), x_C), inverse_depth), set(seen.cx)));
+      const I v = snapped_lanes(hn::Add(hn::Mul(hn::Mul(set(seen.fy), y_C), inverse_depth), set(seen.cy)));
+      hn::StoreU(u, di, tile->screen_x.data() + to + i);
+      hn::StoreU(v, di, tile->screen_y.data() + to + i);
+      low_x = hn::Min(low_x, u);
+      high_x = hn::Max(high_x, u);
+      low_y = hn::Min(low_y, v);
+      high_y = hn::Max(high_y, v);
+    }
   }
   const ScreenPoint low{hn::GetLane(hn::MinOfLanes(di, low_x)), hn::GetLane(hn::MinOfLanes(di, low_y))};
   const ScreenPoint high{hn::GetLane(hn::MaxOfLanes(di, high_x)), hn::GetLane(hn::MaxOfLanes(di, high_y))};
   tile->rect = pixels_between(low, high, {0, 0, seen.width - 1, seen.height - 1});
-  tile->least_inverse_depth = hn::GetLane(hn::MinOfLanes(d, least));
-  tile->most_inverse_depth = hn::GetLane(hn::MaxOfLanes(d, most));
-  constexpr std::int32_t kMost = 65535;
-  tile->packed = high.x - low.x <= kMost && high.y - low.y <= kMost;
-  tile->packed_from = low;
-  if (!tile->packed) return;
-  for (std::size_t i = 0; i < lanes.x.size(); i += hn::Lanes(d)) {
-    const I u = hn::Sub(hn::LoadU(di, tile->screen_x.data() + i), set(low.x));
-    const I v = hn::Sub(hn::LoadU(di, tile->screen_y.data() + i), set(low.y));
-    hn::StoreU(hn::Or(u, hn::ShiftLeft<16>(v)), di, tile->screen.data() + i);
-  }
 }
 
-/// Lists the faces that are turned to the camera; those of a mesh that is not closed are all turned.
-HWY_INLINE void turn_faces(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile) {
-  const DF d;
-  const DI di;
-  const MeshLanes& lanes = mesh.lanes;
-  const F zero = hn::Zero(d);
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < lanes.a.size(); i += hn::Lanes(d)) {
-    const F x = hn::LoadU(d, lanes.normal_x.data() + i);
-    const F y = hn::LoadU(d, lanes.normal_y.data() + i);
-    const F z = hn::LoadU(d, lanes.normal_z.data() + i);
-    F distance = hn::Add(hn::Add(hn::Mul(x, set(seen.from_camera_O[0])), hn::Mul(y, set(seen.from_camera_O[1]))),
-                         hn::Mul(z, set(seen.from_camera_O[2])));
-    distance = hn::Add(distance, hn::LoadU(d, lanes.offset.data() + i));
-    const auto faces_us = mesh.closed ? hn::Lt(distance, zero) : hn::Ne(distance, zero);
-    if (hn::AllFalse(d, faces_us)) continue;
-    const auto behind = hn::Gt(distance, zero);
-    const auto turned = [&](int row) HWY_ATTR {
-      const F normal = rotated(seen, row, x, y, z);
-      return hn::IfThenElse(behind, hn::Neg(normal), normal);
-    };
-    store_chosen(turned(0), faces_us, d, tile->normal_x.data() + count);
-    store_chosen(turned(1), faces_us, d, tile->normal_y.data() + count);
-    store_chosen(turned(2), faces_us, d, tile->normal_z.data() + count);
-    store_chosen(hn::Neg(hn::Abs(distance)), faces_us, d, tile->distance.data() + count);
-    const auto chosen = hn::RebindMask(di, faces_us);
-    store_chosen(hn::LoadU(di, lanes.a.data() + i), chosen, di, tile->a.data() + count);
-    store_chosen(hn::LoadU(di, lanes.b.data() + i), chosen, di, tile->b.data() + count);
-    store_chosen(hn::LoadU(di, lanes.c.data() + i), chosen, di, tile->c.data() + count);
-    count += hn::CountTrue(d, faces_us);
+/// One coordinate of a cluster's vertices, looked up by their numbers.
+class ClusterTable {
+ public:
+  explicit HWY_INLINE ClusterTable(const std::int32_t* values) : values_(values) {
+    if constexpr (kInRegisters)
+      for (std::size_t r = 0; r < kRegisters; ++r) part_[r] = hn::LoadU(DI(), values + r * kLanes);
   }
-  tile->faces = count;
-}
+  HWY_INLINE I at(I numbers) const {
+    const DI di;
+    if constexpr (!kInRegisters) return hn::GatherIndex(di, values_, numbers);
+    const auto places = hn::IndicesFromVec(di, hn::And(numbers, set(static_cast<std::int32_t>(kLanes - 1))));
+    I found = hn::TableLookupLanes(part_[0], places);
+    for (std::size_t r = 1; r < kRegisters; ++r)
+      found = hn::IfThenElse(hn::Gt(numbers, set(static_cast<std::int32_t>(r * kLanes - 1))),
+                             hn::TableLookupLanes(part_[r], places), found);
+    return found;
+  }
+
+ private:
+  static constexpr std::size_t kLanes = hn::MaxLanes(DI());
+  static constexpr std::size_t kRegisters = MeshClusters::kSize / kLanes;
+  static constexpr bool kInRegisters = kRegisters <= 4;
+
+  const std::int32_t* values_;
+  I part_[kInRegisters ? kRegisters : 1];
+};
 
 /// 1/z over the image of faces in lanes: a plane, kept within the object's depths.
 struct FaceDepths {
@@ -192,22 +219,61 @@ HWY_INLINE void draw_pixel(float inverse_depth, std::int32_t face, float* depth,
   *faces = face;
 }
 
-/// Draws faces, kBlock or fewer at a time.
+/// Draws clusters of faces.
 class FaceDrawer {
  public:
-  FaceDrawer(const PoseProjection& seen, PoseTile* tile) : seen_(seen), tile_(*tile) {}
+  FaceDrawer(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile)
+      : mesh_(mesh.clusters), closed_(mesh.closed), seen_(seen), tile_(*tile) {}
 
-  template <bool kPacked>
-  HWY_INLINE void draw(std::size_t first) {
+  void draw_all() {
+    for (std::size_t n = 0; n < tile_.listed; ++n) draw(n);
+    draw_waiting();
+  }
+
+ private:
+  // Pixels: faces that are wider or higher are drawn one by one, their pixels in lanes.
+  static constexpr std::int32_t kLane = 6;
+  // The same with numbers that 32 bits hold.
+  static constexpr std::int32_t kExact = 60;
+  static constexpr std::size_t kMostWaiting = 256;
+
+  struct Places {
+    I x, y;
+  };
+
+  /// The n-th of those listed.
+  HWY_INLINE void draw(std::size_t n) {
+    const auto cluster = static_cast<std::size_t>(tile_.cluster[n]);
+    const ClusterTable x(tile_.screen_x.data() + n * MeshClusters::kSize);
+    const ClusterTable y(tile_.screen_y.data() + n * MeshClusters::kSize);
+    const std::size_t first = cluster * MeshClusters::kSize;
+    for (std::size_t k = 0; k < mesh_.triangles[cluster]; k += hn::Lanes(DF())) draw_faces(first + k, x, y);
+  }
+
+  HWY_INLINE void draw_faces(std::size_t first, const ClusterTable& screen_x, const ClusterTable& screen_y) {
     const DF d;
     const DI di;
-    const auto there = hn::FirstN(di, tile_.faces - first);
+    const F zero = hn::Zero(d);
+    const F normal_x = hn::LoadU(d, mesh_.normal_x.data() + first);
+    const F normal_y = hn::LoadU(d, mesh_.normal_y.data() + first);
+    const F normal_z = hn::LoadU(d, mesh_.normal_z.data() + first);
+    F distance =
+        hn::Add(hn::Add(hn::Mul(normal_x, set(seen_.from_camera_O[0])), hn::Mul(normal_y, set(seen_.from_camera_O[1]))),
+                hn::Mul(normal_z, set(seen_.from_camera_O[2])));
+    distance = hn::Add(distance, hn::LoadU(d, mesh_.offset.data() + first));
+    // Those of a mesh that is not closed are all turned to the camera.
+    const auto faces_us = hn::RebindMask(di, closed_ ? hn::Lt(distance, zero) : hn::Ne(distance, zero));
+    if (hn::AllFalse(di, faces_us)) return;
+    const F facing = hn::Neg(hn::Abs(distance));
+    hn::StoreU(facing, d, tile_.distance.data() + first);
+
     const auto corners = [&](const std::vector<std::int32_t>& vertices) HWY_ATTR {
-      return place_of<kPacked>(hn::IfThenElseZero(there, hn::LoadU(di, vertices.data() + first)));
+      const I numbers = hn::LoadU(di, vertices.data() + first);
+      return Places{screen_x.at(numbers), screen_y.at(numbers)};
     };
-    const Places a = corners(tile_.a);
-    Places b = corners(tile_.b);
-    Places c = corners(tile_.c);
+    const Places a = corners(mesh_.a);
+    Places b = corners(mesh_.b);
+    Places c = corners(mesh_.c);
     const I low_x = hn::Min(a.x, hn::Min(b.x, c.x)), high_x = hn::Max(a.x, hn::Max(b.x, c.x));
     const I low_y = hn::Min(a.y, hn::Min(b.y, c.y)), high_y = hn::Max(a.y, hn::Max(b.y, c.y));
     const I up = set(kSubpixels - 1);
@@ -215,7 +281,7 @@ class FaceDrawer {
     const I y_first = hn::Max(set(tile_.rect.y_first), hn::ShiftRight<8>(hn::Add(low_y, up)));
     const I x_last = hn::Min(set(tile_.rect.x_last), hn::ShiftRight<8>(high_x));
     const I y_last = hn::Min(set(tile_.rect.y_last), hn::ShiftRight<8>(high_y));
-    auto seen = hn::And(there, hn::And(not_above(x_first, x_last), not_above(y_first, y_last)));
+    auto seen = hn::And(faces_us, hn::And(not_above(x_first, x_last), not_above(y_first, y_last)));
     if (hn::AllFalse(di, seen)) return;
 
     const I extent = hn::Max(hn::Sub(high_x, low_x), hn::Sub(high_y, low_y));
@@ -223,7 +289,19 @@ class FaceDrawer {
     seen = hn::AndNot(wide, seen);
     const I area =
         hn::Sub(hn::Mul(hn::Sub(b.x, a.x), hn::Sub(c.y, a.y)), hn::Mul(hn::Sub(b.y, a.y), hn::Sub(c.x, a.x)));
+
+    const auto behind = hn::Gt(distance, zero);
+    const auto turned = [&](int row) HWY_ATTR {
+      const F normal = rotated(seen_, row, normal_x, normal_y, normal_z);
+      return hn::IfThenElse(behind, hn::Neg(normal), normal);
+    };
+    const F scale = hn::Div(set(1.0f), facing);
+    const FaceDepths depths = {hn::Mul(turned(2), scale), hn::Mul(hn::Mul(turned(0), set(seen_.inverse_fx)), scale),
+                               hn::Mul(hn::Mul(turned(1), set(seen_.inverse_fy)), scale),
+                               set(tile_.least_inverse_depth), set(tile_.most_inverse_depth)};
+    if (!hn::AllFalse(di, wide)) draw_wide(first, wide, a, b, c, depths);
     seen = hn::And(seen, hn::Ne(area, hn::Zero(di)));
+    if (hn::AllFalse(di, seen)) return;
     const auto swap = hn::Lt(area, hn::Zero(di));
     const auto exchange = [&](I& p, I& q) HWY_ATTR {
       const I kept = p;
@@ -233,107 +311,83 @@ class FaceDrawer {
     exchange(b.x, c.x);
     exchange(b.y, c.y);
 
-    const F scale = hn::Div(set(1.0f), hn::LoadU(d, tile_.distance.data() + first));
-    const FaceDepths depths = {
-        hn::Mul(hn::LoadU(d, tile_.normal_z.data() + first), scale),
-        hn::Mul(hn::Mul(hn::LoadU(d, tile_.normal_x.data() + first), set(seen_.inverse_fx)), scale),
-        hn::Mul(hn::Mul(hn::LoadU(d, tile_.normal_y.data() + first), set(seen_.inverse_fy)), scale),
-        set(tile_.least_inverse_depth), set(tile_.most_inverse_depth)};
-    if (!hn::AllFalse(di, wide)) draw_wide(first, wide, depths);
-    if (hn::AllFalse(di, seen)) return;
-
     Side ab = side_of(a.x, a.y, b.x, b.y, x_first, y_first);
     Side bc = side_of(b.x, b.y, c.x, c.y, x_first, y_first);
     Side ca = side_of(c.x, c.y, a.x, a.y, x_first, y_first);
-    const I columns = hn::IfThenElseZero(seen, hn::Sub(x_last, x_first));
-    const I rows = hn::IfThenElseZero(seen, hn::Sub(y_last, y_first));
-    const std::int32_t most_columns = hn::GetLane(hn::MaxOfLanes(di, columns));
-    const std::int32_t most_rows = hn::GetLane(hn::MaxOfLanes(di, rows));
+    const I zeros = hn::Zero(di);
+    // Each lane goes through the pixels of its own box, row by row.
+    const I one = set(1);
+    const I columns = hn::Sub(x_last, x_first);
+    const I pixels = hn::IfThenElseZero(seen, hn::Mul(hn::Add(columns, one), hn::Add(hn::Sub(y_last, y_first), one)));
+    const std::int32_t most_pixels = hn::GetLane(hn::MaxOfLanes(di, pixels));
     const I face = hn::Iota(di, static_cast<std::int32_t>(first));
-    const auto stride = static_cast<std::int32_t>(tile_.stride());
-    I row_start = hn::Add(hn::Mul(y_first, set(stride)), x_first);
-    float* const depth_of = tile_.inverse_depth(0);
-    std::int32_t* const face_of = tile_.face(0);
-    HWY_ALIGN std::int32_t places[2 * kBlock];
-    HWY_ALIGN std::int32_t drawn[2 * kBlock];
-    HWY_ALIGN float nearness[2 * kBlock];
-    for (std::int32_t row = 0; row <= most_rows; ++row) {
-      const auto in_rows = hn::And(seen, not_above(set(row), rows));
-      const F y = hn::ConvertTo(d, hn::Add(y_first, set(row)));
-      I at_ab = ab.value, at_bc = bc.value, at_ca = ca.value;
-      for (std::int32_t column = 0; column <= most_columns; ++column) {
-        const auto outside = hn::Lt(hn::Or(at_ab, hn::Or(at_bc, at_ca)), hn::Zero(di));
-        const auto inside = hn::AndNot(outside, hn::And(in_rows, not_above(set(column), columns)));
-        if (!hn::AllFalse(di, inside)) {
-          const F x = hn::ConvertTo(d, hn::Add(x_first, set(column)));
-          const std::size_t count = hn::CountTrue(di, inside);
-          store_chosen(hn::Add(row_start, set(column)), inside, di, places);
-          store_chosen(face, inside, di, drawn);
-          store_chosen(depths.at(seen_, x, y), hn::RebindMask(d, inside), d, nearness);
-          for (std::size_t k = 0; k < count; ++k)
-            draw_pixel(nearness[k], drawn[k], depth_of + places[k], face_of + places[k]);
-        }
-        at_ab = hn::Add(at_ab, ab.per_x);
-        at_bc = hn::Add(at_bc, bc.per_x);
-        at_ca = hn::Add(at_ca, ca.per_x);
-      }
-      ab.value = hn::Add(ab.value, ab.per_y);
-      bc.value = hn::Add(bc.value, bc.per_y);
-      ca.value = hn::Add(ca.value, ca.per_y);
-      row_start = hn::Add(row_start, set(stride));
+    const I stride = set(static_cast<std::int32_t>(tile_.stride()));
+    const auto to_next_row = [&](const Side& side)
+                                 HWY_ATTR { return hn::Sub(side.per_y, hn::Mul(columns, side.per_x)); };
+    const I next_ab = to_next_row(ab), next_bc = to_next_row(bc), next_ca = to_next_row(ca);
+    const I next_place = hn::Sub(stride, columns);
+    I place = hn::Add(hn::Mul(y_first, stride), x_first);
+    I column = hn::Zero(di);
+    const F left = hn::ConvertTo(d, x_first);
+    F x = left, y = hn::ConvertTo(d, y_first);
+    for (std::int32_t pixel = 0; pixel < most_pixels; ++pixel) {
+      const auto outside = hn::Lt(hn::Or(ab.value, hn::Or(bc.value, ca.value)), zeros);
+      const auto inside = hn::AndNot(outside, hn::Lt(set(pixel), pixels));
+      store_chosen(place, inside, di, places_ + waiting_);
+      store_chosen(face, inside, di, drawn_ + waiting_);
+      store_chosen(depths.at(seen_, x, y), hn::RebindMask(d, inside), d, nearness_ + waiting_);
+      waiting_ += hn::CountTrue(di, inside);
+      if (waiting_ > kMostWaiting) draw_waiting();
+      const auto ends = hn::Eq(column, columns);
+      const auto ends_f = hn::RebindMask(d, ends);
+      ab.value = hn::Add(ab.value, hn::IfThenElse(ends, next_ab, ab.per_x));
+      bc.value = hn::Add(bc.value, hn::IfThenElse(ends, next_bc, bc.per_x));
+      ca.value = hn::Add(ca.value, hn::IfThenElse(ends, next_ca, ca.per_x));
+      place = hn::Add(place, hn::IfThenElse(ends, next_place, one));
+      column = hn::IfThenZeroElse(ends, hn::Add(column, one));
+      x = hn::IfThenElse(ends_f, left, hn::Add(x, set(1.0f)));
+      y = hn::Add(y, hn::IfThenElseZero(ends_f, set(1.0f)));
     }
   }
 
- private:
-  // Pixels: faces that are wider or higher are drawn one by one, their pixels in lanes.
-  static constexpr std::int32_t kLane = 6;
-  // The same with numbers that 32 bits hold.
-  static constexpr std::int32_t kExact = 60;
-
-  struct Places {
-    I x, y;
-  };
-  template <bool kPacked>
-  HWY_INLINE Places place_of(I vertices) const {
-    const DI di;
-    if constexpr (!kPacked)
-      return {hn::GatherIndex(di, tile_.screen_x.data(), vertices),
-              hn::GatherIndex(di, tile_.screen_y.data(), vertices)};
-    const I both = hn::GatherIndex(di, tile_.screen.data(), vertices);
-    const auto unsigned_both = hn::BitCast(hn::RebindToUnsigned<DI>(), both);
-    return {hn::Add(hn::And(both, set(0xffff)), set(tile_.packed_from.x)),
-            hn::Add(hn::BitCast(di, hn::ShiftRight<16>(unsigned_both)), set(tile_.packed_from.y))};
+  /// How many there are is hard to foresee for a processor: many at once.
+  void draw_waiting() {
+    float* const depth_of = tile_.inverse_depth(0);
+    std::int32_t* const face_of = tile_.face(0);
+    for (std::size_t k = 0; k < waiting_; ++k)
+      draw_pixel(nearness_[k], drawn_[k], depth_of + places_[k], face_of + places_[k]);
+    waiting_ = 0;
   }
 
-  void draw_wide(std::size_t first, hn::Mask<DI> wide, const FaceDepths& depths) {
+  void draw_wide(std::size_t first, hn::Mask<DI> wide, const Places& a, const Places& b, const Places& c,
+                 const FaceDepths& depths) {
     const DF d;
     const DI di;
     HWY_ALIGN float at_centre[kBlock], along_x[kBlock], along_y[kBlock];
-    HWY_ALIGN std::int32_t chosen[2 * kBlock];
+    HWY_ALIGN std::int32_t chosen[2 * kBlock], corners[6][kBlock];
     hn::Store(depths.at_centre, d, at_centre);
     hn::Store(depths.along_x, d, along_x);
     hn::Store(depths.along_y, d, along_y);
+    std::size_t row = 0;
+    for (const Places* places : {&a, &b, &c}) {
+      hn::Store(places->x, di, corners[row++]);
+      hn::Store(places->y, di, corners[row++]);
+    }
     const std::size_t count = hn::CountTrue(di, wide);
     store_chosen(hn::Iota(di, 0), wide, di, chosen);
     for (std::size_t k = 0; k < count; ++k) {
       const auto lane = static_cast<std::size_t>(chosen[k]);
-      draw_one(first + lane, {set(at_centre[lane]), set(along_x[lane]), set(along_y[lane]), depths.least, depths.most});
+      draw_one(static_cast<std::int32_t>(first + lane), {corners[0][lane], corners[1][lane]},
+               {corners[2][lane], corners[3][lane]}, {corners[4][lane], corners[5][lane]},
+               {set(at_centre[lane]), set(along_x[lane]), set(along_y[lane]), depths.least, depths.most});
     }
   }
 
-  void draw_one(std::size_t index, const FaceDepths& depths) {
-    const auto corner = [&](const std::vector<std::int32_t>& corners) {
-      const auto vertex = static_cast<std::size_t>(corners[index]);
-      return ScreenPoint{tile_.screen_x[vertex], tile_.screen_y[vertex]};
-    };
-    const ScreenPoint a = corner(tile_.a);
-    ScreenPoint b = corner(tile_.b);
-    ScreenPoint c = corner(tile_.c);
+  void draw_one(std::int32_t face, ScreenPoint a, ScreenPoint b, ScreenPoint c, const FaceDepths& depths) {
     const PixelRect box = bounding_pixels(a, b, c, tile_.rect);
     const std::int64_t area = std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
     if (area == 0) return;
     if (area < 0) std::swap(b, c);
-    const auto face = static_cast<std::int32_t>(index);
     const std::int32_t extent = std::max(std::max({a.x, b.x, c.x}) - std::min({a.x, b.x, c.x}),
                                          std::max({a.y, b.y, c.y}) - std::min({a.y, b.y, c.y}));
     if (extent > kExact * kSubpixels) return draw_huge(face, a, b, c, box, depths);
@@ -376,24 +430,24 @@ class FaceDrawer {
     for_each_covered_pixel(a, b, c, box, [&](int x, int y) { draw_block(hn::FirstN(di, 1), x, y, face, depths); });
   }
 
+  const MeshClusters& mesh_;
+  bool closed_;
   const PoseProjection& seen_;
   PoseTile& tile_;
+  // Pixels of small faces that are still to be drawn.
+  HWY_ALIGN std::int32_t places_[kMostWaiting + 2 * kBlock];
+  HWY_ALIGN std::int32_t drawn_[kMostWaiting + 2 * kBlock];
+  HWY_ALIGN float nearness_[kMostWaiting + 2 * kBlock];
+  std::size_t waiting_ = 0;
 };
 
 void draw_kernel(const RenderMesh& mesh, const PoseProjection& seen, PoseTile* tile) {
-  project_vertices(mesh, seen, tile);
-  tile->faces = 0;
+  bound_depths(mesh.clusters, seen, tile);
+  list_clusters(mesh, seen, tile);
+  project_vertices(mesh.clusters, seen, tile);
   if (tile->rect.empty()) return;
   tile->clear();
-  turn_faces(mesh, seen, tile);
-  FaceDrawer drawer(seen, tile);
-  for (std::size_t first = 0; first < tile->faces; first += hn::Lanes(DF())) {
-    if (tile->packed) {
-      drawer.draw<true>(first);
-    } else {
-      drawer.draw<false>(first);
-    }
-  }
+  FaceDrawer(mesh, seen, tile).draw_all();
 }
 
 }  // namespace prescene::rendering::HWY_NAMESPACE

@@ -24,16 +24,12 @@ PoseProjection::PoseProjection(const geometry::Pose& X_CO, const geometry::Pinho
 }
 
 void PoseTile::reserve(const RenderMesh& mesh, int width, int height) {
-  const std::size_t vertices = mesh.lanes.x.size();
-  if (screen_x.size() < vertices) {
-    screen_x.resize(vertices);
-    screen_y.resize(vertices);
-    screen.resize(vertices);
-  }
-  const std::size_t triangles = mesh.lanes.a.size() + kSlack;
-  if (a.size() < triangles) {
-    for (std::vector<std::int32_t>* corners : {&a, &b, &c}) corners->resize(triangles);
-    for (std::vector<float>* values : {&distance, &normal_x, &normal_y, &normal_z}) values->resize(triangles);
+  const std::size_t places = mesh.clusters.x.size() + kSlack;
+  if (distance.size() < places) {
+    cluster.resize(mesh.clusters.count + kSlack);
+    screen_x.resize(places);
+    screen_y.resize(places);
+    distance.resize(places);
   }
   if (width == width_ && height == height_) return;
   width_ = width;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of one hypothesis under way: where its vertices are seen, which faces are turned to the camera, and the
-// nearest of them at each pixel. All of it stays in the near caches.
+// The memory of one hypothesis under way: which clusters may be seen, where their vertices are seen, and the nearest
+// face at each pixel. All of it stays in the near caches.
 #pragma once
 
 #include <cstddef>
@@ -38,7 +38,7 @@ class PoseTile {
   /// empty, so that a border is no outline.
   float* inverse_depth(int y) { return inverse_depth_.data() + offset(y); }
   const float* inverse_depth(int y) const { return inverse_depth_.data() + offset(y); }
-  /// The face of a pixel that is not empty, by its place among the front faces.
+  /// The face of a pixel that is not empty, by its place in the mesh's clusters.
   std::int32_t* face(int y) { return face_.data() + offset(y); }
   const std::int32_t* face(int y) const { return face_.data() + offset(y); }
   std::size_t stride() const { return stride_; }
@@ -49,16 +49,13 @@ class PoseTile {
   float least_inverse_depth = 0.0f;
   float most_inverse_depth = 0.0f;
 
-  // Of vertices.
-  std::vector<std::int32_t> screen_x, screen_y;  ///< 1/256 pixel
-  /// The same from `packed_from`, 16 bits each, x below; of objects that are not larger than 16 bits.
-  std::vector<std::int32_t> screen;
-  ScreenPoint packed_from;
-  bool packed = false;
-  // Of faces turned to the camera, in the order of the mesh: n . p = distance < 0 in C.
-  std::size_t faces = 0;
-  std::vector<std::int32_t> a, b, c;  ///< Corners.
-  std::vector<float> distance, normal_x, normal_y, normal_z;
+  /// Clusters that may be seen, in the order of the mesh, and the vertices of each in 1/256 pixel.
+  std::size_t listed = 0;
+  std::vector<std::int32_t> cluster;
+  std::vector<std::int32_t> screen_x, screen_y;
+  /// Of faces that are drawn, by their places in the mesh's clusters: n . p = distance < 0 in C, n turned to the
+  /// camera.
+  std::vector<float> distance;
 
  private:
   std::size_t offset(int y) const { return static_cast<std::size_t>(y + 1) * stride_ + kSlack; }

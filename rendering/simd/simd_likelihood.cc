@@ -86,7 +86,7 @@ class SimdLikelihoodBatch final : public LikelihoodBatch {
         case Way::kLanes: {
           const PoseProjection seen = drawn(frame, hypotheses[i], scratch);
           CameraEquations sums;
-          sum_equations(frame, seen, scratch.tile, options, &sums);
+          sum_equations(frame, *hypotheses[i].mesh, seen, scratch.tile, options, &sums);
           linearisations[i] = in_body_axes(sums, hypotheses[i].X_CO);
           if (options.with_evidence) linearisations[i].evidence = evidence_of(frame, hypotheses[i], seen, scratch);
           break;

@@ -55,13 +55,13 @@ TEST_F(FrameTermsTest, CountsNanAndNegativeDepthAsMissingAndCutsTheRest) {
   const FrameTerms terms = make();
   for (int x = 0; x < 3; ++x) {
     EXPECT_EQ(terms.depth(x, 0), 0.0f);
-    EXPECT_EQ(terms.absent(x, 0), 0.0f);
+    EXPECT_EQ(terms.inverse_absent(x, 0), 0.0f);
   }
   EXPECT_EQ(terms.depth(3, 0), 2.5f);
   EXPECT_EQ(terms.depth(4, 0), 0.3f);
   // Uniform over 2.2 m without knowledge of the background.
-  EXPECT_NEAR(terms.absent(3, 0), 1.0 / 2.2, 1e-6);
-  EXPECT_NEAR(terms.absent(10, 10), 1.0 / 2.2, 1e-6);
+  EXPECT_NEAR(terms.inverse_absent(3, 0), 2.2, 1e-5);
+  EXPECT_NEAR(terms.inverse_absent(10, 10), 2.2, 1e-5);
   EXPECT_LT(terms.absent_missing(10, 10), 0.0f);
 }
 
@@ -76,13 +76,13 @@ TEST_F(FrameTermsTest, KnowsTheSupportPlaneWithinItsOutline) {
       const Vector3d p = terms.camera.unproject(x, y, 1.0);
       const bool on_support = std::abs(p.x()) < 0.1 && std::abs(p.y()) < 0.1;
       inside += on_support ? 1 : 0;
-      EXPECT_NEAR(terms.absent(x, y), on_support ? on_plane : 1.0 / 2.2, 1e-4);
+      EXPECT_NEAR(1.0 / terms.inverse_absent(x, y), on_support ? on_plane : 1.0 / 2.2, 1e-4);
     }
   }
   EXPECT_GT(inside, 200);
   // The other way around the outline is the same region.
   std::reverse(support_.outline_C.begin(), support_.outline_C.end());
-  EXPECT_TRUE(make().absent == terms.absent);
+  EXPECT_TRUE(make().inverse_absent == terms.inverse_absent);
 }
 
 TEST_F(FrameTermsTest, TakesTheNearestOfSeveralSupports) {
@@ -102,7 +102,8 @@ TEST_F(FrameTermsTest, PrefersAnEmptyScenesDepthToAPlane) {
   EXPECT_NEAR(terms.absent_missing(40, 30), 0.03, 1e-6);
   EXPECT_EQ(terms.absent_peak(0, 0), 0.0f);
   EXPECT_NEAR(terms.absent_missing(0, 0), 0.7, 1e-6);
-  EXPECT_NEAR(terms.absent(0, 0), 1.0 / 2.2, 1e-6);
+  EXPECT_NEAR(terms.inverse_absent(0, 0), 2.2, 1e-5);
+  EXPECT_NEAR(terms.inverse_returns(0, 0), 1.0 / 0.3, 1e-5);
 }
 
 TEST_F(FrameTermsTest, KnownSurfacesReplaceTheBackgroundWhereTheyAre) {
@@ -114,9 +115,9 @@ TEST_F(FrameTermsTest, KnownSurfacesReplaceTheBackgroundWhereTheyAre) {
   FrameTerms terms;
   with_known_surfaces(frame, known, &terms);
   EXPECT_EQ(terms.known(20, 20), 1.0f);
-  EXPECT_GT(terms.absent(20, 20), 10.0f);
-  EXPECT_NEAR(terms.absent(21, 20), 0.2 / 2.2, 1e-5) << "the known surface was not measured where it is";
-  EXPECT_EQ(terms.absent(22, 20), frame.absent(22, 20));
+  EXPECT_LT(terms.inverse_absent(20, 20), 0.1f);
+  EXPECT_NEAR(terms.inverse_absent(21, 20), 2.2 / 0.2, 1e-3) << "the known surface was not measured where it is";
+  EXPECT_EQ(terms.inverse_absent(22, 20), frame.inverse_absent(22, 20));
   // A second layer keeps the nearer of both.
   geometry::DepthImage more(80, 60, 0.8f);
   with_known_surfaces(terms, more, &terms);
