@@ -147,7 +147,8 @@ class SmallBlock : public LikelihoodLaws {
 
   void set(const Covered& pixel, const AbsentMixture& absent, double z) {
     terms_.depth(pixel.x, pixel.y) = static_cast<float>(z);
-    terms_.absent(pixel.x, pixel.y) = z > 0.0 ? static_cast<float>(terms_.model.density(absent, z)) : 0.0f;
+    terms_.inverse_absent(pixel.x, pixel.y) =
+        z > 0.0 ? static_cast<float>(1.0 / terms_.model.density(absent, z)) : 0.0f;
   }
 
   MeshHandle mesh_ = make_render_mesh(geometry::make_mesh(geometry::BoxShape{{0.012, 0.012, 0.012}}));
