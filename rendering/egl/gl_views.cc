@@ -19,48 +19,53 @@ enum ColorSource : GLint { kOfMaterial, kOfVertices, kOfTexture };
 
 // The point in C goes through unchanged: depth is its z, interpolated perspective-correct by the device. Image rows run
 // down, window rows up: the projection leaves v as it is, so that row 0 of the frame buffer is row 0 of the image.
-constexpr const char* kVertexShader = R"(#version 330 core
+constexpr const char* kVertexShader = R"(
 layout(location = 0) in vec3 p_M;
 layout(location = 1) in vec3 normal_M;
+#ifdef COLOR
 layout(location = 2) in vec3 color_srgb;
 layout(location = 3) in vec2 place_in;
+out vec3 vertex_color;
+out vec2 place;
+vec3 linear_of(vec3 c) {
+  return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
+}
+#endif
 uniform mat3 R_CM;
 uniform vec3 p_CM;
 uniform vec4 projection;  // fx, fy, cx, cy in device coordinates
 uniform vec2 clip;        // z_clip = clip.x * z + clip.y
 out float depth;
 flat out vec3 normal;
-out vec3 vertex_color;
-out vec2 place;
-vec3 linear_of(vec3 c) {
-  return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
-}
 void main() {
   vec3 p_C = R_CM * p_M + p_CM;
   normal = R_CM * normal_M;
   if (dot(normal, p_C) > 0.0) normal = -normal;
   depth = p_C.z;
+#ifdef COLOR
   vertex_color = linear_of(color_srgb);
   place = place_in;
+#endif
   gl_Position = vec4(projection.x * p_C.x + projection.z * p_C.z, projection.y * p_C.y + projection.w * p_C.z,
                      clip.x * p_C.z + clip.y, p_C.z);
 }
 )";
 
-constexpr const char* kFragmentShader = R"(#version 330 core
+constexpr const char* kFragmentShader = R"(
 in float depth;
 flat in vec3 normal;
+uniform uint label;
+layout(location = 0) out float out_depth;
+layout(location = 1) out uint out_label;
+layout(location = 2) out vec4 out_normal;
+#ifdef COLOR
 in vec3 vertex_color;
 in vec2 place;
-uniform uint label;
 uniform vec3 towards_light;  // in C, unit
 uniform vec2 shares;         // ambient, direct
 uniform int color_source;    // material, vertices, texture
 uniform vec3 material;       // linear
 uniform sampler2D surface;
-layout(location = 0) out float out_depth;
-layout(location = 1) out uint out_label;
-layout(location = 2) out vec4 out_normal;
 layout(location = 3) out vec4 out_color;
 vec3 linear_of(vec3 c) {
   return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
@@ -82,13 +87,16 @@ vec3 texture_color() {
   return mix(mix(texel(first, size), texel(first + ivec2(1, 0), size), share.x),
              mix(texel(first + ivec2(0, 1), size), texel(first + ivec2(1, 1), size), share.x), share.y);
 }
+#endif
 void main() {
   out_depth = depth;
   out_label = label;
   out_normal = vec4(normal, 0.0);
+#ifdef COLOR
   vec3 own = color_source == 2 ? texture_color() : color_source == 1 ? max(vertex_color, 0.0) : material;
   float light = shares.x + shares.y * max(0.0, dot(normal, towards_light));
   out_color = vec4(srgb_of(clamp(own * light, 0.0, 1.0)), 1.0);
+#endif
 }
 )";
 
@@ -102,9 +110,10 @@ std::string shader_log(GLuint shader) {
   return text.data();
 }
 
-core::Result<GLuint> compiled(GLenum kind, const char* source) {
+core::Result<GLuint> compiled(GLenum kind, bool color, const char* source) {
   const GLuint shader = glCreateShader(kind);
-  glShaderSource(shader, 1, &source, nullptr);
+  const std::array<const char*, 3> parts = {"#version 330 core\n", color ? "#define COLOR\n" : "", source};
+  glShaderSource(shader, static_cast<GLsizei>(parts.size()), parts.data(), nullptr);
   glCompileShader(shader);
   GLint ok = GL_FALSE;
   glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
@@ -149,37 +158,37 @@ core::Result<std::unique_ptr<GlViews>> GlViews::make() {
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &texture_size);
   glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport.data());
   views->max_image_size_ = std::min({texture_size, viewport[0], viewport[1]});
-  PRESCENE_RETURN_IF_ERROR(views->make_program());
+  for (const bool color : {false, true}) PRESCENE_RETURN_IF_ERROR(views->make_program(color));
   return views;
 }
 
-int GlViews::uniform(const char* name) const { return glGetUniformLocation(program_, name); }
-
-core::Status GlViews::make_program() {
-  PRESCENE_TRY(const GLuint vertex, compiled(GL_VERTEX_SHADER, kVertexShader));
-  auto fragment = compiled(GL_FRAGMENT_SHADER, kFragmentShader);
+core::Status GlViews::make_program(bool color) {
+  Program& program = color ? colored_ : plain_;
+  PRESCENE_TRY(const GLuint vertex, compiled(GL_VERTEX_SHADER, color, kVertexShader));
+  auto fragment = compiled(GL_FRAGMENT_SHADER, color, kFragmentShader);
   if (!fragment) {
     glDeleteShader(vertex);
     return fragment.status();
   }
-  program_ = glCreateProgram();
-  glAttachShader(program_, vertex);
-  glAttachShader(program_, *fragment);
-  glLinkProgram(program_);
+  program.name = glCreateProgram();
+  glAttachShader(program.name, vertex);
+  glAttachShader(program.name, *fragment);
+  glLinkProgram(program.name);
   glDeleteShader(vertex);
   glDeleteShader(*fragment);
   GLint ok = GL_FALSE;
-  glGetProgramiv(program_, GL_LINK_STATUS, &ok);
+  glGetProgramiv(program.name, GL_LINK_STATUS, &ok);
   if (ok != GL_TRUE) return gl_failure("the driver does not link our shaders");
-  rotation_ = uniform("R_CM");
-  translation_ = uniform("p_CM");
-  projection_ = uniform("projection");
-  clip_ = uniform("clip");
-  label_ = uniform("label");
-  light_ = uniform("towards_light");
-  shares_ = uniform("shares");
-  color_source_ = uniform("color_source");
-  material_ = uniform("material");
+  const auto uniform = [&](const char* name) { return glGetUniformLocation(program.name, name); };
+  program.rotation = uniform("R_CM");
+  program.translation = uniform("p_CM");
+  program.projection = uniform("projection");
+  program.clip = uniform("clip");
+  program.label = uniform("label");
+  program.light = uniform("towards_light");
+  program.shares = uniform("shares");
+  program.color_source = uniform("color_source");
+  program.material = uniform("material");
   return core::ok_status();
 }
 
@@ -197,7 +206,8 @@ void GlViews::free_images() {
 GlViews::~GlViews() {
   free_images();
   for (const PixelBuffer& pixels : pixels_) glDeleteBuffers(1, &pixels.name);
-  glDeleteProgram(program_);
+  glDeleteProgram(plain_.name);
+  glDeleteProgram(colored_.name);
 }
 
 core::Status GlViews::set_size(int width, int height) {
@@ -253,9 +263,11 @@ core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options) {
   PRESCENE_RETURN_IF_ERROR(set_size(camera.width, camera.height));
   glBindFramebuffer(GL_FRAMEBUFFER, frame_);
   glViewport(0, 0, camera.width, camera.height);
-  constexpr std::array<GLenum, 4> kAll = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
-                                          GL_COLOR_ATTACHMENT3};
-  glDrawBuffers(static_cast<GLsizei>(kAll.size()), kAll.data());
+  // Images that nobody asked for are not drawn.
+  const std::array<GLenum, 4> drawn = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                       options.normals ? GLenum{GL_COLOR_ATTACHMENT2} : GLenum{GL_NONE},
+                                       options.color ? GLenum{GL_COLOR_ATTACHMENT3} : GLenum{GL_NONE}};
+  glDrawBuffers(static_cast<GLsizei>(drawn.size()), drawn.data());
   constexpr std::array<GLfloat, 4> kNothing = {0, 0, 0, 0};
   constexpr std::array<GLuint, 4> kNoLabel = {0, 0, 0, 0};
   constexpr GLfloat kFarthest = 1.0f;
@@ -264,8 +276,8 @@ core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options) {
                                              static_cast<float>(back[2]) / 255.0f, 1.0f};
   glClearBufferfv(GL_COLOR, 0, kNothing.data());
   glClearBufferuiv(GL_COLOR, 1, kNoLabel.data());
-  glClearBufferfv(GL_COLOR, 2, kNothing.data());
-  glClearBufferfv(GL_COLOR, 3, background.data());
+  if (options.normals) glClearBufferfv(GL_COLOR, 2, kNothing.data());
+  if (options.color) glClearBufferfv(GL_COLOR, 3, background.data());
   glClearBufferfv(GL_DEPTH, 0, &kFarthest);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
@@ -273,37 +285,40 @@ core::Status GlViews::draw(const RenderJob& job, const RenderOptions& options) {
   glDisable(GL_DITHER);
   glDisable(GL_FRAMEBUFFER_SRGB);  // the shader does it
 
-  glUseProgram(program_);
+  const Program& program = options.color ? colored_ : plain_;
+  glUseProgram(program.name);
   // Pixel centres are at integers in our images, at halves in the device's.
   const double width = camera.width;
   const double height = camera.height;
-  glUniform4f(projection_, static_cast<float>(2.0 * camera.fx / width), static_cast<float>(2.0 * camera.fy / height),
-              static_cast<float>(2.0 * (camera.cx + 0.5) / width - 1.0),
+  glUniform4f(program.projection, static_cast<float>(2.0 * camera.fx / width),
+              static_cast<float>(2.0 * camera.fy / height), static_cast<float>(2.0 * (camera.cx + 0.5) / width - 1.0),
               static_cast<float>(2.0 * (camera.cy + 0.5) / height - 1.0));
   const double span = options.far_depth - options.near_depth;
-  glUniform2f(clip_, static_cast<float>((options.far_depth + options.near_depth) / span),
+  glUniform2f(program.clip, static_cast<float>((options.far_depth + options.near_depth) / span),
               static_cast<float>(-2.0 * options.far_depth * options.near_depth / span));
   const Vector3f light = (job.X_WC.rotation.conjugate() * options.lighting.towards_light_W.normalized()).cast<float>();
-  glUniform3fv(light_, 1, light.data());
-  glUniform2f(shares_, static_cast<float>(options.lighting.ambient), static_cast<float>(options.lighting.direct));
+  glUniform3fv(program.light, 1, light.data());
+  glUniform2f(program.shares, static_cast<float>(options.lighting.ambient),
+              static_cast<float>(options.lighting.direct));
   const geometry::Pose X_CW = job.X_WC.inverse();
   for (std::size_t i = 0; i < job.scene->instances.size(); ++i)
-    PRESCENE_RETURN_IF_ERROR(draw_instance(job.scene->instances[i], X_CW, static_cast<unsigned>(i + 1)));
+    PRESCENE_RETURN_IF_ERROR(draw_instance(job.scene->instances[i], program, X_CW, static_cast<unsigned>(i + 1)));
   return core::ok_status();
 }
 
-core::Status GlViews::draw_instance(const RenderInstance& instance, const geometry::Pose& X_CW, unsigned label) {
+core::Status GlViews::draw_instance(const RenderInstance& instance, const Program& program, const geometry::Pose& X_CW,
+                                    unsigned label) {
   if (instance.mesh->triangles.empty()) return core::ok_status();
   PRESCENE_TRY(const GlMesh* mesh, meshes_.get(instance.mesh));
   const geometry::Pose X_CM = X_CW * instance.X_WM;
   const Eigen::Matrix3f rotation = X_CM.rotation.toRotationMatrix().cast<float>();
   const Vector3f translation = X_CM.translation.cast<float>();
   const Vector3f material = linear(instance.material.color).cast<float>();
-  glUniformMatrix3fv(rotation_, 1, GL_FALSE, rotation.data());
-  glUniform3fv(translation_, 1, translation.data());
-  glUniform1ui(label_, label);
-  glUniform1i(color_source_, mesh->texture != 0 ? kOfTexture : mesh->colored ? kOfVertices : kOfMaterial);
-  glUniform3fv(material_, 1, material.data());
+  glUniformMatrix3fv(program.rotation, 1, GL_FALSE, rotation.data());
+  glUniform3fv(program.translation, 1, translation.data());
+  glUniform1ui(program.label, label);
+  glUniform1i(program.color_source, mesh->texture != 0 ? kOfTexture : mesh->colored ? kOfVertices : kOfMaterial);
+  glUniform3fv(program.material, 1, material.data());
   glBindTexture(GL_TEXTURE_2D, mesh->texture);
   glBindVertexArray(mesh->vertex_array);
   glDrawArrays(GL_TRIANGLES, 0, mesh->vertices);

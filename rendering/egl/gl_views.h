@@ -36,21 +36,25 @@ class GlViews {
     int height = 0;
   };
 
+  /// With the locations of its uniforms; those of colour are -1 where it draws none.
+  struct Program {
+    unsigned name = 0;
+    int rotation = -1, translation = -1, projection = -1, clip = -1, label = -1;
+    int light = -1, shares = -1, color_source = -1, material = -1;
+  };
+
   GlViews() = default;
-  core::Status make_program();
+  core::Status make_program(bool color);
   core::Status set_size(int width, int height);
   void free_images();
   core::Status draw(const RenderJob& job, const RenderOptions& options);
-  core::Status draw_instance(const RenderInstance& instance, const geometry::Pose& X_CW, unsigned label);
+  core::Status draw_instance(const RenderInstance& instance, const Program& program, const geometry::Pose& X_CW,
+                             unsigned label);
   void send_back(const RenderOptions& options, PixelBuffer* pixels) const;
   static core::Status take(const RenderOptions& options, const PixelBuffer& pixels, RenderedView* view);
-  int uniform(const char* name) const;
 
   int max_image_size_ = 0;
-  unsigned program_ = 0;
-  // Uniform locations.
-  int rotation_ = -1, translation_ = -1, projection_ = -1, clip_ = -1, label_ = -1;
-  int light_ = -1, shares_ = -1, color_source_ = -1, material_ = -1;
+  Program plain_, colored_;
   int width_ = 0;
   int height_ = 0;
   unsigned frame_ = 0;
