@@ -93,7 +93,7 @@ float inverse_absent(const SensorModel& model, const AbsentMixture& absent, floa
   if (depth <= 0.0f) return 0.0f;
   // The range's ends as rounded to single precision may lie outside of it.
   const double z = std::clamp(static_cast<double>(depth), model.options().min_depth, model.options().max_depth);
-  return static_cast<float>(1.0 / model.density(absent, z));
+  return 1.0f / static_cast<float>(model.density(absent, z));
 }
 
 void sample_colors(const FrameTermsInput& input, int step, int offset, double exponent, FrameTerms* terms) {
@@ -158,7 +158,7 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
       terms->inverse_absent(x, y) = inverse_absent(model, absent, depth);
       terms->absent_peak(x, y) = static_cast<float>(absent.peak_depth);
       terms->absent_missing(x, y) = static_cast<float>(absent.missing);
-      terms->inverse_returns(x, y) = static_cast<float>(1.0 / (1.0 - absent.missing));
+      terms->inverse_returns(x, y) = absent.missing < 0.0 ? 1.0f : 1.0f / (1.0f - static_cast<float>(absent.missing));
       terms->known(x, y) = 0.0f;
     }
   }

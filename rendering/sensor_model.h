@@ -58,7 +58,7 @@ double tempering(const Tempering& tempering, double pixels, int step);
 /// Gauss-Newton equations, which knows no silhouettes.
 struct TemperingOptions {
   Tempering weight = {75.0, 500.0};
-  Tempering information = {100.0, 0.0};
+  Tempering information = {90.0, 0.0};
 
   friend bool operator==(const TemperingOptions&, const TemperingOptions&) = default;
 };

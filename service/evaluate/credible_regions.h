@@ -19,7 +19,7 @@ namespace prescene::service {
 
 struct CredibleRegionOptions {
   int frames = 480;                                 ///< For each width; objects and distances take turns.
-  std::vector<int> widths = {80, 160};         ///< Pixels across at which the likelihood looks.
+  std::vector<int> widths = {80, 160};              ///< Pixels across at which the likelihood looks.
   std::vector<double> distances = {0.6, 0.9, 1.3};  ///< m
   rendering::TemperingOptions tempering;
   rendering::SensorModelOptions sensor;
