@@ -336,7 +336,7 @@ int run(int rounds, const std::string& out) {
   Target on_card = open("10k triangles on a graphics card, hypotheses", std::nullopt, 500e3, "");
   on_card.unit = "1/s";
   const auto device_rows = [&](const std::string& name, const Scene& scene) {
-    const std::vector<DeviceCosts> all = costs_on_devices(scene, rounds, &why_not);
+    std::vector<DeviceCosts> all = costs_on_devices(scene, rounds, &why_not);
     for (const DeviceCosts& costs : all)
       on_devices.rows.push_back({name, costs.name, static_cast<std::int64_t>(costs.calls), 1e6 * costs.weight,
                                  1e6 * costs.step, costs.on_device});
