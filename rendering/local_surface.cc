@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "chamfer.h"
+
 namespace prescene::rendering {
 
 using geometry::Vector3d;
@@ -72,7 +74,6 @@ std::optional<LocalSurface> local_surface(const geometry::DepthImage& depth, con
 
 geometry::Image<float> distance_to_marked(const geometry::Image<std::uint8_t>& marked) {
   constexpr float kFar = 1e6f;
-  constexpr float kDiagonal = 1.41421356f;
   const int width = marked.width(), height = marked.height();
   geometry::Image<float> distance(width, height, kFar);
   for (int y = 0; y < height; ++y)
@@ -82,16 +83,7 @@ geometry::Image<float> distance_to_marked(const geometry::Image<std::uint8_t>& m
     if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height) return;
     distance(x, y) = std::min(distance(x, y), distance(x + dx, y + dy) + length);
   };
-  const auto sweep = [&](int x, int y, int back) {
-    relax(x, y, back, 0, 1.0f);
-    relax(x, y, 0, back, 1.0f);
-    relax(x, y, back, back, kDiagonal);
-    relax(x, y, -back, back, kDiagonal);
-  };
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) sweep(x, y, -1);
-  for (int y = height - 1; y >= 0; --y)
-    for (int x = width - 1; x >= 0; --x) sweep(x, y, 1);
+  sweep_neighbours(width, height, relax);
   return distance;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "chamfer.h"
 #include "prescene/core/check.h"
 
 namespace prescene::rendering {
@@ -76,7 +77,6 @@ double jump(const RenderedView& view, const geometry::PinholeCamera& camera, int
 /// Distances by two sweeps over the eight neighbours (chamfer), exact along rows, columns and diagonals.
 EdgeMap find_edges(const RenderedView& view, const geometry::PinholeCamera& camera, double depth_edge) {
   constexpr float kFar = 1e6f;
-  constexpr float kDiagonal = 1.41421356f;
   const int width = view.depth.width();
   const int height = view.depth.height();
   EdgeMap edges{geometry::Image<float>(width, height, kFar), geometry::Image<float>(width, height, 0.0f)};
@@ -100,16 +100,7 @@ EdgeMap find_edges(const RenderedView& view, const geometry::PinholeCamera& came
     edges.distance_px(x, y) = distance;
     edges.other_depth(x, y) = edges.other_depth(x + dx, y + dy);
   };
-  const auto sweep = [&](int x, int y, int back) {
-    relax(x, y, back, 0, 1.0f);
-    relax(x, y, 0, back, 1.0f);
-    relax(x, y, back, back, kDiagonal);
-    relax(x, y, -back, back, kDiagonal);
-  };
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) sweep(x, y, -1);
-  for (int y = height - 1; y >= 0; --y)
-    for (int x = width - 1; x >= 0; --x) sweep(x, y, 1);
+  sweep_neighbours(width, height, relax);
   return edges;
 }
 

@@ -3,6 +3,8 @@
 
 #include <embree3/rtcore.h>
 
+#include "embree_mesh.h"
+
 namespace prescene::tests {
 
 struct RayCaster::Impl {
@@ -21,18 +23,7 @@ RayCaster::RayCaster() : impl_(std::make_unique<Impl>()) {}
 RayCaster::~RayCaster() = default;
 
 void RayCaster::add(const geometry::TriangleMesh& mesh) {
-  RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), mesh.vertices.size()));
-  for (const geometry::Vector3d& vertex : mesh.vertices)
-    for (int k = 0; k < 3; ++k) *vertices++ = static_cast<float>(vertex[k]);
-  auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                 3 * sizeof(unsigned), mesh.triangles.size()));
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t index : triangle) *indices++ = index;
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(impl_->scene, geometry);
-  rtcReleaseGeometry(geometry);
+  attach_mesh(mesh, impl_->device, impl_->scene);
   impl_->committed = false;
 }
 
