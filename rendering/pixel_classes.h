@@ -14,6 +14,8 @@ namespace prescene::rendering {
 inline constexpr float kMatchSigmas = 3.0f;
 /// So many standard deviations off, the hit is nothing beside the outliers.
 inline constexpr float kHitSigmas = 10.0f;
+/// exp(-t^2/2) = 2^(this t^2).
+inline constexpr float kNormalExponent = -0.72134752f;
 /// No pixel counts more against a pose than this, even when a material is said to have no outliers.
 inline constexpr float kMinRatio = 1e-12f;
 

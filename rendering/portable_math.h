@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exp and log made of additions, multiplications and divisions alone, so that likelihoods have the same bits on every
-// processor (the system's library picks variants by processor).
+// Powers and log made of additions, multiplications and divisions alone, so that likelihoods have the same bits on
+// every processor (the system's library picks variants by processor).
 #pragma once
 
 #include <bit>
@@ -8,20 +8,17 @@
 
 namespace prescene::rendering {
 
-/// exp(x) in single precision, relative error below 3e-7; 0 below -87, x at most 88.
-inline float portable_exp(float x) {
-  if (x < -87.0f) return 0.0f;
-  if (x > 88.0f) x = 88.0f;
-  // x = k log 2 + r, |r| <= log(2)/2; log 2 in two parts so that r is exact.
-  const float scaled = x * 1.44269504f;
-  const auto k = static_cast<std::int32_t>(scaled + (scaled < 0.0f ? -0.5f : 0.5f));
-  const auto kf = static_cast<float>(k);
-  const float r = (x - kf * 0.693359375f) + kf * 2.12194440e-4f;
-  // Taylor to the sixth order, paired so that the processor can overlap: the next term is below 2e-7 at |r| = 0.35.
+/// 2^x in single precision for x from -126 to 127, relative error below 3e-7.
+inline float portable_exp2(float x) {
+  // The lowest bits of `shifted` are the whole number next to x; |r| <= 1/2.
+  constexpr float kWhole = 12582912.0f;
+  const float shifted = x + kWhole;
+  const float r = x - (shifted - kWhole);
+  // The fifth order with the least greatest relative error (9e-8), paired so that the processor can overlap.
   const float r2 = r * r;
   const float p =
-      (1.0f + r) + r2 * ((0.5f + r * 0.16666667f) + r2 * ((0.041666667f + r * 0.0083333333f) + r2 * 0.0013888889f));
-  return p * std::bit_cast<float>((k + 127) << 23);
+      (1.0f + r * 0.69314698f) + r2 * ((0.24022242f + r * 0.055507337f) + r2 * (0.0096715127f + r * 0.0013264727f));
+  return p * std::bit_cast<float>((std::bit_cast<std::uint32_t>(shifted) << 23) + 0x3f800000u);
 }
 
 /// exp(x) in double precision, relative error below 1e-15; 0 below -708, x at most 709.

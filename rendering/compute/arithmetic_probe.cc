@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arithmetic_probe.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -35,7 +36,7 @@ Outputs probe_on_processor(const Inputs& in) {
           bits(a / b),
           bits(std::sqrt(std::abs(a))),
           static_cast<std::uint32_t>(snapped(c, 0.0f).x),
-          bits(portable_exp(-std::abs(d))),
+          bits(portable_exp2(std::max(-std::abs(d), -126.0f))),
           static_cast<std::uint32_t>(wide_bits) ^ static_cast<std::uint32_t>(wide_bits >> 32)};
 }
 
@@ -59,7 +60,7 @@ std::vector<Inputs> probe_inputs() {
 
 constexpr const char* kNames[kProbeOutputs] = {
     "a sum of a product", "a sum of products", "a difference of products", "a quotient", "a root",
-    "a snapped place",    "an exponential",    "a sum in double precision"};
+    "a snapped place",    "a power of two",    "a sum in double precision"};
 
 }  // namespace
 

@@ -64,19 +64,15 @@ int snapped(float place) {
   return int(whole);
 }
 
-// As portable_exp(float).
-float exp_of(float x) {
-  if (x < -87.0) return 0.0;
-  precise float limited = min(x, 88.0);
-  precise float scaled = limited * 1.44269504;
-  precise float shifted = scaled + (scaled < 0.0 ? -0.5 : 0.5);
-  int k = int(shifted);
-  precise float kf = float(k);
-  precise float r = (limited - kf * 0.693359375) + kf * 2.12194440e-4;
+// As portable_exp2().
+float exp2_of(float x) {
+  const float kWhole = 12582912.0;
+  precise float shifted = x + kWhole;
+  precise float r = x - (shifted - kWhole);
   precise float r2 = r * r;
-  precise float p = (1.0 + r) + r2 * ((0.5 + r * 0.16666667) +
-                                      r2 * ((0.041666667 + r * 0.0083333333) + r2 * 0.0013888889));
-  precise float result = p * uintBitsToFloat(uint(k + 127) << 23);
+  precise float p = (1.0 + r * 0.69314698) +
+                    r2 * ((0.24022242 + r * 0.055507337) + r2 * (0.0096715127 + r * 0.0013264727));
+  precise float result = p * uintBitsToFloat((floatBitsToUint(shifted) << 23) + 0x3f800000u);
   return result;
 }
 )";
@@ -100,7 +96,7 @@ void main() {
   outputs[8u * i + 3u] = floatBitsToUint(divided(a, b));
   outputs[8u * i + 4u] = floatBitsToUint(root_of(abs(a)));
   outputs[8u * i + 5u] = uint(snapped(c));
-  outputs[8u * i + 6u] = floatBitsToUint(exp_of(-abs(d)));
+  outputs[8u * i + 6u] = floatBitsToUint(exp2_of(max(-abs(d), -126.0)));
   outputs[8u * i + 7u] = wide_bits.x ^ wide_bits.y;
 }
 )";

@@ -65,8 +65,8 @@ uint ratio_of(Pixel p, int x, int y, bool outline, inout int measured, inout int
   precise float deviation = (p.measured - p.depth) * precision_here;
   precise float density = materials[m].outlier_density;
   if (abs(deviation) < HIT_SIGMAS) {
-    precise float power = -0.5 * deviation * deviation;
-    precise float hit = materials[m].hit * precision_here * exp_of(power);
+    precise float power = NORMAL_EXPONENT * deviation * deviation;
+    precise float hit = materials[m].hit * precision_here * exp2_of(power);
     precise float colored = h.color < 0 ? hit : hit * layer(h.color, x, y);
     density = density + colored;
   }
@@ -247,7 +247,8 @@ std::string constant(const std::string& name, float value) {
 
 std::string shader_pixels(const PoseWork& work) {
   std::string text = constant("HIT_SIGMAS", kHitSigmas) + constant("MATCH_SIGMAS", kMatchSigmas) +
-                     constant("MIN_RATIO", kMinRatio) + constant("LEAST_COSINE", 1e-6f) + kPixels;
+                     constant("MIN_RATIO", kMinRatio) + constant("NORMAL_EXPONENT", kNormalExponent) +
+                     constant("LEAST_COSINE", 1e-6f) + kPixels;
   if (work.equations) text += kEquationOfPixel + equation_sums() + equation_rows();
   return text;
 }

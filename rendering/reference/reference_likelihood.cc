@@ -85,7 +85,7 @@ class EvidenceSum {
     const float deviation = (pixel.measured - pixel.depth) * precision;
     float density = c.outlier_density;
     if (std::abs(deviation) < kHitSigmas) {
-      const float hit = c.hit * precision * portable_exp(-0.5f * deviation * deviation);
+      const float hit = c.hit * precision * portable_exp2(kNormalExponent * deviation * deviation);
       density += color_ratio_ != nullptr ? hit * (*color_ratio_)(pixel.x, pixel.y) : hit;
     }
     const float occluder = c.occluder / (pixel.depth - min_depth_);

@@ -128,7 +128,7 @@ void equations_kernel(const FrameTerms& frame, const RenderMesh& mesh, const Pos
                       const LineariseOptions& options, CameraEquations* equations) {
   EquationLanes lanes(frame, mesh.clusters, seen, options);
   for_each_block(frame, seen, tile,
-                 [&](int, int y, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(y, place, p); });
+                 [&](int y, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(y, place, p); });
   lanes.finish(equations);
 }
 

@@ -28,9 +28,11 @@ struct Pixels {
   F ray_x, ray_y;  ///< The ray has z = 1.
   F depth, inverse_depth, measured, slope, cosine;
   I face;
+  std::size_t at;      ///< Of the first, in the frame's images.
+  const float* drawn;  ///< Its 1/z in the tile.
 };
 
-/// Calls visit(x, y, place in the block, pixels) for each vector of pixels that are not all empty; those not covered
+/// Calls visit(row, place in the block, pixels) for each vector of pixels that are not all empty; those not covered
 /// are lanes without meaning. Blocks begin where they do on every instruction set. Returns the number of pixels in
 /// view.
 template <class Visit>
@@ -42,9 +44,14 @@ HWY_INLINE int for_each_block(const FrameTerms& frame, const PoseProjection& see
   const F max_depth = set(static_cast<float>(frame.model.options().max_depth));
   const F ramp = hn::Iota(d, 0.0f);
   const PixelRect& rect = tile.rect;
+  const float *known_depths = frame.known.data(), *measured = frame.depth.data(),
+              *inverse_rays = frame.inverse_ray.data();
+  const float* distances = tile.distance.data();
   std::size_t in_view = 0;
   for (int y = rect.y_first; y <= rect.y_last; ++y) {
     const float* depths = tile.inverse_depth(y);
+    const std::int32_t* faces = tile.face(y);
+    const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(seen.width);
     const F ray_y = set((static_cast<float>(y) - seen.cy) * seen.inverse_fy);
     for (int block = rect.x_first; block <= rect.x_last; block += kBlock) {
       // The last block of a row ends within the image; what the one before had is left out.
@@ -57,44 +64,40 @@ HWY_INLINE int for_each_block(const FrameTerms& frame, const PoseProjection& see
         Pixels p;
         p.in_view = hn::And(here, hn::Gt(inverse_depth, zero));
         if (hn::AllFalse(d, p.in_view)) continue;
-        p.depth = hn::Div(set(1.0f), hn::IfThenElse(p.in_view, inverse_depth, set(1.0f)));
+        p.depth = hn::Div(set(1.0f), inverse_depth);  // No number where empty.
         p.in_view = hn::And(p.in_view, hn::Lt(p.depth, max_depth));
         in_view += hn::CountTrue(d, p.in_view);
-        const F known = hn::LoadU(d, &frame.known(x, y));
+        p.at = row + static_cast<std::size_t>(x);
+        p.drawn = depths + x;
+        const F known = hn::LoadU(d, known_depths + p.at);
         p.covered = hn::AndNot(hn::And(hn::Gt(known, zero), hn::Lt(known, p.depth)), p.in_view);
         if (hn::AllFalse(d, p.covered)) continue;
         p.ray_x = hn::Mul(hn::Sub(column, set(seen.cx)), set(seen.inverse_fx));
         p.ray_y = ray_y;
-        p.face = hn::IfThenElseZero(hn::RebindMask(di, p.covered), hn::LoadU(di, tile.face(y) + x));
-        p.slope = hn::Mul(hn::GatherIndex(d, tile.distance.data(), p.face), inverse_depth);
+        p.face = hn::IfThenElseZero(hn::RebindMask(di, p.covered), hn::LoadU(di, faces + x));
+        p.slope = hn::Mul(hn::GatherIndex(d, distances, p.face), inverse_depth);
         p.inverse_depth = inverse_depth;
-        p.cosine = hn::Max(hn::Mul(hn::Neg(p.slope), hn::LoadU(d, &frame.inverse_ray(x, y))), set(1e-6f));
-        p.measured = hn::LoadU(d, &frame.depth(x, y));
-        visit(x, y, static_cast<std::size_t>(x - start), p);
+        p.cosine = hn::Max(hn::Mul(hn::Neg(p.slope), hn::LoadU(d, inverse_rays + p.at)), set(1e-6f));
+        p.measured = hn::LoadU(d, measured + p.at);
+        visit(y, static_cast<std::size_t>(x - start), p);
       }
     }
   }
   return static_cast<int>(in_view);
 }
 
-/// As portable_exp(float).
-HWY_INLINE F exp_lanes(F x) {
+/// As portable_exp2().
+HWY_INLINE F exp2_lanes(F x) {
   const DF d;
   const DI di;
-  const auto vanishes = hn::Lt(x, set(-87.0f));
-  x = hn::Min(x, set(88.0f));
-  const F scaled = hn::Mul(x, set(1.44269504f));
-  const F half = hn::IfThenElse(hn::Lt(scaled, hn::Zero(d)), set(-0.5f), set(0.5f));
-  const I k = hn::ConvertTo(di, hn::Add(scaled, half));
-  const F kf = hn::ConvertTo(d, k);
-  const F r = hn::Add(hn::Sub(x, hn::Mul(kf, set(0.693359375f))), hn::Mul(kf, set(2.12194440e-4f)));
+  const F whole = set(12582912.0f);
+  const F shifted = hn::Add(x, whole);
+  const F r = hn::Sub(x, hn::Sub(shifted, whole));
   const F r2 = hn::Mul(r, r);
   const auto pair = [&](float low, float high) HWY_ATTR { return hn::Add(set(low), hn::Mul(r, set(high))); };
-  const F tail = hn::Add(pair(0.041666667f, 0.0083333333f), hn::Mul(r2, set(0.0013888889f)));
-  const F upper = hn::Add(pair(0.5f, 0.16666667f), hn::Mul(r2, tail));
-  const F p = hn::Add(hn::Add(set(1.0f), r), hn::Mul(r2, upper));
-  const F power = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(k, set(127))));
-  return hn::IfThenZeroElse(vanishes, hn::Mul(p, power));
+  const F upper = hn::Add(pair(0.24022242f, 0.055507337f), hn::Mul(r2, pair(0.0096715127f, 0.0013264727f)));
+  const F p = hn::Add(pair(1.0f, 0.69314698f), hn::Mul(r2, upper));
+  return hn::Mul(p, hn::BitCast(d, hn::Add(hn::ShiftLeft<23>(hn::BitCast(di, shifted)), set(0x3f800000))));
 }
 
 /// Products of positive, normal numbers, one a lane of a block.
@@ -139,61 +142,65 @@ class Products {
   HWY_ALIGN std::int32_t exponent_[kBlock] = {};
 };
 
-/// A field of the classes, by class, and for each lane the value of its own.
+/// A field of the classes, looked up in lanes.
 class ClassValues {
  public:
   template <class Value>
   ClassValues(const PixelClasses& classes, Value value) {
-    for (std::size_t i = 0; i < PixelClasses::kIncidences; ++i) {
-      inside_[i] = value(classes.of_incidence(i, false));
-      outline_[i] = value(classes.of_incidence(i, true));
-    }
+    for (std::size_t i = 0; i < kRoom; ++i)
+      values_[i] = value(classes.of_incidence(i % PixelClasses::kIncidences, i / PixelClasses::kIncidences % 2 != 0));
   }
-  HWY_INLINE F at(const M (&beyond)[PixelClasses::kIncidences - 1], M outline) const {
-    F value = hn::IfThenElse(outline, set(outline_[0]), set(inside_[0]));
-    for (std::size_t i = 1; i < PixelClasses::kIncidences; ++i)
-      value = hn::IfThenElse(beyond[i - 1], hn::IfThenElse(outline, set(outline_[i]), set(inside_[i])), value);
-    return value;
+  /// `numbers`: of incidence, and kIncidences more at the outline.
+  HWY_INLINE F at(I numbers) const {
+    const DF d;
+    if constexpr (hn::MaxLanes(d) >= kClasses) {
+      return hn::TableLookupLanes(hn::Load(d, values_), hn::IndicesFromVec(d, numbers));
+    } else {
+      return hn::GatherIndex(d, values_, numbers);
+    }
   }
 
  private:
-  float inside_[PixelClasses::kIncidences], outline_[PixelClasses::kIncidences];
+  static constexpr std::size_t kClasses = 2 * PixelClasses::kIncidences;
+  static constexpr std::size_t kRoom = kBlock > kClasses ? kBlock : kClasses;
+
+  HWY_ALIGN float values_[kRoom];
 };
 
 class EvidenceLanes {
  public:
   EvidenceLanes(const EvidenceTerms& terms, const PoseTile& tile)
-      : frame_(*terms.frame),
-        tile_(tile),
-        colors_(terms.color_ratio),
+      : absent_missing_(terms.frame->absent_missing.data()),
+        inverse_absent_(terms.frame->inverse_absent.data()),
+        inverse_returns_(terms.frame->inverse_returns.data()),
+        colors_(terms.color_ratio == nullptr ? nullptr : terms.color_ratio->data()),
+        stride_(static_cast<std::ptrdiff_t>(tile.stride())),
         bounds_(terms.classes->bounds()),
         constant_(terms.classes->of_incidence(0, false)),
         missing_(*terms.classes, [](const PixelClass& c) { return c.missing; }),
         returned_(*terms.classes, [](const PixelClass& c) { return c.returned; }),
         returned_ratio_(*terms.classes, [](const PixelClass& c) { return c.returned_ratio; }),
         missing_ratio_(*terms.classes, [](const PixelClass& c) { return c.missing_ratio; }),
-        precision_(frame_.model.options()),
-        min_depth_(static_cast<float>(frame_.model.options().min_depth)) {}
+        precision_(terms.frame->model.options()),
+        min_depth_(static_cast<float>(terms.frame->model.options().min_depth)) {}
 
   /// `place` is where the vector begins in its block.
-  HWY_INLINE void add(int x, int y, std::size_t place, const Pixels& p) {
+  HWY_INLINE void add(std::size_t place, const Pixels& p) {
     const DF d;
     const F zero = hn::Zero(d);
-    const F absent_missing = hn::LoadU(d, &frame_.absent_missing(x, y));
+    const F absent_missing = hn::LoadU(d, absent_missing_ + p.at);
     const M not_known = hn::Lt(absent_missing, zero);
-    M beyond[PixelClasses::kIncidences - 1];
-    for (std::size_t i = 0; i + 1 < PixelClasses::kIncidences; ++i) beyond[i] = hn::Gt(p.cosine, set(bounds_[i]));
-    const M outline = at_outline(x, y);
+    const I number = class_of(p);
     covered_ += hn::CountTrue(d, p.covered);
 
     const M returns = hn::AndNot(hn::Eq(p.measured, zero), p.covered);
     const M missing = hn::AndNot(returns, p.covered);
     if (!hn::AllFalse(d, missing)) {
       const F known = hn::IfThenElse(not_known, set(1.0f), absent_missing);
-      const F ratio = hn::Div(missing_.at(beyond, outline), known);
-      missing_log_.multiply(place, missing, hn::IfThenElse(not_known, missing_ratio_.at(beyond, outline), ratio));
+      const F ratio = hn::Div(missing_.at(number), known);
+      missing_log_.multiply(place, missing, hn::IfThenElse(not_known, missing_ratio_.at(number), ratio));
     }
-    if (!hn::AllFalse(d, returns)) add_returns(x, y, place, p, returns, not_known, beyond, outline);
+    if (!hn::AllFalse(d, returns)) add_returns(place, p, returns, not_known, number);
     if (++factors_ == 64) {
       factors_ = 0;
       for (Products* products : {&visible_log_, &occluded_log_, &missing_log_}) products->normalise();
@@ -211,17 +218,22 @@ class EvidenceLanes {
   }
 
  private:
-  HWY_INLINE M at_outline(int x, int y) const {
+  /// The numbers of ClassValues.
+  HWY_INLINE I class_of(const Pixels& p) const {
     const DF d;
-    const float* pixel = tile_.inverse_depth(y) + x;
-    const F beside = hn::Min(hn::LoadU(d, pixel - 1), hn::LoadU(d, pixel + 1));
-    const F across =
-        hn::Min(hn::LoadU(d, tile_.inverse_depth(y - 1) + x), hn::LoadU(d, tile_.inverse_depth(y + 1) + x));
-    return hn::Eq(hn::Min(beside, across), hn::Zero(d));
+    const DI di;
+    const auto beyond = [&](std::size_t i) HWY_ATTR {
+      return hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(p.cosine, set(bounds_[i]))));
+    };
+    static_assert(PixelClasses::kIncidences == 4);
+    const I minus_incidence = hn::Add(hn::Add(beyond(0), beyond(1)), beyond(2));
+    const F beside = hn::Min(hn::LoadU(d, p.drawn - 1), hn::LoadU(d, p.drawn + 1));
+    const F across = hn::Min(hn::LoadU(d, p.drawn - stride_), hn::LoadU(d, p.drawn + stride_));
+    const M outline = hn::Eq(hn::Min(beside, across), hn::Zero(d));
+    return hn::Sub(hn::IfThenElseZero(hn::RebindMask(di, outline), set(4)), minus_incidence);
   }
 
-  HWY_INLINE void add_returns(int x, int y, std::size_t place, const Pixels& p, M returns, M not_known,
-                              const M (&beyond)[PixelClasses::kIncidences - 1], M outline) {
+  HWY_INLINE void add_returns(std::size_t place, const Pixels& p, M returns, M not_known, I number) {
     const DF d;
     const F zero = hn::Zero(d);
     const F tilt = hn::Min(hn::Max(hn::Mul(p.cosine, set(precision_.per_cosine)), set(precision_.least)), set(1.0f));
@@ -230,16 +242,17 @@ class EvidenceLanes {
     F density = set(constant_.outlier_density);
     const M hits = hn::And(returns, hn::Lt(hn::Abs(deviation), set(kHitSigmas)));
     if (!hn::AllFalse(d, hits)) {
+      // Of other lanes the power has no meaning.
       F hit = hn::Mul(hn::Mul(set(constant_.hit), precision),
-                      exp_lanes(hn::Mul(hn::Mul(set(-0.5f), deviation), deviation)));
-      if (colors_ != nullptr) hit = hn::Mul(hit, hn::LoadU(d, &(*colors_)(x, y)));
+                      exp2_lanes(hn::Mul(hn::Mul(set(kNormalExponent), deviation), deviation)));
+      if (colors_ != nullptr) hit = hn::Mul(hit, hn::LoadU(d, colors_ + p.at));
       density = hn::Add(density, hn::IfThenElseZero(hits, hit));
     }
     const F occluder = hn::Div(set(constant_.occluder), hn::Sub(p.depth, set(min_depth_)));
     density = hn::Add(density, hn::IfThenElseZero(hn::Lt(deviation, zero), occluder));
-    const F share = hn::Mul(returned_.at(beyond, outline), hn::LoadU(d, &frame_.inverse_returns(x, y)));
-    const F returned = hn::IfThenElse(not_known, returned_ratio_.at(beyond, outline), share);
-    const F against_absent = hn::Mul(density, hn::LoadU(d, &frame_.inverse_absent(x, y)));
+    const F share = hn::Mul(returned_.at(number), hn::LoadU(d, inverse_returns_ + p.at));
+    const F returned = hn::IfThenElse(not_known, returned_ratio_.at(number), share);
+    const F against_absent = hn::Mul(density, hn::LoadU(d, inverse_absent_ + p.at));
     const F ratio = hn::Max(hn::Mul(returned, hn::Add(against_absent, set(constant_.behind))), set(kMinRatio));
     const M occluded = hn::And(returns, hn::Lt(deviation, set(-kMatchSigmas)));
     const M visible = hn::AndNot(occluded, returns);
@@ -250,9 +263,9 @@ class EvidenceLanes {
     if (!hn::AllFalse(d, occluded)) occluded_log_.multiply(place, occluded, ratio);
   }
 
-  const FrameTerms& frame_;
-  const PoseTile& tile_;
-  const geometry::Image<float>* colors_;
+  const float *absent_missing_, *inverse_absent_, *inverse_returns_;
+  const float* colors_;  // Null: no colour.
+  std::ptrdiff_t stride_;
   std::array<float, PixelClasses::kIncidences - 1> bounds_;
   PixelClass constant_;
   ClassValues missing_, returned_, returned_ratio_, missing_ratio_;
@@ -266,9 +279,8 @@ class EvidenceLanes {
 void evidence_kernel(const EvidenceTerms& terms, const PoseProjection& seen, const PoseTile& tile,
                      PoseEvidence* evidence) {
   EvidenceLanes lanes(terms, tile);
-  const int in_view =
-      for_each_block(*terms.frame, seen, tile,
-                     [&](int x, int y, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(x, y, place, p); });
+  const int in_view = for_each_block(*terms.frame, seen, tile,
+                                     [&](int, std::size_t place, const Pixels& p) HWY_ATTR { lanes.add(place, p); });
   lanes.finish(in_view, evidence);
 }
 

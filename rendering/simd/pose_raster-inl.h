@@ -155,6 +155,9 @@ class ClusterTable {
   HWY_INLINE I at(I numbers) const {
     const DI di;
     if constexpr (!kInRegisters) return hn::GatherIndex(di, values_, numbers);
+#if HWY_TARGET == HWY_AVX3
+    if constexpr (kRegisters == 2) return I{_mm512_permutex2var_epi32(part_[0].raw, numbers.raw, part_[1].raw)};
+#endif
     const auto places = hn::IndicesFromVec(di, hn::And(numbers, set(static_cast<std::int32_t>(kLanes - 1))));
     I found = hn::TableLookupLanes(part_[0], places);
     for (std::size_t r = 1; r < kRegisters; ++r)
