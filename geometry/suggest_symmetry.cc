@@ -4,48 +4,13 @@
 #include <numbers>
 #include <optional>
 
-#include "box_tree.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/geometry/surface_tree.h"
 #include "prescene/geometry/symmetry.h"
-#include "prescene/geometry/triangle_distance.h"
 
 namespace prescene::geometry {
 namespace {
-
-// The surface of a mesh for queries "is there a triangle within this distance?".
-class Surface {
- public:
-  explicit Surface(const TriangleMesh& mesh) : mesh_(mesh), tree_(boxes_of(mesh), 4) {}
-
-  bool is_within(const Vector3d& q, double distance) const {
-    double bound = distance * distance;
-    bool found = false;
-    tree_.search(q, bound, [&](std::size_t leaf, std::uint32_t begin) {
-      for (std::uint32_t i = begin; i < tree_.leaf_begins()[leaf + 1] && !found; ++i) {
-        const auto& t = mesh_.triangles[tree_.order()[i]];
-        found =
-            squared_distance_to_triangle(q, mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]) <= bound;
-      }
-      if (found) bound = -1.0;
-    });
-    return found;
-  }
-
- private:
-  static std::vector<BoxTree::ItemBox> boxes_of(const TriangleMesh& mesh) {
-    std::vector<BoxTree::ItemBox> boxes;
-    boxes.reserve(mesh.triangles.size());
-    for (const auto& t : mesh.triangles) {
-      const Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-      boxes.push_back({a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)});
-    }
-    return boxes;
-  }
-
-  const TriangleMesh& mesh_;
-  BoxTree tree_;
-};
 
 // Asks whether rotations about a point map a mesh onto itself.
 class SymmetryTest {
@@ -90,7 +55,7 @@ class SymmetryTest {
   }
 
  private:
-  Surface surface_;
+  SurfaceTree surface_;
   Vector3d centre_;
   double tolerance_;
   std::vector<SurfacePoint> points_;
