@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "prescene/simulation/uncertain/bearing_body.h"
 
@@ -97,13 +98,14 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
     made->support_friction_.push_back(
         std::min(belief::mean(contact.friction),
                  contact.impact_friction ? belief::mean(*contact.impact_friction) : belief::mean(contact.friction)));
+    made->least_support_friction_ = std::min(made->least_support_friction_, made->support_friction_.back());
     for (const belief::CollisionShape& shape : support.collision) {
       const geometry::Box box =
           geometry::bounding_box(geometry::transformed(belief::collision_mesh({shape}), support.X_WS));
       made->shapes_.push_back({box, static_cast<int>(s)});
-      made->lowest_top_ = std::min(made->lowest_top_, box.max().z());
     }
   }
+  std::ranges::stable_sort(made->faces_, std::ranges::greater{}, [](const FixedFace& f) { return f.face.height; });
   return made;
 }
 
@@ -131,7 +133,7 @@ bool MotionCertifier::assess(const belief::WorldState& state, double seconds_lef
     motion.box.max().array() += known.rise;
   }
   stand(state, motions);
-  bound_heights(motions);
+  bound_heights(state, seconds_left, motions);
   for (std::size_t i = 0; i < motions.size(); ++i)
     if (!stays_in_world(motions[i], objects_[i])) return false;
   if (!robot_ && seconds_left >= kFallTime)
@@ -195,18 +197,61 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
   }
 }
 
-void MotionCertifier::bound_heights(std::vector<SureMotion>& motions) const {
+std::vector<double> MotionCertifier::lowest_centers(const belief::WorldState& state, double seconds_left,
+                                                    const std::vector<SureMotion>& motions) const {
+  std::vector<double> lowest(motions.size(), -world_radius_);
+  std::vector<std::size_t> free;
+  double energy = 0.0, lowest_touch = std::numeric_limits<double>::infinity();
+  for (std::size_t j = 0; j < motions.size(); ++j) {
+    const SureMotion& motion = motions[j];
+    energy += kEnergy * motion.kinetic;
+    if (!motion.trap) {
+      free.push_back(j);
+      continue;
+    }
+    lowest[j] = motion.plane + motion.trap->lowest;
+    energy += motion.weight * std::max(0.0, motion.center.z() - lowest[j]);
+    lowest_touch = std::min(lowest_touch, lowest[j] - objects_[j].outer_radius - kRise);
+  }
+  // One alone can give its energy to those that stay on their faces only where it touches one of them.
+  if (free.size() == 1) lowest[free[0]] = std::max(-world_radius_, lowest_touch - objects_[free[0]].outer_radius);
+
+  // None gets through a level face above which all of them stay: with all energy that there is above the face none gets
+  // to its edge in the time that is left, or slides that far.
+  for (const FixedFace& fixed : faces_) {
+    const double height = fixed.face.height;
+    const auto center_above = [&](std::size_t j) { return height + std::max(0.0, objects_[j].inner_radius - kRise); };
+    double all = energy;
+    for (const std::size_t j : free) all += motions[j].weight * std::max(0.0, motions[j].center.z() - center_above(j));
+    const bool stay = std::ranges::all_of(free, [&](std::size_t j) {
+      const SureMotion& motion = motions[j];
+      const belief::PhysicalParameters& physical = state.objects[j].physical;
+      const double friction = least_support_friction_ * std::min(physical.friction, physical.impact_friction);
+      const double speed2 = 2.0 * gravity_ * all / motion.weight;
+      const double way = std::min(std::sqrt(speed2) * seconds_left,
+                                  kSlide * speed2 / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom);
+      return motion.center.z() > height &&
+             distance_inside(fixed.face, motion.center.head<2>()) > way + objects_[j].outer_radius;
+    });
+    if (!stay) continue;
+    for (const std::size_t j : free) lowest[j] = std::max(lowest[j], center_above(j));
+    break;  // the others are lower
+  }
+  return lowest;
+}
+
+void MotionCertifier::bound_heights(const belief::WorldState& state, double seconds_left,
+                                    std::vector<SureMotion>& motions) const {
   double kinetic = 0.0;
   for (const SureMotion& motion : motions) kinetic += motion.kinetic;
   // Suppose that all that may be trapped are, and let go those that the energy of that supposition frees, until none is
   // left over: the first to break out would have had to do it with this energy.
   for (bool changed = true; changed;) {
     changed = false;
+    const std::vector<double> lowest = lowest_centers(state, seconds_left, motions);
     double potential = 0.0;
     const auto falls_by = [&](std::size_t j) {
-      const SureMotion& motion = motions[j];
-      const double lowest = motion.trap ? motion.plane + motion.trap->lowest : lowest_top_ + objects_[j].inner_radius;
-      return motion.weight * std::max(0.0, motion.center.z() - lowest);
+      return motions[j].weight * std::max(0.0, motions[j].center.z() - lowest[j]);
     };
     for (std::size_t j = 0; j < motions.size(); ++j) potential += falls_by(j);
     for (std::size_t i = 0; i < motions.size(); ++i) {

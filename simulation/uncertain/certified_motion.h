@@ -70,7 +70,11 @@ class MotionCertifier {
   };
 
   void stand(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
-  void bound_heights(std::vector<SureMotion>& motions) const;
+  void bound_heights(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
+  /// z that the centres of mass of the objects without a trap do not get below before they could give what they have
+  /// won by falling to another object, m.
+  std::vector<double> lowest_centers(const belief::WorldState& state, double seconds_left,
+                                     const std::vector<SureMotion>& motions) const;
   bool stays_in_world(const SureMotion& motion, const CertifiedObject& known) const;
   std::optional<double> landing_of(const std::vector<SureMotion>& motions, std::size_t object) const;
 
@@ -79,10 +83,10 @@ class MotionCertifier {
   double gravity_ = 0.0;
   std::vector<CertifiedObject> objects_;
   std::vector<geometry::Matrix3d> unit_inertias_;
-  std::vector<FixedFace> faces_;
+  std::vector<FixedFace> faces_;  // highest first
   std::vector<FixedShape> shapes_;
   std::vector<double> support_friction_;
-  double lowest_top_ = std::numeric_limits<double>::infinity();
+  double least_support_friction_ = std::numeric_limits<double>::infinity();
   bool robot_ = false;
 };
 
