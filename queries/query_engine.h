@@ -19,6 +19,7 @@
 #include "prescene/core/progress.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/rendering/renderer.h"
+#include "prescene/simulation/mechanics_options.h"
 #include "prescene/simulation/shape_store.h"
 #include "prescene/simulation/simulator.h"
 
@@ -32,6 +33,8 @@ struct QueryContext {
   /// The same with every step so many times as long; needed where PredictDetail::model_error is asked for.
   std::function<core::Result<std::unique_ptr<simulation::Simulator>>(std::shared_ptr<const belief::Scene>, double)>
       make_simulator_of_step;
+  /// MechanicsOptions::edge_rounding of those simulators, m.
+  double edge_rounding = simulation::MechanicsOptions{}.edge_rounding;
   /// Where shapes are kept over queries; null: answers do not tell of flights (belief::FlightForecast).
   simulation::ShapeStore* shapes = nullptr;
   /// Needed by `view`; called once a query.

@@ -81,6 +81,7 @@ queries::QueryContext Backends::query_context(core::ThreadPool& pool) {
     return make_simulator(*scene, factor);
   };
   context.make_renderer = [this] { return make_renderer(); };
+  context.edge_rounding = settings_.bullet.edge_rounding;
   context.shapes = &shapes_;
   context.pool = &pool;
   context.meshes = &meshes_;

@@ -26,8 +26,6 @@ constexpr double kKeptInLanding = 0.75;
 constexpr double kBouncy = 0.7;
 // s: a fall is over by then.
 constexpr double kFallTime = 1.0;
-// m: the smallest radius of edges in contacts (BulletOptions::edge_rounding).
-constexpr double kLeastEdge = 2e-4;
 
 bool disjoint_and_parting(const geometry::Box& a, const geometry::Box& b, const Vector3d& v) {
   for (int k = 0; k < 2; ++k) {
@@ -43,7 +41,7 @@ double depth_of(const ConvexPolytope& hull, const Vector3d& p) {
   return least;
 }
 
-std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model, ShapeStore* store) {
+std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model, const CertifierOptions& options) {
   auto hull = make_polytope(belief::collision_mesh(model).vertices);
   if (!hull) return std::nullopt;
   CertifiedObject object;
@@ -53,14 +51,15 @@ std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model
   object.center_of_mass = belief::mean(model.center_of_mass);
   object.center_play = belief::dimensions(model.center_of_mass) > 0 ? 2e-3 : 1e-9;
   if (collides_as_spheres(model.collision)) {
-    if (!store) return std::nullopt;
-    std::optional<BearingBody> body = bearing_body(model.collision, object.hull, object.center_of_mass, *store);
+    if (!options.shapes) return std::nullopt;
+    std::optional<BearingBody> body =
+        bearing_body(model.collision, object.hull, object.center_of_mass, *options.shapes);
     if (!body) return std::nullopt;
     object.bearing = std::move(body->polytope);
     object.rise = body->rise;
     object.inner_radius = std::max(0.0, body->inner_radius - object.center_play);
   }
-  object.edge_radius = std::max(kLeastEdge, model.contact.edge_radius);
+  object.edge_radius = std::max(options.edge_rounding, model.contact.edge_radius);
   for (const ConvexPolytope& shape : object.shapes)
     object.inner_radius = std::max(object.inner_radius, depth_of(shape, object.center_of_mass) - object.center_play);
   for (const Vector3d& v : object.hull.vertices)
@@ -84,7 +83,7 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
   made->gravity_ = -gravity.z();
   made->robot_ = !scene.robot.empty();
   for (const belief::SceneObject& object : scene.objects) {
-    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object), options.shapes);
+    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object), options);
     if (!certified) return nullptr;
     made->objects_.push_back(*std::move(certified));
     made->unit_inertias_.push_back(scene.model_of(object).unit_inertia);
@@ -98,6 +97,7 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
     made->support_friction_.push_back(
         std::min(belief::mean(contact.friction),
                  contact.impact_friction ? belief::mean(*contact.impact_friction) : belief::mean(contact.friction)));
+    made->support_edge_radius_ = std::max({made->support_edge_radius_, options.edge_rounding, contact.edge_radius});
     made->least_support_friction_ = std::min(made->least_support_friction_, made->support_friction_.back());
     for (const belief::CollisionShape& shape : support.collision) {
       const geometry::Box box =
@@ -191,7 +191,10 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     const double upwards = relative.z() * relative.z() + turning + 2.0 * gravity_ * gap;
     motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom +
                    2.0 * std::sqrt(sideways * upwards) / gravity_;
-    const double edge = options_.shorten_arms ? distance_inside(*best, foot) - motion.reach : 1e30;
+    // What is below ends in round edges, too.
+    const double round =
+        on_support ? support_edge_radius_ : objects_[static_cast<std::size_t>(motion.base)].edge_radius;
+    const double edge = options_.shorten_arms ? distance_inside(*best, foot) - round - motion.reach : 1e30;
     motion.trap = trap_of(objects_[i].bearing, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
                           objects_[i].edge_radius);
   }

@@ -56,6 +56,8 @@ class MotionCertifier {
   bool assess(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
   /// Nothing but `motions[object].base` is near enough to be touched while it stays there.
   bool alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const;
+  /// The largest radius of a support's edges, m.
+  double support_edge_radius() const { return support_edge_radius_; }
   /// Every shape of the support ends above `height`.
   bool support_above(int support, double height) const;
 
@@ -86,6 +88,7 @@ class MotionCertifier {
   std::vector<FixedFace> faces_;  // highest first
   std::vector<FixedShape> shapes_;
   std::vector<double> support_friction_;
+  double support_edge_radius_ = 0.0;
   double least_support_friction_ = std::numeric_limits<double>::infinity();
   bool robot_ = false;
 };

@@ -26,6 +26,8 @@ Truth when(bool yes, bool no) { return yes ? Truth::kYes : no ? Truth::kNo : Tru
 constexpr double kAngleRoom = 0.01;
 // s: what stands on its face is at rest by then.
 constexpr double kSettleTime = 0.5;
+// Share of its radius that a rounded corner lies inside of the sharp one.
+constexpr double kCornerLoss = 0.7320508;
 // m of air around a volume in which ways into it and out of it are looked for, at least.
 constexpr double kLeastAir = 0.03;
 
@@ -231,8 +233,10 @@ class EnergyCertifier final : public Certifier {
   std::unique_ptr<const MotionCertifier> certifier_;
 };
 
+/// Surfaces are those of sharp things; contacts round their edges by up to `edge_radius`.
 Passage passage_of(const belief::InsideVolume& volume, const CertifiedObject& object,
-                   const std::vector<geometry::TriangleMesh>& surfaces) {
+                   const std::vector<geometry::TriangleMesh>& surfaces, double edge_radius) {
+  const double ball_radius = object.inner_radius - kCornerLoss * edge_radius;
   const double offset = object.center_of_mass.norm() + object.center_play;
   const Vector3d air = Vector3d::Constant(std::max(kLeastAir, 2.0 * object.inner_radius));
   const geometry::Box box = box_of(volume);
@@ -243,7 +247,7 @@ Passage passage_of(const belief::InsideVolume& volume, const CertifiedObject& ob
   const auto inside = [&](const Vector3d& low, const Vector3d& high) {
     return may_be_inside(volume, offset, low, high);
   };
-  const auto leave = std::make_shared<const SpillLevels>(surfaces, domain, object.inner_radius, outside, true);
+  const auto leave = std::make_shared<const SpillLevels>(surfaces, domain, ball_radius, outside, true);
   return {leave, std::make_shared<const SpillLevels>(*leave, inside, false)};
 }
 
@@ -275,8 +279,8 @@ std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const beli
         EnergyCertifier::Question& question = answer.all_of.emplace_back();
         question.condition = condition;
         const auto* volume = std::get_if<belief::InsideVolume>(&condition.predicate);
-        if (volume && objects[answer.object].inner_radius > 0.0)
-          question.passage = passage_of(*volume, objects[answer.object], surfaces);
+        if (volume && objects[answer.object].inner_radius > kCornerLoss * motions->support_edge_radius())
+          question.passage = passage_of(*volume, objects[answer.object], surfaces, motions->support_edge_radius());
       }
     }
   }

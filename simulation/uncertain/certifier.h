@@ -15,17 +15,18 @@
 #include <span>
 #include <vector>
 
+#include "prescene/simulation/mechanics_options.h"
 #include "prescene/simulation/simulator.h"
 #include "prescene/simulation/uncertain/outcome_estimator.h"
 
 namespace prescene::simulation {
 
-class ShapeStore;
-
 struct CertifierOptions {
   /// Where the spheres of objects that collide as spheres are kept; without it, scenes that have such get no
   /// certificates.
   ShapeStore* shapes = nullptr;
+  /// MechanicsOptions::edge_rounding of the simulator that runs the instances, m.
+  double edge_rounding = MechanicsOptions{}.edge_rounding;
   /// Off only to see that the audit catches it: supports are taken to be without edges.
   bool shorten_arms = true;
 };

@@ -83,6 +83,13 @@ TEST(Backends, LockstepRunsWhatItCanAndBulletTheRest) {
   EXPECT_TRUE(same(runs(**lockstep, *one, pushed), runs(**bullet, *one, pushed)));
 }
 
+TEST(Backends, QueriesKnowHowTheirSimulatorsRoundEdges) {
+  core::ThreadPool pool(1);
+  BackendSettings settings;
+  settings.bullet.edge_rounding = 3e-3;
+  EXPECT_EQ(Backends(pool, settings).query_context(pool).edge_rounding, 3e-3);
+}
+
 TEST(Backends, AutomaticStepperIsBulletWhereLockstepRefusesTheScene) {
   core::ThreadPool pool(1);
   BackendSettings settings;

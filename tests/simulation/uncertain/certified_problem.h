@@ -15,9 +15,10 @@ namespace prescene::simulation {
 inline core::RandomStream test_stream() { return {11, core::Purpose::kTest}; }
 
 struct Problem {
-  explicit Problem(std::shared_ptr<const belief::Scene> given) : scene(std::move(given)) {
+  explicit Problem(std::shared_ptr<const belief::Scene> given, const BulletOptions& options = {})
+      : scene(std::move(given)) {
     ShapeStore shapes;
-    simulator = *make_bullet_simulator(*scene, shapes);
+    simulator = *make_bullet_simulator(*scene, shapes, options);
     starts = start_of(scene);
     variables = variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
     request.stop.duration = scene->duration;

@@ -39,6 +39,29 @@ TEST_P(Certificates, AreRightWhenInstancesRunOnToRest) {
 }
 INSTANTIATE_TEST_SUITE_P(OfScenes, Certificates, testing::Range(0, 4));
 
+TEST(Certificates, KnowHowRoundEdgesAre) {
+  // A box with edges of 1 cm tips sooner than a sharp one.
+  BulletOptions round;
+  round.edge_rounding = 0.01;
+  const Problem problem(tests::uncertain_scenes()[2].scene, round);
+#ifdef NDEBUG
+  const int count = 3000;
+#else
+  const int count = 200;
+#endif
+  const OutcomeEstimate whole = problem.run_exactly(count, nullptr, 0.0);
+  const auto wrong_with = [&](const CertifierOptions& options) {
+    const auto certifier = make_certifier(problem.scene, problem.variables, problem.request, options);
+    const OutcomeEstimate certified = problem.run_exactly(count, certifier.get(), 0.0);
+    EXPECT_GE(certified.certificates.certified, count * 8 / 10);
+    return classed_otherwise(certified, whole);
+  };
+  CertifierOptions knowing;
+  knowing.edge_rounding = round.edge_rounding;
+  EXPECT_EQ(wrong_with(knowing), 0);
+  EXPECT_GT(wrong_with({}), 0);
+}
+
 TEST(Certificates, ThatForgetTheEdgesOfSupportsAreCaughtAndRepaired) {
   const Problem problem(tests::uncertain_scenes()[3].scene);
   CertifierOptions forgetful;
