@@ -43,6 +43,16 @@ void draw_triangle(const Face& face, const geometry::PinholeCamera& camera, cons
   Vector3d polygon[4];
   const int count = clip_to_near(corners, options.near_depth, polygon);
   if (count < 3) return;
+  const PixelRect image = {0, 0, camera.width - 1, camera.height - 1};
+  ScreenPoint screen[4];
+  PixelRect boxes[4];
+  bool covers = false;
+  for (int i = 0; i < count; ++i) screen[i] = projected(polygon[i], camera);
+  for (int k = 2; k < count; ++k) {
+    boxes[k] = bounding_pixels(screen[0], screen[k - 1], screen[k], image);
+    covers = covers || !boxes[k].empty();
+  }
+  if (!covers) return;
   // The face's plane n . p = k gives 1 / z = n . ray / k at each pixel: perspective-correct, and linear over the image.
   const Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
   const double distance = normal.dot(corners[0]);
@@ -54,12 +64,8 @@ void draw_triangle(const Face& face, const geometry::PinholeCamera& camera, cons
     z_max = std::max(z_max, polygon[i].z());
   }
   const Vector3f towards_camera = (distance > 0.0 ? Vector3d(-normal) : normal).cast<float>();
-  const PixelRect image = {0, 0, camera.width - 1, camera.height - 1};
   for (int k = 2; k < count; ++k) {
-    const ScreenPoint a = projected(polygon[0], camera);
-    const ScreenPoint b = projected(polygon[k - 1], camera);
-    const ScreenPoint c = projected(polygon[k], camera);
-    for_each_covered_pixel(a, b, c, bounding_pixels(a, b, c, image), [&](int x, int y) {
+    for_each_covered_pixel(screen[0], screen[k - 1], screen[k], boxes[k], [&](int x, int y) {
       const double linear = normal.dot(camera.unproject(x, y, 1.0)) / distance;
       // Faces almost edge-on would leave the depths of their own corners.
       const double inverse_depth = std::clamp(linear, 1.0 / z_max, 1.0 / z_min);
