@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "prescene/core/check.h"
-
 namespace prescene::filter {
 namespace {
 
@@ -108,14 +106,6 @@ geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, cons
   if (!render_depth(scene, camera, Pose::identity(), renderer, &depth).ok())
     depth = geometry::DepthImage(camera.width, camera.height);
   return depth;
-}
-
-void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth) {
-  PRESCENE_CHECK(other.width() == depth->width() && other.height() == depth->height());
-  for (std::size_t i = 0; i < depth->size(); ++i) {
-    const float a = depth->data()[i], b = other.data()[i];
-    if (b > 0.0f && (a == 0.0f || b < a)) depth->data()[i] = b;
-  }
 }
 
 rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,

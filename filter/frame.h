@@ -75,8 +75,7 @@ SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& fram
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
                               rendering::Renderer& renderer);
 
-/// Nearest of both, 0 = nothing; sizes equal.
-void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth);
+using rendering::merge_nearest;
 
 /// The frame for one object: robot, neighbours (`others`, one depth image each) and those supports that stand clearly
 /// in front of it (nearer than the sphere of `radius` about p_CQ) explain what they show.

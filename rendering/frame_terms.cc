@@ -187,4 +187,12 @@ void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& kn
   }
 }
 
+void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth) {
+  PRESCENE_CHECK(other.width() == depth->width() && other.height() == depth->height());
+  for (std::size_t i = 0; i < depth->size(); ++i) {
+    const float a = depth->data()[i], b = other.data()[i];
+    if (b > 0.0f && (a == 0.0f || b < a)) depth->data()[i] = b;
+  }
+}
+
 }  // namespace prescene::rendering

@@ -77,6 +77,9 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
 /// one is behind the hypothesis, it is what the camera would see were the object absent. Aborts when the sizes differ.
 void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& known_depth, FrameTerms* terms);
 
+/// Nearest of both at each pixel, 0 = nothing: joins the renderings of several known things. Aborts when sizes differ.
+void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth);
+
 /// One object at one pose. Pointers must outlive the call only.
 struct PoseHypothesis {
   const RenderMesh* mesh = nullptr;
