@@ -70,6 +70,7 @@ class ByteReader {
     X.translation = vector();
     return X;
   }
+  std::size_t left() const { return bytes_.size() - at_; }
   bool ok() const { return ok_; }
   bool at_end() const { return at_ == bytes_.size(); }
 

@@ -10,10 +10,13 @@
 #include "contact_log.h"
 #include "instance_world.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/mechanics_hash.h"
 #include "rest_detector.h"
 
 namespace prescene::simulation {
 namespace {
+
+constexpr std::uint32_t kSnapshotVersion = 0x62540002;
 
 /// What one thread needs to run instances one after another.
 struct Worker {
@@ -28,7 +31,11 @@ class BulletInstance : public Instance {
  public:
   BulletInstance(const std::shared_ptr<const CompiledScene>& scene, std::vector<belief::Action> actions,
                  const core::RandomStream& stream)
-      : world_(scene), actions_(std::move(actions)), stream_(stream) {
+      : world_(scene),
+        actions_(std::move(actions)),
+        stream_(stream),
+        scene_hash_(scene->hash),
+        actions_hash_(mechanics_hash(actions_, stream_)) {
     set_state(belief::mean_start(scene->scene));
   }
   void set_state(const belief::WorldState& state) override {
@@ -45,24 +52,35 @@ class BulletInstance : public Instance {
   bool at_rest() const override { return rest_.at_rest(world_); }
   Snapshot save() const override {
     Snapshot snapshot;
-    world_.save(snapshot.bytes);
+    ByteWriter out(snapshot.bytes);
+    out.value(kSnapshotVersion);
+    out.value(scene_hash_);
+    out.value(actions_hash_);
+    world_.save(out);
     return snapshot;
   }
   core::Status restore(const Snapshot& snapshot) override {
     const Snapshot now = save();
     rest_.reset();
-    if (world_.restore(snapshot.bytes)) return core::ok_status();
-    PRESCENE_CHECK(world_.restore(now.bytes));
+    if (read(snapshot)) return core::ok_status();
+    PRESCENE_CHECK(read(now));
     return core::invalid_input(
         "the snapshot is of another simulator, scene or list of actions; restore it where it was saved");
   }
 
  private:
+  bool read(const Snapshot& snapshot) {
+    ByteReader in(snapshot.bytes);
+    return in.value<std::uint32_t>() == kSnapshotVersion && in.value<std::uint64_t>() == scene_hash_ &&
+           in.value<std::uint64_t>() == actions_hash_ && world_.restore(in);
+  }
+
   // Asking whether it rests nudges the world and puts it back, which leaves it as it was.
   mutable InstanceWorld world_;
   mutable RestDetector rest_;
   std::vector<belief::Action> actions_;
   core::RandomStream stream_;
+  std::uint64_t scene_hash_, actions_hash_;
 };
 
 class BulletSimulator : public Simulator {

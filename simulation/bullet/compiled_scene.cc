@@ -6,7 +6,9 @@
 
 #include "prescene/belief/validation.h"
 #include "prescene/collision/spheres/surface_spheres.h"
+#include "prescene/core/hash.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/simulation/mechanics_hash.h"
 
 namespace prescene::simulation {
 namespace {
@@ -113,6 +115,8 @@ core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::S
   auto compiled = std::make_shared<CompiledScene>();
   compiled->scene = scene;
   compiled->options = options;
+  core::Hasher hasher;
+  compiled->hash = hasher.value(mechanics_hash(scene, options)).value(options.solver_accuracy).digest();
   compiled->object_count = static_cast<int>(scene.objects.size());
   compiled->support_count = static_cast<int>(scene.supports.size());
   compiled->robot_count = static_cast<int>(scene.robot.size());

@@ -42,6 +42,7 @@ struct CompiledScene {
   belief::Scene scene;
   BulletOptions options;
   std::vector<CompiledBody> bodies;  ///< Objects, supports, robot bodies, in the scene's order.
+  std::uint64_t hash = 0;            ///< Of what steps depend on.
   int object_count = 0;
   int support_count = 0;
   int robot_count = 0;

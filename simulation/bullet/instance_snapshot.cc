@@ -6,16 +6,8 @@
 #include "instance_world.h"
 
 namespace prescene::simulation {
-namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 1;
-
-}  // namespace
-
-void InstanceWorld::save(std::vector<std::uint8_t>& bytes) const {
-  bytes.clear();
-  ByteWriter out(bytes);
-  out.value(kSnapshotVersion);
+void InstanceWorld::save(ByteWriter& out) const {
   out.value(static_cast<std::uint32_t>(objects_.size()));
   out.value(start_time_);
   out.value(steps_);
@@ -51,9 +43,7 @@ void InstanceWorld::save(std::vector<std::uint8_t>& bytes) const {
   }
 }
 
-bool InstanceWorld::restore(const std::vector<std::uint8_t>& bytes) {
-  ByteReader in(bytes);
-  if (in.value<std::uint32_t>() != kSnapshotVersion) return false;
+bool InstanceWorld::restore(ByteReader& in) {
   if (in.value<std::uint32_t>() != objects_.size()) return false;
   start_time_ = in.value<double>();
   steps_ = in.value<std::int64_t>();
@@ -74,7 +64,7 @@ bool InstanceWorld::restore(const std::vector<std::uint8_t>& bytes) {
   }
   for (std::uint8_t& parting : parting_) parting = in.value<std::uint8_t>();
   const auto count = in.value<std::uint32_t>();
-  if (!in.ok() || count > bytes.size()) return false;
+  if (!in.ok() || count > in.left()) return false;
   warm_.resize(count);
   for (Warm& warm : warm_) {
     warm.key = in.value<std::uint64_t>();
@@ -83,7 +73,7 @@ bool InstanceWorld::restore(const std::vector<std::uint8_t>& bytes) {
     warm.friction_impulse = in.vector();
   }
   const auto touch_count = in.value<std::uint32_t>();
-  if (!in.ok() || touch_count > bytes.size()) return false;
+  if (!in.ok() || touch_count > in.left()) return false;
   touches_.resize(touch_count);
   for (Touch& touch : touches_) {
     touch.first = in.value<int>();

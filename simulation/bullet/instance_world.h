@@ -81,8 +81,9 @@ class InstanceWorld {
   };
   Footing footing(int object, const Vector3d& down);
 
-  void save(std::vector<std::uint8_t>& bytes) const;
-  bool restore(const std::vector<std::uint8_t>& bytes);
+  void save(ByteWriter& out) const;
+  /// Reads to the end; false when these are not its bytes.
+  bool restore(ByteReader& in);
 
  private:
   struct Object {

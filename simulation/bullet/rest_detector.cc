@@ -122,7 +122,9 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
     const double toppled = (turn - down * down.dot(turn)).norm();
     return toppled > kRunAway * kNudge && drop > kLeastDrop * 0.5 * before.height * toppled * toppled;
   };
-  world.save(saved_);
+  saved_.clear();
+  ByteWriter saved(saved_);
+  world.save(saved);
   bool returns = true;
   for (int k = 0; k < kNudgeAxes && returns; ++k) {
     // Axes between a body's likely edges, both senses of turning: 22.5, 112.5, 202.5 and 292.5 degrees.
@@ -133,7 +135,8 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
       world.step();
       for (int i = 0; i < world.object_count() && returns; ++i) returns = !world.free(i) || !runs_away(i);
     }
-    world.restore(saved_);
+    ByteReader before(saved_);
+    world.restore(before);
   }
   return returns;
 }

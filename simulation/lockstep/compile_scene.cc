@@ -6,7 +6,9 @@
 
 #include "convex_parts.h"
 #include "prescene/belief/validation.h"
+#include "prescene/core/hash.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/simulation/mechanics_hash.h"
 
 namespace prescene::simulation {
 namespace {
@@ -232,6 +234,10 @@ core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const bel
                     options.restitution_speed,
                     options.impact_speed};
   lanes.origin = plain(belief::mean_start(scene).objects.front().X_WO.translation);
+  core::Hasher hasher;
+  hasher.value(mechanics_hash(scene, options)).value(options.solver_accuracy);
+  for (const double coordinate : lanes.origin) hasher.value(coordinate);
+  compiled->hash = hasher.digest();
   Compiler compiler(*compiled, shapes);
   // Fixed parts come first, so that they are where the lanes' lists expect them.
   PRESCENE_RETURN_IF_ERROR(compiler.add_supports());

@@ -14,6 +14,7 @@ namespace prescene::simulation {
 struct CompiledLockstep {
   belief::Scene scene;
   LockstepOptions options;
+  std::uint64_t hash = 0;  ///< Of what steps depend on.
   LockstepScene lanes;
   std::vector<geometry::Quaterniond> R_OP;  ///< Principal axes, by object.
   std::vector<int> robot_bodies;            ///< In lanes.bodies, by robot body; -1: it has no shape.

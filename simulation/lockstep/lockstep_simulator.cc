@@ -9,11 +9,12 @@
 #include "compile_scene.h"
 #include "lane_batch.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/mechanics_hash.h"
 
 namespace prescene::simulation {
 namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 0x4c4b0002;
+constexpr std::uint32_t kSnapshotVersion = 0x4c4b0003;
 
 core::Status wrong_snapshot() {
   return core::invalid_input(
@@ -27,6 +28,7 @@ class LockstepInstance : public Instance {
       : scene_(std::move(scene)),
         actions_(std::move(actions)),
         stream_(stream),
+        actions_hash_(mechanics_hash(actions_, stream_)),
         engine_(scene_, 1),
         instance_(*scene_),
         nudges_(scene_->lanes.objects) {
@@ -72,6 +74,8 @@ class LockstepInstance : public Instance {
     Snapshot snapshot;
     ByteWriter out(snapshot.bytes);
     out.value(kSnapshotVersion);
+    out.value(scene_->hash);
+    out.value(actions_hash_);
     out.value(static_cast<std::uint32_t>(start_.objects.size()));
     out.value(start_.time);
     for (const belief::ObjectState& object : start_.objects) {
@@ -91,6 +95,8 @@ class LockstepInstance : public Instance {
   core::Status restore(const Snapshot& snapshot) override {
     ByteReader in(snapshot.bytes);
     if (in.value<std::uint32_t>() != kSnapshotVersion) return wrong_snapshot();
+    if (in.value<std::uint64_t>() != scene_->hash) return wrong_snapshot();
+    if (in.value<std::uint64_t>() != actions_hash_) return wrong_snapshot();
     if (in.value<std::uint32_t>() != start_.objects.size()) return wrong_snapshot();
     belief::WorldState start = start_;
     start.time = in.value<double>();
@@ -177,6 +183,7 @@ class LockstepInstance : public Instance {
   std::shared_ptr<const CompiledLockstep> scene_;
   std::vector<belief::Action> actions_;
   core::RandomStream stream_;
+  std::uint64_t actions_hash_;
   belief::WorldState start_;
   // Asking whether it rests nudges objects and puts them back, which leaves all as it was.
   mutable LaneEngine engine_;

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/simulation/mechanics_options.h"
 #include "prescene/tests/support/closed_forms.h"
 #include "prescene/tests/support/simple_scenes.h"
 
@@ -20,7 +21,7 @@ namespace prescene::tests {
 
 struct Stepper {
   std::string name;
-  std::function<std::unique_ptr<simulation::Simulator>(const Scene&)> make;
+  std::function<std::unique_ptr<simulation::Simulator>(const Scene&, const simulation::MechanicsOptions&)> make;
   double precision;  ///< m and m/s: as close as it gets to what is exact.
 
   friend void PrintTo(const Stepper& stepper, std::ostream* out) { *out << stepper.name; }
@@ -28,7 +29,10 @@ struct Stepper {
 
 class StepperContract : public testing::TestWithParam<Stepper> {
  protected:
-  std::unique_ptr<simulation::Simulator> simulator_of(const Scene& scene) const { return GetParam().make(scene); }
+  std::unique_ptr<simulation::Simulator> simulator_of(const Scene& scene,
+                                                      const simulation::MechanicsOptions& options = {}) const {
+    return GetParam().make(scene, options);
+  }
   /// An error that exact arithmetic would not exceed.
   double fine(double error) const { return std::max(error, GetParam().precision); }
   belief::Trajectory run_actions(const Scene& scene, std::vector<belief::Action> actions, double duration,
@@ -379,6 +383,73 @@ TEST_P(StepperContract, IntervalsBeginAtTheImpactAndCarryItsImpulse) {
   EXPECT_NEAR(c.end, run.final().time, 1e-9);
   EXPECT_NEAR(c.largest_impulse, 2.0 * std::sqrt(2.0 * kG * fall), 0.1);
   EXPECT_NEAR(c.normal_z, 1.0, fine(1e-9));
+}
+
+TEST_P(StepperContract, SnapshotsAreForTheSameMechanicsAlone) {
+  const Scene scene = held_scene();
+  const std::vector<belief::Action> actions = {{0.1, belief::Release{"object", {0.0, 0.0, 0.1}}}};
+  const core::RandomStream stream(5, core::Purpose::kTest);
+  auto saved = simulator_of(scene)->make_instance(actions, stream);
+  step_for(*saved, 0.2);
+  const simulation::Snapshot snapshot = saved->save();
+  const auto refused = [&](const Scene& other, const std::vector<belief::Action>& does,
+                           const simulation::MechanicsOptions& options = {}) {
+    auto instance = simulator_of(other, options)->make_instance(does, stream);
+    const WorldState before = instance->state();
+    const bool accepted = instance->restore(snapshot).ok();
+    EXPECT_TRUE(accepted || instance->state() == before);
+    return !accepted;
+  };
+  EXPECT_FALSE(refused(scene, actions));
+  const auto changed = [&](const auto& change) {
+    Scene of = scene;
+    change(of);
+    return of;
+  };
+  // What is seen and asked is no matter.
+  const Scene alike = changed([](Scene& of) {
+    of.name = "other";
+    of.models[0].color = {0.1, 0.2, 0.3};
+    of.duration = 1.0;
+  });
+  EXPECT_FALSE(refused(alike, actions));
+
+  const Scene others[] = {
+      changed([](Scene& of) { of.gravity_W.z() = -9.8; }),
+      changed([](Scene& of) {
+        of.models[0].collision = {belief::PrimitiveShape{BoxShape{{0.1, 0.1, 0.11}}, Pose{}}};
+      }),
+      changed([](Scene& of) { of.models[0].unit_inertia *= 1.1; }),
+      changed([](Scene& of) { of.models[0].contact.edge_radius = 0.002; }),
+      changed([](Scene& of) { of.supports[0].contact.friction = belief::FixedScalar{0.9}; }),
+      changed([](Scene& of) { of.supports[0].X_WS.translation.z() -= 0.01; }),
+      changed([](Scene& of) { of.robot[0].timeline[1].time = 2.5; }),
+      changed([](Scene& of) { of.robot[0].contact.restitution = belief::FixedScalar{0.3}; }),
+  };
+  for (std::size_t i = 0; i < std::size(others); ++i) EXPECT_TRUE(refused(others[i], actions)) << "scene " << i;
+
+  EXPECT_TRUE(refused(scene, {{0.1, belief::Release{"object", {0.0, 0.0, 0.2}}}}));
+  EXPECT_TRUE(refused(scene, {{0.15, belief::Release{"object", {0.0, 0.0, 0.1}}}}));
+  EXPECT_TRUE(refused(scene, {{0.1, belief::Grasp{"object", "hand"}}}));
+
+  simulation::MechanicsOptions options;
+  options.step = 1.0 / 1000.0;
+  EXPECT_TRUE(refused(scene, actions, options));
+  options = {};
+  options.edge_rounding = 1e-3;
+  EXPECT_TRUE(refused(scene, actions, options));
+}
+
+TEST_P(StepperContract, SnapshotsAreForTheSameDrawsOfActionsAlone) {
+  const Scene scene = held_scene();
+  belief::Release release{"object", {0.0, 0.0, 0.1}};
+  release.disturbance.linear.x = belief::NormalScalar{0.0, 0.1};
+  const auto instance = [&](std::uint64_t seed) {
+    return simulator_of(scene)->make_instance({{0.1, release}}, core::RandomStream(seed, core::Purpose::kTest));
+  };
+  const simulation::Snapshot snapshot = instance(1)->save();
+  EXPECT_TRUE(instance(1)->restore(snapshot).ok());
+  EXPECT_FALSE(instance(2)->restore(snapshot).ok());
 }
 
 }  // namespace prescene::tests

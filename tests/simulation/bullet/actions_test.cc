@@ -7,7 +7,10 @@ namespace prescene::tests {
 namespace {
 
 INSTANTIATE_TEST_SUITE_P(Bullet, StepperContract,
-                         testing::Values(Stepper{"bullet", [](const Scene& scene) { return simulator_of(scene); },
+                         testing::Values(Stepper{"bullet",
+                                                 [](const Scene& scene, const simulation::MechanicsOptions& options) {
+                                                   return simulator_of(scene, simulation::BulletOptions{options});
+                                                 },
                                                  1e-12}),
                          [](const auto& stepper) { return stepper.param.name; });
 

@@ -7,7 +7,10 @@ namespace prescene::tests {
 namespace {
 
 INSTANTIATE_TEST_SUITE_P(Lockstep, StepperContract,
-                         testing::Values(Stepper{"lockstep", [](const Scene& scene) { return lockstep_of(scene); },
+                         testing::Values(Stepper{"lockstep",
+                                                 [](const Scene& scene, const simulation::MechanicsOptions& options) {
+                                                   return lockstep_of(scene, simulation::LockstepOptions{options});
+                                                 },
                                                  2e-6}),
                          [](const auto& stepper) { return stepper.param.name; });
 
