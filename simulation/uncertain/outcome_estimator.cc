@@ -115,30 +115,47 @@ void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& rec
 }
 
 /// Runs the instances of these numbers to rest and replaces their records; returns how many, in order, were not
-/// cancelled. `mismatches` counts those whose classes change.
-std::size_t run_to_rest(const Runner& runner, const std::vector<std::uint32_t>& numbers,
-                        std::vector<InstanceRecord>& records, int* mismatches) {
+/// cancelled. `changed` gets those whose classes change.
+std::size_t run_to_rest(const Runner& runner, std::span<const std::uint32_t> numbers,
+                        std::vector<InstanceRecord>& records, std::vector<std::uint32_t>& changed) {
   RunRequest request = runner.request;
   request.end_rule = nullptr;
   std::vector<belief::WorldState> starts;
   for (const std::uint32_t number : numbers)
     starts.push_back(runner.samplers[static_cast<std::size_t>(records[number].component)].draw(records[number].point));
   std::vector<belief::Trajectory> runs(numbers.size());
-  runner.simulator.run(starts, request, runner.stream, std::span(numbers), runner.pool, runs, runner.cancellation);
+  runner.simulator.run(starts, request, runner.stream, numbers, runner.pool, runs, runner.cancellation);
   for (std::size_t n = 0; n < numbers.size(); ++n) {
     if (runs[n].end == belief::TrajectoryEnd::kCancelled) return n;
     InstanceRecord& record = records[numbers[n]];
     const std::vector<int> before = record.classes;
     note_run(runner, runs[n], record);
-    *mismatches += record.classes != before;
+    if (record.classes != before) changed.push_back(numbers[n]);
   }
   return numbers.size();
 }
 
+/// Numbers of the instances that ended by a certificate, ascending.
+struct AuditTrail {
+  std::vector<std::uint32_t> certified, audited, mismatched;
+
+  /// Of the first `count` instances, whatever became of the others.
+  CertificateUse use_of(std::size_t count) const {
+    const auto below = [&](const std::vector<std::uint32_t>& numbers) {
+      return static_cast<int>(std::ranges::lower_bound(numbers, count) - numbers.begin());
+    };
+    return {below(certified), below(audited), below(mismatched), false};
+  }
+  bool fails(std::size_t count, double tolerated) const {
+    const CertificateUse use = use_of(count);
+    return use.mismatches > tolerated * use.audited;
+  }
+};
+
 /// Runs `planned` (numbers first, first + 1, ... of the order) and appends the records of those that were finished
 /// before any that was cancelled. Returns false when one was.
 bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, std::vector<InstanceRecord>& records,
-               CertificateUse& certificates) {
+               AuditTrail& trail) {
   const std::size_t first = records.size();
   std::vector<belief::WorldState> starts(planned.size());
   runner.pool.for_each_index(planned.size(), [&](std::size_t i) {
@@ -162,26 +179,38 @@ bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, s
   std::vector<std::uint32_t> audited;
   for (auto n = static_cast<std::uint32_t>(first); n < first + finished; ++n) {
     if (!records[n].certified) continue;
-    ++certificates.certified;
+    trail.certified.push_back(n);
     core::RandomStream draw = runner.stream.for_purpose(core::Purpose::kAudit).at(0, n);
     if (draw.uniform() < runner.audit_share) audited.push_back(n);
   }
-  const std::size_t done = run_to_rest(runner, audited, records, &certificates.mismatches);
-  certificates.audited += static_cast<int>(done);
+  const std::size_t done = run_to_rest(runner, audited, records, trail.mismatched);
+  trail.audited.insert(trail.audited.end(), audited.begin(), audited.begin() + static_cast<std::ptrdiff_t>(done));
   if (done < audited.size()) records.resize(audited[done]);
   return finished == runs.size() && done == audited.size();
 }
 
-/// Runs to rest what ended by its certificate; cut to what was repaired when cancelled (false).
-bool repair(const Runner& runner, std::vector<InstanceRecord>& records, CertificateUse& certificates) {
-  std::vector<std::uint32_t> numbers;
+/// Runs to rest what ended by its certificate; returns whether certificates count for nothing then. Cancelled on the
+/// way, it cuts to the instances that were repaired, or to those of which the audit had not failed, if those are more:
+/// a replay of so many comes to the same.
+bool repair(const Runner& runner, const AuditTrail& trail, double tolerated, std::vector<InstanceRecord>& records,
+            bool& cancelled) {
+  std::vector<InstanceRecord> repaired = records;
+  std::vector<std::uint32_t> numbers, changed;
   for (std::uint32_t n = 0; n < records.size(); ++n)
     if (records[n].certified) numbers.push_back(n);
-  certificates.switched_off = true;
-  int changed = 0;
-  const std::size_t done = run_to_rest(runner, numbers, records, &changed);
-  if (done < numbers.size()) records.resize(numbers[done]);
-  return done == numbers.size();
+  const std::size_t done = run_to_rest(runner, numbers, repaired, changed);
+  cancelled = done < numbers.size();
+  if (cancelled) {
+    repaired.resize(numbers[done]);
+    std::size_t sound = records.size();
+    while (trail.fails(sound, tolerated)) --sound;
+    if (sound >= repaired.size()) {
+      records.resize(sound);
+      return false;
+    }
+  }
+  records = std::move(repaired);
+  return true;
 }
 
 /// Of each instance; they sum to one.
@@ -306,6 +335,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
 
   PRESCENE_CHECK(options.audit_share >= 0.0 && options.audit_share <= 1.0);
   OutcomeEstimate estimate;
+  AuditTrail trail;
   Runner runner{simulator,
                 variables,
                 request,
@@ -333,19 +363,22 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
       const std::size_t done = estimate.instances.size();
       const auto planned = std::span(plan.order()).subspan(done, std::min(chunk, target - done));
       const double begun = watch.seconds();
-      if (!run_chunk(runner, planned, estimate.instances, estimate.certificates) ||
-          (cancellation && cancellation->requested()))
+      if (!run_chunk(runner, planned, estimate.instances, trail) || (cancellation && cancellation->requested()))
         stop = EstimateStop::kCancelled;
       else if (options.max_seconds && !options.exact_instances && watch.seconds() >= *options.max_seconds)
         stop = EstimateStop::kTimeLimit;
       if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, kLargestChunk);
       forecast.tell(static_cast<double>(estimate.instances.size()));
     }
-    const CertificateUse& use = estimate.certificates;
-    if (runner.certifier && use.mismatches > options.tolerated_mismatch * use.audited) {
+    bool switched_off = estimate.certificates.switched_off;
+    if (runner.certifier && trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
+      bool cancelled = false;
+      switched_off = repair(runner, trail, options.tolerated_mismatch, estimate.instances, cancelled);
+      if (cancelled) stop = EstimateStop::kCancelled;
       runner.certifier = nullptr;
-      if (!repair(runner, estimate.instances, estimate.certificates)) stop = EstimateStop::kCancelled;
     }
+    estimate.certificates = trail.use_of(estimate.instances.size());
+    estimate.certificates.switched_off = switched_off;
     evaluate(starts, variables, options, estimate);
     forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate),
                         settled_text(variables, estimate));

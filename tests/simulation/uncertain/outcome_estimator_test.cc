@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 
+#include "expect_equal_estimates.h"
 #include "toy_problems.h"
 
 namespace prescene::simulation {
@@ -22,21 +23,6 @@ OutcomeEstimate estimate(const ToyProblem& problem, const EstimatorOptions& opti
   const std::vector<Variable> variables = problem.variables();
   return estimate_outcomes(simulator, problem.starts(), variables, {}, test_stream(), options, pool, cancellation,
                            progress);
-}
-
-/// Everything but the wall time, which may differ.
-void expect_equal(const OutcomeEstimate& a, const OutcomeEstimate& b) {
-  EXPECT_EQ(a.variables, b.variables);
-  EXPECT_EQ(a.simulated_seconds, b.simulated_seconds);
-  EXPECT_EQ(a.converged, b.converged);
-  ASSERT_EQ(a.instances.size(), b.instances.size());
-  for (std::size_t i = 0; i < a.instances.size(); ++i) {
-    EXPECT_EQ(a.instances[i].component, b.instances[i].component);
-    EXPECT_EQ(a.instances[i].point, b.instances[i].point);
-    EXPECT_EQ(a.instances[i].weight, b.instances[i].weight);
-    EXPECT_EQ(a.instances[i].classes, b.instances[i].classes);
-    EXPECT_EQ(a.instances[i].final, b.instances[i].final);
-  }
 }
 
 TEST(OutcomeEstimator, NetsGrowByHalvesAndThirds) {
