@@ -136,7 +136,7 @@ void EvolutionSearch::run(const Cost& cost, int max_evaluations, const SearchPro
     stopped = progress && !progress(best);
     return found;
   };
-  if (best.evaluations == 0) tried(s.values_of(s.mean));
+  if (best.evaluations == 0 && max_evaluations > 0) tried(s.values_of(s.mean));
   while (!stopped && !best.settled && best.evaluations < max_evaluations) {
     best.settled = s.done();
     if (best.settled) break;
@@ -153,14 +153,6 @@ void EvolutionSearch::run(const Cost& cost, int max_evaluations, const SearchPro
     if (static_cast<int>(costs.size()) < s.k.children) break;
     s.adapt(moves, costs, eigen.eigenvectors(), lengths);
   }
-}
-
-SearchResult evolution_search(const std::vector<SearchParameter>& parameters, const EvolutionSearch::Cost& cost,
-                              const SearchEnd& end, int max_evaluations, core::RandomStream stream,
-                              const SearchProgress& progress) {
-  EvolutionSearch search(parameters, end, stream);
-  search.run(cost, max_evaluations, progress);
-  return search.best();
 }
 
 }  // namespace prescene::simulation

@@ -34,17 +34,12 @@ class EvolutionSearch {
   /// Goes on until it settles, `progress` stops it, or so many evaluations of `cost` were made, those of earlier calls
   /// counted; a generation that they cut is lost to later calls.
   void run(const Cost& cost, int max_evaluations, const SearchProgress& progress = {});
-  /// The best that was tried.
+  /// The best that was tried; without values before anything was.
   const SearchResult& best() const;
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// One run of it.
-SearchResult evolution_search(const std::vector<SearchParameter>& parameters, const EvolutionSearch::Cost& cost,
-                              const SearchEnd& end, int max_evaluations, core::RandomStream stream,
-                              const SearchProgress& progress = {});
 
 }  // namespace prescene::simulation

@@ -9,9 +9,17 @@
 namespace prescene::tests {
 namespace {
 
-using simulation::evolution_search;
 using simulation::SearchParameter;
 using simulation::SearchResult;
+
+SearchResult evolution_search(const std::vector<SearchParameter>& parameters,
+                              const simulation::EvolutionSearch::Cost& cost, const simulation::SearchEnd& end,
+                              int max_evaluations, core::RandomStream stream,
+                              const simulation::SearchProgress& progress = {}) {
+  simulation::EvolutionSearch search(parameters, end, stream);
+  search.run(cost, max_evaluations, progress);
+  return search.best();
+}
 
 core::RandomStream stream(std::uint64_t seed) { return {seed, core::Purpose::kTest}; }
 
@@ -115,6 +123,17 @@ TEST(EvolutionSearch, GoesOnWhereItStopped) {
   const SearchResult at_once = evolution_search(all, turned_ellipsoid, {1e-2}, 100000, stream(1));
   EXPECT_EQ(search.best().cost, at_once.cost);
   EXPECT_EQ(search.best().evaluations, at_once.evaluations);
+}
+
+TEST(EvolutionSearch, TriesNothingWithoutABudget) {
+  const auto all = parameters(4, 0.0, 0.5, -10.0, 10.0);
+  simulation::EvolutionSearch search(all, {1e-2}, stream(1));
+  for (const int budget : {-3, 0}) {
+    search.run(turned_ellipsoid, budget);
+    EXPECT_EQ(search.best().evaluations, 0);
+  }
+  search.run(turned_ellipsoid, 1);
+  EXPECT_EQ(search.best().evaluations, 1);
 }
 
 TEST(EvolutionSearch, ReturnsTheBestThatItTried) {
