@@ -6,12 +6,12 @@
 #include <numeric>
 #include <utility>
 
+#include "instance_classes.h"
 #include "instance_plan.h"
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
 #include "prescene/simulation/action_draws.h"
-#include "prescene/simulation/uncertain/certifier.h"
 
 namespace prescene::simulation {
 namespace {
@@ -90,22 +90,9 @@ struct Runner {
 };
 
 void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& record) {
-  record.classes.clear();
+  record.classes = classes_of(run, runner.variables, runner.certifier, runner.request.stop.duration);
   record.certified = run.end == belief::TrajectoryEnd::kDecided;
   record.failed = run.end == belief::TrajectoryEnd::kDiverged;
-  if (record.failed) {
-    record.classes.assign(runner.variables.size(), -1);
-  } else if (record.certified) {
-    const double left = runner.request.stop.duration - run.simulated_seconds;
-    std::optional<std::vector<int>> decided = runner.certifier->classes(run.states.back(), left);
-    PRESCENE_CHECK_MSG(decided, "a certifier that answers differently when it is asked again");
-    record.classes = *std::move(decided);
-  }
-  for (std::size_t v = 0; v < runner.variables.size() && !record.failed; ++v) {
-    if (!record.certified) record.classes.push_back(runner.variables[v].classify(run));
-    PRESCENE_CHECK(record.classes[v] >= 0 &&
-                   static_cast<std::size_t>(record.classes[v]) < runner.variables[v].classes.size());
-  }
   record.final = std::move(run.states.back());
   record.end = run.end;
   record.deepest_overlap = std::max(record.deepest_overlap, run.deepest_overlap);

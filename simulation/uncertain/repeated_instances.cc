@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "instance_classes.h"
 #include "prescene/core/check.h"
-#include "prescene/simulation/uncertain/certifier.h"
 
 namespace prescene::simulation {
 namespace {
@@ -67,16 +67,8 @@ std::optional<std::vector<std::vector<int>>> classes_from(const Simulator& simul
     simulator.run(starts.subspan(begin, count), asked, stream, static_cast<std::uint32_t>(begin), pool, runs,
                   cancellation);
     for (std::size_t i = 0; i < count; ++i) {
-      const belief::Trajectory& run = runs[i];
-      std::vector<int>& found = classes[begin + i];
-      if (run.end == belief::TrajectoryEnd::kCancelled) return std::nullopt;
-      if (run.end == belief::TrajectoryEnd::kDiverged) {
-        found.assign(variables.size(), -1);
-      } else if (run.end == belief::TrajectoryEnd::kDecided) {
-        found = *certifier->classes(run.final(), request.stop.duration - run.simulated_seconds);
-      } else {
-        for (const Variable& variable : variables) found.push_back(variable.classify(run));
-      }
+      if (runs[i].end == belief::TrajectoryEnd::kCancelled) return std::nullopt;
+      classes[begin + i] = classes_of(runs[i], variables, certifier, request.stop.duration);
     }
   }
   return classes;
