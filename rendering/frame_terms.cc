@@ -57,8 +57,9 @@ double background_sigma(const SensorModel& model, double depth) {
   return std::sqrt(sigma * sigma + own * own);
 }
 
-/// What the pixel returns without the object, from the nearest source of knowledge.
-AbsentMixture absent_mixture(const FrameTermsInput& input, const SensorModel& model, int x, int y) {
+/// What the pixel returns without the object, from the nearest source of knowledge. `ray` (z = 1) goes through it.
+AbsentMixture absent_mixture(const FrameTermsInput& input, const SensorModel& model, int x, int y,
+                             const Vector3d& ray) {
   const SensorModelOptions& options = model.options();
   AbsentMixture absent;
   if (!input.background.empty()) {
@@ -72,7 +73,6 @@ AbsentMixture absent_mixture(const FrameTermsInput& input, const SensorModel& mo
     }
     return absent;
   }
-  const Vector3d ray = input.camera.unproject(x, y, 1.0);
   for (const SupportRegion& region : input.supports) {
     const std::optional<double> depth = support_depth(region, ray, options);
     if (!depth || (absent.peak_weight > 0.0 && *depth >= absent.peak_depth)) continue;
@@ -148,11 +148,15 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
   for (geometry::Image<float>* image : {&terms->depth, &terms->inverse_absent, &terms->absent_peak,
                                         &terms->absent_missing, &terms->inverse_returns, &terms->known})
     resize(image, width, height);
+  std::vector<double> across;  // x of the ray through each column
+  for (int x = 0; x < width; ++x) across.push_back(input.camera.unproject(offset + step * x, 0.0, 1.0).x());
   for (int y = 0; y < height; ++y) {
+    const int full_y = offset + step * y;
+    Vector3d ray = input.camera.unproject(0.0, full_y, 1.0);
     for (int x = 0; x < width; ++x) {
       const int full_x = offset + step * x;
-      const int full_y = offset + step * y;
-      const AbsentMixture absent = absent_mixture(input, model, full_x, full_y);
+      ray.x() = across[static_cast<std::size_t>(x)];
+      const AbsentMixture absent = absent_mixture(input, model, full_x, full_y, ray);
       const float depth = measured_depth(input.depth(full_x, full_y), model.options());
       terms->depth(x, y) = depth;
       terms->inverse_absent(x, y) = inverse_absent(model, absent, depth);
