@@ -75,12 +75,13 @@ struct ActionCheck {
 
 struct PredicateCheck {
   const Scene& scene;
+  const std::string& object;  // that is judged
   Status operator()(const InsideVolume& inside) const {
     PRESCENE_RETURN_IF_ERROR(check_pose(inside.X_WV));
     for (int i = 0; i < 3; ++i) PRESCENE_RETURN_IF_ERROR(check_finite_positive(inside.size[i], "a volume's edge"));
     return {};
   }
-  Status operator()(const RestingOn& resting) const { return check_thing(scene, resting.support); }
+  Status operator()(const RestingOn& resting) const { return check_other(resting.support); }
   Status operator()(const UprightWithin& upright) const {
     PRESCENE_RETURN_IF_ERROR(check_unit(upright.axis_O));
     return check_angle(upright.max_angle);
@@ -101,9 +102,14 @@ struct PredicateCheck {
     return {};
   }
   Status operator()(const TurnedMoreThan& turned) const { return check_angle(turned.angle); }
-  Status operator()(const Touched& touched) const { return check_thing(scene, touched.other); }
+  Status operator()(const Touched& touched) const { return check_other(touched.other); }
   Status operator()(const StillMoving&) const { return {}; }
 
+  Status check_other(const std::string& name) const {
+    if (name == object)
+      return invalid_input("'" + name + "' neither touches itself nor rests on itself: name another thing");
+    return check_thing(scene, name);
+  }
   static Status check_unit(const Vector3d& axis) {
     if (!axis.allFinite() || std::abs(axis.norm() - 1.0) > 1e-6)
       return invalid_input("the axis is not of length 1: normalise it");
@@ -172,21 +178,13 @@ bool contradict(const Condition& a, const Condition& b) {
   return a.predicate == b.predicate && a.when == b.when && a.negated != b.negated;
 }
 
-/// Whenever `later` holds, `earlier` does.
-bool implied(const Outcome& earlier, const Outcome& later) {
-  return earlier.object == later.object &&
-         std::all_of(earlier.all_of.begin(), earlier.all_of.end(), [&](const Condition& condition) {
-           return std::find(later.all_of.begin(), later.all_of.end(), condition) != later.all_of.end();
-         });
-}
-
 Status check_outcome(const Scene& scene, const Outcome& outcome) {
   if (outcome.name.empty()) return invalid_input("an outcome has no name: name it");
   const std::string place = quoted("outcome", outcome.name);
   PRESCENE_RETURN_IF_ERROR(check_object_name(scene, outcome.object).at(place));
   if (outcome.all_of.empty()) return invalid_input("it has no condition: give at least one").at(place);
   for (const Condition& condition : outcome.all_of)
-    PRESCENE_RETURN_IF_ERROR(std::visit(PredicateCheck{scene}, condition.predicate).at(place));
+    PRESCENE_RETURN_IF_ERROR(std::visit(PredicateCheck{scene, outcome.object}, condition.predicate).at(place));
   for (std::size_t i = 0; i < outcome.all_of.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if (contradict(outcome.all_of[i], outcome.all_of[j]))
@@ -215,7 +213,7 @@ Status check_outcomes(const Scene& scene) {
     }
     for (std::size_t later = 1; later < group.outcomes.size(); ++later)
       for (std::size_t earlier = 0; earlier < later; ++earlier)
-        if (implied(group.outcomes[earlier], group.outcomes[later]))
+        if (is_implied(group.outcomes[earlier], group.outcomes[later]))
           return invalid_input("'" + group.outcomes[later].name + "' never counts, as '" +
                                group.outcomes[earlier].name +
                                "' above it holds whenever it does: put the narrower outcome first")
@@ -225,6 +223,13 @@ Status check_outcomes(const Scene& scene) {
 }
 
 }  // namespace
+
+bool is_implied(const Outcome& earlier, const Outcome& later) {
+  return earlier.object == later.object &&
+         std::all_of(earlier.all_of.begin(), earlier.all_of.end(), [&](const Condition& condition) {
+           return std::find(later.all_of.begin(), later.all_of.end(), condition) != later.all_of.end();
+         });
+}
 
 Status validate(const Scene& scene) {
   for (const ObjectModel& model : scene.models) PRESCENE_RETURN_IF_ERROR(validate(model));

@@ -10,6 +10,8 @@
 
 namespace prescene::belief {
 
+struct Outcome;
+
 /// Closed range of a quantity. A hard end is physical, normals have to be cut there; the others only catch slips.
 struct ScalarRange {
   double low;
@@ -26,6 +28,12 @@ inline constexpr ScalarRange kFrictionRange{
     0.0, 1e3, "give a Coulomb coefficient of at least 0 (steel on ice 0.03, rubber 1)", true};
 inline constexpr ScalarRange kRestitutionRange{0.0, 1.0, "give a coefficient between 0 (no bounce) and 1", true, true};
 
+/// m from W's origin: farther away things have left the world, and simulators freeze them.
+inline constexpr double kWorldRadius = 20.0;
+/// An object that rests on one lighter by more than this factor is not held up: what one step of the contact solver's
+/// iterations passes on through the light one is too little.
+inline constexpr double kGreatestMassRatio = 100.0;
+
 core::Status check_name(const std::string& name);
 /// All draws of the distribution are finite and within the range, its parameters are well formed.
 core::Status check_scalar(const ScalarDistribution& distribution, const ScalarRange& range);
@@ -41,5 +49,7 @@ core::Status check_shapes(const std::vector<CollisionShape>& shapes);
 double thinnest_half(const std::vector<CollisionShape>& shapes);
 core::Status check_contact(const ContactProperties& contact);
 core::Status check_color(const Color& color);
+/// Whenever `later` holds, `earlier` does, as far as their lists of conditions show it.
+bool is_implied(const Outcome& earlier, const Outcome& later);
 
 }  // namespace prescene::belief

@@ -27,10 +27,14 @@ interfaces::SceneFileOptions options(const core::LogSink& log) {
   return options;
 }
 
+void tell(const interfaces::FileReport& report, const core::LogSink& log) {
+  for (const interfaces::Problem& warning : report.warnings) core::log(log, core::LogLevel::kWarning, warning.text());
+}
+
 core::Result<std::shared_ptr<const belief::Scene>> shared(core::Result<belief::Scene> scene,
                                                           const interfaces::FileReport& report,
                                                           const core::LogSink& log) {
-  for (const interfaces::Problem& warning : report.warnings) core::log(log, core::LogLevel::kWarning, warning.text());
+  tell(report, log);
   if (!scene) return scene.status();
   return std::shared_ptr<const belief::Scene>(std::make_shared<belief::Scene>(*std::move(scene)));
 }
@@ -65,7 +69,10 @@ bool is_model_file(const std::filesystem::path& path) {
 }
 
 core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log) {
-  return interfaces::read_model(path, path.stem().string(), options(log));
+  interfaces::FileReport report;
+  core::Result<belief::ObjectModel> model = interfaces::read_model(path, path.stem().string(), options(log), &report);
+  tell(report, log);
+  return model;
 }
 
 std::shared_ptr<const belief::Scene> unknown_scene(const std::filesystem::path& folder, const geometry::Pose& X_WC) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects that begin in the middle of a support: what a simulator makes of them is no prediction.
+// Objects that begin in the middle of a support or outside of the world: what a simulator makes of them is no
+// prediction.
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/belief/validation.h"
 #include "prescene/core/text.h"
 #include "read_scene_parts.h"
 
@@ -54,11 +56,13 @@ class Solid {
   geometry::TriangleMesh hull_;
 };
 
-}  // namespace
+const LocatedValue& pose_of(const LocatedValue& object) {
+  const LocatedValue* pose = object.find("pose");
+  return pose ? *pose : object;
+}
 
-void refuse_starts_inside(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
-  const LocatedValue& objects = *document.find("objects");
-  const belief::WorldState start = belief::mean_start(scene);
+void refuse_starts_inside(const LocatedValue& objects, const belief::Scene& scene, const belief::WorldState& start,
+                          Problems& problems) {
   for (const belief::Support& support : scene.supports) {
     for (const belief::CollisionShape& shape : support.collision) {
       const Solid solid(shape);
@@ -69,14 +73,42 @@ void refuse_starts_inside(const LocatedValue& document, const belief::Scene& sce
         const bool inside = std::all_of(mesh.vertices.begin(), mesh.vertices.end(),
                                         [&](const Vector3d& vertex) { return solid.holds(X_SO * vertex); });
         if (!inside) continue;
-        const LocatedValue& value = *objects.find(scene.objects[o].name);
-        const LocatedValue* pose = value.find("pose");
-        const LocatedValue& at = pose ? *pose : value;
+        const LocatedValue& at = pose_of(*objects.find(scene.objects[o].name));
         problems.add(at.place, at.path, "it starts wholly inside the support '" + support.name + "'",
                      "move it out: positions are those of the object's origin, often its middle, in metres");
       }
     }
   }
+}
+
+// Simulators freeze what is there.
+void refuse_starts_outside(const LocatedValue& objects, const belief::Scene& scene, const belief::WorldState& start,
+                           Problems& problems) {
+  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+    const Vector3d& p = start.objects[o].X_WO.translation;
+    if (p.norm() <= belief::kWorldRadius) continue;
+    const LocatedValue& pose = pose_of(*objects.find(scene.objects[o].name));
+    const LocatedValue* position = pose.find("position");
+    const LocatedValue& at = position ? *position : pose;
+    const Vector3d meant = 1e-3 * p;
+    problems.add(at.place, at.path,
+                 "it starts " + core::rounded_text(p.norm()) + " m from the world's origin, and the world ends at " +
+                     core::rounded_text(belief::kWorldRadius) + " m",
+                 meant.norm() < 0.5 * belief::kWorldRadius
+                     ? "millimetres? then write [" + core::rounded_text(meant.x()) + ", " +
+                           core::rounded_text(meant.y()) + ", " + core::rounded_text(meant.z()) +
+                           "]; else put the origin near the things"
+                     : "put the origin near the things");
+  }
+}
+
+}  // namespace
+
+void refuse_starts(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
+  const LocatedValue& objects = *document.find("objects");
+  const belief::WorldState start = belief::mean_start(scene);
+  refuse_starts_outside(objects, scene, start, problems);
+  refuse_starts_inside(objects, scene, start, problems);
 }
 
 }  // namespace prescene::interfaces

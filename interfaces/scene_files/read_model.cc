@@ -16,7 +16,6 @@ using geometry::Matrix3d;
 using geometry::SymmetryGroup;
 using geometry::Vector3d;
 
-constexpr NumberRange kDensity{0.1, 25000.0, "give kg/m^3 (water 1000, wood 600, steel 7850)"};
 constexpr NumberRange kLever{0.0, 0.5, "give metres between 0 and 0.5", "m"};
 
 void read_contact(Binder& binder, ContactProperties& contact) {
@@ -190,6 +189,16 @@ void read_mass(Binder& binder, const BodyShape& shape, ObjectModel& model) {
                  "give 'mass' instead, or close the mesh");
 }
 
+void read_moments(const LocatedValue& at, double mass, Problems& problems, ObjectModel& model) {
+  const std::optional<Matrix3d> matrix = read_matrix(at, problems);
+  if (!matrix) return;
+  model.unit_inertia = *matrix / std::max(mass, 1e-9);
+  if (!geometry::MassProperties{1.0, Vector3d::Zero(), model.unit_inertia}.is_physical())
+    problems.add(
+        at.place, at.path, "no body has this inertia",
+        "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
+}
+
 void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
   Problems& problems = binder.problems();
   const LocatedValue* center = binder.find("center_of_mass");
@@ -204,16 +213,11 @@ void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
                    "use its convex_hull, close the mesh, or give mass, center_of_mass and inertia");
     }
   }
+  const std::size_t before = problems.errors().size();
   if (center) model.center_of_mass = read_vector_distribution(*center, problems, kPosition);
-  if (!inertia) return;
-  const std::optional<Matrix3d> matrix = read_matrix(*inertia, problems);
-  if (!matrix) return;
-  const double mass = which == "inertia" ? belief::mean(model.mass) : 1.0;
-  model.unit_inertia = *matrix / std::max(mass, 1e-9);
-  if (!geometry::MassProperties{1.0, Vector3d::Zero(), model.unit_inertia}.is_physical())
-    problems.add(
-        inertia->place, inertia->path, "no body has this inertia",
-        "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
+  if (inertia) read_moments(*inertia, which == "inertia" ? belief::mean(model.mass) : 1.0, problems, model);
+  if (problems.errors().size() == before)
+    check_mass_distribution({center, inertia, which != "inertia"}, model, problems);
 }
 
 // Of bodies without mass, for which nothing else asks for the hulls.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "prescene/belief/validation.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "read_scene_parts.h"
 
@@ -27,7 +28,9 @@ constexpr const char* kConditionRemedy =
 
 class ConditionReader {
  public:
-  explicit ConditionReader(SceneContext& context) : context_(context), problems_(context.problems) {}
+  /// `object` is the one that is judged.
+  ConditionReader(SceneContext& context, const std::string& object)
+      : context_(context), problems_(context.problems), object_(object) {}
 
   // All conditions among the keys of a map, each of which has to hold.
   std::vector<Condition> read_keys(Binder& binder) {
@@ -99,7 +102,11 @@ class ConditionReader {
   }
 
   std::string read_thing(const LocatedValue& value) {
-    return context_.read_name(value, context_.all_things(), "an object, a support or a robot body");
+    std::string name = context_.read_name(value, context_.all_things(), "an object, a support or a robot body");
+    if (!name.empty() && name == object_)
+      problems_.add(value.place, value.path, "this is the object that is judged, which never touches itself",
+                    "name another object, a support or a robot body");
+    return name;
   }
 
   // A support's hollow by its name, or a box of its own.
@@ -153,6 +160,7 @@ class ConditionReader {
 
   SceneContext& context_;
   Problems& problems_;
+  const std::string& object_;
 };
 
 // The object that is judged where it is clear: named, the group's, or the only one.
@@ -168,29 +176,47 @@ std::string require_judged(Binder& binder, const std::string& group_object, Scen
   return object;
 }
 
+// Outcomes that never count, as one above them holds whenever they do.
+void check_order(const LocatedValue& outcomes, const belief::ExclusiveOutcomes& group, Problems& problems) {
+  for (std::size_t later = 1; later < group.outcomes.size(); ++later) {
+    for (std::size_t earlier = 0; earlier < later; ++earlier) {
+      if (!belief::is_implied(group.outcomes[earlier], group.outcomes[later])) continue;
+      problems.add(outcomes.keys[later].place, outcomes.items[later].path,
+                   interfaces::quote(group.outcomes[later].name) + " never counts, as " +
+                       interfaces::quote(group.outcomes[earlier].name) + " above it holds whenever it does",
+                   "put the narrower outcome first");
+      break;
+    }
+  }
+}
+
 }  // namespace
 
 belief::Outcome read_outcome(const LocatedValue& value, const std::string& name, const std::string& default_object,
                              SceneContext& context) {
   Binder binder(value, context.problems);
+  const std::size_t before = context.problems.errors().size();
   belief::Outcome outcome{name, require_judged(binder, default_object, context), {}};
-  ConditionReader reader(context);
+  ConditionReader reader(context, outcome.object);
   outcome.all_of = reader.read_keys(binder);
   if (const LocatedValue* list = binder.find("all_of")) {
     const std::vector<Condition> more = reader.read_list(*list);
     outcome.all_of.insert(outcome.all_of.end(), more.begin(), more.end());
   }
   if (outcome.all_of.empty()) {
-    const std::size_t before = context.problems.errors().size();
     binder.finish();  // a mistyped key explains it
     if (value.kind == LocatedValue::Kind::kMap && context.problems.errors().size() == before)
       context.problems.add(value.place, value.path, "the outcome has no condition", kConditionRemedy);
   }
+  if (context.problems.errors().size() == before && !outcome.object.empty())
+    if (const core::Status status = belief::validate(context.scene, outcome); !status.ok())
+      context.problems.add(value.place, value.path, status.message(), "correct it");
   return outcome;
 }
 
 belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::string& name, SceneContext& context) {
   Problems& problems = context.problems;
+  const std::size_t before = problems.errors().size();
   belief::ExclusiveOutcomes group{name, {}};
   Binder binder(value, problems);
   const std::string object = find_judged(binder, "", context);  // else each outcome names its own
@@ -213,6 +239,7 @@ belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::s
       problems.add(at->keys[i].place, at->items[i].path, "'other' is made by itself", "give it another name");
     group.outcomes.push_back(read_outcome(at->items[i], at->keys[i].name, object, context));
   }
+  if (problems.errors().size() == before) check_order(*at, group, problems);
   return group;
 }
 

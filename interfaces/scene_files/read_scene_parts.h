@@ -37,8 +37,19 @@ belief::Outcome read_outcome(const LocatedValue& value, const std::string& name,
                              SceneContext& context);
 belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::string& name, SceneContext& context);
 
-/// Reports objects whose mean start lies wholly inside one solid of a support. The scene is valid.
-void refuse_starts_inside(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
+/// Reports objects whose mean start lies wholly inside one solid of a support, or outside of the world. The scene is
+/// valid.
+void refuse_starts(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
+/// Where a model's file says how its mass is spread; null: nowhere.
+struct MassPlaces {
+  const LocatedValue* center = nullptr;
+  const LocatedValue* inertia = nullptr;
+  bool is_unit = true;  ///< The inertia is that of 1 kg.
+};
+/// Reports what no body of that shape and mean mass has, and warns of what hardly any has.
+void check_mass_distribution(const MassPlaces& at, const belief::ObjectModel& model, Problems& problems);
+/// Warns of a scene that is valid and yet odd.
+void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
 
 /// Shapes of a body and what comes with them.
 struct BodyShape {

@@ -15,6 +15,8 @@ inline constexpr NumberRange kObjectSize{1e-5, 20.0, "give metres, more than 0 a
 /// Edges of supports.
 inline constexpr NumberRange kSupportSize{1e-5, 1000.0, "give metres, more than 0 and at most 1000", "m"};
 inline constexpr NumberRange kMass{1e-6, 1e5, "give kg, more than 0 and at most 1e5", "kg"};
+/// Of all there is: gases to metals.
+inline constexpr NumberRange kDensity{0.1, 25000.0, "give kg/m^3 (water 1000, wood 600, steel 7850)"};
 inline constexpr NumberRange kTime{0.0, 1e5, "give seconds between 0 and 1e5", "s"};
 inline constexpr NumberRange kDuration{1e-4, 3600.0, "give seconds, more than 0 and at most 3600", "s"};
 inline constexpr NumberRange kAngleDeg{-36000.0, 36000.0, "give degrees", "deg"};

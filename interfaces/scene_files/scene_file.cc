@@ -112,19 +112,6 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   });
 }
 
-void warn_of_oddities(const LocatedValue& document, const Scene& scene, Problems& problems) {
-  if (scene.supports.empty())
-    problems.warn(document.place, "", "the scene has no support, so everything falls", "add a table or a 'ground'");
-  for (const belief::Action& action : scene.actions) {
-    if (action.time <= scene.duration) continue;
-    const LocatedValue& at = *document.find("actions");
-    problems.warn(
-        at.place, at.path,
-        "an action is at " + number_text(action.time) + " s, after the end at " + number_text(scene.duration) + " s",
-        "raise 'duration'");
-  }
-}
-
 }  // namespace
 
 std::string SceneContext::read_name(const LocatedValue& value, const std::vector<std::string>& names,
@@ -237,7 +224,7 @@ core::Result<Scene> parse_scene(std::string_view text, const std::string& file, 
     if (const core::Status status = belief::validate(scene); !status.ok())
       problems.add({document->place.file, 0, 0}, "", status.message(), "correct it");
   }
-  if (problems.empty()) refuse_starts_inside(*document, scene, problems);
+  if (problems.empty()) refuse_starts(*document, scene, problems);
   if (problems.empty()) warn_of_oddities(*document, scene, problems);
   if (report) *report = {problems.errors(), problems.warnings()};
   if (!problems.empty()) return problems.status();

@@ -72,7 +72,8 @@ ModelFile random_model(RandomStream& stream) {
   model.contact.restitution = random_between(stream, 0.0, 1.0);
   model.contact.rolling_friction = tests::random_below(stream, 2) * 0.00123;
   model.contact.edge_radius = tests::random_below(stream, 2) * 0.0023;
-  const Eigen::MatrixXd spread = tests::random_covariance(stream, 3, 3);  // of mass about its centre
+  Eigen::MatrixXd spread = tests::random_covariance(stream, 3, 3);  // of mass about its centre, of a box of 0.1 m
+  spread = 0.001 * (spread / spread.trace() + 0.1 * geometry::Matrix3d::Identity());
   model.unit_inertia = spread.trace() * geometry::Matrix3d::Identity() - spread;
   model.symmetry = random_symmetry(stream);
   model.surface = static_cast<belief::SurfaceKind>(tests::random_below(stream, 3));

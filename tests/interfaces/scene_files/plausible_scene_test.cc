@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene file says that cannot be, or hardly is meant.
+#include <gmock/gmock.h>
+
+#include "prescene/belief/validation.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
+
+namespace prescene::interfaces {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+struct Read {
+  std::string errors;
+  std::string warnings;
+};
+
+Read read(const std::string& text) {
+  FileReport report;
+  Read found;
+  found.errors = parse_scene(text, "s.yaml", {}, &report).status().message();
+  for (const Problem& warning : report.warnings) found.warnings += warning.text() + "\n";
+  return found;
+}
+
+// A cube of 0.1 m and 0.5 kg, whose unit inertia is 0.00167 m^2 about each axis.
+Read cube(const std::string& more, const std::string& position = "[0, 0, 0.05]") {
+  return read("models:\n  m:\n    box: [0.1, 0.1, 0.1]\n    mass: 0.5\n    " + more +
+              "\nsupports:\n  table: {ground: {size: 4}}\nobjects:\n  o:\n    model: m\n    pose: {position: " +
+              position + "}\n");
+}
+
+TEST(PlausibleScene, CentresOfMassAreInTheShape) {
+  EXPECT_THAT(cube("center_of_mass: [0, 0, -10]").errors,
+              AllOf(HasSubstr("s.yaml:5: models.m.center_of_mass: the centre of mass lies 9.95 m outside of the shape"),
+                    HasSubstr("millimetres? then write [0, 0, -0.01]")));
+  EXPECT_THAT(cube("center_of_mass: [0, {normal: [-3, 0.1]}, 0]").errors,
+              HasSubstr("millimetres? then write [0, -0.003, 0]; centimetres? then write [0, -0.03, 0]"));
+  // Outside, but it may be that the shape stands for a part only.
+  for (const char* near : {"[0, 0, -0.06]", "[0.1, 0, 0]", "[0, -0.2, 0]"}) {
+    const Read found = cube(std::string("center_of_mass: ") + near);
+    EXPECT_EQ(found.errors, "") << near;
+    EXPECT_THAT(found.warnings, HasSubstr("outside of the shape")) << near;
+  }
+  for (const char* in : {"[0, 0, 0]", "[0.05, -0.05, 0.05]", "[0, 0, {normal: [0.01, 0.02]}]"}) {
+    const Read found = cube(std::string("center_of_mass: ") + in);
+    EXPECT_EQ(found.errors + found.warnings, "") << in;
+  }
+}
+
+TEST(PlausibleScene, InertiasAreThoseOfABodyOfThatSizeAndMass) {
+  for (const char* large : {"[1000, 1000, 1000]", "[1, 1, 1]", "[0.05, 0.05, 0.05]"})
+    EXPECT_THAT(cube(std::string("unit_inertia: ") + large).errors,
+                AllOf(HasSubstr("s.yaml:5: models.m.unit_inertia"), HasSubstr("more than the shape can have")))
+        << large;
+  for (const char* small : {"[1e-12, 1e-12, 1e-12]", "[1e-300, 1e-300, 1e-300]", "[1e-300, 0.0016, 0.0016]"})
+    EXPECT_THAT(cube(std::string("unit_inertia: ") + small).errors, HasSubstr("less than any body of this mass"))
+        << small;
+  EXPECT_THAT(cube("unit_inertia: [1600, 1700, 1600]").errors, HasSubstr("mm^2? then write [0.0016, 0.0017, 0.0016]"));
+  EXPECT_THAT(cube("inertia: [800, 800, 800]").errors, HasSubstr("kg mm^2? then write [0.0008, 0.0008, 0.0008]"));
+  EXPECT_THAT(cube("inertia: [8000, 8000, 8000]").errors, HasSubstr("g cm^2? then write [0.0008, 0.0008, 0.0008]"));
+  // A ball of lead in a light box, and a cube's frame: odd and not odd.
+  EXPECT_THAT(cube("unit_inertia: [6e-5, 6e-5, 6e-5]").warnings, HasSubstr("far from that of the shape"));
+  EXPECT_EQ(cube("unit_inertia: [6e-5, 6e-5, 6e-5]").errors, "");
+  for (const char* right : {"unit_inertia: [0.0017, 0.0016, 0.0017]", "unit_inertia: [0.004, 0.004, 0.004]",
+                            "inertia: [0.0008, 0.0008, 0.0008]", "center_of_mass: [0, 0, 0.03]"}) {
+    const Read found = cube(right);
+    EXPECT_EQ(found.errors + found.warnings, "") << right;
+  }
+}
+
+TEST(PlausibleScene, ObjectsStartInTheWorld) {
+  EXPECT_THAT(cube("friction: 0.4", "[300, 20, 50]").errors,
+              AllOf(HasSubstr("s.yaml:11: objects.o.pose.position: it starts 304.795 m from the world's origin"),
+                    HasSubstr("ends at 20 m"), HasSubstr("millimetres? then write [0.3, 0.02, 0.05]")));
+  EXPECT_THAT(cube("friction: 0.4", "[0, 20.1, 0.05]").errors, HasSubstr("objects.o.pose"));
+  EXPECT_EQ(cube("friction: 0.4", "[0, 19, 0.05]").errors, "");
+}
+
+const char* const kTwo =
+    "models:\n  light: {box: [0.1, 0.1, 0.1], mass: 0.1}\n  heavy: {box: [0.1, 0.1, 0.1], mass: %}\n"
+    "supports:\n  table: {ground: {size: 4}}\nobjects:\n  a: {model: light, pose: {position: [0, 0, 0.05]}}\n"
+    "  b: {model: heavy, pose: {position: [0, 0, 0.15]}}\n";
+std::string two(const std::string& mass) {
+  std::string text = kTwo;
+  return text.replace(text.find('%'), 1, mass);
+}
+
+TEST(PlausibleScene, WarnsOfMassesThatTheSolverCannotStack) {
+  const Read found = read(two("20"));
+  EXPECT_EQ(found.errors, "");
+  EXPECT_THAT(found.warnings, AllOf(HasSubstr("s.yaml:8: objects.b: it has more than 100 times the mass of 'a'"),
+                                    HasSubstr("20 and 0.1 kg")));
+  EXPECT_EQ(read(two("10")).warnings, "");
+}
+
+TEST(PlausibleScene, NothingTouchesOrRestsOnItself) {
+  for (const char* condition : {"resting_on", "touched"}) {
+    const std::string key(condition);
+    EXPECT_THAT(read(two("1") + "outcomes:\n  x: {object: b, " + key + ": b}\n").errors,
+                AllOf(HasSubstr("s.yaml:10: outcomes.x." + key), HasSubstr("never touches itself")));
+    EXPECT_THAT(read(two("1") + "outcomes:\n  x: {object: b, all_of: [{not: {" + key + ": b}}]}\n").errors,
+                HasSubstr("never touches itself"));
+    EXPECT_EQ(read(two("1") + "outcomes:\n  x: {object: b, " + key + ": a}\n").errors, "");
+  }
+  // Those that come in no file.
+  const auto scene = parse_scene(two("1"), "s.yaml");
+  ASSERT_TRUE(scene.ok());
+  const belief::Outcome self{"x", "b", {belief::Condition{belief::Touched{"b"}}}};
+  EXPECT_THAT(belief::validate(*scene, self).message(), HasSubstr("neither touches itself nor rests on itself"));
+}
+
+TEST(PlausibleScene, OutcomesThatNeverCountAreToldWithTheirLine) {
+  EXPECT_THAT(
+      read(two("1") + "exclusive_outcomes:\n  g:\n    object: b\n    outcomes:\n      low: {below: 1}\n" +
+           "      again: {below: 1}\n")
+          .errors,
+      HasSubstr("s.yaml:14: exclusive_outcomes.g.outcomes.again: 'again' never counts, as 'low' above it holds"));
+  EXPECT_THAT(read(two("1") + "outcomes:\n  x:\n    object: b\n    below: 1\n    not: {below: 1}\n").errors,
+              HasSubstr("s.yaml:11: outcomes.x: "));
+}
+
+}  // namespace
+}  // namespace prescene::interfaces
