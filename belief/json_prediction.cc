@@ -159,6 +159,7 @@ Json prediction_json(const PredictAnswer& predict) {
             {"step", predict.step},
             {"certificates", certificates_json(predict.certificates)},
             {"overlaps", {{"share", predict.overlapping_share}, {"deepest", predict.deepest_overlap}}},
+            {"dropped_contacts", {{"instances", predict.crowded_instances}, {"contacts", predict.dropped_contacts}}},
             {"wall_seconds", predict.wall_seconds},
             {"cpu_seconds", predict.cpu_seconds},
             {"remarks", predict.remarks},

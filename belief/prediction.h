@@ -198,6 +198,9 @@ struct PredictAnswer {
   /// of it, m.
   double overlapping_share = 0.0;
   double deepest_overlap = 0.0;
+  /// Contacts that steps had no room for and were solved without, and in how many instances.
+  std::int64_t dropped_contacts = 0;
+  int crowded_instances = 0;
   double wall_seconds = 0.0;
   double cpu_seconds = 0.0;  ///< Of all threads of the process meanwhile.
   bool converged = false;    ///< All intervals reached the tolerance.

@@ -40,6 +40,8 @@ struct Trajectory {
   /// How deep two things were in each other at the start or when something was let go, m. 0 where the simulator does
   /// not tell.
   double deepest_overlap = 0.0;
+  /// Contacts that steps found and had no room for, summed over the steps: these were solved without them.
+  std::int64_t dropped_contacts = 0;
   friend bool operator==(const Trajectory&, const Trajectory&) = default;
 
   const WorldState& start() const { return states.front(); }

@@ -124,6 +124,8 @@ void account(const Foresight& foresight, belief::PredictAnswer& answer) {
   answer.certificates = {foresight.certifier != nullptr, estimate.certificates.certified, estimate.certificates.audited,
                          estimate.certificates.mismatches, estimate.certificates.switched_off};
   for (const simulation::InstanceRecord& record : estimate.instances) {
+    answer.dropped_contacts += record.dropped_contacts;
+    if (record.dropped_contacts > 0) ++answer.crowded_instances;
     if (record.deepest_overlap <= kNoticed) continue;
     answer.overlapping_share += record.weight;
     answer.deepest_overlap = std::max(answer.deepest_overlap, record.deepest_overlap);

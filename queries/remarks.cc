@@ -125,6 +125,11 @@ std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const b
                       " of the instances things were in each other, at the start or when let go, by up to " +
                       fixed_text(1000.0 * answer.deepest_overlap, 0) +
                       " mm. They are parted gently; what comes of it is doubtful.");
+  if (answer.crowded_instances > 0)
+    remarks.push_back("In " + std::to_string(answer.crowded_instances) + " of " + std::to_string(answer.instances) +
+                      " instances an object had more contacts in a step than there is room for: " +
+                      std::to_string(answer.dropped_contacts) +
+                      " were left out. Give it fewer parts, or simulate with '--stepper bullet'.");
   if (answer.certificates.switched_off)
     remarks.push_back(
         "Certificates ended too many instances with another outcome than running on: all were run to "

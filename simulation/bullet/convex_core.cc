@@ -210,7 +210,7 @@ void ConvexCore::facing(const Vector3d& d, Feature& feature) const {
       }
       feature.normal = best->normal;
       const std::size_t size = best->loop.size();
-      const std::size_t step = (size + Feature::kMaxPoints - 1) / Feature::kMaxPoints;
+      const std::size_t step = (size + Feature::kMaxCorners - 1) / Feature::kMaxCorners;
       for (std::size_t i = 0; i < size; i += step) feature.add(polytope_.vertices[best->loop[i]]);
       break;
     }

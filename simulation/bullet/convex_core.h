@@ -19,7 +19,9 @@ namespace prescene::simulation {
 /// A face, edge or corner of a core, in the frame that the function says: one point, a segment, or a planar convex
 /// polygon counter-clockwise seen from outside with its outward normal.
 struct Feature {
-  static constexpr int kMaxPoints = 32;
+  static constexpr int kMaxCorners = 32;  ///< Of a core's side; larger ones leave out corners evenly.
+  /// A side that is clipped to another gains at most one point an edge.
+  static constexpr int kMaxPoints = 2 * kMaxCorners;
   int count = 0;
   std::array<Vector3d, kMaxPoints> points;
   Vector3d normal = Vector3d::Zero();

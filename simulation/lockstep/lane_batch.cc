@@ -223,6 +223,8 @@ void LaneBatch::after_step(int at) {
     return;
   }
   note_touches(at);
+  for (int object = 0; object < engine_.objects(); ++object)
+    queue_->trajectories[slot.index].dropped_contacts += engine_.dropped(at, object);
   if (slot.instance.began()) note_overlap(at);
   freeze_beyond(at);
   const bool calm = slot.instance.calm(engine_, at);

@@ -354,6 +354,7 @@ void LaneEngine::find_contacts(std::span<const std::uint8_t> wanted) {
   for (int object = 0; object < objects(); ++object) {
     fly(scene_->lanes, object, count, state_);
     std::fill_n(state_.contact_count.begin() + state_.at(object, 0), count, 0);
+    std::fill_n(state_.dropped_count.begin() + state_.at(object, 0), count, 0);
   }
   guide(count);
   for (int object = 0; object < objects(); ++object) {

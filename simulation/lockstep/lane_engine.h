@@ -74,6 +74,9 @@ class LaneEngine {
             static_cast<std::size_t>(state_.contact_count[place_of(object, slot)])};
   }
 
+  /// Contacts of an object that the step had no room for.
+  int dropped(int slot, int object) const { return state_.dropped_count[place_of(object, slot)]; }
+
   /// From the local origin.
   Vector3d center_of_mass(int slot, int object) const;
   /// Of the centre of mass.

@@ -37,6 +37,7 @@ LaneState::LaneState(int slots, int bodies, int objects)
   const auto of_objects = static_cast<std::size_t>(slots_ * objects);
   contact_count.assign(of_objects, 0);
   warm_count.assign(of_objects, 0);
+  dropped_count.assign(of_objects, 0);
   contacts_.resize(of_objects * kMaxContacts);
   warm_.resize(of_objects * kMaxContacts);
 }
@@ -49,7 +50,8 @@ void ContactStage::flush(const std::int32_t* objects, LaneState& state) {
     const int room = std::min(counts_[lane], kMaxContacts - count);
     std::copy_n(contacts_[lane].data(), room, state.contacts(object) + count);
     count += room;
-    counts_[lane] = 0;
+    state.dropped_count[static_cast<std::size_t>(object)] += counts_[lane] - room + dropped_[lane];
+    counts_[lane] = dropped_[lane] = 0;
   }
 }
 

@@ -152,6 +152,7 @@ class LaneState {
 
   // Of objects: with the objects after it, then with all else.
   std::vector<int> contact_count, warm_count;
+  std::vector<int> dropped_count;  ///< Contacts beyond kMaxContacts, of this step.
   LaneContact* contacts(int at) { return contacts_.data() + static_cast<std::size_t>(at) * kMaxContacts; }
   WarmContact* warm(int at) { return warm_.data() + static_cast<std::size_t>(at) * kMaxContacts; }
 
@@ -171,13 +172,16 @@ class ContactStage {
  public:
   void add(int lane, const LaneContact& contact) {
     int& count = counts_[static_cast<std::size_t>(lane)];
-    if (count < kMaxContacts) contacts_[static_cast<std::size_t>(lane)][static_cast<std::size_t>(count++)] = contact;
+    if (count < kMaxContacts)
+      contacts_[static_cast<std::size_t>(lane)][static_cast<std::size_t>(count++)] = contact;
+    else
+      ++dropped_[static_cast<std::size_t>(lane)];
   }
-  /// Appends what was added to the contacts of the lanes' objects, as far as there is room.
+  /// Appends what was added to the contacts of the lanes' objects, as far as there is room; the rest is counted.
   void flush(const std::int32_t* objects, LaneState& state);
 
  private:
-  std::array<int, kLaneMultiple> counts_{};
+  std::array<int, kLaneMultiple> counts_{}, dropped_{};
   std::array<std::array<LaneContact, kMaxContacts>, kLaneMultiple> contacts_;
 };
 

@@ -96,6 +96,7 @@ void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& rec
   record.final = std::move(run.states.back());
   record.end = run.end;
   record.deepest_overlap = std::max(record.deepest_overlap, run.deepest_overlap);
+  record.dropped_contacts = std::max(record.dropped_contacts, run.dropped_contacts);
   if (runner.keep_contacts) record.contacts = std::move(run.contacts);
   record.simulated_seconds += run.simulated_seconds;
   record.flown_seconds += run.flown_seconds;

@@ -73,6 +73,7 @@ struct InstanceRecord {
   /// The simulation blew up: no class is true of it (-1), and it counts for none.
   bool failed = false;
   double deepest_overlap = 0.0;                   ///< m, see Trajectory.
+  std::int64_t dropped_contacts = 0;              ///< See Trajectory.
   std::vector<belief::ContactInterval> contacts;  ///< With EstimatorOptions::keep_contacts.
 };
 

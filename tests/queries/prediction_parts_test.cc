@@ -167,6 +167,7 @@ class TouchingSimulator final : public simulation::Simulator {
       if (friction < tests::kSlideBelow) runs[i].contacts.push_back({0, 1, 0.5, 1.0, friction, 0.0});
       if (friction > 0.5 && friction < 0.5 + failing_) runs[i].end = belief::TrajectoryEnd::kDiverged;
       runs[i].deepest_overlap = friction > 0.6 ? 0.015 : 0.0;
+      runs[i].dropped_contacts = friction > 0.6 ? 3 : 0;
     }
   }
   std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>&,
@@ -227,6 +228,8 @@ TEST(Failures, AreToldAndNotDropped) {
   EXPECT_THAT(answer.remarks.front(), HasSubstr("more than 1 %"));
   EXPECT_NEAR(answer.overlapping_share, 1.0 - core::normal_cdf(1.0), 0.02);
   EXPECT_EQ(answer.deepest_overlap, 0.015);
+  EXPECT_GT(answer.crowded_instances, 0);
+  EXPECT_EQ(answer.dropped_contacts, 3 * answer.crowded_instances);
   EXPECT_THAT(answer.remarks[1], HasSubstr("by up to 15 mm"));
   double mass = 0.0;
   for (const belief::PoseComponent& component : answer.final_poses[0].components) mass += component.weight;

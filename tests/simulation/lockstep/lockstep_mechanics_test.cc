@@ -278,6 +278,30 @@ TEST(LockstepMechanics, WhatMerelyBalancesIsNotAtRest) {
   EXPECT_EQ(end_of(Sphere{0.05}, Pose::from_translation({0, 0, 0.05})), belief::TrajectoryEnd::kAtRest);
 }
 
+TEST(LockstepMechanics, ContactsWithoutRoomAreCounted) {
+  // Four corners a foot; there is room for 32.
+  const auto on_feet = [](int feet) {
+    std::vector<belief::CollisionShape> shapes;
+    for (int i = 0; i < feet; ++i) {
+      const Vector3d place(0.04 * (i % 4), 0.04 * (i / 4), 0.0);
+      shapes.push_back(belief::PrimitiveShape{BoxShape{{0.02, 0.02, 0.1}}, Pose::from_translation(place)});
+    }
+    Scene scene = floor_scene(model_of("table", shapes));
+    scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.05})};
+    return scene;
+  };
+  simulation::RunRequest request;
+  request.stop.duration = 0.1;
+  request.stop.stop_at_rest = false;
+  const auto dropped = [&](const Scene& scene, const simulation::Simulator& simulator) {
+    return run_one(simulator, start_of(scene), request).dropped_contacts;
+  };
+  const Scene eight = on_feet(8), twelve = on_feet(12);
+  EXPECT_EQ(dropped(eight, *lockstep_of(eight)), 0);
+  EXPECT_EQ(dropped(twelve, *lockstep_of(twelve)), 24 * 16);  // each of the 24 steps
+  EXPECT_EQ(dropped(twelve, *bullet_of(twelve)), 0);
+}
+
 TEST(LockstepMechanics, OverlapIsPushedOutGently) {
   // Started 3 mm deep, in a face and in an edge; and with the middle of the object inside.
   for (const double depth : {0.003, 0.03}) {
