@@ -11,6 +11,7 @@
 #include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/service/motion_units.h"
 #include "prescene/simulation/calibration/find_beginning.h"
+#include "prescene/simulation/calibration/free_fall.h"
 #include "prescene/simulation/calibration/keep_untold.h"
 #include "prescene/simulation/calibration/sliding_fit.h"
 
@@ -31,13 +32,21 @@ constexpr double kLeastRotationNoise = 1e-4;  // rad
 constexpr double kLittle = 0.6;
 // A tracker's metre is worth a remark when it is off by so much, and by three standard errors.
 constexpr double kScaleRemark = 0.003;
-// And no metre at all when gravity is off by such a factor.
-constexpr double kScaleRefused = 2.0;
+// And no metre at all when gravity is off by such a share, and by so many errors.
+constexpr double kScaleRefused = 0.1;
+constexpr double kScaleErrors = 4.0;
+// s of a flight in which its fall is measured: a contact that comes earlier than simulated is seldom among them.
+constexpr double kFallSeconds = 0.1;
+// Of the recordings, that may be left out, and how many of them a refusal names.
+constexpr double kMostLeftOut = 0.25;
+constexpr std::size_t kMostNamed = 3;
 // Times as uncertain as frames show, that starts may be before the fit is called poor.
 constexpr double kPoorFit = 10.0;
 // Nothing that a lab throws or pushes has less friction.
 constexpr double kNoFriction = 0.02;
 constexpr double kLeastFrameRate = 100.0;  // Hz
+// m: twice the gap at which things still count as touching, and more.
+constexpr double kNoisySlide = 5e-4;
 
 std::size_t place_of(MotionParameter parameter) { return static_cast<std::size_t>(parameter); }
 
@@ -58,21 +67,45 @@ const char* what_tells(MotionParameter parameter) {
   }
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 std::string words(MotionParameter parameter) {
   std::string text = to_string(parameter);
   std::ranges::replace(text, '_', ' ');
   return text;
 }
 
-core::Result<std::vector<RecordedMotion>> beginnings(const MotionDataset& dataset, Backends& backends) {
+/// What of the recordings can be used; what cannot is left out with a remark, unless too little remains.
+core::Result<std::vector<RecordedMotion>> beginnings(const MotionDataset& dataset, std::size_t least,
+                                                     Backends& backends, std::vector<std::string>* remarks) {
   PRESCENE_TRY(const auto simulator, backends.make_simulator(*dataset.scene));
+  std::vector<std::span<const simulation::TimedPose>> frames;
+  for (const MotionRecording& recording : dataset.recordings) frames.emplace_back(recording.frames);
+  const double noise = simulation::position_noise_of(frames);
   std::vector<RecordedMotion> motions;
+  std::vector<std::string> refused;
   for (const MotionRecording& recording : dataset.recordings) {
-    PRESCENE_TRY(RecordedMotion motion, simulation::find_beginning(recording.name, recording.frames, *dataset.scene,
-                                                                   *simulator, backends.pool()));
-    motions.push_back(std::move(motion));
+    auto motion = simulation::find_beginning(recording.name, recording.frames, *dataset.scene, *simulator,
+                                             backends.pool(), noise);
+    if (motion)
+      motions.push_back(*std::move(motion));
+    else
+      refused.push_back(motion.status().message());
   }
-  return motions;
+  const double share = static_cast<double>(refused.size()) / static_cast<double>(dataset.recordings.size());
+  if (refused.empty() || (motions.size() >= least && share <= kMostLeftOut)) {
+    for (const std::string& reason : refused) remarks->push_back("left out: " + reason);
+    return motions;
+  }
+  std::string text =
+      std::to_string(refused.size()) + " of " + std::to_string(dataset.recordings.size()) + " recordings can't be used";
+  for (std::size_t i = 0; i < std::min(refused.size(), kMostNamed); ++i) text += (i == 0 ? ": " : "; ") + refused[i];
+  if (refused.size() > kMostNamed) text += "; ...";
+  return core::invalid_input(dataset.table_file().string() + ": " + text);
 }
 
 /// What flights tell becomes the prior of what contacts, which come later, are asked.
@@ -99,12 +132,51 @@ core::Result<FlightCalibration> fly(const std::vector<RecordedMotion>& motions, 
   return simulation::calibrate_flights(flights, prior);
 }
 
-core::Status check_gravity(const MotionDataset& dataset, double gravity) {
-  const double given = dataset.scene->gravity_W.norm();
-  if (gravity < kScaleRefused * given && gravity * kScaleRefused > given) return core::ok_status();
-  return core::invalid_input(dataset.table_file().string() + ": flights fall with " + core::rounded_text(gravity) +
-                             " m/s^2, the scene's gravity is " + core::rounded_text(given) +
-                             ": x, y, z must be in metres and t in seconds");
+std::string unit_guess(double ratio) {
+  struct Unit {
+    const char* name;
+    double metres;
+  };
+  for (const Unit& unit : {Unit{"feet", 0.3048}, Unit{"inches", 0.0254}, Unit{"decimetres", 0.1}}) {
+    const double off = ratio * unit.metres;
+    if (off > 1.0 - kScaleRefused && off < 1.0 + kScaleRefused)
+      return std::string("; if they are in ") + unit.name + " multiply them by " + core::rounded_text(unit.metres);
+  }
+  return {};
+}
+
+/// By how flights fall before they touch anything, whatever the fit of the model makes of it.
+core::Status check_gravity(const MotionDataset& dataset, const std::vector<RecordedMotion>& motions) {
+  const belief::Scene& scene = *dataset.scene;
+  const geometry::Vector3d center = belief::mean(scene.model_of(scene.objects[0]).center_of_mass);
+  std::vector<std::span<const simulation::TimedPose>> flights;
+  for (const RecordedMotion& motion : motions) {
+    if (motion.beginning != MotionBeginning::kFlight) continue;
+    std::size_t count = std::min(simulation::kLeastFallFrames, motion.first_frames);
+    while (count < motion.first_frames && motion.frames[count].time - motion.frames[0].time <= kFallSeconds) ++count;
+    flights.push_back(std::span(motion.frames).first(count));
+  }
+  if (flights.empty()) return core::ok_status();
+  const double noise = simulation::position_noise_of(flights);
+  std::vector<double> falls;
+  double variance = 0.0;
+  for (const auto& flight : flights) {
+    const simulation::FreeFall fall = simulation::measure_whole_fall(flight, center, scene.gravity_W, noise);
+    falls.push_back(fall.acceleration);
+    variance += fall.error * fall.error;
+  }
+  const auto n = static_cast<double>(falls.size());
+  const double fall = median(falls);
+  std::vector<double> deviations;
+  for (const double each : falls) deviations.push_back(std::abs(each - fall));
+  // Of a median of normal numbers.
+  const double error = 1.2533 * std::max(std::sqrt(variance / n), 1.4826 * median(deviations)) / std::sqrt(n);
+  const double given = scene.gravity_W.norm();
+  if (std::abs(fall - given) <= std::max(kScaleRefused * given, kScaleErrors * error)) return core::ok_status();
+  return core::invalid_input(dataset.table_file().string() + ": flights fall with " + core::rounded_text(fall) +
+                             " +- " + core::rounded_text(error) + " m/s^2, the scene's gravity is " +
+                             core::rounded_text(given) + ": x, y, z must be in metres and t in seconds" +
+                             unit_guess(fall / given));
 }
 
 /// Noise of the tracker, from slides where there are no flights.
@@ -122,11 +194,8 @@ core::Status measure_noise(const std::vector<RecordedMotion>& motions, simulatio
     rotations.push_back(fit->state.rotation_rms * std::sqrt(freedom));
   }
   if (positions.empty()) return core::ok_status();
-  const auto middle = static_cast<std::ptrdiff_t>(positions.size() / 2);
-  std::ranges::nth_element(positions, positions.begin() + middle);
-  std::ranges::nth_element(rotations, rotations.begin() + middle);
-  options->position_noise = positions[static_cast<std::size_t>(middle)];
-  options->rotation_noise = rotations[static_cast<std::size_t>(middle)];
+  options->position_noise = median(std::move(positions));
+  options->rotation_noise = median(std::move(rotations));
   return core::ok_status();
 }
 
@@ -158,10 +227,15 @@ void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
                              " times as uncertain as their frames show; values may be off by more than their errors: "
                              "check shape, size and supports, and that nothing else touches the object");
   }
-  if (found->position_noise < kLeastPositionNoise || found->rotation_noise < kLeastRotationNoise) {
+  if (found->position_noise < kLeastPositionNoise && found->rotation_noise < kLeastRotationNoise) {
     found->remarks.push_back("the frames show next to no noise (" + core::fixed_text(1e3 * found->position_noise, 2) +
                              " mm, " + core::fixed_text(1e3 * found->rotation_noise, 2) +
                              " mrad): they are simulated, or smoothed by the tracker, and errors may be too small");
+  }
+  if (found->slides > 0 && found->position_noise > kNoisySlide) {
+    found->remarks.push_back(
+        "a position noise of " + core::fixed_text(1e3 * found->position_noise, 1) +
+        " mm is much for slides: simulated ones hop at their start, and friction may come out low");
   }
   if (const double rate = frame_rate(dataset.recordings); rate < kLeastFrameRate) {
     found->remarks.push_back("recordings have " + core::fixed_text(rate, 0) +
@@ -189,10 +263,7 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
                                                  const core::Cancellation* cancellation) {
   if (core::Status status = check_units(dataset.recordings, dataset.scene->gravity_W.norm()); !status.ok())
     return status.at(dataset.table_file().string());
-  PRESCENE_TRY(const std::vector<RecordedMotion> motions, beginnings(dataset, backends));
   ObjectCalibration found;
-  for (const RecordedMotion& motion : motions)
-    ++(motion.beginning == MotionBeginning::kFlight ? found.flights : found.slides);
   belief::Scene scene = *dataset.scene;
   const belief::ObjectModel& model = scene.model_of(scene.objects[0]);
   found.prior = simulation::motion_prior(model);
@@ -201,6 +272,13 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
     if (std::ranges::find(options.keep, name) != options.keep.end()) found.prior[i].deviation = 0.0;
   }
 
+  const auto free = static_cast<std::size_t>(std::ranges::count_if(
+      found.prior, [](const simulation::MotionBelief& belief) { return belief.deviation > 0.0; }));
+  PRESCENE_TRY(const std::vector<RecordedMotion> motions,
+               beginnings(dataset, simulation::least_recordings(free), backends, &found.remarks));
+  PRESCENE_RETURN_IF_ERROR(check_gravity(dataset, motions));
+  for (const RecordedMotion& motion : motions)
+    ++(motion.beginning == MotionBeginning::kFlight ? found.flights : found.slides);
   simulation::MotionPrior prior = found.prior;
   simulation::MotionCalibrationOptions motion;
   motion.max_evaluations = options.max_evaluations;
@@ -214,7 +292,6 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
     flight.gravity_W = scene.gravity_W;
     flight.unit_inertia = model.unit_inertia;
     PRESCENE_TRY(found.flight, fly(motions, flight));
-    PRESCENE_RETURN_IF_ERROR(check_gravity(dataset, found.flight->gravity_W.norm()));
     use_flights(*found.flight, flight, &scene, &prior);
     motion.position_noise = found.flight->position_noise;
     motion.rotation_noise = found.flight->rotation_noise;
@@ -241,6 +318,13 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
     }
     p.left_of_prior = p.standard_error / before.deviation;
   }
+  if (std::ranges::all_of(found.motion.parameters, [](const simulation::CalibratedParameter& p) {
+        return p.left_of_prior >= simulation::kUntold;
+      }))
+    return core::invalid_input(
+        dataset.table_file().string() +
+        ": these recordings say nothing about any parameter; record tosses that bounce and spin, "
+        "and long slides");
   found.model = calibrated_model(model, found.motion);
   add_remarks(dataset, &found);
   return found;

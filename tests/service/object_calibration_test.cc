@@ -23,6 +23,7 @@ using service::ObjectCalibration;
 using service::read_motion_dataset;
 using service::read_motion_table;
 using simulation::CalibratedParameter;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
@@ -159,6 +160,49 @@ TEST_F(ObjectCalibrationTest, SaysThatAFitIsPoor) {
   ASSERT_TRUE(found.ok()) << found.status().message();
   EXPECT_GT(found->motion.start_noise, 10.0);
   EXPECT_THAT(found->remarks, Contains(HasSubstr("the fit is poor")));
+}
+
+TEST_F(ObjectCalibrationTest, OneBadTossIsLeftOutAndNamed) {
+  const belief::Scene scene = box_scene({});
+  const auto simulator = backends_.make_simulator(scene);
+  auto slides = simulated_slides(scene, **simulator, 8, core::RandomStream(1, core::Purpose::kTest), pool_);
+  for (geometry::Pose& pose : slides[3].X_WO) pose.translation.z() += 0.04;
+  write("scene.yaml", box_scene_yaml({}));
+  service::ObjectCalibrationOptions options;
+  options.samples = 4;
+  options.max_evaluations = 30;
+  options.keep = {"impact_friction",  "restitution",      "inertia_size",    "edge_radius",
+                  "center_of_mass_x", "center_of_mass_y", "center_of_mass_z"};
+  const auto fitted = [&](const std::vector<SimulatedMotion>& motions) {
+    write("tosses.csv", motion_table(motions));
+    return calibrate_object(*read_motion_dataset(folder_, {}), backends_, options);
+  };
+  const auto found = fitted(slides);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_EQ(found->slides, 7);
+  EXPECT_THAT(found->remarks, Contains(AllOf(HasSubstr("left out: toss 3: "), HasSubstr("mm above a support"))));
+  // Of most of them it is the scene that is wrong.
+  for (std::size_t i : {0U, 1U, 2U, 4U})
+    for (geometry::Pose& pose : slides[i].X_WO) pose.translation.z() += 0.04;
+  const auto refused = fitted(slides);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(std::string(refused.status().message()),
+              AllOf(HasSubstr("tosses.csv: 5 of 8 recordings can't be used: toss 0: "), HasSubstr("toss 1: "),
+                    HasSubstr("mm above a support")));
+}
+
+TEST_F(ObjectCalibrationTest, FeetAreToldByHowTossesFall) {
+  const belief::Scene scene = box_scene({});
+  const auto simulator = backends_.make_simulator(scene);
+  auto motions = simulated_tosses(scene, **simulator, 12, core::RandomStream(1, core::Purpose::kTest), pool_);
+  for (SimulatedMotion& motion : motions)
+    for (geometry::Pose& pose : motion.X_WO) pose.translation /= 0.3048;
+  write("scene.yaml", box_scene_yaml({}));
+  write("tosses.csv", motion_table(motions));
+  const auto found = calibrate_object(*read_motion_dataset(folder_, {}), backends_, {});
+  ASSERT_FALSE(found.ok());
+  EXPECT_THAT(std::string(found.status().message()),
+              AllOf(HasSubstr("tosses.csv: flights fall with 3"), HasSubstr("in feet multiply them by 0.3048")));
 }
 
 TEST_F(ObjectCalibrationTest, SaysThatAHandStillPushes) {

@@ -94,6 +94,21 @@ TEST_F(CalibrateTest, MillimetresEndWithTwoAndOneMessage) {
   EXPECT_EQ(std::ranges::count(finished.err, '\n'), 1) << finished.err;
 }
 
+TEST_F(CalibrateTest, WhatNeverMovesEndsWithTwoAndWithoutAModel) {
+  std::vector<SimulatedMotion> motions(8);
+  for (SimulatedMotion& motion : motions) {
+    for (int i = 0; i < 100; ++i) {
+      motion.times.push_back(i / 120.0);
+      motion.X_WO.push_back(geometry::Pose::from_translation({0.0, 0.0, 0.05}));
+    }
+  }
+  write_file(folder_ / "tosses.csv", motion_table(motions));
+  const Finished finished = run_program(command((folder_ / "object.yaml").string()));
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_THAT(finished.err, HasSubstr("8 of 8 recordings can't be used: toss 0: it does not move"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "object.yaml"));
+}
+
 TEST_F(CalibrateTest, BadDataSetsEndWithTwo) {
   write_file(folder_ / "tosses.csv", "toss,t,x,y,z\n1,0,0,0,0\n");
   const Finished finished = run_program(command((folder_ / "object.yaml").string()));
