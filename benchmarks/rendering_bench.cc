@@ -57,8 +57,7 @@ struct Scene {
     X_CO.rotation = geometry::exp_rotation({1.2, 0.3, 0.2});
     X_CO.translation = Vector3d(0.0, 0.0, distance) - X_CO.rotation * Vector3d(0.0, 0.0, 0.5 * size);
     const MeshHandle wall = make_render_mesh(geometry::make_mesh(geometry::BoxShape{{4.0, 4.0, 0.1}}));
-    scene.instances = {{mesh, X_CO, material, false},
-                       {wall, Pose::from_translation({0.0, 0.0, distance + 0.6}), material, false}};
+    scene.instances = {{mesh, X_CO, material}, {wall, Pose::from_translation({0.0, 0.0, distance + 0.6}), material}};
     RenderOptions options;
     options.normals = true;
     RenderedView view;
@@ -189,7 +188,7 @@ double cast_as_rays(const Scene& scene, const geometry::TriangleMesh& mesh) {
   std::vector<tests::PixelWindow> windows;
   RenderScene alone;
   for (const PoseHypothesis& hypothesis : scene.hypotheses) {
-    alone.instances = {{scene.mesh, hypothesis.X_CO, scene.material, false}};
+    alone.instances = {{scene.mesh, hypothesis.X_CO, scene.material}};
     RenderedView view;
     PRESCENE_CHECK(renderer->render(alone, scene.frame.camera, Pose::identity(), {}, &view).ok());
     tests::PixelWindow window{view.depth.width(), view.depth.height(), -1, -1};

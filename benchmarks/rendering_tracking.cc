@@ -98,7 +98,7 @@ class Tracking {
   /// Each thing once, and the terms of each that know the others.
   void draw_layers() {
     for (std::size_t i = 0; i < kObjects; ++i) {
-      layer_.instances = {{chosen_[i], X_CO_[i], material_, false}};
+      layer_.instances = {{chosen_[i], X_CO_[i], material_}};
       PRESCENE_CHECK(renderer_->render(layer_, terms_.camera, Pose::identity(), {}, &layers_[i]).ok());
     }
     for (std::size_t i = 0; i < kObjects; ++i) {
@@ -147,9 +147,9 @@ class Tracking {
     geometry::TriangleMesh table;
     table.vertices = {{-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0}};
     table.triangles = {{0, 1, 2}, {0, 2, 3}};
-    scene.instances = {{make_render_mesh(table), X_CW_, material_, false}};
+    scene.instances = {{make_render_mesh(table), X_CW_, material_}};
     for (std::size_t i = 0; i < kObjects; ++i)
-      scene.instances.push_back({levels_[i].levels().front().mesh, X_CO_[i], material_, false});
+      scene.instances.push_back({levels_[i].levels().front().mesh, X_CO_[i], material_});
     RenderOptions options;
     options.normals = true;
     RenderedView view;

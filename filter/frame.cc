@@ -100,7 +100,7 @@ SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& fram
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
                               rendering::Renderer& renderer) {
   rendering::RenderScene scene;
-  scene.instances.push_back({target.mesh, X_CO, target.material, false});
+  scene.instances.push_back({target.mesh, X_CO, target.material});
   geometry::DepthImage depth;
   // The camera was checked when the frame was prepared, so a failure is a lost device: the object then hides nothing.
   if (!render_depth(scene, camera, Pose::identity(), renderer, &depth).ok())

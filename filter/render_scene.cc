@@ -18,7 +18,7 @@ geometry::Rgb rgb_of(const belief::Color& color) {
 
 void add(BeliefView& view, const std::string& name, InstanceKind kind, rendering::MeshHandle mesh,
          const belief::Pose& X_WM, const rendering::SurfaceMaterial& material) {
-  view.scene.instances.push_back({std::move(mesh), X_WM, material, kind == InstanceKind::kRobot});
+  view.scene.instances.push_back({std::move(mesh), X_WM, material});
   view.names.push_back(name);
   view.kinds.push_back(kind);
 }

@@ -57,6 +57,14 @@ double background_sigma(const SensorModel& model, double depth) {
   return std::sqrt(sigma * sigma + own * own);
 }
 
+/// Puts in a known surface; one beyond the range is not seen.
+void expect_surface(const SensorModel& model, double depth, AbsentMixture* absent) {
+  if (depth >= model.options().max_depth) return;
+  absent->peak_depth = depth;
+  absent->peak_sigma = background_sigma(model, depth);
+  absent->peak_weight = model.options().background_weight;
+}
+
 /// What the pixel returns without the object, from the nearest source of knowledge. `ray` (z = 1) goes through it.
 AbsentMixture absent_mixture(const FrameTermsInput& input, const SensorModel& model, int x, int y,
                              const Vector3d& ray) {
@@ -66,11 +74,7 @@ AbsentMixture absent_mixture(const FrameTermsInput& input, const SensorModel& mo
     const float depth = input.background(x, y);
     const bool returned = std::isfinite(depth) && depth > 0.0f;
     absent.missing = returned ? options.background_missing : options.background_missing_again;
-    if (returned && depth < options.max_depth) {
-      absent.peak_depth = depth;
-      absent.peak_sigma = background_sigma(model, depth);
-      absent.peak_weight = options.background_weight;
-    }
+    if (returned) expect_surface(model, depth, &absent);
     return absent;
   }
   for (const SupportRegion& region : input.supports) {
@@ -173,7 +177,6 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
 void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& known_depth, FrameTerms* terms) {
   PRESCENE_CHECK(known_depth.width() == frame.camera.width && known_depth.height() == frame.camera.height);
   if (terms != &frame) *terms = frame;
-  const SensorModelOptions& options = frame.model.options();
   for (int y = 0; y < known_depth.height(); ++y) {
     for (int x = 0; x < known_depth.width(); ++x) {
       const float known = known_depth(x, y);
@@ -181,11 +184,9 @@ void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& kn
       float& nearest = terms->known(x, y);
       nearest = nearest > 0.0f ? std::min(nearest, known) : known;
       AbsentMixture absent;
-      absent.peak_depth = nearest;
-      absent.peak_sigma = background_sigma(frame.model, nearest);
-      absent.peak_weight = options.background_weight;
+      expect_surface(frame.model, nearest, &absent);
       terms->inverse_absent(x, y) = inverse_absent(frame.model, absent, terms->depth(x, y));
-      terms->absent_peak(x, y) = nearest;
+      terms->absent_peak(x, y) = static_cast<float>(absent.peak_depth);
       terms->absent_missing(x, y) = -1.0f;
     }
   }

@@ -5,6 +5,11 @@
 
 namespace prescene::rendering {
 
+void temper(const FrameTerms& frame, const PoseHypothesis& hypothesis, PoseEvidence* evidence) {
+  const double pixels = hypothesis.tempering_pixels > 0.0 ? hypothesis.tempering_pixels : evidence->measured;
+  evidence->tempered = tempering(frame.tempering.weight, pixels, frame.step) * evidence->log_ratio;
+}
+
 std::unique_ptr<LikelihoodWorkspace> WorkspacePool::take() {
   {
     const std::lock_guard lock(mutex_);

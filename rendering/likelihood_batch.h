@@ -94,7 +94,7 @@ struct PoseHypothesis {
 struct PoseEvidence {
   double log_ratio =
       0.0;  ///< Sum over pixels of log p(frame | object there) - log p(frame | absent). 0: nothing to see.
-  double tempered = 0.0;           ///< alpha * log_ratio, alpha = min(1, weight K / tempering pixels).
+  double tempered = 0.0;           ///< tempering(frame.tempering.weight, tempering pixels, frame.step) * log_ratio.
   int in_view = 0;                 ///< Pixels that the object covers, known surfaces in front or not.
   int covered = 0;                 ///< Of these, not hidden by a known surface.
   int measured = 0;                ///< Of these, with a measurement.
@@ -109,6 +109,9 @@ struct PoseEvidence {
   /// Share of the covered pixels that are visible, of those with a measurement.
   double visible_share() const { return measured > 0 ? static_cast<double>(visible) / measured : 0.0; }
 };
+
+/// Fills `evidence->tempered` from the rest of it.
+void temper(const FrameTerms& frame, const PoseHypothesis& hypothesis, PoseEvidence* evidence);
 
 struct LineariseOptions {
   double gate = 0.012;         ///< m; residuals beyond about half of it lose their weight.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The surface at a pixel of a measured depth image, from its neighbours alone: what the pixel itself returned can then
-// be judged by it.
+// The surface at a pixel of a measured depth image, from its neighbours: what the pixel itself returned can then be
+// judged by it.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,8 @@ struct LocalSurface {
   double cosine = 1.0;  ///< |n . ray|
 };
 
-/// A plane of least squares over the neighbours of (x, y), without that pixel; 0 = not measured. Nothing where too few
-/// are of one surface.
+/// A plane of least squares over the neighbours of (x, y) that are of one surface, without that pixel; 0 = not
+/// measured. Nothing where too few are of one surface.
 std::optional<LocalSurface> local_surface(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                                           int x, int y, const LocalSurfaceOptions& options = {});
 

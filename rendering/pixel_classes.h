@@ -19,9 +19,6 @@ inline constexpr float kNormalExponent = -0.72134752f;
 /// No pixel counts more against a pose than this, even when a material is said to have no outliers.
 inline constexpr float kMinRatio = 1e-12f;
 
-/// Depth from which objects are drawn, m: a hair beyond the range's start, where the occluder's interval has no length.
-inline float nearest_drawn(const SensorModelOptions& options) { return static_cast<float>(options.min_depth) + 1e-4f; }
-
 /// 1 / sigma of a hit, 1/m: scale w^2 min(1, max(least, cosine * per_cosine)) at 1/z = w.
 struct HitPrecision {
   explicit HitPrecision(const SensorModelOptions& options)

@@ -106,8 +106,6 @@ struct RenderInstance {
   MeshHandle mesh;
   geometry::Pose X_WM;
   SurfaceMaterial material;
-  bool known_occluder =
-      false;  ///< Its pose is known from elsewhere (a robot's link), so that it explains what it hides.
 };
 
 /// Instances in the order of their labels: the label image of a view holds 1 + index, 0 where nothing is.

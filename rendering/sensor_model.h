@@ -36,7 +36,8 @@ struct SensorModelOptions {
   /// full image, up to and including outline_px[i].
   std::array<double, 4> outline_px = {1.5, 3.0, 6.0, 12.0};
   std::array<double, 4> outline_missing = {0.38, 0.35, 0.27, 0.12};
-  /// Missing returns grow with the incidence angle: classes by the cosine, below incidence_cosine[i].
+  /// Missing returns grow with the incidence angle: classes by the cosine, up to and including
+  /// incidence_cosine[i].
   std::array<double, 3> incidence_cosine = {0.2, 0.4, 0.6};
   std::array<double, 3> incidence_missing = {0.47, 0.28, 0.10};
 

@@ -22,7 +22,7 @@ rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary&
         std::find_if(scene.models.begin(), scene.models.end(), [&](const auto& m) { return m.name == object.model; });
     if (model == scene.models.end() || object.state == belief::TrackState::kLost) continue;
     drawn.instances.push_back({meshes.get(model->visual, model->collision, filter::MeshDetail::kDisplay), object.X_WO,
-                               filter::material_of(model->surface, model->color), false});
+                               filter::material_of(model->surface, model->color)});
   }
   *objects = drawn.instances.size();
   std::vector<geometry::Pose> X_WG;
@@ -33,7 +33,7 @@ rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary&
   for (const belief::Support& support : scene.supports) {
     if (support.name != filter::kFoundSupport) continue;
     drawn.instances.push_back({meshes.get(support.visual, support.collision, filter::MeshDetail::kDisplay),
-                               support.X_WS, filter::material_of(belief::SurfaceKind::kOpaque, support.color), false});
+                               support.X_WS, filter::material_of(belief::SurfaceKind::kOpaque, support.color)});
     ++*objects;
   }
   const filter::BeliefView around = filter::known_surroundings(scene, X_WG, filter::MeshDetail::kDisplay, meshes);

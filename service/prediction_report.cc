@@ -44,8 +44,7 @@ core::Result<geometry::ColorImage> mesh_picture(const rendering::MeshHandle& mes
   R_WC << right, forward.cross(right), forward;
   const geometry::Pose X_WC{geometry::Quaterniond(R_WC), -3.4 * radius * forward};
   rendering::RenderScene scene;
-  scene.instances.push_back(
-      {mesh, {R_WB, -(R_WB * p_BoC)}, rendering::SurfaceMaterial::opaque({205, 190, 165}), false});
+  scene.instances.push_back({mesh, {R_WB, -(R_WB * p_BoC)}, rendering::SurfaceMaterial::opaque({205, 190, 165})});
   rendering::RenderOptions options;
   options.near_depth = 0.1 * radius;
   options.far_depth = 10.0 * radius;

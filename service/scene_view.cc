@@ -253,7 +253,7 @@ core::Status SceneView::outline(const belief::Scene& scene, std::size_t object, 
   const belief::ObjectModel& model = scene.model_of(scene.objects[object]);
   rendering::RenderScene alone;
   alone.instances.push_back({backends.meshes().get(model.visual, model.collision, filter::MeshDetail::kDisplay), X_WO,
-                             filter::material_of(belief::SurfaceKind::kOpaque, model.color), false});
+                             filter::material_of(belief::SurfaceKind::kOpaque, model.color)});
   rendering::RenderedView images;
   PRESCENE_RETURN_IF_ERROR(renderer->render(alone, view_.camera, view_.X_WC, options_for(view_), &images));
   geometry::ColorImage shaded;

@@ -7,7 +7,7 @@
 
 namespace prescene::rendering {
 
-/// kUnsupported when sums of products, quotients, roots, snapped places or exponentials of random numbers have other
+/// kUnsupported when sums of products, quotients, snapped places or powers of two of random numbers have other
 /// bits than here. Needs the context to be current.
 core::Status probe_arithmetic(int division_error);
 

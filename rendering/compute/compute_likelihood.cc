@@ -9,6 +9,7 @@
 #include "pose_device.h"
 #include "prescene/core/check.h"
 #include "prescene/rendering/camera_equations.h"
+#include "prescene/rendering/near_plane.h"
 #include "prescene/rendering/portable_math.h"
 
 namespace prescene::rendering {
@@ -43,8 +44,7 @@ PoseEvidence evidence_of(const DeviceResult& result, const FrameTerms& frame, co
   evidence.hits = result.hits;
   evidence.visible_log_ratio = log_of(0);
   evidence.log_ratio = evidence.visible_log_ratio + log_of(1) + log_of(2);
-  const double pixels = hypothesis.tempering_pixels > 0.0 ? hypothesis.tempering_pixels : evidence.measured;
-  evidence.tempered = tempering(frame.tempering.weight, pixels, frame.step) * evidence.log_ratio;
+  temper(frame, hypothesis, &evidence);
   return evidence;
 }
 
@@ -111,18 +111,6 @@ class ComputeLikelihood final : public ComputeLikelihoodBatch {
   }
 
  private:
-  enum class Way { kUnseen, kProcessor, kDevice };
-
-  static Way way_of(const FrameTerms& frame, const PoseHypothesis& hypothesis) {
-    const RenderMesh& mesh = *hypothesis.mesh;
-    const float near_depth = nearest_drawn(frame.model.options());
-    const auto depth = static_cast<float>((hypothesis.X_CO * mesh.centre.cast<double>().eval()).z());
-    if (mesh.triangles.empty() || depth + mesh.radius <= near_depth) return Way::kUnseen;
-    // Faces that the near plane cuts are rare, and much code.
-    if (depth - mesh.radius < near_depth) return Way::kProcessor;
-    return Way::kDevice;
-  }
-
   /// Calls unseen(i), processor(i, count) or device(i, result) for each hypothesis.
   template <class Unseen, class Processor, class Device>
   void share_out(const FrameTerms& frame, std::span<const PoseHypothesis> hypotheses, const PoseWork& work,
@@ -133,9 +121,10 @@ class ComputeLikelihood final : public ComputeLikelihoodBatch {
       warm(frame, hypotheses, scratch);
       std::size_t on_processor = 0;
       for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-        const Way way = way_of(frame, hypotheses[i]);
-        if (way == Way::kUnseen) unseen(i);
-        if (way != Way::kProcessor) continue;
+        const NearPlane plane = near_plane(hypotheses[i], frame.model.options());
+        if (plane == NearPlane::kLeavesNothing) unseen(i);
+        // Cutting faces is rare, and much code.
+        if (plane != NearPlane::kMayCut) continue;
         processor(i, 1);
         ++on_processor;
       }
@@ -184,7 +173,7 @@ class ComputeLikelihood final : public ComputeLikelihoodBatch {
       scratch.tasks.clear();
       scratch.waiting.clear();
       for (; next < hypotheses.size(); ++next) {
-        if (way_of(frame, hypotheses[next]) != Way::kDevice) continue;
+        if (near_plane(hypotheses[next], frame.model.options()) != NearPlane::kLeavesAll) continue;
         if (!scratch.tasks.add(frame, hypotheses[next])) break;
         scratch.waiting.push_back(next);
       }

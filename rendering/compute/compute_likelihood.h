@@ -22,7 +22,7 @@ struct ComputeOptions {
   /// Calls with fewer hypotheses are left to the processor: what a dispatch costs beside its work, it has done by then.
   std::size_t least_hypotheses = 1;
   std::size_t scratch_mib = 128;  ///< Memory of the device for hypotheses under way; more of them a dispatch.
-  int division_error = 0;  ///< Units that quotients and roots are put off by before they are corrected, for tests.
+  int division_error = 0;         ///< Units that quotients are put off by before they are corrected, for tests.
 };
 
 /// What became of the hypotheses so far.

@@ -41,9 +41,9 @@ const void* GlBuffer::map(std::size_t bytes) {
   return glMapBufferRange(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(bytes), GL_MAP_READ_BIT);
 }
 
-void GlBuffer::unmap() {
+bool GlBuffer::unmap() {
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, name_);
-  glUnmapBuffer(GL_SHADER_STORAGE_BUFFER);
+  return glUnmapBuffer(GL_SHADER_STORAGE_BUFFER) == GL_TRUE;
 }
 
 GlProgram::~GlProgram() { glDeleteProgram(name_); }
@@ -85,8 +85,9 @@ core::Status gl_errors() {
     if (first == GL_NO_ERROR) first = error;
   }
   if (first == GL_NO_ERROR) return core::ok_status();
+  // Which buffer has no memory now, nobody knows.
   if (first == GL_OUT_OF_MEMORY)
-    return core::resource_exhausted(
+    return core::unavailable(
         "likelihood in compute shaders: the device has too little memory: give it less scratch memory, or use the "
         "processor");
   return device_failure("OpenGL error " + std::to_string(first));

@@ -29,7 +29,8 @@ class GlBuffer {
   void bind(unsigned binding) const;
   /// The content for reading, until unmap(); null when the device failed.
   const void* map(std::size_t bytes);
-  void unmap();
+  /// Whether what was mapped was the content all the time.
+  bool unmap();
 
  private:
   unsigned name_ = 0;
@@ -52,7 +53,7 @@ class GlProgram {
   unsigned name_ = 0;
 };
 
-/// kResourceExhausted or kUnavailable for errors since the last call.
+/// kUnavailable for errors since the last call: the device has to be made anew.
 core::Status gl_errors();
 
 }  // namespace prescene::rendering

@@ -195,8 +195,12 @@ core::Status PoseDevice::place_meshes(PoseTasks& tasks) {
     return core::resource_exhausted(
         "likelihood in compute shaders: the meshes of one call are more than the device holds: use the processor");
   };
+  if (tasks.scratch_words_ * kWord > scratch_bytes_) return too_large();
   const std::size_t turns_before = tasks.scratch_words_ / (2 * kThreads);
-  if (tasks.scratch_words_ * kWord > scratch_bytes_ || turns_before > kTurnsOfSoftware / 8) return too_large();
+  if (turns_before > static_cast<std::size_t>(frame_.most_turns) / 8)
+    return core::resource_exhausted(
+        "likelihood in compute shaders: a mesh has more vertices and faces than this device's loops have turns: use "
+        "the processor");
   // Twice the buffer each time until all are in it, or it is as large as it may be.
   constexpr int kTries = 16;
   for (int attempt = 0; attempt < kTries; ++attempt) {

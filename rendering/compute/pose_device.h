@@ -69,7 +69,7 @@ class PoseDevice {
       const std::size_t count = std::min(tasks.size() - begin, groups_at_once(tasks));
       PRESCENE_TRY(const std::span<const DeviceResult> results, dispatch(tasks, begin, count, work));
       for (std::size_t i = 0; i < count; ++i) take(begin + i, results[i]);
-      results_->unmap();
+      if (!results_->unmap()) return device_failure("what the device computed was lost while it was read");
       begin += count;
     }
     return core::ok_status();

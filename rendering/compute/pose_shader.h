@@ -89,7 +89,7 @@ std::string shader_pixels(const PoseWork& work);
 
 // What the arithmetic is checked with: four numbers in, the bits of eight out.
 inline constexpr int kProbeInputs = 4;
-inline constexpr int kProbeOutputs = 8;
+inline constexpr int kProbeOutputs = 7;
 /// Reads kHypotheses as numbers, writes kResults as bits; see arithmetic_probe.cc.
 std::string probe_program(int division_error);
 

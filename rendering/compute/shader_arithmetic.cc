@@ -5,7 +5,7 @@ namespace prescene::rendering {
 namespace {
 
 // OpenGL promises that additions, subtractions and multiplications are rounded correctly, and `precise` that they are
-// not fused. Of divisions and roots it promises about two units in the last place: the rest is found in integers, from
+// not fused. Of divisions it promises about two units in the last place: the rest is found in integers, from
 // the remainder, of which the lowest 32 bits are all.
 constexpr const char* kArithmetic = R"(
 uint mantissa_of(uint bits) { return (bits & 0x007fffffu) | 0x00800000u; }
@@ -23,15 +23,6 @@ uint nearer_quotient(uint bits, uint A, uint B, int spread) {
   return bits;
 }
 
-// The same towards the root of X, by one unit.
-uint nearer_root(uint bits, uint X, int spread) {
-  int S = int(mantissa_of(bits));
-  int remainder = int((X << uint(spread - 2 * exponent_of(bits))) - uint(S) * uint(S));
-  if (remainder > S) return bits + 1u;
-  if (remainder <= (S == 0x00800000 ? -(S >> 1) : -S)) return bits - 1u;
-  return bits;
-}
-
 float disturbed(float q) { return uintBitsToFloat(uint(int(floatBitsToUint(q)) + DIVISION_ERROR)); }
 
 // a / b, rounded as the processor does.
@@ -43,15 +34,6 @@ float divided(float a, float b) {
   int spread = exponent_of(floatBitsToUint(a)) - exponent_of(floatBitsToUint(b)) + 150;
   uint bits = floatBitsToUint(disturbed(q));
   return uintBitsToFloat(nearer_quotient(nearer_quotient(bits, A, B, spread), A, B, spread));
-}
-
-// The root of a number from 2^-100 to 2^100.
-float root_of(float x) {
-  uint X = mantissa_of(floatBitsToUint(x));
-  int spread = exponent_of(floatBitsToUint(x)) + 150;
-  uint bits = floatBitsToUint(disturbed(sqrt(x)));
-  bits = nearer_root(nearer_root(bits, X, spread), X, spread);
-  return uintBitsToFloat(nearer_root(nearer_root(bits, X, spread), X, spread));
 }
 
 // As snapped() of triangle_raster.h: 1/256 pixel, ties to even.
@@ -90,14 +72,13 @@ void main() {
   precise float cross = a * d - b * c;
   precise double wide = double(a) + double(b) * double(c);
   uvec2 wide_bits = unpackDouble2x32(wide);
-  outputs[8u * i] = floatBitsToUint(sum);
-  outputs[8u * i + 1u] = floatBitsToUint(dot);
-  outputs[8u * i + 2u] = floatBitsToUint(cross);
-  outputs[8u * i + 3u] = floatBitsToUint(divided(a, b));
-  outputs[8u * i + 4u] = floatBitsToUint(root_of(abs(a)));
-  outputs[8u * i + 5u] = uint(snapped(c));
-  outputs[8u * i + 6u] = floatBitsToUint(exp2_of(max(-abs(d), -126.0)));
-  outputs[8u * i + 7u] = wide_bits.x ^ wide_bits.y;
+  outputs[7u * i] = floatBitsToUint(sum);
+  outputs[7u * i + 1u] = floatBitsToUint(dot);
+  outputs[7u * i + 2u] = floatBitsToUint(cross);
+  outputs[7u * i + 3u] = floatBitsToUint(divided(a, b));
+  outputs[7u * i + 4u] = uint(snapped(c));
+  outputs[7u * i + 5u] = floatBitsToUint(exp2_of(max(-abs(d), -126.0)));
+  outputs[7u * i + 6u] = wide_bits.x ^ wide_bits.y;
 }
 )";
 

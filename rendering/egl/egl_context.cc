@@ -103,11 +103,16 @@ core::Result<std::vector<EGLDisplay>> candidate_displays(const DeviceChoice& cho
     return core::invalid_input(user + ": there is no graphics device " + std::to_string(choice.device) +
                                ": EGL lists " + std::to_string(count) +
                                (count > 0 ? ", from 0 on" : "; leave the choice open"));
+  std::vector<EGLDisplay> of_software;
   for (int i = 0; i < count; ++i) {
     if (choice.device >= 0 && i != choice.device) continue;
-    if (choice.hardware_only && list.describe(static_cast<std::size_t>(i)).software) continue;
-    displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, list.devices[static_cast<std::size_t>(i)], nullptr));
+    const auto number = static_cast<std::size_t>(i);
+    const bool software = list.describe(number).software;
+    if (choice.hardware_only && software) continue;
+    (software ? of_software : displays)
+        .push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, list.devices[number], nullptr));
   }
+  displays.insert(displays.end(), of_software.begin(), of_software.end());
   const bool surfaceless =
       has_extension(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_MESA_platform_surfaceless");
   if (surfaceless && choice.device < 0)

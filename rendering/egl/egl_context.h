@@ -21,9 +21,9 @@ struct GlVersion {
 /// whole process, and closing it would take it from everybody else.
 class EglContext {
  public:
-  /// On the device that is chosen, else the first EGL device that gives such a context, else Mesa's surfaceless
-  /// platform. `user` begins the message of a failure, which is kUnavailable, or kInvalidInput for an index that EGL
-  /// does not list.
+  /// On the device that is chosen, else the first EGL device that gives such a context, graphics cards first, else
+  /// Mesa's surfaceless platform. `user` begins the message of a failure, which is kUnavailable, or kInvalidInput for
+  /// an index that EGL does not list.
   static core::Result<std::unique_ptr<EglContext>> make(const GlVersion& version, const DeviceChoice& choice,
                                                         const std::string& user);
   ~EglContext();

@@ -9,6 +9,7 @@
 #include "object_raster.h"
 #include "prescene/core/check.h"
 #include "prescene/rendering/camera_equations.h"
+#include "prescene/rendering/near_plane.h"
 #include "prescene/rendering/pixel_classes.h"
 #include "prescene/rendering/portable_math.h"
 
@@ -63,6 +64,7 @@ class EvidenceSum {
  public:
   EvidenceSum(const FrameTerms& frame, const PoseHypothesis& hypothesis)
       : frame_(frame),
+        hypothesis_(hypothesis),
         classes_(frame.model, *hypothesis.material, frame.step),
         precision_(frame.model.options()),
         min_depth_(static_cast<float>(frame.model.options().min_depth)) {
@@ -103,17 +105,17 @@ class EvidenceSum {
     if (deviation <= kMatchSigmas) ++evidence_.hits;
   }
 
-  PoseEvidence result(int in_view, double tempering_pixels) {
+  PoseEvidence result(int in_view) {
     evidence_.in_view = in_view;
     evidence_.visible_log_ratio = visible_.log();
     evidence_.log_ratio = evidence_.visible_log_ratio + occluded_.log() + missing_;
-    const double pixels = tempering_pixels > 0.0 ? tempering_pixels : evidence_.measured;
-    evidence_.tempered = tempering(frame_.tempering.weight, pixels, frame_.step) * evidence_.log_ratio;
+    temper(frame_, hypothesis_, &evidence_);
     return evidence_;
   }
 
  private:
   const FrameTerms& frame_;
+  const PoseHypothesis& hypothesis_;
   PixelClasses classes_;
   const geometry::Image<float>* color_ratio_ = nullptr;
   HitPrecision precision_;
@@ -218,7 +220,7 @@ class ReferenceLikelihoodBatch final : public LikelihoodBatch {
       const int in_view = for_each_pixel(frame, hypotheses[i], raster, [&](const Pixel& pixel) {
         sum.add(pixel, raster.at_outline(pixel.x, pixel.y));
       });
-      evidences[i] = sum.result(in_view, hypotheses[i].tempering_pixels);
+      evidences[i] = sum.result(in_view);
     }
   }
 
@@ -240,7 +242,7 @@ class ReferenceLikelihoodBatch final : public LikelihoodBatch {
         sum.add(pixel, raster.at_outline(pixel.x, pixel.y));
       });
       linearisations[i] = equations.result();
-      linearisations[i].evidence = sum.result(in_view, hypotheses[i].tempering_pixels);
+      linearisations[i].evidence = sum.result(in_view);
     }
   }
 };
@@ -258,7 +260,7 @@ geometry::Image<float> log_ratio_map(const FrameTerms& frame, const PoseHypothes
   for_each_pixel(frame, hypothesis, raster, [&](const Pixel& pixel) {
     EvidenceSum one = nothing;
     one.add(pixel, raster.at_outline(pixel.x, pixel.y));
-    map(pixel.x, pixel.y) = static_cast<float>(one.result(0, 0.0).log_ratio);
+    map(pixel.x, pixel.y) = static_cast<float>(one.result(0).log_ratio);
   });
   return map;
 }

@@ -6,6 +6,7 @@
 #include "cut_mesh.h"
 #include "pose_kernels.h"
 #include "prescene/core/check.h"
+#include "prescene/rendering/near_plane.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 
 namespace prescene::rendering {
@@ -99,22 +100,16 @@ class SimdLikelihoodBatch final : public LikelihoodBatch {
   enum class Way { kUnseen, kNarrow, kLanes };
 
   static Way way_of(const FrameTerms& frame, const PoseHypothesis& hypothesis) {
-    const RenderMesh& mesh = *hypothesis.mesh;
-    if (mesh.triangles.empty() || centre_depth(hypothesis) + mesh.radius <= nearest_drawn(frame.model.options()))
-      return Way::kUnseen;
+    if (near_plane(hypothesis, frame.model.options()) == NearPlane::kLeavesNothing) return Way::kUnseen;
     return frame.camera.width < kBlock ? Way::kNarrow : Way::kLanes;
-  }
-  static float centre_depth(const PoseHypothesis& hypothesis) {
-    return static_cast<float>((hypothesis.X_CO * hypothesis.mesh->centre.cast<double>().eval()).z());
   }
 
   static PoseProjection drawn(const FrameTerms& frame, const PoseHypothesis& hypothesis, SimdWorkspace& scratch) {
     const RenderMesh& mesh = *hypothesis.mesh;
     const PoseProjection seen(hypothesis.X_CO, frame.camera);
     scratch.tile.reserve(mesh, frame.camera.width, frame.camera.height);
-    const float near_depth = nearest_drawn(frame.model.options());
-    if (centre_depth(hypothesis) - mesh.radius < near_depth) {
-      draw_cut(mesh, seen, near_depth, &scratch.tile);
+    if (near_plane(hypothesis, frame.model.options()) == NearPlane::kMayCut) {
+      draw_cut(mesh, seen, nearest_drawn(frame.model.options()), &scratch.tile);
     } else {
       draw(mesh, seen, &scratch.tile);
     }
@@ -132,8 +127,7 @@ class SimdLikelihoodBatch final : public LikelihoodBatch {
     }
     PoseEvidence evidence;
     sum_evidence(terms, seen, scratch.tile, &evidence);
-    const double pixels = hypothesis.tempering_pixels > 0.0 ? hypothesis.tempering_pixels : evidence.measured;
-    evidence.tempered = tempering(frame.tempering.weight, pixels, frame.step) * evidence.log_ratio;
+    temper(frame, hypothesis, &evidence);
     return evidence;
   }
 

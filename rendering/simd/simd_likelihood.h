@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The likelihood in vector instructions: vertices, triangles and pixels in lanes, one pass from a pose to its log
 // ratio, no image on the way. Pixels are the reference backend's, bit by bit, and so are their ratios; only sums are
-// rounded otherwise (1e-6 of them). The same bits on all instruction sets of a processor and for any number of threads.
+// rounded otherwise (by less than 1e-4 of max(1, |log ratio|)). The same bits on all instruction sets of a processor
+// and for any number of threads.
 #pragma once
 
 #include <memory>

@@ -63,7 +63,7 @@ rendering::RenderInstance unknown_box(const Vector3d& towards_camera, double obj
   const double offset = stream.uniform(-1.5, 1.5) * object_radius;
   Pose X_WM = Pose::from_translation(gap * ahead + offset * aside + 0.5 * size.z() * Vector3d::UnitZ());
   X_WM.rotation = geometry::exp_rotation({0.0, 0.0, stream.uniform(0.0, std::numbers::pi)});
-  return {rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{size})), X_WM, {}, false};
+  return {rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{size})), X_WM, {}};
 }
 
 }  // namespace
@@ -100,8 +100,8 @@ core::Result<TabletopFrame> simulate_tabletop(const TabletopObject& object, doub
   frame.table.plane_C = geometry::transformed({Vector3d::UnitZ(), 0.0}, X_WC.inverse());
 
   RenderScene scene;
-  scene.instances.push_back({object.mesh, X_WO, {}, false});
-  scene.instances.push_back({table_mesh(), Pose::identity(), {}, false});
+  scene.instances.push_back({object.mesh, X_WO, {}});
+  scene.instances.push_back({table_mesh(), Pose::identity(), {}});
   if (index % 2 == 1)
     scene.instances.push_back(unknown_box(towards_camera, static_cast<double>(object.mesh->radius), draws));
   rendering::RenderOptions options;

@@ -47,8 +47,6 @@ TEST(RenderScene, ListsObjectsThenSupportsThenRobot) {
   EXPECT_EQ(view.kinds[1], InstanceKind::kObject);
   EXPECT_EQ(view.kinds[2], InstanceKind::kSupport);
   EXPECT_EQ(view.kinds[3], InstanceKind::kRobot);
-  EXPECT_TRUE(view.scene.instances[3].known_occluder);
-  EXPECT_FALSE(view.scene.instances[0].known_occluder);
   EXPECT_NEAR(view.scene.instances[3].X_WM.translation.z(), 0.5, 1e-12);
   EXPECT_NEAR(view.scene.instances[1].X_WM.translation.x(), 0.3, 1e-12);
 }

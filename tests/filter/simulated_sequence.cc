@@ -20,7 +20,7 @@ rendering::RenderScene world_at(const SimulatedSequence& sequence, double time) 
   BeliefView view = render_scene(*sequence.scene, state, {}, MeshDetail::kDisplay, meshes);
   for (const Occluder& occluder : sequence.occluders)
     view.scene.instances.push_back({rendering::make_render_mesh(occluder.mesh), occluder.X_WM(time),
-                                    rendering::SurfaceMaterial::opaque({120, 90, 70}), false});
+                                    rendering::SurfaceMaterial::opaque({120, 90, 70})});
   return view.scene;
 }
 

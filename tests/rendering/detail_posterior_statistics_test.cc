@@ -46,8 +46,7 @@ struct Frame {
     RenderScene scene;
     const MeshHandle wall = make_render_mesh(geometry::make_mesh(geometry::BoxShape{{6.0, 6.0, 0.1}}));
     const double behind = distance + 0.35;
-    scene.instances = {{mesh, truth, material, false},
-                       {wall, Pose::from_translation({0.0, 0.0, behind + 0.05}), material, false}};
+    scene.instances = {{mesh, truth, material}, {wall, Pose::from_translation({0.0, 0.0, behind + 0.05}), material}};
     RenderOptions options;
     options.normals = true;
     RenderedView view;

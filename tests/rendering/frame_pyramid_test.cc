@@ -81,7 +81,7 @@ TEST_F(FramePyramidTest, CoveredPixelsAreThoseThatARendererCovers) {
     for (int i = 0; i < 10; ++i) {
       const Pose X_CO{geometry::uniform_rotation(stream), {0.05, -0.03, stream.uniform(0.6, 1.5)}};
       RenderScene scene;
-      scene.instances.push_back({mesh, X_CO, {}, false});
+      scene.instances.push_back({mesh, X_CO, {}});
       RenderedView view;
       ASSERT_TRUE(renderer->render(scene, camera, Pose::identity(), {}, &view).ok());
       int covered = 0;

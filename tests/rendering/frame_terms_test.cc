@@ -125,6 +125,14 @@ TEST_F(FrameTermsTest, KnownSurfacesReplaceTheBackgroundWhereTheyAre) {
   EXPECT_EQ(terms.known(21, 20), 0.7f);
 }
 
+TEST_F(FrameTermsTest, KnownSurfacesBeyondTheRangeAreNotExpected) {
+  const FrameTerms frame = make();
+  FrameTerms terms;
+  with_known_surfaces(frame, geometry::DepthImage(80, 60, 3.0f), &terms);
+  EXPECT_EQ(terms.inverse_absent(20, 20), frame.inverse_absent(20, 20));
+  EXPECT_EQ(terms.absent_peak(20, 20), 0.0f);
+}
+
 TEST_F(FrameTermsTest, RaisesColourRatiosToTheExponent) {
   std::vector<ColorModel> models(2);
   models[1].log_ratio[ColorHistogram::bin({100, 100, 100})] = 0.75f;

@@ -53,7 +53,7 @@ class LikelihoodContract : public testing::TestWithParam<Backend> {
     mesh_ = make_render_mesh(geometry::make_gable_carton(0.07, 0.07, 0.19, 0.23));
     wall_.plane_C = {Vector3d(0.1, 0.3, -1.0).normalized(), 0.0};
     wall_.plane_C.offset = -wall_.plane_C.normal.dot(Vector3d(0.0, 0.0, 1.1));
-    scene_.instances = {{mesh_, X_CO_, material_, false}, {wall_mesh(), Pose::identity(), material_, false}};
+    scene_.instances = {{mesh_, X_CO_, material_}, {wall_mesh(), Pose::identity(), material_}};
     renderer_ = make_reference_renderer();
     RenderOptions options;
     options.normals = true;
@@ -153,7 +153,7 @@ PoseEvidence evidence_by_pixels(const FrameTerms& frame, Renderer& renderer, con
                                 const MeshHandle& mesh) {
   const SensorModel& model = frame.model;
   RenderScene scene;
-  scene.instances = {{mesh, h.X_CO, *h.material, false}};
+  scene.instances = {{mesh, h.X_CO, *h.material}};
   RenderOptions options;
   options.near_depth = model.options().min_depth + 1e-4;
   options.far_depth = model.options().max_depth;
@@ -309,7 +309,7 @@ TEST_P(LikelihoodContract, LinearisesTheDistancesToTheRenderedFaces) {
     const PoseLinearisation actual = linearise(frame, hypothesis(X_CO), options);
 
     RenderScene scene;
-    scene.instances = {{mesh_, X_CO, material_, false}};
+    scene.instances = {{mesh_, X_CO, material_}};
     RenderOptions render_options;
     render_options.normals = true;
     RenderedView view;

@@ -227,7 +227,7 @@ class FullView : public LikelihoodLaws {
  protected:
   FullView() {
     RenderScene scene;
-    scene.instances.push_back({mesh_, X_CO_, {}, false});
+    scene.instances.push_back({mesh_, X_CO_, {}});
     RenderedView view;
     EXPECT_TRUE(make_reference_renderer()->render(scene, camera_, Pose::identity(), {}, &view).ok());
     depth_ = view.depth;

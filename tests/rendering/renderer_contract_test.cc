@@ -67,7 +67,7 @@ struct TwinScene {
   std::vector<geometry::TriangleMesh> meshes_C;
 
   void add(const geometry::TriangleMesh& mesh, const Pose& X_WM, const Pose& X_WC) {
-    scene.instances.push_back({make_render_mesh(mesh), X_WM, SurfaceMaterial{}, false});
+    scene.instances.push_back({make_render_mesh(mesh), X_WM, SurfaceMaterial{}});
     meshes_C.push_back(geometry::transformed(mesh, X_WC.inverse() * X_WM));
     rays.add(meshes_C.back());
   }
@@ -111,7 +111,7 @@ bool at_silhouette(const TwinScene& twin, const geometry::PinholeCamera& camera,
 }
 
 Comparison compare(const TwinScene& twin, const geometry::PinholeCamera& camera, const RenderOptions& options,
-                   const RenderedView& view) {
+                   const RenderedView& view, double tolerance) {
   Comparison result;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -125,7 +125,7 @@ Comparison compare(const TwinScene& twin, const geometry::PinholeCamera& camera,
       ++result.compared;
       const double expected = hit ? hit->t : 0.0;
       const double error = std::abs(view.depth(x, y) - expected);
-      if (error > 1e-4 + 1e-4 * expected) ++result.wrong_depths;
+      if (error > tolerance + 1e-4 * expected) ++result.wrong_depths;
       result.worst_depth = std::max(result.worst_depth, error);
       if (view.labels(x, y) != (hit ? hit->mesh + 1 : 0)) ++result.wrong_labels;
       if (!hit) continue;
@@ -175,7 +175,8 @@ TEST_P(RendererContract, AgreesWithRaysOnTwentyMeshesInRandomPoses) {
       }
       crossing_near += before && behind ? 1 : 0;
       partly_outside += inside && outside ? 1 : 0;
-      sum += compare(twin, camera, options, render(twin.scene, camera, X_WC, options));
+      sum +=
+          compare(twin, camera, options, render(twin.scene, camera, X_WC, options), renderer_->info().depth_tolerance);
     }
     EXPECT_EQ(sum.wrong_depths, 0) << meshes[i].name << ", worst " << sum.worst_depth << " m";
     EXPECT_EQ(sum.wrong_labels, 0) << meshes[i].name;
@@ -198,7 +199,7 @@ TEST_P(RendererContract, LeavesNoHolesInASurface) {
     X_CM.rotation = geometry::exp_rotation(0.2 * geometry::normal_vector(stream));
     X_CM.translation = {0.0, 0.0, 0.5};
     RenderScene scene;
-    scene.instances = {{make_render_mesh(geometry::scaled(sheet, 6.0)), X_CM, SurfaceMaterial{}, false}};
+    scene.instances = {{make_render_mesh(geometry::scaled(sheet, 6.0)), X_CM, SurfaceMaterial{}}};
     const RenderedView view = render(scene, camera, Pose::identity(), {});
     int holes = 0;
     for (std::size_t k = 0; k < view.depth.size(); ++k) holes += view.depth.data()[k] == 0.0f ? 1 : 0;
@@ -210,7 +211,7 @@ TEST_P(RendererContract, CutsAwayWhatIsTooNearOrTooFar) {
   const geometry::TriangleMesh wall = geometry::make_mesh(geometry::BoxShape{{4.0, 4.0, 0.01}});
   RenderScene scene;
   for (const double z : {0.5, 1.0, 2.0, 4.0})
-    scene.instances.push_back({make_render_mesh(wall), Pose::from_translation({0, 0, z}), SurfaceMaterial{}, false});
+    scene.instances.push_back({make_render_mesh(wall), Pose::from_translation({0, 0, z}), SurfaceMaterial{}});
   RenderOptions options;
   for (const auto& [near, far, label, depth] :
        {std::tuple{0.1, 10.0, 1, 0.495}, {0.6, 10.0, 2, 0.995}, {1.5, 10.0, 3, 1.995}, {2.5, 3.5, 0, 0.0}}) {
@@ -232,7 +233,7 @@ TEST_P(RendererContract, ReusesViewsOfAnySizeAndForgetsMeshes) {
     RenderScene scene;
     const double radius = stream.uniform(0.05, 0.3);
     scene.instances = {{make_render_mesh(geometry::make_mesh(geometry::Sphere{radius}, 64)),
-                        Pose::from_translation({0, 0, 1}), SurfaceMaterial{}, false}};
+                        Pose::from_translation({0, 0, 1}), SurfaceMaterial{}}};
     ASSERT_TRUE(renderer_->render(scene, camera, Pose::identity(), {}, &view).ok());
     ++views_rendered_;
     EXPECT_EQ(view.depth.width(), width);
@@ -251,8 +252,8 @@ TEST_P(RendererContract, DrawsABatchAsItDrawsOneByOne) {
   std::vector<RenderJob> jobs;
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     const geometry::PinholeCamera camera = camera_of_width(40 + 10 * static_cast<int>(i % 3));
-    scenes[i].instances = {{make_render_mesh(meshes[i].mesh), tests::random_view_pose(camera, 0.5, 1.0, stream),
-                            SurfaceMaterial{}, false}};
+    scenes[i].instances = {
+        {make_render_mesh(meshes[i].mesh), tests::random_view_pose(camera, 0.5, 1.0, stream), SurfaceMaterial{}}};
     jobs.push_back({&scenes[i], camera, Pose::identity()});
   }
   std::vector<RenderedView> views(jobs.size());
@@ -270,7 +271,7 @@ TEST_P(RendererContract, MayBeUsedFromManyThreadsBesideAnotherRenderer) {
   const geometry::PinholeCamera camera = camera_of_width(64);
   RenderScene scene;
   scene.instances = {{make_render_mesh(geometry::make_mesh(geometry::Cone{0.2, 0.4})),
-                      Pose::from_translation({0, 0, 1}), SurfaceMaterial{}, false}};
+                      Pose::from_translation({0, 0, 1}), SurfaceMaterial{}}};
   const RenderedView expected = render(scene, camera, Pose::identity(), {});
   std::vector<int> failures(4, 0);
   std::vector<std::thread> threads;
@@ -308,13 +309,13 @@ TEST_P(RendererContract, RefusesWhatCanNotBeDrawn) {
   Pose nowhere;
   nowhere.translation.x() = std::nan("");
   EXPECT_EQ(renderer_->render(scene, camera, nowhere, {}, &view).code(), core::StatusCode::kInvalidInput);
-  scene.instances.resize(65536, {make_render_mesh({}), Pose::identity(), SurfaceMaterial{}, false});
+  scene.instances.resize(65536, {make_render_mesh({}), Pose::identity(), SurfaceMaterial{}});
   const core::Status status = renderer_->render(scene, camera, Pose::identity(), {}, &view);
   EXPECT_EQ(status.code(), core::StatusCode::kInvalidInput);
   EXPECT_NE(status.message().find("65535"), std::string::npos);
 }
 
-/// Largest difference of a channel, and how many pixels differ by more than `step`, away from where labels change.
+/// Largest difference of a channel away from where labels change.
 struct ColorDifference {
   int compared = 0;
   int worst = 0;
@@ -393,8 +394,8 @@ TEST_P(RendererContract, DrawsTheColorsOfTheReference) {
     X_WC.translation = geometry::normal_vector(stream);
     for (const MeshHandle& mesh :
          {make_render_mesh(sheet), make_render_mesh(ball, spotted), make_render_mesh(flat, printed)})
-      scene.instances.push_back({mesh, X_WC * tests::random_view_pose(camera, 0.4, 0.8, stream),
-                                 SurfaceMaterial::opaque({200, 90, 30}), false});
+      scene.instances.push_back(
+          {mesh, X_WC * tests::random_view_pose(camera, 0.4, 0.8, stream), SurfaceMaterial::opaque({200, 90, 30})});
     // Closer than the near plane in some: cut triangles have the same places.
     RenderOptions options = colored();
     options.near_depth = view % 3 == 0 ? 0.5 : 0.02;
@@ -414,7 +415,7 @@ TEST_P(RendererContract, LightsInLinearLight) {
   Pose facing;
   facing.rotation = Eigen::AngleAxisd(M_PI, Vector3d::UnitX());
   facing.translation = {0.0, 0.0, 1.0};
-  scene.instances = {{make_render_mesh(square(0.2)), facing, SurfaceMaterial::opaque({255, 128, 0}), false}};
+  scene.instances = {{make_render_mesh(square(0.2)), facing, SurfaceMaterial::opaque({255, 128, 0})}};
   RenderOptions options = colored();
   options.lighting.background = {10, 20, 30};
   const geometry::PinholeCamera camera = camera_of_width(64);
@@ -451,7 +452,7 @@ TEST_P(RendererContract, PutsTexturesTheRightWayUp) {
   look.vertex_colors.assign(4, {1, 2, 3});  // the texture goes before
   // Axes as the camera's: u to the right, v down.
   RenderScene scene;
-  scene.instances = {{make_render_mesh(flat, look), Pose::from_translation({0.0, 0.0, 1.0}), {}, false}};
+  scene.instances = {{make_render_mesh(flat, look), Pose::from_translation({0.0, 0.0, 1.0}), {}}};
   RenderOptions options = colored();
   options.lighting.ambient = 1.0;
   options.lighting.direct = 0.0;
@@ -473,7 +474,7 @@ TEST_P(RendererContract, GivesTheSameBitsAgainWhereItPromises) {
   }
   RenderScene scene;
   for (const tests::NamedMesh& mesh : tests::twenty_meshes())
-    scene.instances.push_back({make_render_mesh(mesh.mesh), Pose::from_translation({0, 0, 0.7}), {}, false});
+    scene.instances.push_back({make_render_mesh(mesh.mesh), Pose::from_translation({0, 0, 0.7}), {}});
   const RenderedView first = render(scene, camera_of_width(100), Pose::identity(), {});
   const RenderedView again = render(scene, camera_of_width(100), Pose::identity(), {});
   EXPECT_TRUE(first.depth == again.depth);

@@ -146,7 +146,7 @@ TEST(SensorModel, ExpectationMaximisationFindsTheWeightsInSamples) {
 }
 
 TEST(SensorModel, PosteriorsMadeFromTheRatioAreCalibrated) {
-  // Depths drawn from a uniform prior, ten returns each, the posterior over a grid by the ratio: the truth's place in
+  // Depths drawn from a uniform prior, four returns each, the posterior over a grid by the ratio: the truth's place in
   // its posterior is uniform [Talts et al. 2018].
   const SensorModel model;
   const SurfaceMaterial material = SurfaceMaterial::opaque();

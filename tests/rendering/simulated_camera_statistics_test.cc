@@ -25,7 +25,7 @@ class SimulatedCameraTest : public testing::Test {
     const double h = 0.5 * size;
     mesh.vertices = {{-h, -h, 0}, {h, -h, 0}, {h, h, 0}, {-h, h, 0}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
-    return {make_render_mesh(mesh), {geometry::exp_rotation({0, tilt, 0}), p}, material, false};
+    return {make_render_mesh(mesh), {geometry::exp_rotation({0, tilt, 0}), p}, material};
   }
 
   RenderedView render(const RenderScene& scene) {

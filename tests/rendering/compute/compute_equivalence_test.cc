@@ -68,7 +68,7 @@ TEST_F(ComputeEquivalence, GivesTheBitsOfTheProcessor) {
 }
 
 TEST_F(ComputeEquivalence, NeedsNoExactDivision) {
-  // OpenGL allows quotients and roots to be two or three units off.
+  // OpenGL allows quotients to be two or three units off.
   for (const int error : {-3, 2}) {
     ComputeOptions options;
     options.division_error = error;

@@ -27,7 +27,7 @@ TEST(EglRenderer, DrawsOnAfterALostContext) {
   if (!renderer) GTEST_SKIP() << renderer.status().message();
   RenderScene scene;
   scene.instances = {{make_render_mesh(geometry::make_mesh(geometry::Sphere{0.2})),
-                      geometry::Pose::from_translation({0, 0, 1}), SurfaceMaterial{}, false}};
+                      geometry::Pose::from_translation({0, 0, 1}), SurfaceMaterial{}}};
   const geometry::PinholeCamera camera = {64, 48, 60.0, 60.0, 31.5, 23.5};
   RenderOptions options;
   options.color = true;

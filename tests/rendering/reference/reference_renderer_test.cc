@@ -30,7 +30,7 @@ TEST(ReferenceRenderer, GivesAPixelOnAnEdgeToTheTriangleBelowOrToTheRight) {
     const int i = (7 * k) % 24;
     const int x = 4 * (i % 6);
     const int y = 4 * (i / 6);
-    scene.instances.push_back({make_render_mesh(quad(x, y, x + 4, y + 4, k % 2 == 0)), Pose::identity(), {}, false});
+    scene.instances.push_back({make_render_mesh(quad(x, y, x + 4, y + 4, k % 2 == 0)), Pose::identity(), {}});
     corner_of_label.push_back({x, y});
   }
   RenderedView view;
@@ -46,7 +46,7 @@ TEST(ReferenceRenderer, GivesAPixelOnAnEdgeToTheTriangleBelowOrToTheRight) {
 
 TEST(ReferenceRenderer, ExcludesTheLowerAndRightEdges) {
   RenderScene scene;
-  scene.instances = {{make_render_mesh(quad(3, 2, 8, 6, false)), Pose::identity(), {}, false}};
+  scene.instances = {{make_render_mesh(quad(3, 2, 8, 6, false)), Pose::identity(), {}}};
   RenderedView view;
   ASSERT_TRUE(make_reference_renderer()->render(scene, kExactCamera, Pose::identity(), {}, &view).ok());
   for (int y = 0; y < 16; ++y)
@@ -60,7 +60,7 @@ TEST(ReferenceRenderer, InterpolatesOneOverDepth) {
   wall.triangles = {{0, 1, 2}, {0, 2, 3}};
   const geometry::PinholeCamera camera = {100, 10, 100.0, 100.0, 49.5, 4.5};
   RenderScene scene;
-  scene.instances = {{make_render_mesh(wall), Pose::identity(), {}, false}};
+  scene.instances = {{make_render_mesh(wall), Pose::identity(), {}}};
   RenderedView view;
   RenderOptions options;
   options.normals = true;
