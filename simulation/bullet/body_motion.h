@@ -3,6 +3,7 @@
 #pragma once
 
 #include "compiled_scene.h"
+#include "prescene/simulation/free_spin.h"
 
 namespace prescene::simulation {
 
@@ -11,9 +12,23 @@ inline Matrix3d world_inertia(const Quaterniond& R_WO, const CompiledBody& body,
   return R_WP * (mass * body.unit_moments).asDiagonal() * R_WP.transpose();
 }
 
-inline Matrix3d world_inverse_inertia(const Quaterniond& R_WO, const CompiledBody& body, double mass) {
-  const Matrix3d R_WP = R_WO.toRotationMatrix() * body.R_OP;
-  return R_WP * (mass * body.unit_moments).cwiseInverse().asDiagonal() * R_WP.transpose();
+struct Spin {
+  Quaterniond R_WO;
+  Vector3d w_WO;
+};
+/// After a step without torque.
+inline Spin spun(const Quaterniond& R_WO, const Vector3d& w_WO, const CompiledBody& body, double dt) {
+  const SpinRates rates = spin_rates(body.unit_moments, dt);
+  Quaterniond R = R_WO;
+  Vector3d L_P = body.unit_moments.cwiseProduct(body.R_OP.transpose() * (R.conjugate() * w_WO));
+  for (const Vector3d* about : {&rates.about_least, &rates.about_most, &rates.about_least}) {
+    const Vector3d turn_P = about->cwiseProduct(L_P);
+    R = R * geometry::exp_rotation(body.R_OP * turn_P);
+    L_P = geometry::exp_rotation(-turn_P) * L_P;
+  }
+  const Vector3d L_W = R * (body.R_OP * L_P);
+  R = (geometry::exp_rotation(rates.about_momentum * L_W) * R).normalized();
+  return {R, R * (body.R_OP * L_P.cwiseQuotient(body.unit_moments))};
 }
 
 inline Quaterniond turned(const Quaterniond& R, const Vector3d& rotation_vector) {

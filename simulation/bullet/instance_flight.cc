@@ -21,16 +21,14 @@ constexpr double kFastest = 1e3;
 }  // namespace
 
 InstanceWorld::Flight InstanceWorld::flight_of(const Object& object, const CompiledBody& body) const {
-  // Without contact a step ends here: a parabola, and a rotation that keeps the angular momentum (midpoint rule).
+  // Without contact a step ends here.
   const Vector3d& gravity = scene_->scene.gravity_W;
   Flight flight;
   flight.v_WCm = object.v_WCm + dt() * gravity;
   flight.p_WCm = object.p_WCm + 0.5 * dt() * (object.v_WCm + flight.v_WCm);
-  const Vector3d momentum = world_inertia(object.R_WO, body, 1.0) * object.w_WO;
-  const Quaterniond middle = turned(object.R_WO, 0.5 * dt() * object.w_WO);
-  const Vector3d w_middle = world_inverse_inertia(middle, body, 1.0) * momentum;
-  flight.R_WO = turned(object.R_WO, dt() * w_middle);
-  flight.w_WO = world_inverse_inertia(flight.R_WO, body, 1.0) * momentum;
+  const Spin spin = spun(object.R_WO, object.w_WO, body, dt());
+  flight.R_WO = spin.R_WO;
+  flight.w_WO = spin.w_WO;
   return flight;
 }
 

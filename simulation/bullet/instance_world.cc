@@ -224,12 +224,10 @@ void InstanceWorld::integrate() {
       const double falls_before = impact.supported ? 0.0 : 0.5 * before;
       const double falls_after = impact.supported || !impact.bounced ? 0.0 : -0.5 * after;
       const Vector3d flown = before * (object.v_WCm + falls_before * gravity);
-      const Vector3d turn_flown = before * object.w_WO;
       object.v_WCm = from_bullet(rigid_[i]->getLinearVelocity());
       object.w_WO = from_bullet(rigid_[i]->getAngularVelocity());
       object.p_WCm += flown + after * (object.v_WCm + falls_after * gravity) + dt() * result.push;
-      if (before > 0.0) object.R_WO = turned(object.R_WO, turn_flown);
-      object.R_WO = turned(object.R_WO, after * object.w_WO + dt() * result.turn);
+      object.R_WO = turned(flight.R_WO, after * (object.w_WO - flight.w_WO) + dt() * result.turn);
     } else {
       object.v_WCm = flight.v_WCm;
       object.w_WO = flight.w_WO;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lane_state.h"
+#include "prescene/simulation/free_spin.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "flight.cc"
@@ -59,6 +60,10 @@ void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* sta
   const Vec3<V> gravity = set3<V>(scene->settings.gravity);
   const Vec3<V> moments = set3<V>(body.unit_moments);
   const Vec3<V> inverse = set3<V>(1.0 / body.unit_moments[0], 1.0 / body.unit_moments[1], 1.0 / body.unit_moments[2]);
+  const SpinRates rates = spin_rates(Eigen::Vector3d(body.unit_moments.data()), scene->settings.dt);
+  const Vec3<V> about_least = set3<V>(rates.about_least[0], rates.about_least[1], rates.about_least[2]);
+  const Vec3<V> about_most = set3<V>(rates.about_most[0], rates.about_most[1], rates.about_most[2]);
+  const V about_momentum = set<V>(rates.about_momentum);
   const V radius = set<V>(body.radius);
   const int first = state->at(object, 0);
   for (int at = first; at < first + count; at += static_cast<int>(hn::Lanes(d))) {
@@ -66,16 +71,19 @@ void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* sta
     const Vec3<V> v = load(state->v, at);
     const Vec3<V> w = load(state->w, at);
     const Quat<V> q = load(state->q, at);
-    // A parabola, and a rotation that keeps the angular momentum (midpoint rule).
+    // A parabola, and a turn that keeps the angular momentum.
     const Vec3<V> flown_v = v + gravity * dt;
     const Vec3<V> flown_p = p + (v + flown_v) * half_dt;
     const Mat3<V> R = matrix_of(q);
-    const Vec3<V> momentum = R * times(moments, transposed(R, w));
-    const Mat3<V> R_middle = matrix_of(turned(q, w * half_dt));
-    const Vec3<V> w_middle = R_middle * times(inverse, transposed(R_middle, momentum));
-    const Quat<V> flown_q = turned(q, w_middle * dt);
-    const Mat3<V> R_flown = matrix_of(flown_q);
-    const Vec3<V> flown_w = R_flown * times(inverse, transposed(R_flown, momentum));
+    Vec3<V> momentum = times(moments, transposed(R, w));
+    Quat<V> spun = q;
+    for (const Vec3<V>* about : {&about_least, &about_most, &about_least}) {
+      const Quat<V> turn = exp_rotation(times(*about, momentum));
+      spun = spun * turn;
+      momentum = rotated(conjugate(turn), momentum);
+    }
+    const Quat<V> flown_q = turned(spun, rotated(spun, momentum) * about_momentum);
+    const Vec3<V> flown_w = rotated(flown_q, times(inverse, momentum));
     store(flown_p, state->flown_p, at);
     store(flown_v, state->flown_v, at);
     store(flown_w, state->flown_w, at);

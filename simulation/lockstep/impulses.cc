@@ -310,7 +310,6 @@ void LaneSolver<kMany>::finish(int object) {
   const Vec3<V> gravity = set3<V>(settings_.gravity);
   const V falls_before = hn::IfThenElseZero(hn::Not(supported), half * before);
   const V falls_after = hn::IfThenElseZero(hn::AndNot(supported, bounced), hn::Neg(half * after));
-  const Vec3<V> w = rows_.lanes_of(state_.w, object);
   const Vec3<V> flown_w = rows_.lanes_of(state_.flown_w, object);
   const Rates& change = changes_[object];
   const Rates& push = pushes_[object];
@@ -322,10 +321,8 @@ void LaneSolver<kMany>::finish(int object) {
   const Vec3<V> touched_p =
       o.p + (o.before.velocity + gravity * falls_before) * before + (new_v + gravity * falls_after) * after;
   const Vec3<V> new_p = select(touched, touched_p, rows_.lanes_of(state_.flown_p, object)) + push_v;
-  const Quat<V> q = rows_.lanes_of(state_.q, object);
-  const Quat<V> touched_q = turned(turned(q, w * before), new_w * after + push_w);
-  const Quat<V> flown_q = rows_.lanes_of(state_.flown_q, object);
-  const Quat<V> new_q = select(touched, touched_q, turned(flown_q, push_w));
+  // Not touched, it has the spin that it flew with.
+  const Quat<V> new_q = turned(rows_.lanes_of(state_.flown_q, object), (new_w - flown_w) * after + push_w);
   set_lanes(new_v, state_.v, object);
   set_lanes(new_w, state_.w, object);
   set_lanes(new_p, state_.p, object);

@@ -149,10 +149,21 @@ HWY_INLINE Mat3<V> matrix_of(const Quat<V>& q) {
           {two * (xy + wz), one - two * (xx + zz), two * (yz - wx)},
           {two * (xz - wy), two * (yz + wx), one - two * (xx + yy)}};
 }
-/// exp of a rotation vector times q, normalised. Series of sine and cosine of an eighth of the angle: exact to rounding
-/// up to 6 rad, far beyond what a step turns.
 template <class V>
-HWY_INLINE Quat<V> turned(const Quat<V>& q, const Vec3<V>& turn) {
+HWY_INLINE Quat<V> conjugate(const Quat<V>& q) {
+  return {q.w, hn::Neg(q.x), hn::Neg(q.y), hn::Neg(q.z)};
+}
+/// The vector turned by a unit quaternion.
+template <class V>
+HWY_INLINE Vec3<V> rotated(const Quat<V>& q, const Vec3<V>& v) {
+  const Vec3<V> axis{q.x, q.y, q.z};
+  const Vec3<V> twice = cross(axis, v) * set<V>(2.0);
+  return v + twice * q.w + cross(axis, twice);
+}
+/// exp of a rotation vector. Series of sine and cosine of an eighth of the angle: exact to rounding up to 6 rad, far
+/// beyond what a step turns.
+template <class V>
+HWY_INLINE Quat<V> exp_rotation(const Vec3<V>& turn) {
   const Vec3<V> h = turn * set<V>(0.125);
   const V s = dot(h, h);
   const V cosine =
@@ -161,8 +172,12 @@ HWY_INLINE Quat<V> turned(const Quat<V>& q, const Vec3<V>& turn) {
                  s * (set<V>(1.0 / 6) - s * (set<V>(1.0 / 120) - s * (set<V>(1.0 / 5040) - s * set<V>(1.0 / 362880))));
   Quat<V> e{cosine, sine * h.x, sine * h.y, sine * h.z};
   e = e * e;
-  e = e * e;
-  return normalized(e * q);
+  return e * e;
+}
+/// exp of a rotation vector times q, normalised.
+template <class V>
+HWY_INLINE Quat<V> turned(const Quat<V>& q, const Vec3<V>& turn) {
+  return normalized(exp_rotation(turn) * q);
 }
 
 /// Two unit vectors across a unit vector [Duff et al. 2017].

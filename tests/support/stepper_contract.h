@@ -266,6 +266,70 @@ TEST_P(StepperContract, AFastBallThatGripsKeepsFiveSeventhsOfItsSpeedWhereverInA
   }
 }
 
+/// A free top turns about its angular momentum, and about its axis: R(t) = exp(L t / I) R exp(w_a (1 - I_a / I) t).
+TEST_P(StepperContract, TopsSpinAsTheirClosedFormSays) {
+  // Radius and length (m), spin about the axis and across it (rad/s): slender ones, where the axis' moment is small,
+  // to a disc.
+  const double tops[][4] = {{0.01, 0.25, 50.0, 20.0},  {0.01, 0.25, 30.0, 15.0},  {0.004, 0.18, 50.0, 20.0},
+                            {0.02, 0.20, 40.0, 40.0},  {0.035, 0.24, 60.0, 60.0}, {0.004, 0.18, 200.0, 1.0},
+                            {0.002, 0.40, 10.0, 60.0}, {0.1, 0.02, 60.0, 10.0}};
+  // In single precision a fast spin's rounding is much of a slow one across it.
+  const double close = std::max(1e-6, 5e3 * GetParam().precision);
+  for (const auto& [radius, length, axial, across] : tops) {
+    Scene scene = floor_scene(primitive_model("top", geometry::Cylinder{radius, length}));
+    scene.gravity_W.setZero();
+    auto instance = simulator_of(scene)->make_instance({}, core::RandomStream(1, core::Purpose::kTest));
+    WorldState start = start_of(scene);
+    start.objects[0].X_WO.translation = {0.0, 0.0, 3.0};
+    start.objects[0].V_WO.angular = {across, 0.0, axial};
+    instance->set_state(start);
+    const geometry::Vector3d moments = scene.models[0].unit_inertia.diagonal();
+    const geometry::Vector3d L = moments.cwiseProduct(start.objects[0].V_WO.angular);
+    const double seconds = 1.0;
+    step_for(*instance, seconds);
+    const belief::ObjectState end = instance->state().objects[0];
+    const geometry::Quaterniond expected =
+        geometry::exp_rotation(seconds / moments.x() * L) * start.objects[0].X_WO.rotation *
+        geometry::exp_rotation(seconds * axial * (1.0 - moments.z() / moments.x()) * geometry::Vector3d::UnitZ());
+    const geometry::Matrix3d R = end.X_WO.rotation.toRotationMatrix();
+    EXPECT_LT(geometry::log_rotation(expected.conjugate() * end.X_WO.rotation).norm(), close)
+        << radius << " x " << length;
+    const geometry::Vector3d L_end = R * moments.asDiagonal() * R.transpose() * end.V_WO.angular;
+    EXPECT_LT((L_end - L).norm(), close * L.norm()) << radius << " x " << length;
+    EXPECT_NEAR(L_end.dot(end.V_WO.angular) / L.dot(start.objects[0].V_WO.angular), 1.0, 1e-4)
+        << radius << " x " << length;
+  }
+}
+
+/// Bodies with three moments, slender ones too: the energy sways, and never by much.
+TEST_P(StepperContract, TumblingKeepsAngularMomentumAndEnergy) {
+  const double bricks[][6] = {{0.3, 0.02, 0.015, 5.0, 40.0, 3.0},
+                              {0.2, 0.1, 0.05, 0.1, 12.0, 0.2},
+                              {0.2, 0.1, 0.05, 20.0, 30.0, 10.0},
+                              {0.25, 0.21, 0.01, 30.0, 5.0, 20.0},
+                              {0.18, 0.008, 0.007, 150.0, 20.0, 5.0}};
+  for (const auto& [x, y, z, wx, wy, wz] : bricks) {
+    Scene scene = floor_scene(primitive_model("brick", BoxShape{{x, y, z}}));
+    scene.gravity_W.setZero();
+    auto instance = simulator_of(scene)->make_instance({}, core::RandomStream(1, core::Purpose::kTest));
+    WorldState start = start_of(scene);
+    start.objects[0].X_WO.translation = {0.0, 0.0, 3.0};
+    start.objects[0].V_WO.angular = {wx, wy, wz};
+    instance->set_state(start);
+    const geometry::Matrix3d inertia = scene.models[0].unit_inertia;
+    const geometry::Vector3d L = inertia * start.objects[0].V_WO.angular;
+    const double energy = L.dot(start.objects[0].V_WO.angular);
+    for (int n = 0; n < 200; ++n) {
+      step_for(*instance, 0.05);
+      const belief::ObjectState o = instance->state().objects[0];
+      const geometry::Matrix3d R = o.X_WO.rotation.toRotationMatrix();
+      const geometry::Vector3d L_now = R * inertia * R.transpose() * o.V_WO.angular;
+      ASSERT_LT((L_now - L).norm(), 1e-3 * L.norm()) << x << " x " << y << " x " << z << ", " << n;
+      ASSERT_NEAR(L_now.dot(o.V_WO.angular) / energy, 1.0, 0.01) << x << " x " << y << " x " << z << ", " << n;
+    }
+  }
+}
+
 TEST_P(StepperContract, WhatCreepsDownASlopeIsNotAtRest) {
   const double angle = 20.0 * kPi / 180.0;
   const ObjectModel block = primitive_model("block", BoxShape{{0.1, 0.1, 0.04}});
