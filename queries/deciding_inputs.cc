@@ -2,6 +2,7 @@
 // Which uncertain input decides.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "prediction_parts.h"
 #include "prescene/simulation/action_draws.h"
@@ -23,6 +24,13 @@ bool varies(const std::vector<double>& values) {
   return *high - *low > 1e-9 * (1.0 + std::abs(*low));
 }
 
+/// The turn about W's z axis of a rotation that is a tilt first and then that turn, in (-pi, pi]. 0 where it is upside
+/// down, which leaves it open.
+double heading_of(const geometry::Quaterniond& rotation) {
+  const double angle = 2.0 * std::atan2(rotation.z(), rotation.w());
+  return std::remainder(angle, 2.0 * std::numbers::pi);
+}
+
 /// Columns of values, one instance after the other.
 class Columns {
  public:
@@ -39,7 +47,8 @@ class Columns {
     for (int axis = 0; axis < 3; ++axis)
       add(name + " " + kAxes[axis], [&](std::size_t i) { return Vector3d(value(i))[axis]; });
   }
-  /// A rotation: turns from its mean about W's axes, or, when it may be any, how far each axis of the body points up.
+  /// A rotation: turns from its mean about W's axes, or, when it may be any, how far each axis of the body points up,
+  /// and its heading.
   template <class Rotation>
   void add_rotation(const std::string& name, const geometry::Quaterniond& mean, const Rotation& rotation) {
     double largest = 0.0;
@@ -54,6 +63,7 @@ class Columns {
     for (int axis = 0; axis < 3; ++axis)
       add(name + kAxes[axis] + " axis upwards",
           [&](std::size_t i) { return Vector3d(rotation(i).conjugate() * Vector3d::UnitZ())[axis]; });
+    add(name + "heading", [&](std::size_t i) { return heading_of(rotation(i) * mean.conjugate()); });
   }
   std::vector<UncertainInput> result() && { return std::move(inputs_); }
 
@@ -150,6 +160,11 @@ std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, 
           input.effects.push_back({variable.classes[c], effect.low_fifth[c], effect.high_fifth[c]});
       }
     });
+    if (found.inputs.size() == 1) {
+      // Nothing else could: what its values, cut into intervals, do not show is finer than these.
+      found.inputs[0].share = 1.0;
+      found.inputs[0].standard_error = 0.0;
+    }
     double sum = 0.0;
     for (const belief::InputShare& input : found.inputs) sum += input.share;
     found.explained_by_single = std::min(1.0, sum);

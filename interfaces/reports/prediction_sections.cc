@@ -94,7 +94,8 @@ std::optional<ChartBlock> settling_chart(const belief::PredictAnswer& answer, co
 }
 
 std::string rest_text(const belief::DecidingInputs& inputs, int instances) {
-  if (inputs.by_several) return "several together decide about " + percent(*inputs.by_several);
+  if (inputs.by_several)
+    return "several together, or differences too fine for these instances, decide about " + percent(*inputs.by_several);
   return std::to_string(instances) + " instances are too few to say what decides the rest";
 }
 

@@ -55,7 +55,8 @@ std::string deciding_text(const belief::DecidingInputs& inputs, int instances) {
   if (!inputs.by_several)
     return text + "; the rest is unexplained (" + std::to_string(instances) + " instances are too few to say)\n";
   if (*inputs.by_several > 0.02)
-    text += "; by several together about " + fixed_text(100.0 * *inputs.by_several, 0) + " %";
+    text += "; by several together, or by differences too fine for these instances, about " +
+            fixed_text(100.0 * *inputs.by_several, 0) + " %";
   return text + "\n";
 }
 

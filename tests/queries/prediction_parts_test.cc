@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "prescene/belief/json.h"
 #include "prescene/queries/query_engine.h"
@@ -63,6 +65,32 @@ TEST(DecidingInputs, TheFrictionDecidesWhetherTheCartonSlides) {
     EXPECT_EQ(effect.high_fifth, effect.outcome == "slides" ? 0.0 : 1.0);
   }
   for (const belief::DecidingInputs& one : answer.inputs) EXPECT_NE(one.about, "cup moves");  // it never does
+}
+
+TEST(DecidingInputs, AHeadingThatMayBeAnyDecidesAloneWhereNothingElseIsOpen) {
+  core::ThreadPool pool(2);
+  auto scene = sliding_scene();
+  // Lying, and known but for where it points: by much, and by so much that it may point anywhere.
+  for (const double spread : {0.4, 1.5}) {
+    scene->models[0].contact.friction = belief::FixedScalar{0.5};
+    geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+    covariance(1, 1) = spread * spread;  // about the body's y axis, which points up
+    scene->objects[0].pose =
+        belief::NormalPose{{geometry::exp_rotation({0.5 * std::numbers::pi, 0.0, 0.0}), geometry::Vector3d::Zero()}, covariance};
+    const auto by_heading = [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+      belief::WorldState end = start;
+      const geometry::Vector3d axis = start.objects[0].X_WO.rotation * geometry::Vector3d::UnitX();
+      if (std::sin(3.0 * std::atan2(axis.y(), axis.x())) > 0.0) end.objects[0].X_WO.translation.x() += 1.0;
+      return end;
+    };
+    const PredictAnswer answer = predicted(queries::answer(
+        scene, 1, {"", asking([](auto& tell) { tell.inputs = true; })}, context_with(by_heading, pool)));
+    const belief::DecidingInputs& end = about(answer, "end");
+    ASSERT_EQ(end.inputs.size(), 1u) << spread;
+    EXPECT_THAT(end.inputs[0].input, HasSubstr(spread > 1.0 ? "heading" : "turn about z"));
+    EXPECT_EQ(end.inputs[0].share, 1.0);
+    EXPECT_EQ(end.by_several, 0.0);
+  }
 }
 
 TEST(DecidingInputs, WhatActionsDrawCountsToo) {
