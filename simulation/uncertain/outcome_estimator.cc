@@ -370,6 +370,9 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     evaluate(starts, variables, options, estimate);
     forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate),
                         settled_text(variables, estimate));
+    // Whoever gave a time may also cancel when it is over.
+    if (stop == EstimateStop::kCancelled && options.max_seconds && watch.seconds() >= *options.max_seconds)
+      stop = EstimateStop::kTimeLimit;
     if (stop) break;
     if (estimate.certain) {
       stop = EstimateStop::kConverged;
