@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -75,8 +74,8 @@ TEST(DecidingInputs, AHeadingThatMayBeAnyDecidesAloneWhereNothingElseIsOpen) {
     scene->models[0].contact.friction = belief::FixedScalar{0.5};
     geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
     covariance(1, 1) = spread * spread;  // about the body's y axis, which points up
-    scene->objects[0].pose =
-        belief::NormalPose{{geometry::exp_rotation({0.5 * std::numbers::pi, 0.0, 0.0}), geometry::Vector3d::Zero()}, covariance};
+    scene->objects[0].pose = belief::NormalPose{
+        {geometry::exp_rotation({0.5 * std::numbers::pi, 0.0, 0.0}), geometry::Vector3d::Zero()}, covariance};
     const auto by_heading = [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
       belief::WorldState end = start;
       const geometry::Vector3d axis = start.objects[0].X_WO.rotation * geometry::Vector3d::UnitX();

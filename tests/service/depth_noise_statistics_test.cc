@@ -23,8 +23,7 @@ class DepthNoiseTest : public testing::Test {
   static rendering::RenderInstance box(const Vector3d& size, const Vector3d& p, const Vector3d& turn) {
     return {rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{size})),
             {geometry::exp_rotation(turn), p},
-            {},
-            false};
+            {}};
   }
 
   DepthNoiseTest() {

@@ -46,8 +46,7 @@ rendering::RenderScene table_and_box() {
   }();
   const auto add = [&](const Vector3d& size, const Vector3d& at) {
     scene.instances.push_back({rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{size})),
-                               X_WT * Pose::from_translation(at), rendering::SurfaceMaterial::opaque({170, 150, 120}),
-                               false});
+                               X_WT * Pose::from_translation(at), rendering::SurfaceMaterial::opaque({170, 150, 120})});
   };
   add({0.8, 0.8, 0.04}, {0.0, 0.0, -0.02});
   add({0.1, 0.08, 0.15}, {0.05, 0.02, 0.075});
