@@ -23,8 +23,8 @@ struct OutcomeProbability {
   friend bool operator==(const OutcomeProbability&, const OutcomeProbability&) = default;
 };
 
-/// Where an object ends: mean and covariance of its final position and the share of each 2 cm cell of a grid in W's xy
-/// plane.
+/// Where an object ends: the share of each cell of a grid in W's xy plane (FinalPoses has mean and covariance of the
+/// position).
 struct HeatMap {
   double cell = 0.02;         ///< m
   double x0 = 0.0, y0 = 0.0;  ///< Lower corner of cell (0, 0), W.

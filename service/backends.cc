@@ -26,8 +26,7 @@ class EitherSimulator : public simulation::Simulator {
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
            const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
            std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
-    const simulation::Simulator& simulator =
-        simulation::lockstep_supports(request, starts).ok() ? *lockstep_ : *bullet_;
+    const simulation::Simulator& simulator = simulation::lockstep_supports(request).ok() ? *lockstep_ : *bullet_;
     simulator.run(starts, request, stream, numbers, pool, trajectories, cancellation);
   }
 

@@ -175,7 +175,7 @@ core::Status validate(const LockstepOptions& options) {
   return core::ok_status();
 }
 
-core::Status lockstep_supports(const RunRequest& request, std::span<const belief::WorldState>) {
+core::Status lockstep_supports(const RunRequest& request) {
   const std::size_t pushers = pusher_radii(request.actions).size();
   if (pushers <= kMostPushers) return core::ok_status();
   return core::unsupported(std::to_string(pushers) + " push actions are more than the " + std::to_string(kMostPushers) +

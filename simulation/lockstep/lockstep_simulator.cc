@@ -202,7 +202,7 @@ class LockstepSimulator : public Simulator {
            InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
     PRESCENE_CHECK(starts.size() == trajectories.size());
-    PRESCENE_CHECK(lockstep_supports(request, starts).ok());
+    PRESCENE_CHECK(lockstep_supports(request).ok());
     if (starts.empty()) return;
     LaneQueue queue;
     queue.starts = starts;
