@@ -5,6 +5,21 @@
 #include "prescene/belief/prediction.h"
 
 namespace prescene::belief {
+
+std::string to_string(FlightEnd end) {
+  switch (end) {
+    case FlightEnd::kMayTouch:
+      return "may_touch";
+    case FlightEnd::kPush:
+      return "push";
+    case FlightEnd::kNotFollowed:
+      return "not_followed";
+    case FlightEnd::kRunEnds:
+      return "run_ends";
+  }
+  return "unknown";
+}
+
 namespace {
 
 Json final_poses_json(const FinalPoses& poses) {
@@ -107,7 +122,7 @@ Json flight_json(const FlightForecast& flight) {
   for (const FlightForecast::Pair& pair : flight.may_touch)
     pairs.push_back(
         {{"first", pair.first}, {"second", pair.second}, {"probability", pair.probability}, {"error", pair.error}});
-  return {{"apart_until", flight.apart_until}, {"may_touch", std::move(pairs)}};
+  return {{"apart_until", flight.apart_until}, {"ended_by", to_string(flight.end)}, {"may_touch", std::move(pairs)}};
 }
 
 Json paths_json(const std::vector<ObjectPath>& paths) {

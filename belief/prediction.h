@@ -119,6 +119,16 @@ struct ContactForecast {
   friend bool operator==(const ContactForecast&, const ContactForecast&) = default;
 };
 
+/// Why a start is followed as one object no further.
+enum class FlightEnd {
+  kMayTouch,     ///< Something may touch something.
+  kPush,         ///< A push begins within a look (1/60 s).
+  kNotFollowed,  ///< Flights that last longer than this (10 s) are not followed.
+  kRunEnds,      ///< Nothing does within the run, up to its last look.
+};
+/// "may_touch", "push", "not_followed", "run_ends".
+std::string to_string(FlightEnd end);
+
 /// For how long a start is one object: nothing can touch anything, and what each object does is told by the moments of
 /// its flight. What is in contact from the start ends it at 0.
 struct FlightForecast {
@@ -127,8 +137,9 @@ struct FlightForecast {
     double probability = 0.0, error = 0.0;  ///< That they touch just then, and two standard errors of it.
     friend bool operator==(const Pair&, const Pair&) = default;
   };
-  double apart_until = 0.0;     ///< s
-  std::vector<Pair> may_touch;  ///< Then, likeliest first; empty: nothing ever does.
+  double apart_until = 0.0;  ///< s
+  FlightEnd end = FlightEnd::kRunEnds;
+  std::vector<Pair> may_touch;  ///< Then, likeliest first; empty unless it ended with kMayTouch.
   friend bool operator==(const FlightForecast&, const FlightForecast&) = default;
 };
 

@@ -20,6 +20,7 @@ std::optional<belief::FlightForecast> forecast_flight(const Foresight& foresight
   if (!flight) return std::nullopt;
   belief::FlightForecast forecast;
   forecast.apart_until = flight->apart_until;
+  forecast.end = flight->end;
   for (const simulation::FlightOpening& opening : flight->openings)
     forecast.may_touch.push_back({belief::body_name(scene, opening.first), belief::body_name(scene, opening.second),
                                   opening.probability, opening.probability_error});

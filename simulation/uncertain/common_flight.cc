@@ -109,7 +109,8 @@ class Touching {
   };
   /// Of an object with any body, numbered as in belief::ContactInterval, where the objects and the robot's bodies are.
   /// The ball first: however uncertain the object's rotation is, it does not count there.
-  Answer ask(std::size_t object, std::size_t other, std::vector<PlacedObject>& placed, const std::vector<Pose>& robot) {
+  Answer ask(std::size_t object, std::size_t other, std::vector<PlacedObject>& placed,
+             const std::vector<std::vector<Pose>>& robot) {
     const std::size_t objects = scene_.objects.size(), supports = scene_.supports.size();
     PlacedObject& own = placed[object];
     const FlightBodies::Object& body = bodies_.object(object);
@@ -125,14 +126,16 @@ class Touching {
     }
     const bool fixed = other < objects + supports;
     const std::size_t index = fixed ? other - objects : other - objects - supports;
-    const Pose& X_WB = fixed ? scene_.supports[index].X_WS : robot[index];
+    const std::vector<Pose> poses = fixed ? std::vector<Pose>{scene_.supports[index].X_WS} : robot[index];
     for (const FlightBodies::Placed& shape : fixed ? bodies_.support(index) : bodies_.robot_body(index)) {
-      const UncertainPose there{X_WB * shape.X_BS};
-      if (collision::uncertain_overlap(*body.ball, *shape.shape, between(own.middle(), there), scratch_).state ==
-          OverlapState::kNone)
-        continue;
-      for (const auto& part : body.parts)
-        note(collision::uncertain_overlap(*part, *shape.shape, between(own.pose(), there), scratch_), &answer);
+      for (const Pose& X_WB : poses) {
+        const UncertainPose there{X_WB * shape.X_BS};
+        if (collision::uncertain_overlap(*body.ball, *shape.shape, between(own.middle(), there), scratch_).state ==
+            OverlapState::kNone)
+          continue;
+        for (const auto& part : body.parts)
+          note(collision::uncertain_overlap(*part, *shape.shape, between(own.pose(), there), scratch_), &answer);
+      }
     }
     return answer;
   }
@@ -231,7 +234,8 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
   PRESCENE_CHECK(options.draws >= 32 && options.interval > 0.0 && options.longest > 0.0);
   const std::size_t objects = scene.objects.size(), components = starts.components.size();
   const std::size_t body_count = objects + scene.supports.size() + scene.robot.size();
-  const double longest = std::min({request.stop.duration, options.longest, first_push(request.actions)});
+  const double push = first_push(request.actions);
+  const double longest = std::min({request.stop.duration, options.longest, push});
   const auto looks = static_cast<std::size_t>(std::max(0.0, std::floor(longest / options.interval)));
   double total = 0.0;
   for (const StartComponent& component : starts.components) total += component.weight;
@@ -244,6 +248,9 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
   std::size_t flown = 0;  // looks
   CommonFlight found;
   found.apart_until = static_cast<double>(looks) * options.interval;
+  found.end = longest == request.stop.duration ? belief::FlightEnd::kRunEnds
+              : longest == push                ? belief::FlightEnd::kPush
+                                               : belief::FlightEnd::kNotFollowed;
   for (std::size_t look = 0; look < looks && found.openings.empty(); ++look) {
     if (look >= flown) {
       flown = std::min(looks, std::max<std::size_t>(4 * flown, 16));
@@ -251,10 +258,14 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
       if (!flyer.fly(seconds, pool, cancellation, flights))
         return core::cancelled("the flight was not followed to its end");
     }
-    std::vector<Pose> robot;
-    const double middle = flyer.start_time() + (static_cast<double>(look) + 0.5) * options.interval;
-    for (std::size_t i = 0; i < scene.robot.size(); ++i)
-      robot.push_back(belief::robot_pose_at(scene, request.actions, static_cast<int>(i), middle));
+    std::vector<std::vector<Pose>> robot(scene.robot.size());  // by body: where it is within the look
+    for (std::size_t i = 0; i < scene.robot.size(); ++i) {
+      for (const double share : {0.5, 0.0, 1.0}) {
+        const double time = flyer.start_time() + (static_cast<double>(look) + share) * options.interval;
+        const Pose X_WB = belief::robot_pose_at(scene, request.actions, static_cast<int>(i), time);
+        if (robot[i].empty() || !(X_WB == robot[i].front())) robot[i].push_back(X_WB);
+      }
+    }
     std::vector<std::vector<PlacedObject>> placed(components);
     for (std::size_t k = 0; k < components; ++k)
       for (std::size_t i = 0; i < objects; ++i) placed[k].emplace_back(flights[k][i], look, bodies.object(i).middle);
@@ -274,7 +285,10 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
         if (!apart && !parting[i][other]) found.openings.push_back(opening);
       }
     if (found.openings.empty() && look + 1 < looks) continue;
-    if (!found.openings.empty()) found.apart_until = static_cast<double>(look) * options.interval;
+    if (!found.openings.empty()) {
+      found.apart_until = static_cast<double>(look) * options.interval;
+      found.end = belief::FlightEnd::kMayTouch;
+    }
     for (std::size_t k = 0; k < components; ++k) {
       found.moments.emplace_back();
       for (PlacedObject& object : placed[k]) found.moments[k].push_back(object.pose());

@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "prescene/belief/prediction.h"
 #include "prescene/belief/scene.h"
 #include "prescene/collision/spheres/relative_uncertainty.h"
 #include "prescene/core/parallel.h"
@@ -70,7 +71,9 @@ struct CommonFlight {
   double apart_until = 0.0;
   /// Where the components are in the look in which the flight ends: by component, by object.
   std::vector<std::vector<collision::UncertainPose>> moments;
-  /// What may touch next, likeliest first; empty when nothing ever does within the run.
+  /// Why it ends there.
+  belief::FlightEnd end = belief::FlightEnd::kRunEnds;
+  /// What may touch next, likeliest first; empty unless it ended with kMayTouch.
   std::vector<FlightOpening> openings;
 };
 
@@ -82,9 +85,11 @@ struct CommonFlightOptions {
 
 /// Each object flies by itself in `make_simulator`'s empty world, with the request's actions, and the moments of its
 /// poses (those of both ends of a look together) are asked whether they touch: uncertain_overlap() of
-/// prescene/collision/spheres. What is held does not touch what holds it, nor after its release until they have parted.
-/// The distribution opens at the first look in which a pair of some component is not surely apart, or a push begins.
-/// Errors of different objects count as independent. Fails as the factory does, and with kCancelled.
+/// prescene/collision/spheres. The robot's bodies are asked where they are at both ends of a look and in its middle:
+/// what moves by more than its own size within half a look could miss something. What is held does not touch what holds
+/// it, nor after its release until they have parted. The distribution opens at the first look in which a pair of some
+/// component is not surely apart, or a push begins. Errors of different objects count as independent. Fails as the
+/// factory does, and with kCancelled.
 core::Result<CommonFlight> common_flight(const belief::Scene& scene, const FlightBodies& bodies,
                                          const StartDistribution& starts, const RunRequest& request,
                                          const SimulatorFactory& make_simulator, const core::RandomStream& stream,

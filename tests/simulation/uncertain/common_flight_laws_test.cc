@@ -193,5 +193,44 @@ TEST(CommonFlight, TheSameForAnyNumberOfThreads) {
     EXPECT_EQ(one.openings[i].probability, two.openings[i].probability);
 }
 
+TEST(CommonFlight, SaysWhyItEnds) {
+  using belief::FlightEnd;
+  EXPECT_EQ(flown(falling_ball(1.0, 0.01)).flight.end, FlightEnd::kMayTouch);
+  const auto end_of = [](const std::shared_ptr<Scene>& scene) {
+    const CommonFlight flight = flown(scene).flight;
+    EXPECT_TRUE(flight.openings.empty());
+    return flight.end;
+  };
+  auto brief = falling_ball(2.0, 0.01);
+  brief->duration = 0.2;
+  EXPECT_EQ(end_of(brief), FlightEnd::kRunEnds);
+  brief->duration = 0.01;  // less than a look
+  EXPECT_EQ(end_of(brief), FlightEnd::kRunEnds);
+  auto pushed = falling_ball(2.0, 0.01);
+  pushed->actions = {{0.1, belief::Push{{1.0, 0.0, 1.0}, {1.1, 0.0, 1.0}}}};
+  EXPECT_EQ(end_of(pushed), FlightEnd::kPush);
+  auto endless = falling_ball(2.0, 0.01);
+  endless->supports[0].X_WS.translation.z() = -2000.0;
+  endless->duration = 30.0;
+  EXPECT_EQ(end_of(endless), FlightEnd::kNotFollowed);
+}
+
+TEST(CommonFlight, IsOpenedByWhatARobotTouchesBetweenTheMiddlesOfLooks) {
+  // A plate comes to the falling ball at 3 m/s, as far as the end of a look, and goes back.
+  auto scene = falling_ball(2.0, 1e-4);
+  belief::KinematicBody plate;
+  plate.name = "plate";
+  plate.collision = {belief::PrimitiveShape{geometry::BoxShape{{0.01, 0.2, 1.0}}, Pose{}}};
+  const double when = 10.0 / 60.0;
+  plate.timeline = {{0.0, Pose::from_translation({0.53, 0.0, 2.0})},
+                    {when, Pose::from_translation({0.03, 0.0, 2.0})},
+                    {2.0 * when, Pose::from_translation({0.53, 0.0, 2.0})}};
+  scene->robot.push_back(plate);
+  const CommonFlight flight = flown(scene).flight;
+  EXPECT_NEAR(flight.apart_until, when - 1.0 / 60.0, 1e-9);
+  ASSERT_FALSE(flight.openings.empty());
+  EXPECT_EQ(flight.openings[0].second, 2);
+}
+
 }  // namespace
 }  // namespace prescene::tests
