@@ -56,7 +56,8 @@ belief::OutcomeProbability outcome_from(const ordered_json& json) {
 
 void add_prediction(const ordered_json& predict, const belief::Scene& scene, interfaces::ReportSection& section) {
   interfaces::OutcomeBlock outcomes;
-  outcomes.caption = std::to_string(predict.value("instances", 0)) + " simulated instances";
+  outcomes.caption = std::to_string(predict.value("instances", 0)) +
+                     (predict.value("instances", 0) == 1 ? " simulated instance" : " simulated instances");
   for (const ordered_json& outcome : predict.value("outcomes", ordered_json::array()))
     outcomes.outcomes.push_back(outcome_from(outcome));
   section.blocks.push_back(std::move(outcomes));

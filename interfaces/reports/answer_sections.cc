@@ -57,7 +57,8 @@ std::vector<ReportSection> sections_of(const belief::WhereAnswer& answer, const 
 
 std::vector<ReportSection> sections_of(const belief::StabilityAnswer& answer, const belief::Scene&) {
   ReportSection section{"Does " + answer.object + " stay?", {OutcomeBlock{"", {answer.stable}}}};
-  std::string text = "From " + std::to_string(answer.instances) + " simulated instances, " +
+  std::string text = "From " + std::to_string(answer.instances) +
+                     (answer.instances == 1 ? " simulated instance, " : " simulated instances, ") +
                      decimal(answer.simulated_seconds, 0) + " simulated seconds in " + decimal(answer.wall_seconds, 1) +
                      " s.";
   if (!answer.likely_event.empty()) text += " When it does not stay, it typically " + answer.likely_event + ".";

@@ -50,7 +50,8 @@ bool belongs(const belief::OutcomeProbability& outcome, const std::string& quest
 }
 
 std::string cost_text(const belief::PredictAnswer& answer) {
-  std::string text = "From " + std::to_string(answer.instances) + " simulated instances";
+  std::string text = "From " + std::to_string(answer.instances) +
+                     (answer.instances == 1 ? " simulated instance" : " simulated instances");
   if (answer.step > 0.0) {
     text += " of together " + decimal(answer.simulated_seconds / answer.step, 0) + " steps of " +
             decimal(1000.0 * answer.step, 2) + " ms";

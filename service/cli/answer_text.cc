@@ -18,7 +18,7 @@ std::string interval(const nlohmann::ordered_json& p) {
 
 /// What a probability rests on: few instances, wide intervals.
 std::string basis(const nlohmann::ordered_json& answer) {
-  return "from " + std::to_string(answer.value("instances", 0)) + " instances, " +
+  return "from " + counted(answer.value("instances", std::size_t{0}), "instance") + ", " +
          fixed_text(answer.value("wall_seconds", 0.0), 1) + " s\n";
 }
 

@@ -21,7 +21,7 @@ struct Options {
   std::string data;
   std::string output;
   std::vector<std::string> keep;
-  std::string start = "measured";
+  std::optional<std::string> start;
   std::optional<int> samples;
   std::optional<int> max_evaluations;
 };
@@ -61,7 +61,8 @@ core::Status run_cube(const Options& options, VerbContext& context) {
       {"measured", measured_cube_model()}, {"described", described_cube_model()}, {"shipped", shipped_cube_model()}};
   if (!options.output.empty() || !options.keep.empty())
     return core::invalid_input("cube_tosses takes neither -o nor --keep: its model is part of the program");
-  const CubeModel& start = starts.at(options.start);
+  const std::string from = options.start.value_or("measured");
+  const CubeModel& start = starts.at(from);
   CalibrationOptions search;
   search.samples = options.samples.value_or(search.samples);
   search.max_evaluations = options.max_evaluations.value_or(search.max_evaluations);
@@ -71,7 +72,7 @@ core::Status run_cube(const Options& options, VerbContext& context) {
   PRESCENE_TRY(CubeCalibration found,
                calibrate_cube(tosses, start, context.options().seed, context.pool(),
                               context.progress("calibrating " + options.name), &context.cancellation(), search));
-  found.model.provenance = "found by prescene calibrate " + options.name + " --from " + options.start;
+  found.model.provenance = "found by prescene calibrate " + options.name + " --from " + from;
   bool better = found.cost < found.start_cost;
 
   nlohmann::ordered_json document;
@@ -130,8 +131,7 @@ std::string text_of(const ObjectCalibration& found) {
 
 /// A folder with recordings of somebody's own object.
 core::Status run_folder(const Options& options, VerbContext& context) {
-  if (options.output.empty())
-    return core::invalid_input("-o is missing: name the model file to write, or give cube_tosses and --data");
+  if (options.output.empty()) return core::invalid_input("-o is missing: name the model file to write");
   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(options.name, context.log()));
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, dataset.inputs));
   BackendSettings settings;
@@ -157,6 +157,10 @@ core::Status run_folder(const Options& options, VerbContext& context) {
 core::Status run(const Options& options, VerbContext& context) {
   if (options.name == "cube_tosses" && !options.data.empty()) return run_cube(options, context);
   if (!options.data.empty()) return core::invalid_input("--data goes with cube_tosses only; give the folder itself");
+  if (options.name == "cube_tosses" && !std::filesystem::exists(options.name))
+    return core::invalid_input("cube_tosses takes --data: name the folder that holds the data sets' folders");
+  if (options.start)
+    return core::invalid_input("--from goes with cube_tosses only; a folder's scene.yaml is the start");
   return run_folder(options, context);
 }
 
@@ -167,7 +171,9 @@ Verb add_calibrate_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   verb->add_option("DATASET", options->name, "Folder with scene.yaml and tosses.csv; or cube_tosses, with --data")
       ->required();
-  verb->add_option("-o,--output", options->output, "Model file to write, for scenes to use");
+  verb->add_option("-o,--output", options->output,
+                   "Model file to write, for scenes to use; required but for cube_tosses")
+      ->check(file_name());
   std::vector<std::string> names;
   for (std::size_t i = 0; i < simulation::kMotionParameters; ++i)
     names.push_back(to_string(static_cast<simulation::MotionParameter>(i)));
@@ -184,9 +190,8 @@ Verb add_calibrate_verb(CLI::App& app) {
   verb->add_option("--data", options->data, "cube_tosses: folder that holds the data sets' folders");
   verb->add_option("--from", options->start,
                    "cube_tosses: where the search starts: measured (read off the recordings), described (by the data "
-                   "set), shipped")
-      ->check(CLI::IsMember({"measured", "described", "shipped"}))
-      ->capture_default_str();
+                   "set), shipped; default measured")
+      ->check(CLI::IsMember({"measured", "described", "shipped"}));
   verb->footer("Example: prescene calibrate recordings -o mug.yaml");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

@@ -152,7 +152,7 @@ Verb add_inspect_verb(CLI::App& app) {
   verb->add_option("FILE", options->file,
                    "Mesh (PLY, OBJ, STL, glTF, COLLADA), or recording (.mcap, or a folder of images)")
       ->required();
-  verb->add_option("-o,--output", options->model, "Write a model file that scene files can name");
+  verb->add_option("-o,--output", options->model, "Write a model file that scene files can name")->check(file_name());
   verb->add_option("--density", options->inspection.density, "kg/m^3")
       ->check(number_between(0.1, 25000.0))
       ->capture_default_str();
@@ -161,7 +161,7 @@ Verb add_inspect_verb(CLI::App& app) {
       ->check(positive_number())
       ->capture_default_str();
   verb->add_flag("--y-up", options->y_up, "The file's y axis points up");
-  verb->add_option("--report", options->report, "Write an HTML page with pictures");
+  verb->add_option("--report", options->report, "Write an HTML page with pictures")->check(file_name());
   verb->add_option("--frame", options->recording.frame, "Of a recording: from 0, over the frames that can be used")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
@@ -173,9 +173,11 @@ Verb add_inspect_verb(CLI::App& app) {
   verb->add_flag("--depth-noise", options->depth_noise,
                  "Of a recording in which nothing moves: the depth camera's noise, and the sensor model's settings");
   verb->add_option("--overlay", options->recording.overlay,
-                   "Of a recording: write a PNG of the camera's picture with the belief drawn over it");
+                   "Of a recording: write a PNG of the camera's picture with the belief drawn over it")
+      ->check(file_name());
   verb->add_option("--likelihood-map", options->recording.likelihood_map,
-                   "Of a recording: write a PNG of what each pixel says for or against the poses believed");
+                   "Of a recording: write a PNG of what each pixel says for or against the poses believed")
+      ->check(file_name());
   options->verb = verb;
   verb->footer(
       "Examples: prescene inspect cup.stl --scale 0.001 -o cup.yaml --report cup.html\n"

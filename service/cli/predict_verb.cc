@@ -61,7 +61,7 @@ std::string deciding_text(const belief::DecidingInputs& inputs, int instances) {
 }
 
 std::string cost_text(const belief::PredictAnswer& predicted) {
-  std::string text = std::to_string(predicted.instances) + " instances, ";
+  std::string text = counted(static_cast<std::size_t>(predicted.instances), "instance") + ", ";
   if (predicted.step > 0.0) text += fixed_text(predicted.simulated_seconds / predicted.step, 0) + " steps, ";
   text += fixed_text(predicted.simulated_seconds, 0) + " simulated seconds, " + fixed_text(predicted.cpu_seconds, 1) +
           " s of processor time, " + fixed_text(predicted.wall_seconds, 1) + " s";
@@ -217,7 +217,7 @@ Verb add_predict_verb(CLI::App& app) {
                  "With --json: no final poses, typical runs and contacts, so that instances end once they are decided");
   verb->add_flag("--model-error", options->model_error,
                  "Also repeat instances at half and double step and at the ends of uncertain parameters");
-  verb->add_option("--heat-map", options->heat_map, "Write a PNG picture of where objects end");
+  verb->add_option("--heat-map", options->heat_map, "Write a PNG picture of where objects end")->check(file_name());
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
       ->check(positive_number());
   verb->add_option("--stepper", options->stepper,
@@ -226,7 +226,8 @@ Verb add_predict_verb(CLI::App& app) {
                    "alone (docs/simulation.md says what lockstep can)")
       ->check(CLI::IsMember({"automatic", "bullet", "lockstep"}))
       ->capture_default_str();
-  verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
+  verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
+      ->check(file_name());
   verb->footer("Example: prescene predict scenarios/milk_on_bin.yaml --json --seed 1");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

@@ -49,7 +49,7 @@ core::Status record_bus(const Options& options, VerbContext& context) {
 Verb add_record_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("record", "Record the robot's topics, or a scene as a simulated robot would see it");
   auto options = std::make_shared<Options>();
-  verb->add_option("-o,--output", options->output, "Recording to write (MCAP)")->required();
+  verb->add_option("-o,--output", options->output, "Recording to write (MCAP)")->check(file_name())->required();
   verb->add_option("--simulate", options->simulate,
                    "Scene file to play with a simulated RGB-D camera, instead of listening");
   verb->add_option("--rate", options->simulation.rate, "Simulated frames a second")

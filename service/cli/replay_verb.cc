@@ -271,7 +271,8 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines");
+  verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
+      ->check(file_name());
   add_bus_options(*verb, options->bus.dds, options->tracker.topics);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);

@@ -41,7 +41,8 @@ Verb add_serve_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   verb->add_option("--scene", options->scene, "Scene file: models, supports, robot, objects (docs/scene_files.md)")
       ->required();
-  verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)");
+  verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)")
+      ->check(file_name());
   verb->add_option("--question-seconds", options->settings.desk.default_seconds,
                    "Time that a question without limits of its own may take, s")
       ->check(number_between(1e-3, 3600.0))

@@ -14,10 +14,6 @@ struct Checked {
   std::string text;
 };
 
-std::string counted(std::size_t number, const std::string& thing) {
-  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
-}
-
 Checked bad(const std::string& file, const core::Status& status) {
   return {status, {{"file", file}, {"valid", false}, {"errors", status.message()}}, status.message()};
 }

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "verb.h"
 
+#include <fcntl.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -176,6 +179,11 @@ CLI::Validator number_between(double low, double high) {
           range};
 }
 
+CLI::Validator file_name() {
+  return {[](std::string& text) { return text.empty() ? std::string("a file name is needed, not ''") : std::string(); },
+          "", "file name"};
+}
+
 std::string live_recording_path(const std::string& asked, VerbContext& context) {
   std::string unused = unused_recording_path(asked).string();
   if (unused != asked) core::log(context.log(), core::LogLevel::kWarning, asked + " exists: recording to " + unused);
@@ -197,10 +205,22 @@ core::Status check_output(const std::string& option, const std::string& output,
   if (folder.empty()) folder = ".";
   if (!std::filesystem::is_directory(folder, none))
     return core::unavailable(wont + "there is no folder " + folder.string() + "; make it, or name another place");
+  if (std::filesystem::is_character_file(output, none)) {
+    // A device that takes nothing says so when nothing is written.
+    const int device = open(output.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY);
+    const bool takes = device >= 0 && write(device, "", 0) == 0;
+    const std::string why = std::strerror(errno);
+    if (device >= 0) close(device);
+    return takes ? core::ok_status() : core::unavailable(wont + why + "; name another file");
+  }
   const bool there = std::filesystem::exists(output, none);
   if (access(there ? output.c_str() : folder.c_str(), W_OK) != 0)
     return core::unavailable(wont + "no permission; name another place");
   return core::ok_status();
+}
+
+std::string counted(std::size_t number, const std::string& thing) {
+  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
 }
 
 std::string table(const std::vector<std::vector<std::string>>& rows) {

@@ -115,12 +115,16 @@ std::string answer_text(const nlohmann::ordered_json& answer);
 /// Checks of options: finite numbers only (CLI11's own let NaN pass).
 CLI::Validator positive_number();
 CLI::Validator number_between(double low, double high);
+/// A name that is not empty.
+CLI::Validator file_name();
 /// Where to record a robot live, see unused_recording_path(); says so when it is another file than the one asked for.
 std::string live_recording_path(const std::string& asked, VerbContext& context);
 /// kInvalidInput if `output`, named by `option`, would overwrite one of the inputs; kUnavailable where it can't be
 /// written, so that nobody waits for a result that is then lost. Empty names are no files.
 core::Status check_output(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
+/// "1 object", "2 objects".
+std::string counted(std::size_t number, const std::string& thing);
 /// Rows of text with columns padded to equal width; the first row is underlined.
 std::string table(const std::vector<std::vector<std::string>>& rows);
 

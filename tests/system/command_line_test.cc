@@ -261,6 +261,38 @@ TEST(CommandLine, AnInputIsNeverOverwritten) {
   }
 }
 
+TEST(CommandLine, OutputsThatCannotBeAreRefusedFirst) {
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"predict", scenario("tossed_cube"), "--report", ""},
+                                             {"predict", scenario("tossed_cube"), "--heat-map", ""},
+                                             {"calibrate", "nowhere", "-o", ""},
+                                             {"serve", "--scene", scenario("tossed_cube"), "--record", ""}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << args[0];
+    EXPECT_NE(finished.err.find("a file name is needed"), std::string::npos) << finished.err;
+  }
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  // Before anything is simulated: a budget of hours would not end.
+  const Finished full = run_program({"predict", scenario("tossed_cube"), "--budget", "60min", "--tolerance", "0.0001",
+                                     "--max-instances", "4194304", "--report", "/dev/full"});
+  EXPECT_EQ(full.exit_code, 1) << full.err;
+  EXPECT_NE(full.err.find("--report /dev/full: can't be written"), std::string::npos) << full.err;
+}
+
+TEST(CommandLine, CalibrateSaysWhichOptionsBelongToWhat) {
+  const auto message = [](std::vector<std::string> args) {
+    args.insert(args.begin(), "calibrate");
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2);
+    return finished.err;
+  };
+  EXPECT_NE(message({"cube_tosses"}).find("cube_tosses takes --data"), std::string::npos);
+  EXPECT_NE(message({"folder", "-o", "x.yaml", "--from", "shipped"}).find("--from goes with cube_tosses"),
+            std::string::npos);
+  EXPECT_NE(message({"folder"}).find("-o is missing"), std::string::npos);
+  EXPECT_NE(run_program({"calibrate", "--help"}).out.find("required"), std::string::npos);
+}
+
 TEST(CommandLine, EveryScenarioIsValid) {
   for (const auto& entry : std::filesystem::directory_iterator(source_dir() / "scenarios")) {
     if (entry.path().extension() != ".yaml") continue;
