@@ -28,6 +28,12 @@ bool is_moving(const ObjectState& state) {
   return state.V_WO.linear.norm() > kMovingSpeed || state.V_WO.angular.norm() > kMovingTurn;
 }
 
+Vector3d up_of(const Scene& scene) {
+  const Vector3d& g = scene.gravity_W;
+  if (g.isZero(0.0) || (g.x() == 0.0 && g.y() == 0.0 && g.z() < 0.0)) return Vector3d::UnitZ();
+  return -g.normalized();
+}
+
 bool supports(const ContactInterval& contact, int lower, int upper) {
   constexpr double kFromBelow = 0.5;  // the normal is within 60 degrees of the vertical
   if (contact.first == upper && contact.second == lower) return contact.normal_z > kFromBelow;

@@ -105,6 +105,7 @@ void add_containments(const Scene& scene, const Trajectory& trajectory, std::siz
 void add_motion(const Scene& scene, const Trajectory& trajectory, std::size_t i, Timeline& timeline) {
   const SceneObject& object = scene.objects[i];
   const Vector3d up_O = trajectory.start().objects[i].X_WO.rotation.conjugate() * Vector3d::UnitZ();
+  const Vector3d up_W = up_of(scene);
   add_sampled(
       trajectory, Relation::kMoving, object.name, "",
       [&](const WorldState& state) { return is_moving(state.objects[i]); }, timeline);
@@ -115,7 +116,7 @@ void add_motion(const Scene& scene, const Trajectory& trajectory, std::size_t i,
       trajectory, Relation::kFalling, object.name, "",
       [&](const WorldState& state) {
         const ObjectState& now = state.objects[i];
-        return now.mode != MotionMode::kHeld && now.V_WO.linear.z() < -kFallingSpeed &&
+        return now.mode != MotionMode::kHeld && up_W.dot(now.V_WO.linear) < -kFallingSpeed &&
                !touches_anything(trajectory, static_cast<int>(i), state.time);
       },
       timeline);

@@ -22,8 +22,8 @@ struct ContactInterval {
   double begin = 0.0;
   double end = 0.0;
   double largest_impulse = 0.0;  ///< N s within one step
-  /// z in W of the mean unit normal at the interval's last step, from `second` towards `first`: 1 = first lies flat on
-  /// second, -1 = second lies on first, 0 = side by side. A contact supports when it is beyond +-0.5.
+  /// Share along up_of(scene) of the mean unit normal at the last step, from `second` to `first`: 1 = first lies flat
+  /// on second, -1 = second lies on first, 0 = side by side. A contact supports when it is beyond +-0.5.
   double normal_z = 0.0;
   friend bool operator==(const ContactInterval&, const ContactInterval&) = default;
 };

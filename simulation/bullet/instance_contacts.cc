@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "instance_world.h"
+#include "prescene/belief/body_names.h"
 
 namespace prescene::simulation {
 
@@ -191,10 +192,11 @@ void InstanceWorld::note_touches() {
   touches_.clear();
   overlap_ = 0.0;
   const bool begins = steps_ == 1 || !released_.empty();
+  const Vector3d up = belief::up_of(scene_->scene);
   Vector3d normal = Vector3d::Zero();
   const auto close = [&] {
     const double norm = normal.norm();
-    if (!touches_.empty()) touches_.back().normal_z = norm > 0.0 ? normal.z() / norm : 0.0;
+    if (!touches_.empty()) touches_.back().normal_z = norm > 0.0 ? up.dot(normal) / norm : 0.0;
     normal.setZero();
   };
   // Contacts of a pair lie together, and pairs ascend.

@@ -22,7 +22,7 @@ struct Touch {
   int first = 0;
   int second = 0;
   double impulse = 0.0;   ///< N s, sum of the normal impulses.
-  double normal_z = 0.0;  ///< Of the mean normal, from second to first.
+  double normal_z = 0.0;  ///< Along up_of(scene), of the mean normal from second to first.
 };
 
 class InstanceWorld {

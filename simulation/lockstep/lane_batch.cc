@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "prescene/belief/body_names.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -20,6 +22,7 @@ void touches_of(LaneEngine& engine, int slot, const LaneInstance& instance, std:
   const auto counts = [&](const LaneContact& c) {
     return c.impulse > 0 || static_cast<double>(c.gap) <= scene.options.touching_distance;
   };
+  const Vector3d up_W = belief::up_of(scene.scene);
   const auto body_of = [&](const LaneContact& c) { return scene.lanes.parts[static_cast<std::size_t>(c.part)].number; };
   for (int object = 0; object < engine.objects(); ++object) {
     const auto contacts = engine.contacts(slot, object);
@@ -36,7 +39,7 @@ void touches_of(LaneEngine& engine, int slot, const LaneInstance& instance, std:
               [](const LaneTouch& a, const LaneTouch& b) { return a.second < b.second; });
     if (touches.size() == begin) continue;
     const double unit = engine.objects() == 1 ? instance.mass(0) : 1.0;
-    const Vector3d up = engine.rotation(slot, object).conjugate() * Vector3d::UnitZ();
+    const Vector3d up = engine.rotation(slot, object).conjugate() * up_W;
     for (std::size_t i = begin; i < touches.size(); ++i) {
       LaneTouch& touch = touches[i];
       Vector3d normal = Vector3d::Zero();

@@ -18,7 +18,7 @@ namespace prescene::simulation {
 struct LaneTouch {
   int first = 0, second = 0;
   double impulse = 0.0;   ///< N s
-  double normal_z = 0.0;  ///< Of the mean normal, from the second to the first.
+  double normal_z = 0.0;  ///< Along up_of(scene), of the mean normal from the second to the first.
 };
 /// Touching bodies of a slot's last step, ascending, into `touches` (scratch reused).
 void touches_of(LaneEngine& engine, int slot, const LaneInstance& instance, std::vector<LaneTouch>& touches);

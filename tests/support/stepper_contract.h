@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/belief/outcome.h"
 #include "prescene/simulation/mechanics_options.h"
 #include "prescene/tests/support/closed_forms.h"
 #include "prescene/tests/support/simple_scenes.h"
@@ -447,6 +448,25 @@ TEST_P(StepperContract, IntervalsBeginAtTheImpactAndCarryItsImpulse) {
   EXPECT_NEAR(c.end, run.final().time, 1e-9);
   EXPECT_NEAR(c.largest_impulse, 2.0 * std::sqrt(2.0 * kG * fall), 0.1);
   EXPECT_NEAR(c.normal_z, 1.0, fine(1e-9));
+}
+
+TEST_P(StepperContract, WhatLiesOnAWallThatIsBelowRestsOnIt) {
+  ObjectModel box = primitive_model("box", BoxShape{{0.1, 0.1, 0.1}}, 2.0);
+  for (const Vector3d& down : {Vector3d(1.0, 0.0, 0.0), Vector3d(0.0, -1.0, 0.0), Vector3d(0.0, 0.6, 0.8)}) {
+    // A floor whose upper face holds the origin and looks against gravity.
+    Scene scene = floor_scene(box);
+    scene.gravity_W = kG * down;
+    const Quaterniond R_WF = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), -down);
+    scene.supports[0].X_WS = geometry::Pose{R_WF, Vector3d::Zero()} * scene.supports[0].X_WS;
+    WorldState start = start_of(scene);
+    start.objects[0].X_WO = {R_WF, -0.0505 * down};
+    simulation::RunRequest request;
+    const belief::Trajectory run = run_one(*simulator_of(scene), start, request);
+    ASSERT_EQ(run.contacts.size(), 1U) << down.transpose();
+    EXPECT_NEAR(run.contacts[0].normal_z, 1.0, fine(1e-6)) << down.transpose();
+    const std::string floor = scene.supports[0].name;
+    EXPECT_TRUE(belief::holds(scene, run, {"lies", "object", {belief::Condition{belief::RestingOn{floor}}}}));
+  }
 }
 
 TEST_P(StepperContract, SnapshotsAreForTheSameMechanicsAlone) {
