@@ -17,9 +17,8 @@ namespace prescene::simulation {
 ///
 /// The energy is split into that of a body whose three moments are the middle one, which turns about L, and what is
 /// left about the axes of the least and of the greatest moment. Each part turns exactly, so L stays, and the energy
-/// sways a little without growing (symplectic; of such splittings the one that Fasso 2003, "Comparison of splitting
-/// algorithms for the rigid body", finds most exact). A body with two equal moments turns exactly, however slender and
-/// fast it is.
+/// sways a little without growing (a symplectic splitting, of those compared in [Fasso 2003] the most exact). A body
+/// with two equal moments turns exactly, however slender and fast it is.
 struct SpinRates {
   Eigen::Vector3d about_least = Eigen::Vector3d::Zero();  ///< rad / (m^2/s), L of a body of 1 kg.
   Eigen::Vector3d about_most = Eigen::Vector3d::Zero();
