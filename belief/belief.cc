@@ -118,7 +118,19 @@ void hash_particle(core::Hasher& hasher, const Particle& particle) {
       .value(particle.physical.restitution);
 }
 
+// Nothing where nothing was learned.
+void hash_colors(core::Hasher& hasher, const LearnedColors& colors) {
+  if (!colors.shares) return;
+  hasher.value(colors.frames).value(colors.shares->size());
+  for (const ColorShare& share : *colors.shares) hasher.value(share.bin).value(share.object).value(share.rest);
+}
+
 }  // namespace
+
+bool operator==(const LearnedColors& a, const LearnedColors& b) {
+  if (a.frames != b.frames) return false;
+  return a.shares == b.shares || (a.shares && b.shares && *a.shares == *b.shares);
+}
 
 std::string to_string(TrackState state) {
   switch (state) {
@@ -263,6 +275,7 @@ std::uint64_t content_hash(const Belief& belief) {
     hasher.value(object.frames_refuted);
     hasher.value(object.last_seen_ns).value(object.island).value(object.particles.size());
     for (const Particle& particle : object.particles) hash_particle(hasher, particle);
+    hash_colors(hasher, object.colors);
   }
   hasher.value(belief.robot.size());
   for (const Pose& pose : belief.robot) hash_pose(hasher, pose);

@@ -41,6 +41,26 @@ enum class TrackState {
 std::string to_string(TrackState state);
 std::string to_string(MotionMode mode);
 
+/// Bins of LearnedColors: 16 each of red, green and blue; bin = (r / 16 * 16 + g / 16) * 16 + b / 16.
+inline constexpr int kColorCells = 16 * 16 * 16;
+
+/// How often a colour was seen on an object and on everything else.
+struct ColorShare {
+  int bin = 0;          ///< In [0, kColorCells).
+  double object = 0.0;  ///< Share of the object's pixels, [0, 1].
+  double rest = 0.0;    ///< Of all others.
+  friend bool operator==(const ColorShare&, const ColorShare&) = default;
+};
+
+/// What the frames showed of an object's colours. The table is shared by copies and never changed.
+struct LearnedColors {
+  int frames = 0;  ///< That it was learned from; 0 = none, then there is no table.
+  /// Bins seen on either, ascending; null = none.
+  std::shared_ptr<const std::vector<ColorShare>> shares;
+};
+/// Tables compare by content.
+bool operator==(const LearnedColors& a, const LearnedColors& b);
+
 struct ObjectBelief {
   std::string name;  ///< Unique within a belief.
   int model = 0;     ///< Index into the context's models.
@@ -54,6 +74,7 @@ struct ObjectBelief {
   int frames_refuted = 0;      ///< Since the evidence last did not speak against the pose.
   core::TimeNs last_seen_ns = 0;
   int island = 0;  ///< Objects of equal number touch each other.
+  LearnedColors colors;
   friend bool operator==(const ObjectBelief&, const ObjectBelief&) = default;
 };
 

@@ -56,6 +56,35 @@ Particle particle_from(const JsonAt& at) {
   return particle;
 }
 
+Json colors_json(const LearnedColors& colors) {
+  Json shares = Json::array();
+  for (const ColorShare& share : *colors.shares) shares.push_back({share.bin, share.object, share.rest});
+  return {{"frames", colors.frames}, {"shares", std::move(shares)}};
+}
+
+LearnedColors colors_from(const JsonAt& at) {
+  LearnedColors colors;
+  JsonObject fields(at);
+  if (const auto frames = fields.require("frames"))
+    colors.frames = static_cast<int>(frames->integer(1, std::numeric_limits<int>::max()));
+  const auto rows = fields.require("shares");
+  if (!rows) return colors;
+  std::vector<ColorShare> shares;
+  for (const JsonAt& row : rows->items()) {
+    const std::vector<JsonAt> cells = row.items(3);
+    if (cells.empty()) continue;
+    ColorShare share;
+    share.bin = static_cast<int>(cells[0].integer(shares.empty() ? 0 : shares.back().bin + 1, kColorCells - 1));
+    share.object = cells[1].number();
+    share.rest = cells[2].number();
+    const auto is_share = [](double value) { return value >= 0.0 && value <= 1.0; };
+    if (!is_share(share.object) || !is_share(share.rest)) row.fail("give shares between 0 and 1");
+    shares.push_back(share);
+  }
+  colors.shares = std::make_shared<const std::vector<ColorShare>>(std::move(shares));
+  return colors;
+}
+
 ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
   ObjectBelief object;
   JsonObject fields(at);
@@ -81,6 +110,7 @@ ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
   if (const auto seen = fields.require("last_seen_ns")) object.last_seen_ns = seen->integer(INT64_MIN, INT64_MAX);
   if (const auto island = fields.require("island"))
     object.island = static_cast<int>(island->integer(0, std::numeric_limits<int>::max()));
+  if (const auto colors = fields.find("colors")) object.colors = colors_from(*colors);
   return object;
 }
 
@@ -147,17 +177,19 @@ Json to_json(const Trajectory& trajectory) {
 Json to_json(const ObjectBelief& object) {
   Json particles = Json::array();
   for (const Particle& particle : object.particles) particles.push_back(particle_json(particle));
-  return {{"name", object.name},
-          {"model", object.model},
-          {"particles", std::move(particles)},
-          {"existence", object.existence},
-          {"state", to_string(object.state)},
-          {"evidence_per_pixel", object.evidence_per_pixel},
-          {"visible_share", object.visible_share},
-          {"frames_unseen", object.frames_unseen},
-          {"frames_refuted", object.frames_refuted},
-          {"last_seen_ns", object.last_seen_ns},
-          {"island", object.island}};
+  Json json{{"name", object.name},
+            {"model", object.model},
+            {"particles", std::move(particles)},
+            {"existence", object.existence},
+            {"state", to_string(object.state)},
+            {"evidence_per_pixel", object.evidence_per_pixel},
+            {"visible_share", object.visible_share},
+            {"frames_unseen", object.frames_unseen},
+            {"frames_refuted", object.frames_refuted},
+            {"last_seen_ns", object.last_seen_ns},
+            {"island", object.island}};
+  if (object.colors.shares) json["colors"] = colors_json(object.colors);
+  return json;
 }
 
 Json to_json(const Belief& belief) {

@@ -86,6 +86,7 @@ struct ObjectModel {
   geometry::SymmetryGroup symmetry;
   SurfaceKind surface = SurfaceKind::kOpaque;
   Color color;
+  bool learn_colors = false;     ///< Tracked by the colours that frames show of it, too, not by depth alone.
   std::optional<Hollow> hollow;  ///< Of containers.
 
   friend bool operator==(const ObjectModel& a, const ObjectModel& b);

@@ -106,6 +106,41 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   return true;
 }
 
+bool are_exchanged(const std::array<const rendering::FrameTerms*, 2>& terms,
+                   const std::array<const SearchTarget*, 2>& targets, const std::array<Pose, 2>& X_CO,
+                   const AugmentOptions& options, const FilterTools& tools) {
+  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+  double gain = 0.0, tempered_gain = 0.0;
+  int visible = 0;
+  for (std::size_t place = 0; place < 2; ++place) {
+    const std::array<rendering::PoseHypothesis, 2> hypotheses = {hypothesis(*targets[place], X_CO[place]),
+                                                                 hypothesis(*targets[1 - place], X_CO[place])};
+    std::array<rendering::PoseEvidence, 2> evidence;
+    tools.search->batch().evaluate(*terms[place], hypotheses, *workspace, evidence);
+    gain += evidence[1].visible_log_ratio - evidence[0].visible_log_ratio;
+    tempered_gain += evidence[1].tempered - evidence[0].tempered;
+    visible += evidence[0].visible;
+  }
+  return tempered_gain >= options.exchange_gain && gain >= options.exchange_evidence * visible;
+}
+
+void exchange(ObjectBelief& first, ObjectBelief& second) {
+  const std::vector<Particle> of_first = first.particles, of_second = second.particles;
+  const auto with_physics_of = [](std::vector<Particle> particles, const std::vector<Particle>& own) {
+    for (std::size_t i = 0; i < particles.size(); ++i) particles[i].physical = own[i % own.size()].physical;
+    return particles;
+  };
+  first.particles = with_physics_of(of_second, of_first);
+  second.particles = with_physics_of(of_first, of_second);
+  std::swap(first.state, second.state);
+  std::swap(first.evidence_per_pixel, second.evidence_per_pixel);
+  std::swap(first.visible_share, second.visible_share);
+  std::swap(first.frames_unseen, second.frames_unseen);
+  std::swap(first.frames_refuted, second.frames_refuted);
+  std::swap(first.last_seen_ns, second.last_seen_ns);
+  std::swap(first.island, second.island);
+}
+
 int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
                    const Vector3d& gravity_W, const AugmentOptions& options, const WeightOptions& weighting,
                    const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,

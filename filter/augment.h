@@ -6,6 +6,7 @@
 //   new_objects(...)                // clusters that nobody explains
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -50,6 +51,10 @@ struct AugmentOptions {
   double hidden_furthest = 0.3;  ///< m; ... to this.
   double hidden_turn = 0.8;      ///< rad
 
+  /// Two objects of one shape change places where the colours of both together say so by this many nats (tempered), ...
+  double exchange_gain = 10.0;
+  double exchange_evidence = 1.0;  ///< ... and so many per visible pixel.
+
   bool new_objects = false;      ///< Look for more objects of the scene's models than it names.
   int new_every = 15;            ///< frames
   double new_log_ratio = 250.0;  ///< nats; smaller finds are remnants more often than objects.
@@ -70,6 +75,15 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
                    const Vector3d& gravity_W, const AugmentOptions& options, const WeightOptions& weighting,
                    const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
                    belief::ObjectBelief& object);
+
+/// Whether `second` where the first object is thought to be and `first` where the second is explain the frame so much
+/// better than the other way round that they were taken for each other. Both are of one shape (target.mesh) and know
+/// colours; `terms[i]` is the frame with everything put in but the i-th of them.
+bool are_exchanged(const std::array<const rendering::FrameTerms*, 2>& terms,
+                   const std::array<const SearchTarget*, 2>& targets, const std::array<Pose, 2>& X_CO,
+                   const AugmentOptions& options, const FilterTools& tools);
+/// Gives each the other's place, motion and state; names, models, colours, existence and physical parameters stay.
+void exchange(belief::ObjectBelief& first, belief::ObjectBelief& second);
 
 /// Whether an object is to be looked for in the frame of this number.
 bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, std::uint64_t frame);

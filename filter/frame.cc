@@ -37,7 +37,7 @@ rendering::RenderScene only(const BeliefView& view, InstanceKind kind) {
 }  // namespace
 
 core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
-                           std::span<const Pose> X_WG, const ColorModels& colors, const FrameOptions& options,
+                           std::span<const Pose> X_WG, const FrameColors& colors, const FrameOptions& options,
                            const FilterTools& tools, FrameCache& cache, FilterFrame* frame) {
   const belief::RgbdFrame& rgbd = observation.frame;
   if (!rgbd.depth || rgbd.depth->empty())
@@ -65,10 +65,17 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   frame->X_CW = observation.X_WC.inverse();
   frame->X_WG.assign(X_WG.begin(), X_WG.end());
   frame->color_models.clear();
+  frame->color_objects.clear();
   std::vector<rendering::ColorModel> color_models;
-  for (const auto& [name, model] : colors) {
-    frame->color_models.push_back(name);
-    color_models.push_back(model);
+  if (rgbd.color) {
+    for (const auto& [name, model] : colors.of_models) {
+      frame->color_models.push_back(name);
+      color_models.push_back(model);
+    }
+    for (const auto& [name, model] : colors.of_objects) {
+      frame->color_objects.push_back(name);
+      color_models.push_back(model);
+    }
   }
   rendering::FrameTermsInput input;
   input.camera = rgbd.camera;
@@ -76,7 +83,6 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   if (rgbd.color && !color_models.empty()) input.color = rgbd.color->view();
   if (!scene->supports.empty()) input.background = cache.supports.view();
   input.color_models = color_models;
-  if (!rgbd.color) frame->color_models.clear();
   PRESCENE_RETURN_IF_ERROR(
       make_frame_terms(input, options.terms, rendering::SensorModel(options.sensor), &frame->terms));
   // Only where supports are known is a missing return there evidence; elsewhere the view is open.
@@ -94,6 +100,16 @@ SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& fram
   target.material = material_of(model.surface, model.color);
   const auto color = std::find(frame.color_models.begin(), frame.color_models.end(), model.name);
   if (color != frame.color_models.end()) target.color_model = static_cast<int>(color - frame.color_models.begin());
+  return target;
+}
+
+SearchTarget target_of(const belief::ObjectBelief& object, const belief::Scene& scene, const FilterFrame& frame,
+                       const FilterTools& tools) {
+  SearchTarget target = target_of(scene.models[static_cast<std::size_t>(object.model)], frame, tools);
+  const auto own = std::find(frame.color_objects.begin(), frame.color_objects.end(), object.name);
+  if (own != frame.color_objects.end())
+    target.color_model =
+        static_cast<int>(frame.color_models.size()) + static_cast<int>(own - frame.color_objects.begin());
   return target;
 }
 

@@ -16,6 +16,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
+#include "prescene/filter/learned_colors.h"
 #include "prescene/filter/pose_search.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/filter/segmentation.h"
@@ -35,6 +36,7 @@ struct FilterTools {
 struct FrameOptions {
   rendering::FrameTermsOptions terms;
   rendering::SensorModelOptions sensor;
+  ColorLearningOptions colors;
 };
 
 /// A frame, prepared.
@@ -47,7 +49,9 @@ struct FilterFrame {
   geometry::DepthImage supports;                    ///< Their depth in terms.camera, 0 = none.
   geometry::DepthImage robot;                       ///< The same of the robot's bodies.
   std::shared_ptr<const SupportSurfaces> surfaces;  ///< Of the supports, where no object can be. Never null.
-  std::vector<std::string> color_models;            ///< Model names, in the order of terms.color_ratio.
+  /// Names of models, then of objects, in the order of terms.color_ratio.
+  std::vector<std::string> color_models;
+  std::vector<std::string> color_objects;
 };
 
 /// The supports alone, rendered and as surfaces, kept while camera and supports stay where they are.
@@ -59,17 +63,24 @@ struct FrameCache {
   std::shared_ptr<const SupportSurfaces> surfaces;
 };
 
-/// Colour models by the name of the object model; none for a model means depth only.
 using ColorModels = std::map<std::string, rendering::ColorModel>;
+/// What things look like; what is named by neither is known by depth only.
+struct FrameColors {
+  ColorModels of_models;   ///< By the name of the object model.
+  ColorModels of_objects;  ///< By the name of the object; counts more than its model's.
+};
 
 /// Fails with kInvalidInput when the frame's sizes don't fit its camera, a pose is not finite, or there is no depth.
 /// X_WG.size() == scene->robot.size().
 core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
-                           std::span<const Pose> X_WG, const ColorModels& colors, const FrameOptions& options,
+                           std::span<const Pose> X_WG, const FrameColors& colors, const FrameOptions& options,
                            const FilterTools& tools, FrameCache& cache, FilterFrame* frame);
 
 /// The target to look for, of a model of the scene.
 SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& frame, const FilterTools& tools);
+/// The same of an object of the scene, with its own colours if the frame has them.
+SearchTarget target_of(const belief::ObjectBelief& object, const belief::Scene& scene, const FilterFrame& frame,
+                       const FilterTools& tools);
 
 /// Depth of one object in the frame's reduced camera, 0 where it is not.
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,

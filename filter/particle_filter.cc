@@ -6,6 +6,7 @@
 
 #include "prescene/belief/robot_motion.h"
 #include "prescene/core/check.h"
+#include "prescene/filter/learn_colors.h"
 
 namespace prescene::filter {
 namespace {
@@ -125,7 +126,7 @@ void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& 
   const core::RandomStream stream(belief.seed, core::Purpose::kProposal);
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
-    const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
+    const SearchTarget target = target_of(belief.objects[i], *belief.scene, frame, tools_);
     const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
     reports[i] = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
                         stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
@@ -138,6 +139,31 @@ void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& 
   }
 }
 
+void ParticleFilter::exchange_all(const FilterFrame& frame, StepResult& result,
+                                  std::vector<geometry::DepthImage>& depths, std::vector<WeightReport>& reports) {
+  Belief& belief = result.belief;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    const SearchTarget target = target_of(belief.objects[i], *belief.scene, frame, tools_);
+    if (target.color_model < 0) continue;
+    for (std::size_t j = i + 1; j < belief.objects.size(); ++j) {
+      const SearchTarget other = target_of(belief.objects[j], *belief.scene, frame, tools_);
+      if (other.color_model < 0 || other.color_model == target.color_model || other.mesh != target.mesh) continue;
+      const Particle& first = belief::heaviest(belief.objects[i].particles);
+      const Particle& second = belief::heaviest(belief.objects[j].particles);
+      if (first.mode == belief::MotionMode::kHeld || second.mode == belief::MotionMode::kHeld) continue;
+      const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
+      const rendering::FrameTerms other_terms = terms_of(frame, belief, j, other, depths);
+      if (!are_exchanged({&terms, &other_terms}, {&target, &other}, {frame.X_CW * first.X_WO, frame.X_CW * second.X_WO},
+                         settings_.augment, tools_))
+        continue;
+      exchange(belief.objects[i], belief.objects[j]);
+      std::swap(depths[i], depths[j]);
+      std::swap(reports[i], reports[j]);
+      ++result.counters.exchanges;
+    }
+  }
+}
+
 void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports, StepResult& result,
                                  std::vector<geometry::DepthImage>& depths) {
   Belief& belief = result.belief;
@@ -146,7 +172,7 @@ void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<Wei
     ObjectBelief& object = belief.objects[i];
     const bool look = wants_recovery(settings_.augment, object, belief.step + i);
     if (!look && object.frames_refuted == 0) continue;
-    const SearchTarget target = target_of(model_of(belief, i), frame, tools_);
+    const SearchTarget target = target_of(belief.objects[i], *belief.scene, frame, tools_);
     const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
     const WeightReport& report = reports[i];
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
@@ -219,7 +245,8 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   FilterFrame frame;
   result.frame_status =
-      prepare_frame(belief.scene, observation, X_WG, settings_.colors, settings_.frame, tools_, frame_cache_, &frame);
+      prepare_frame(belief.scene, observation, X_WG, {settings_.colors, learned_models(belief, settings_.frame.colors)},
+                    settings_.frame, tools_, frame_cache_, &frame);
   if (!result.frame_status.ok()) {
     result.degraded |= kFrameRejected;
     if (first) belief.step = 0;  // the first look is still to be taken
@@ -232,12 +259,14 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   std::vector<geometry::DepthImage> depths;
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    depths.push_back(depth_of(target_of(model_of(belief, i), frame, tools_),
+    depths.push_back(depth_of(target_of(belief.objects[i], *belief.scene, frame, tools_),
                               frame.X_CW * belief::heaviest(belief.objects[i].particles).X_WO, frame.terms.camera,
                               *tools_.renderer));
   std::vector<WeightReport> reports(belief.objects.size());
   weigh_all(frame, first ? settings_.max_gap : dt, result, depths, reports);
   note("weight", result);
+  exchange_all(frame, result, depths, reports);
+  learn_colors(frame, observation, reports, settings_.frame.colors, tools_, belief);
 
   const core::RandomStream stream(belief.seed, core::Purpose::kResample);
   for (std::size_t i = 0; i < belief.objects.size(); ++i)

@@ -40,9 +40,9 @@ struct FilterSettings {
   ResampleOptions resample;
   TrackStateOptions track;
   SupportTrackingOptions supports;
-  ColorModels colors;         ///< By model name; a model without one is tracked by depth alone.
-  bool recover = true;        ///< Look for objects that are not tracked.
-  double max_gap = 1.0;       ///< s; a longer pause between frames is predicted as one of this length.
+  ColorModels colors;    ///< By model name; what an object's colours were learned to be (frame.colors) counts more.
+  bool recover = true;   ///< Look for objects that are not tracked.
+  double max_gap = 1.0;  ///< s; a longer pause between frames is predicted as one of this length.
   double island_gap = 0.005;  ///< m; objects nearer than this form an island.
   /// Time of Scene timelines and actions: s between their start and the stamp 0 (robot bodies that no observation
   /// names).
@@ -66,6 +66,7 @@ struct StepCounters {
   int recoveries_tried = 0;
   int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
+  int exchanges = 0;         ///< Pairs of one shape that had been taken for each other.
   int hidden_particles = 0;  ///< That stayed hidden.
   int hidden_proposed = 0;   ///< Put at places where a refuted object may hide.
   int looked_for = 0;        ///< At the start.
@@ -109,6 +110,8 @@ class ParticleFilter {
                  std::vector<WeightReport>& reports);
   void recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports, StepResult& result,
                    std::vector<geometry::DepthImage>& depths);
+  void exchange_all(const FilterFrame& frame, StepResult& result, std::vector<geometry::DepthImage>& depths,
+                    std::vector<WeightReport>& reports);
   void look_for_more(const FilterFrame& frame, const belief::Observation& observation,
                      const std::vector<geometry::DepthImage>& depths, StepResult& result);
   rendering::FrameTerms terms_of(const FilterFrame& frame, const belief::Belief& belief, std::size_t object,

@@ -23,6 +23,7 @@ class ColorHistogram {
   /// Adds the pixels whose mask has the given value; both images of one size.
   void add(geometry::ImageView<const geometry::Rgb> image, geometry::ImageView<const std::uint8_t> mask,
            std::uint8_t value);
+  void add_to_bin(std::size_t bin, double weight) { counts_[bin] += weight; }
   double total() const;
   const std::vector<double>& counts() const { return counts_; }
 

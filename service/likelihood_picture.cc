@@ -95,8 +95,9 @@ core::Result<std::vector<ObjectEvidence>> evidence_of_pixels(const belief::Belie
   all_pixels.terms.target_width = observation.frame.camera.width;
   filter::FrameCache cache;
   filter::FilterFrame frame;
-  PRESCENE_RETURN_IF_ERROR(
-      prepare_frame(belief.scene, observation, belief.robot, colors, all_pixels, tools, cache, &frame));
+  PRESCENE_RETURN_IF_ERROR(prepare_frame(belief.scene, observation, belief.robot,
+                                         {colors, learned_models(belief, options.colors)}, all_pixels, tools, cache,
+                                         &frame));
 
   struct Seen {
     const belief::ObjectBelief* object;
@@ -107,8 +108,7 @@ core::Result<std::vector<ObjectEvidence>> evidence_of_pixels(const belief::Belie
   std::vector<Seen> seen;
   for (const belief::ObjectBelief& object : belief.objects) {
     if (object.state == belief::TrackState::kLost) continue;
-    const filter::SearchTarget target =
-        target_of(belief.scene->models[static_cast<std::size_t>(object.model)], frame, tools);
+    const filter::SearchTarget target = target_of(object, *belief.scene, frame, tools);
     const belief::Pose X_CO = frame.X_CW * belief::heaviest(object.particles).X_WO;
     seen.push_back({&object, target, X_CO, depth_of(target, X_CO, frame.terms.camera, *renderer)});
   }

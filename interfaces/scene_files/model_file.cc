@@ -191,6 +191,7 @@ std::string model_yaml(const ModelFile& file) {
   line("color", text_of(Vector3d(model.color.r, model.color.g, model.color.b)));
   if (model.surface != belief::SurfaceKind::kOpaque)
     line("surface", model.surface == belief::SurfaceKind::kMirror ? "mirror" : "transparent");
+  if (model.learn_colors) line("learn_colors", "true");
   if (model.hollow)
     line("hollow", "{size: " + text_of(model.hollow->size) + ", position: " + text_of(model.hollow->X_OV.translation) +
                        ", rotation: {quaternion: " + text_of(model.hollow->X_OV.rotation) + "}}");

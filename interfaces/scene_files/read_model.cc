@@ -291,6 +291,7 @@ belief::ObjectModel read_object_model(const LocatedValue& value, const std::stri
       {"transparent", belief::SurfaceKind::kTransparent},
       {"mirror", belief::SurfaceKind::kMirror}};
   binder.read_enum("surface", model.surface, kSurfaces);
+  binder.read("learn_colors", model.learn_colors);
   if (!merged) binder.note_known("file");
   return model;
 }

@@ -194,6 +194,12 @@ ObjectBelief random_object_belief(RandomStream& stream, const std::string& name)
   object.visible_share = stream.uniform();
   object.frames_unseen = random_below(stream, 100);
   object.frames_refuted = random_below(stream, 100);
+  if (random_below(stream, 2) == 1) {
+    std::vector<ColorShare> shares;
+    for (int bin = random_below(stream, 900); bin < kColorCells; bin += 1 + random_below(stream, 900))
+      shares.push_back({bin, stream.uniform(), stream.uniform()});
+    object.colors = {1 + random_below(stream, 100), std::make_shared<const std::vector<ColorShare>>(std::move(shares))};
+  }
   object.last_seen_ns = static_cast<core::TimeNs>(stream.next_u64() >> 2);
   object.island = random_below(stream, 5);
   const Pose middle = random_pose(stream);

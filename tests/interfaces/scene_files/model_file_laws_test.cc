@@ -78,6 +78,7 @@ ModelFile random_model(RandomStream& stream) {
   model.symmetry = random_symmetry(stream);
   model.surface = static_cast<belief::SurfaceKind>(tests::random_below(stream, 3));
   model.color = {stream.uniform(), stream.uniform(), stream.uniform()};
+  model.learn_colors = tests::random_below(stream, 2) == 1;
   if (tests::random_below(stream, 2) == 1)
     model.hollow = belief::Hollow{tests::random_pose(stream), geometry::Vector3d(0.1, 0.2, stream.uniform(0.1, 0.3))};
   return file;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/learned_colors.h"
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "prescene/core/check.h"
+
+namespace prescene::filter {
+
+using belief::ColorShare;
+using belief::LearnedColors;
+
+static_assert(belief::kColorCells == rendering::kColorBins * rendering::kColorBins * rendering::kColorBins);
+
+void blend(const rendering::ColorHistogram& object, const rendering::ColorHistogram& rest,
+           const ColorLearningOptions& options, LearnedColors& colors) {
+  const double object_total = object.total(), rest_total = rest.total();
+  PRESCENE_CHECK(object_total > 0.0 && rest_total > 0.0);
+  ++colors.frames;
+  const double gain = std::max(1.0 / colors.frames, options.gain);
+  auto shares = std::make_shared<std::vector<ColorShare>>();
+  const std::vector<ColorShare> none;
+  const std::vector<ColorShare>& before = colors.shares ? *colors.shares : none;
+  auto old = before.begin();
+  for (int bin = 0; bin < belief::kColorCells; ++bin) {
+    ColorShare share{.bin = bin};
+    if (old != before.end() && old->bin == bin) share = *old++;
+    const auto i = static_cast<std::size_t>(bin);
+    share.object += gain * (object.counts()[i] / object_total - share.object);
+    share.rest += gain * (rest.counts()[i] / rest_total - share.rest);
+    if (std::max(share.object, share.rest) >= options.least_share) shares->push_back(share);
+  }
+  colors.shares = std::move(shares);
+}
+
+rendering::ColorModel model_of(const LearnedColors& colors, const rendering::ColorModelOptions& options) {
+  PRESCENE_CHECK(colors.shares != nullptr);
+  rendering::ColorHistogram object, rest;
+  for (const ColorShare& share : *colors.shares) {
+    object.add_to_bin(static_cast<std::size_t>(share.bin), share.object);
+    rest.add_to_bin(static_cast<std::size_t>(share.bin), share.rest);
+  }
+  return make_color_model(object, rest, options);
+}
+
+bool learns(const belief::Belief& belief, const belief::ObjectBelief& object, const ColorLearningOptions& options) {
+  return options.learn || belief.scene->models[static_cast<std::size_t>(object.model)].learn_colors;
+}
+
+std::map<std::string, rendering::ColorModel> learned_models(const belief::Belief& belief,
+                                                            const ColorLearningOptions& options) {
+  std::map<std::string, rendering::ColorModel> models;
+  for (const belief::ObjectBelief& object : belief.objects)
+    if (learns(belief, object, options) && object.colors.shares && object.colors.frames >= options.frames)
+      models.emplace(object.name, model_of(object.colors, options.model));
+  return models;
+}
+
+}  // namespace prescene::filter
