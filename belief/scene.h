@@ -2,6 +2,7 @@
 // A scene: what is fixed, what may move, who acts, and what is asked about it. The context C of the estimation problem.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -66,6 +67,16 @@ struct SceneCamera {
   friend bool operator==(const SceneCamera&, const SceneCamera&) = default;
 };
 
+/// The depth camera's noise where it was measured; what is empty is the sensor model's default
+/// (docs/sensor_model.md).
+struct DepthNoiseSettings {
+  std::optional<double> sigma_per_depth_squared;           ///< 1/m, > 0 and at most 1: sigma = s d^2, seen frontally.
+  std::optional<double> incidence_knee;                    ///< Cosine, [0, 1), below which sigma grows.
+  std::optional<std::array<double, 3>> incidence_missing;  ///< Shares, [0, 1), at cosines up to 0.2, 0.4, 0.6.
+  std::optional<std::array<double, 4>> outline_missing;    ///< The same up to 1.5, 3, 6, 12 pixels from the outline.
+  friend bool operator==(const DepthNoiseSettings&, const DepthNoiseSettings&) = default;
+};
+
 struct Scene {
   std::string name;
   std::vector<ObjectModel> models;
@@ -73,6 +84,7 @@ struct Scene {
   std::vector<KinematicBody> robot;
   std::vector<SceneObject> objects;
   std::optional<SceneCamera> camera;
+  DepthNoiseSettings depth_noise;
   Vector3d gravity_W = Vector3d(0.0, 0.0, -9.81);  ///< m/s^2
   std::vector<Action> actions;
   double duration = 5.0;     ///< Longest simulated time, s.

@@ -35,6 +35,22 @@ Status check_thing(const Scene& scene, const std::string& name) {
   return {};
 }
 
+Status check_depth_noise(const DepthNoiseSettings& noise) {
+  if (const auto sigma = noise.sigma_per_depth_squared; sigma && !(*sigma > 0.0 && *sigma <= 1.0))
+    return invalid_input("sigma_per_depth_squared of " + std::to_string(*sigma) + ": give more than 0 and at most 1");
+  const auto check_share = [](const char* what, double share) {
+    if (share >= 0.0 && share < 1.0) return Status();
+    return invalid_input(std::string(what) + " of " + std::to_string(share) + ": give at least 0 and less than 1");
+  };
+  if (noise.incidence_knee) PRESCENE_RETURN_IF_ERROR(check_share("incidence_knee", *noise.incidence_knee));
+  if (noise.incidence_missing)
+    for (const double share : *noise.incidence_missing)
+      PRESCENE_RETURN_IF_ERROR(check_share("incidence_missing", share));
+  if (noise.outline_missing)
+    for (const double share : *noise.outline_missing) PRESCENE_RETURN_IF_ERROR(check_share("outline_missing", share));
+  return {};
+}
+
 struct ActionCheck {
   const Scene& scene;
   Status operator()(const Release& release) const {
@@ -244,6 +260,7 @@ Status validate(const Scene& scene) {
     PRESCENE_RETURN_IF_ERROR(geometry::validate(scene.camera->intrinsics).at("camera"));
     PRESCENE_RETURN_IF_ERROR(check_pose(scene.camera->X_WC).at("camera"));
   }
+  PRESCENE_RETURN_IF_ERROR(check_depth_noise(scene.depth_noise).at("depth_noise"));
   if (!scene.gravity_W.allFinite()) return invalid_input("gravity is not finite: give m/s^2");
   PRESCENE_RETURN_IF_ERROR(check_finite_positive(scene.duration, "a duration"));
   double last = 0.0;

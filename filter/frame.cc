@@ -36,6 +36,15 @@ rendering::RenderScene only(const BeliefView& view, InstanceKind kind) {
 
 }  // namespace
 
+rendering::SensorModelOptions with_settings(rendering::SensorModelOptions options,
+                                            const belief::DepthNoiseSettings& noise) {
+  options.sigma_per_depth_squared = noise.sigma_per_depth_squared.value_or(options.sigma_per_depth_squared);
+  options.incidence_knee = noise.incidence_knee.value_or(options.incidence_knee);
+  options.incidence_missing = noise.incidence_missing.value_or(options.incidence_missing);
+  options.outline_missing = noise.outline_missing.value_or(options.outline_missing);
+  return options;
+}
+
 core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
                            std::span<const Pose> X_WG, const FrameColors& colors, const FrameOptions& options,
                            const FilterTools& tools, FrameCache& cache, FilterFrame* frame) {
@@ -83,8 +92,8 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   if (rgbd.color && !color_models.empty()) input.color = rgbd.color->view();
   if (!scene->supports.empty()) input.background = cache.supports.view();
   input.color_models = color_models;
-  PRESCENE_RETURN_IF_ERROR(
-      make_frame_terms(input, options.terms, rendering::SensorModel(options.sensor), &frame->terms));
+  PRESCENE_RETURN_IF_ERROR(make_frame_terms(
+      input, options.terms, rendering::SensorModel(with_settings(options.sensor, scene->depth_noise)), &frame->terms));
   // Only where supports are known is a missing return there evidence; elsewhere the view is open.
   for (int y = 0; y < frame->terms.camera.height; ++y)
     for (int x = 0; x < frame->terms.camera.width; ++x)

@@ -35,9 +35,13 @@ struct FilterTools {
 
 struct FrameOptions {
   rendering::FrameTermsOptions terms;
-  rendering::SensorModelOptions sensor;
+  rendering::SensorModelOptions sensor;  ///< What the scene's depth_noise holds counts more.
   ColorLearningOptions colors;
 };
+
+/// `options` with what the scene says of its camera in their place.
+rendering::SensorModelOptions with_settings(rendering::SensorModelOptions options,
+                                            const belief::DepthNoiseSettings& noise);
 
 /// A frame, prepared.
 struct FilterFrame {

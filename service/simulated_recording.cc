@@ -8,6 +8,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/robot_motion.h"
+#include "prescene/filter/frame.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
@@ -34,7 +35,7 @@ class Player {
         backends_(backends),
         renderer_(renderer),
         recording_(recording),
-        camera_(rendering::SensorModel(options.sensor), options.camera),
+        camera_(rendering::SensorModel(filter::with_settings(options.sensor, scene.depth_noise)), options.camera),
         noise_(seed, core::Purpose::kSensorNoise) {}
 
   core::Status write_camera_pose() {

@@ -2,8 +2,10 @@
 #include "prescene/interfaces/scene_files/scene_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "prescene/belief/validation.h"
 #include "prescene/interfaces/bytes/file.h"
@@ -62,6 +64,25 @@ void for_each_named(const LocatedValue* map, Problems& problems, const Read& rea
   for (std::size_t i = 0; i < map->keys.size(); ++i) read(map->items[i], map->keys[i].name);
 }
 
+template <std::size_t kCount>
+void read_shares(Binder& binder, const char* key, std::optional<std::array<double, kCount>>& to) {
+  constexpr NumberRange kShare{0.0, 0.999, "give shares of pixels without a return, at least 0 and below 1"};
+  const LocatedValue* at = binder.find(key);
+  const auto shares = at ? read_numbers(*at, binder.problems(), kCount, kShare) : std::nullopt;
+  if (shares) std::copy(shares->begin(), shares->end(), to.emplace().begin());
+}
+
+belief::DepthNoiseSettings read_depth_noise(const LocatedValue& value, Problems& problems) {
+  belief::DepthNoiseSettings noise;
+  Binder binder(value, problems);
+  binder.read("sigma_per_depth_squared", noise.sigma_per_depth_squared,
+              {1e-6, 1.0, "give the deviation in metres at 1 m, seen frontally (structured light 0.002 to 0.007)"});
+  binder.read("incidence_knee", noise.incidence_knee, {0.0, 0.999, "give a cosine, at least 0 and below 1"});
+  read_shares(binder, "incidence_missing", noise.incidence_missing);
+  read_shares(binder, "outline_missing", noise.outline_missing);
+  return noise;
+}
+
 void read_gravity(Binder& binder, Scene& scene) {
   const LocatedValue* at = binder.find("gravity");
   if (at) scene.gravity_W = read_vector(*at, binder.problems(), kGravity);
@@ -99,6 +120,7 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
     scene.objects.push_back(read_object(value, name, context));
   });
   if (const LocatedValue* at = binder.find("camera")) scene.camera = read_camera(*at, context);
+  if (const LocatedValue* at = binder.find("depth_noise")) scene.depth_noise = read_depth_noise(*at, problems);
   if (const LocatedValue* at = binder.find("actions")) scene.actions = read_actions(*at, context);
   const LocatedValue* outcomes = binder.find("outcomes");
   read_names(outcomes, problems);

@@ -84,6 +84,18 @@ std::string text_of(const MeshInspection& found) {
   return text;
 }
 
+std::string scene_yaml(const rendering::SensorModelOptions& settings) {
+  const auto list = [](std::span<const double> values) {
+    std::string text;
+    for (const double value : values) text += (text.empty() ? "[" : ", ") + core::rounded_text(value);
+    return text + "]";
+  };
+  return "depth_noise:\n  sigma_per_depth_squared: " + core::rounded_text(settings.sigma_per_depth_squared) +
+         "\n  incidence_knee: " + core::rounded_text(settings.incidence_knee) +
+         "\n  incidence_missing: " + list(settings.incidence_missing) +
+         "\n  outline_missing: " + list(settings.outline_missing) + "\n";
+}
+
 std::string text_of(const DepthNoise& noise) {
   std::vector<std::vector<std::string>> rows = {{"class", "up to", "pixels", "sigma / depth^2, 1/m", "missing, %"}};
   const auto add = [&rows](const char* name, const std::vector<DepthNoiseClass>& classes) {
@@ -101,9 +113,7 @@ std::string text_of(const DepthNoise& noise) {
   if (noise.quantisation_per_depth_squared)
     text += "steps of " + fixed_text(*noise.quantisation_per_depth_squared, 5) + " / m x depth^2\n";
   if (noise.step) text += "steps of " + fixed_text(1e3 * *noise.step, 2) + " mm\n";
-  text += "settings of the sensor model (SensorModelOptions; FilterSettings::frame.sensor of the library):\n";
-  const auto json = to_json(noise)["settings"];
-  for (const auto& [name, value] : json.items()) text += "  " + name + " = " + value.dump() + "\n";
+  text += "for the scene file:\n\n" + scene_yaml(noise.settings) + "\n";
   for (const std::string& remark : noise.remarks) text += "remark: " + remark + "\n";
   return text;
 }

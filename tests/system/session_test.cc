@@ -105,6 +105,27 @@ TEST_F(Session, InspectShowsAFrameAndWhyItsPosesAreBelieved) {
   EXPECT_LT(blue, orange / 4);
 }
 
+TEST_F(Session, AMeasuredDepthNoiseGoesIntoTheSceneFile) {
+  // The scene's own camera, from above, twice as noisy as the default.
+  std::string scene = kScene;
+  scene.replace(scene.find("from: [0.55, -0.5, 0.5]"), 23, "from: [0.0, -0.2, 0.7]");
+  write_file(path("noisy.yaml"), scene + "depth_noise: {sigma_per_depth_squared: 0.008}\n");
+  ASSERT_EQ(
+      run_program({"record", "--simulate", path("noisy.yaml"), "-o", path("still.mcap"), "--rate", "12"}).exit_code, 0);
+  const Finished found = run_program({"inspect", path("still.mcap"), "--depth-noise", "--json"});
+  ASSERT_EQ(found.exit_code, 0) << found.err;
+  const double sigma = parsed(found)["settings"]["sigma_per_depth_squared"].get<double>();
+  EXPECT_NEAR(sigma, 0.008, 0.1 * 0.008);
+
+  const std::string printed = run_program({"inspect", path("still.mcap"), "--depth-noise"}).out;
+  const std::size_t begin = printed.find("depth_noise:\n");
+  ASSERT_NE(begin, std::string::npos) << printed;
+  write_file(path("measured.yaml"), scene + printed.substr(begin, printed.find("\n\n", begin) - begin) + "\n");
+  const Finished valid = run_program({"validate", path("measured.yaml")});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+  EXPECT_EQ(run_program({"replay", path("still.mcap"), "--scene", path("measured.yaml"), "--json"}).exit_code, 0);
+}
+
 TEST_F(Session, InspectSaysWhatIsAmiss) {
   const auto refused = [&](std::vector<std::string> args, const std::string& reason) {
     args.insert(args.begin(), "inspect");

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -94,6 +95,8 @@ TEST(SceneFile, DefaultsAreThoseOfTheStructs) {
   EXPECT_EQ(scene.models[0].contact, belief::ContactProperties{});
   EXPECT_EQ(scene.models[0].mass, belief::ScalarDistribution(belief::FixedScalar{1.0}));
   EXPECT_FALSE(scene.camera.has_value());
+  EXPECT_EQ(scene.depth_noise, belief::DepthNoiseSettings{});
+  EXPECT_FALSE(scene.models[0].learn_colors);
   // Uniform density: (y^2 + z^2) / 12.
   EXPECT_NEAR(scene.models[0].unit_inertia(0, 0), (0.04 + 0.09) / 12.0, 1e-12);
 }
@@ -179,6 +182,21 @@ TEST(SceneFile, ALookedAtPointIsInTheMiddleOfThePicture) {
   EXPECT_LT(above_C.y(), 0.0) << "up in the world is up in the picture, where y points down";
   EXPECT_NEAR(camera.intrinsics.fx, 160.0, 1e-9);
   EXPECT_EQ(camera.intrinsics.cx, 159.5);
+}
+
+TEST(SceneFile, ReadsTheDepthNoiseAndRefusesWhatNoCameraHas) {
+  const auto noise =
+      scene_of(small("depth_noise: {incidence_knee: 0.5, incidence_missing: [0.3, 0.2, 0]}\n")).depth_noise;
+  EXPECT_EQ(noise.incidence_knee, 0.5);
+  EXPECT_EQ(noise.incidence_missing, (std::array{0.3, 0.2, 0.0}));
+  EXPECT_FALSE(noise.sigma_per_depth_squared || noise.outline_missing);
+  const auto error = [](const std::string& keys) { return error_of(small("depth_noise: {" + keys + "}\n")); };
+  EXPECT_THAT(error("sigma_per_depth_squared: 0"), HasSubstr("metres at 1 m"));
+  EXPECT_THAT(error("sigma_per_depth_squared: 3.8"), HasSubstr("metres at 1 m"));
+  EXPECT_THAT(error("incidence_knee: 1"), HasSubstr("a cosine"));
+  EXPECT_THAT(error("incidence_missing: [0.1, 0.2]"), HasSubstr("depth_noise.incidence_missing"));
+  EXPECT_THAT(error("outline_missing: [0.1, 0.2, 0.1, 1.0]"), HasSubstr("shares of pixels"));
+  EXPECT_THAT(error("outline_mising: [0.1, 0.2, 0.1, 0.1]"), HasSubstr("did you mean 'outline_missing'"));
 }
 
 TEST(SceneFile, ListsAllMistakesAtOnce) {
