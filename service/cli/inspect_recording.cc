@@ -78,6 +78,7 @@ core::Status write_picture(const std::string& path, const geometry::ColorImage& 
 
 core::Status inspect_recording(const RecordingInspection& options, VerbContext& context) {
   const std::string place = options.input.path.string();
+  PRESCENE_RETURN_IF_ERROR(check_apart("--overlay", options.overlay, "--likelihood-map", options.likelihood_map));
   PRESCENE_RETURN_IF_ERROR(check_output("--overlay", options.overlay, {place}));
   PRESCENE_RETURN_IF_ERROR(check_output("--likelihood-map", options.likelihood_map, {place}));
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(options.input, context.log()));

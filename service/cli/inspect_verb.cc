@@ -119,7 +119,8 @@ std::string text_of(const DepthNoise& noise) {
 }
 
 core::Status inspect_mesh(Options& options, VerbContext& context) {
-  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.file, options.report}));
+  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.file}));
+  PRESCENE_RETURN_IF_ERROR(check_apart("-o", options.model, "--report", options.report));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.file}));
   if (options.y_up) options.inspection.read.up_axis = interfaces::UpAxis::kY;
   PRESCENE_TRY(const MeshInspection found, service::inspect_mesh(options.file, options.inspection));

@@ -2,7 +2,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <system_error>
@@ -145,10 +144,7 @@ core::Status run(const Options& options, VerbContext& context) {
         "text without --json works out no more than outcomes by itself)");
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene}));
-  std::error_code none;
-  const auto place = [&](const std::string& file) { return std::filesystem::weakly_canonical(file, none); };
-  if (!options.heat_map.empty() && !options.report.empty() && place(options.heat_map) == place(options.report))
-    return core::invalid_input("--heat-map and --report name the same file " + options.report + ": name two");
+  PRESCENE_RETURN_IF_ERROR(check_apart("--heat-map", options.heat_map, "--report", options.report));
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
   BackendSettings settings;
   if (options.stepper == "bullet") settings.stepper = Stepper::kBullet;

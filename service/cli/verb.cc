@@ -190,6 +190,17 @@ std::string live_recording_path(const std::string& asked, VerbContext& context) 
   return unused;
 }
 
+core::Status check_apart(const std::string& option, const std::string& output, const std::string& other_option,
+                         const std::string& other) {
+  if (output.empty() || other.empty()) return core::ok_status();
+  std::error_code none;
+  const auto place = [&](const std::string& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file, none), none);
+  };
+  if (!std::filesystem::equivalent(output, other, none) && place(output) != place(other)) return core::ok_status();
+  return core::invalid_input(option + " and " + other_option + " name the same file " + other + ": name two");
+}
+
 core::Status check_output(const std::string& option, const std::string& output,
                           const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {

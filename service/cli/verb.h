@@ -119,6 +119,9 @@ CLI::Validator number_between(double low, double high);
 CLI::Validator file_name();
 /// Where to record a robot live, see unused_recording_path(); says so when it is another file than the one asked for.
 std::string live_recording_path(const std::string& asked, VerbContext& context);
+/// kInvalidInput if two outputs, named by these options, are one file. Empty names are no files.
+core::Status check_apart(const std::string& option, const std::string& output, const std::string& other_option,
+                         const std::string& other);
 /// kInvalidInput if `output`, named by `option`, would overwrite one of the inputs; kUnavailable where it can't be
 /// written, so that nobody waits for a result that is then lost. Empty names are no files.
 core::Status check_output(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);

@@ -137,6 +137,7 @@ TEST_F(Session, InspectSaysWhatIsAmiss) {
   refused({path("run.mcap"), "--density", "500"}, "--density is for meshes");
   refused({path("none.ply"), "--overlay", path("x.png")}, "--overlay is for recordings");
   refused({path("run.mcap"), "--overlay", path("run.mcap")}, "is the input too");
+  refused({path("run.mcap"), "--overlay", path("a.png"), "--likelihood-map", path("./a.png")}, "name the same file");
 }
 
 TEST_F(Session, ACutRecordingIsReadToItsLastWholeMessage) {
