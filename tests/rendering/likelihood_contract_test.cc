@@ -76,6 +76,7 @@ class LikelihoodContract : public testing::TestWithParam<Backend> {
     const ComputeHealth health = compute->health();
     EXPECT_TRUE(health.last_failure.ok()) << health.last_failure.message();
     EXPECT_EQ(health.lost, 0u);
+    if (IsSkipped()) return;
     EXPECT_GT(health.on_device + health.on_processor, 0u);
   }
 
