@@ -12,9 +12,9 @@ namespace {
 
 // Room for what the integrator and the solver add to the energy, and for overlap that is pushed out (m).
 constexpr double kEnergy = 1.05;
-constexpr double kRise = 1e-3;
+constexpr double kRise = 5e-4;
 // m below a barrier that still counts as over it.
-constexpr double kBarrierRoom = 5e-4;
+constexpr double kBarrierRoom = 2.5e-4;
 // Sliding to a stop takes at most this many times what friction says, and this much more (m).
 constexpr double kSlide = 1.25;
 constexpr double kSlideRoom = 3e-3;
@@ -26,6 +26,25 @@ constexpr double kKeptInLanding = 0.75;
 constexpr double kBouncy = 0.7;
 // s: a fall is over by then.
 constexpr double kFallTime = 1.0;
+// m beyond the side of a thing from which a convex body that tips over that side does not come back.
+constexpr double kTipped = 5e-3;
+// A body rolls over edges that lift its centre of mass by less than this share.
+constexpr double kRollingRise = 0.05;
+
+/// Level direction in which the body tips off the side of a thing, over which its centre of mass is already: x, y, -x
+/// or -y as 0 to 3.
+std::optional<int> tips_off(const SureMotion& motion, const geometry::Box& thing, const Vector3d& relative_velocity) {
+  if (relative_velocity.z() > 0.0) return std::nullopt;
+  for (int side = 0; side < 4; ++side) {
+    const int k = side % 2;
+    const double sign = side < 2 ? 1.0 : -1.0;
+    const double beyond = sign > 0.0 ? motion.center[k] - thing.max()[k] : thing.min()[k] - motion.center[k];
+    const Vector3d tipping_axis = Vector3d::UnitZ().cross(sign * Vector3d::Unit(k));
+    if (beyond >= kTipped && sign * relative_velocity[k] >= 0.0 && motion.angular_velocity.dot(tipping_axis) >= 0.0)
+      return side;
+  }
+  return std::nullopt;
+}
 
 bool disjoint_and_parting(const geometry::Box& a, const geometry::Box& b, const Vector3d& v) {
   for (int k = 0; k < 2; ++k) {
@@ -35,10 +54,18 @@ bool disjoint_and_parting(const geometry::Box& a, const geometry::Box& b, const 
   return false;
 }
 
-double depth_of(const ConvexPolytope& hull, const Vector3d& p) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const ConvexPolytope::Face& face : hull.faces) least = std::min(least, face.offset - face.normal.dot(p));
-  return least;
+bool rolls(const ConvexPolytope& hull, const Vector3d& center_of_mass) {
+  for (const ConvexPolytope::Face& face : hull.faces) {
+    const double depth = face.offset - face.normal.dot(center_of_mass);
+    const Vector3d foot = center_of_mass + depth * face.normal;
+    for (std::size_t i = 0; i < face.loop.size(); ++i) {
+      const Vector3d& from = hull.vertices[face.loop[i]];
+      const Vector3d side = hull.vertices[face.loop[(i + 1) % face.loop.size()]] - from;
+      const double arm = face.normal.dot(side.cross(foot - from)) / side.norm();
+      if (arm >= 0.0 && std::hypot(depth, arm) < (1.0 + kRollingRise) * depth) return true;
+    }
+  }
+  return false;
 }
 
 std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model, const CertifierOptions& options) {
@@ -60,8 +87,11 @@ std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model
     object.inner_radius = std::max(0.0, body->inner_radius - object.center_play);
   }
   object.edge_radius = std::max(options.edge_rounding, model.contact.edge_radius);
+  object.convex = model.collision.size() == 1 && object.shapes.size() == 1 && object.rise == 0.0;
+  object.rolls = rolls(object.hull, object.center_of_mass);
+  object.rolling_arm = model.contact.rolling_friction;
   for (const ConvexPolytope& shape : object.shapes)
-    object.inner_radius = std::max(object.inner_radius, depth_of(shape, object.center_of_mass) - object.center_play);
+    object.inner_radius = std::max(object.inner_radius, least_depth(shape, object.center_of_mass) - object.center_play);
   for (const Vector3d& v : object.hull.vertices)
     object.outer_radius =
         std::max(object.outer_radius, (v - object.center_of_mass).norm() + object.rise + object.center_play);
@@ -97,6 +127,7 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
     made->support_friction_.push_back(
         std::min(belief::mean(contact.friction),
                  contact.impact_friction ? belief::mean(*contact.impact_friction) : belief::mean(contact.friction)));
+    made->support_rolling_arm_.push_back(contact.rolling_friction);
     made->support_edge_radius_ = std::max({made->support_edge_radius_, options.edge_rounding, contact.edge_radius});
     made->least_support_friction_ = std::min(made->least_support_friction_, made->support_friction_.back());
     for (const belief::CollisionShape& shape : support.collision) {
@@ -123,6 +154,7 @@ bool MotionCertifier::assess(const belief::WorldState& state, double seconds_lef
     const geometry::Matrix3d R = object.X_WO.rotation.toRotationMatrix();
     motion.center = object.X_WO * center_O;
     motion.velocity = object.V_WO.linear + object.V_WO.angular.cross(R * center_O);
+    motion.angular_velocity = object.V_WO.angular;
     const Vector3d w_O = R.transpose() * object.V_WO.angular;
     motion.weight = object.physical.mass * gravity_;
     motion.spin = 0.5 * object.physical.mass * w_O.dot(unit_inertias_[i] * w_O);
@@ -134,6 +166,7 @@ bool MotionCertifier::assess(const belief::WorldState& state, double seconds_lef
   }
   stand(state, motions);
   bound_heights(state, seconds_left, motions);
+  let_roll(state, motions);
   for (std::size_t i = 0; i < motions.size(); ++i)
     if (!stays_in_world(motions[i], objects_[i])) return false;
   if (!robot_ && seconds_left >= kFallTime)
@@ -189,12 +222,13 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     const double sideways = relative.head<2>().squaredNorm() + turning;
     const double gap = std::max(0.0, motion.box.min().z() - motion.plane);
     const double upwards = relative.z() * relative.z() + turning + 2.0 * gravity_ * gap;
-    motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom +
-                   2.0 * std::sqrt(sideways * upwards) / gravity_;
+    motion.hop = 2.0 * std::sqrt(sideways * upwards) / gravity_;
+    motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom + motion.hop;
     // What is below ends in round edges, too.
     const double round =
         on_support ? support_edge_radius_ : objects_[static_cast<std::size_t>(motion.base)].edge_radius;
-    const double edge = options_.shorten_arms ? distance_inside(*best, foot) - round - motion.reach : 1e30;
+    motion.inside = distance_inside(*best, foot) - round;
+    const double edge = options_.shorten_arms ? motion.inside - motion.reach : 1e30;
     motion.trap = trap_of(objects_[i].bearing, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
                           objects_[i].edge_radius);
   }
@@ -229,7 +263,8 @@ std::vector<double> MotionCertifier::lowest_centers(const belief::WorldState& st
     const bool stay = std::ranges::all_of(free, [&](std::size_t j) {
       const SureMotion& motion = motions[j];
       const belief::PhysicalParameters& physical = state.objects[j].physical;
-      const double friction = least_support_friction_ * std::min(physical.friction, physical.impact_friction);
+      double friction = least_support_friction_ * std::min(physical.friction, physical.impact_friction);
+      if (objects_[j].rolls) friction = std::min(friction, objects_[j].rolling_arm / objects_[j].outer_radius);
       const double speed2 = 2.0 * gravity_ * all / motion.weight;
       const double way = std::min(std::sqrt(speed2) * seconds_left,
                                   kSlide * speed2 / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom);
@@ -271,27 +306,50 @@ void MotionCertifier::bound_heights(const belief::WorldState& state, double seco
   }
 }
 
+void MotionCertifier::let_roll(const belief::WorldState& state, std::vector<SureMotion>& motions) const {
+  const auto count = static_cast<int>(objects_.size());
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    SureMotion& motion = motions[i];
+    const CertifiedObject& known = objects_[i];
+    if (motion.trap) motion.lowest = motion.plane + motion.trap->lowest;
+    if (motion.trap || !known.rolls || motion.base < count) continue;
+    const auto support = static_cast<std::size_t>(motion.base - count);
+    const belief::PhysicalParameters& physical = state.objects[i].physical;
+    const double friction = std::min(physical.friction, physical.impact_friction) * support_friction_[support];
+    const double rolling_arm = std::max(known.rolling_arm, support_rolling_arm_[support]);
+    const double resistance = std::min(friction, rolling_arm / (motion.highest - motion.plane));
+    const double lowest = motion.plane + least_depth(known.bearing, physical.center_of_mass);
+    motion.reach = kSlide * (motion.highest - kRise - lowest) / std::max(resistance, 1e-9) + kSlideRoom + motion.hop;
+    if (motion.reach < motion.inside) motion.lowest = lowest;
+  }
+}
+
 bool MotionCertifier::stays_in_world(const SureMotion& motion, const CertifiedObject& known) const {
-  return motion.center.norm() + (motion.trap ? motion.reach : 0.0) + known.outer_radius < world_radius_;
+  return motion.center.norm() + (motion.lowest ? motion.reach : 0.0) + known.outer_radius < world_radius_;
 }
 
 std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>& motions, std::size_t object) const {
   const SureMotion& motion = motions[object];
   double floor = -std::numeric_limits<double>::infinity();
   double lowest_beside = std::numeric_limits<double>::infinity();
+  std::optional<int> tipped_side;
+  const auto falls_past = [&](const geometry::Box& thing, const Vector3d& relative_velocity) {
+    lowest_beside = std::min(lowest_beside, thing.max().z());
+    if (disjoint_and_parting(motion.box, thing, relative_velocity)) return true;
+    // Things on two sides could hold it between them.
+    const std::optional<int> side = objects_[object].convex ? tips_off(motion, thing, relative_velocity) : std::nullopt;
+    if (!side || side != tipped_side.value_or(*side)) return false;
+    tipped_side = side;
+    return true;
+  };
   for (const FixedShape& shape : shapes_) {
-    if (shape.box.max().z() <= motion.box.min().z()) {
+    if (shape.box.max().z() <= motion.box.min().z())
       floor = std::max(floor, shape.box.max().z());
-    } else {
-      if (!disjoint_and_parting(motion.box, shape.box, motion.velocity)) return std::nullopt;
-      lowest_beside = std::min(lowest_beside, shape.box.max().z());
-    }
+    else if (!falls_past(shape.box, motion.velocity))
+      return std::nullopt;
   }
-  for (std::size_t j = 0; j < motions.size(); ++j) {
-    if (j == object) continue;
-    if (!disjoint_and_parting(motion.box, motions[j].box, motion.velocity - motions[j].velocity)) return std::nullopt;
-    lowest_beside = std::min(lowest_beside, motions[j].box.max().z());
-  }
+  for (std::size_t j = 0; j < motions.size(); ++j)
+    if (j != object && !falls_past(motions[j].box, motion.velocity - motions[j].velocity)) return std::nullopt;
   const double rebound = floor + kKeptInLanding * (motion.highest - floor);
   if (!(floor < motion.box.min().z() && (std::isinf(floor) || rebound < lowest_beside + objects_[object].inner_radius)))
     return std::nullopt;

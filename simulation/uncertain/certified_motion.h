@@ -25,12 +25,16 @@ struct CertifiedObject {
   double inner_radius = 0.0;  ///< Of a ball about any such centre that the body holds, m; 0 = none known.
   double outer_radius = 0.0;  ///< Of a ball about any such centre that holds the body, m.
   double edge_radius = 0.0;   ///< m
+  bool convex = false;        ///< All of one convex shape.
+  bool rolls = false;         ///< Some faces meet at hardly any edge.
+  double rolling_arm = 0.0;   ///< m
 };
 
 /// One object of one instance.
 struct SureMotion {
   Vector3d center = Vector3d::Zero();  ///< Of mass, W.
   Vector3d velocity = Vector3d::Zero();
+  Vector3d angular_velocity = Vector3d::Zero();
   double weight = 0.0;   ///< N
   double kinetic = 0.0;  ///< J
   double spin = 0.0;     ///< J, of these in turning
@@ -38,9 +42,13 @@ struct SureMotion {
   geometry::Box box;     ///< Of the hull as it is now, W.
   /// It stays on its lowest face, on a plane.
   std::optional<Trap> trap;
-  double plane = 0.0;  ///< z of that plane.
-  int base = -1;       ///< Body whose plane it is, numbered as in ContactInterval.
-  double reach = 0.0;  ///< How far the centre of mass may still go sideways, m.
+  double plane = 0.0;   ///< z of the plane below it.
+  int base = -1;        ///< Body whose plane it is, numbered as in ContactInterval.
+  double inside = 0.0;  ///< Distance from below the centre of mass to where that plane ends, m.
+  double hop = 0.0;     ///< How far the centre of mass may still fly sideways, m.
+  double reach = 0.0;   ///< How far it may still go sideways altogether, m.
+  /// z that the centre of mass can't get below: it stays on its face, or rolls to a stop on the plane.
+  std::optional<double> lowest;
   /// It has fallen past what is higher than this, and will not come up again: it lands here, or leaves the world below.
   std::optional<double> landing;
 };
@@ -73,6 +81,7 @@ class MotionCertifier {
 
   void stand(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
   void bound_heights(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
+  void let_roll(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
   /// z that the centres of mass of the objects without a trap do not get below before they could give what they have
   /// won by falling to another object, m.
   std::vector<double> lowest_centers(const belief::WorldState& state, double seconds_left,
@@ -88,6 +97,7 @@ class MotionCertifier {
   std::vector<FixedFace> faces_;  // highest first
   std::vector<FixedShape> shapes_;
   std::vector<double> support_friction_;
+  std::vector<double> support_rolling_arm_;
   double support_edge_radius_ = 0.0;
   double least_support_friction_ = std::numeric_limits<double>::infinity();
   bool robot_ = false;

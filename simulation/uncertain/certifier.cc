@@ -80,19 +80,23 @@ class Judge {
     if (box.min().z() > highest_end() + offset_) return Truth::kNo;
     if (passage_ && motion_.highest < passage_->leave->level(motion_.center)) return Truth::kYes;
     if (passage_ && motion_.highest < passage_->enter->level(motion_.center)) return Truth::kNo;
-    if (!motion_.trap) return Truth::kPerhaps;
-    const double sideways = motion_.reach + motion_.trap->arm;
-    const Vector3d low(motion_.center.x() - sideways, motion_.center.y() - sideways,
-                       motion_.plane + motion_.trap->lowest);
+    if (!motion_.lowest) return Truth::kPerhaps;
+    const double sideways = motion_.reach + (motion_.trap ? motion_.trap->arm : 0.0);
+    const Vector3d low(motion_.center.x() - sideways, motion_.center.y() - sideways, *motion_.lowest);
     const Vector3d high(motion_.center.x() + sideways, motion_.center.y() + sideways, motion_.highest);
     return when(!may_be_outside(volume, offset_, low, high), !may_be_inside(volume, offset_, low, high));
   }
   Truth operator()(const belief::BelowHeight& below) const {
-    return when(highest_end() + offset_ < below.height,
-                motion_.trap && motion_.plane + motion_.trap->lowest - offset_ > below.height);
+    return when(highest_end() + offset_<below.height, motion_.lowest&& * motion_.lowest - offset_> below.height);
   }
   Truth operator()(const belief::UprightWithin& upright) const {
-    if (!motion_.trap) return Truth::kPerhaps;
+    if (!motion_.trap) {
+      if (!motion_.lowest) return Truth::kPerhaps;
+      const double needed =
+          least_upright_height(known_.bearing, known_.center_of_mass, upright.axis_O, upright.max_angle + kAngleRoom) -
+          known_.center_play - kCornerLoss * known_.edge_radius;
+      return when(false, motion_.highest - motion_.plane < needed);
+    }
     const Vector3d up_O = -motion_.trap->face_normal_O;
     const double angle = std::atan2(upright.axis_O.cross(up_O).norm(), upright.axis_O.dot(up_O));
     const double tilt = motion_.trap->tilt(motion_.highest - motion_.plane) + kAngleRoom;

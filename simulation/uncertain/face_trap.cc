@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace prescene::simulation {
 namespace {
@@ -49,6 +50,24 @@ void append_level_faces(const std::vector<ConvexPolytope>& hulls, const Pose& X_
       }
     }
   }
+}
+
+double least_depth(const ConvexPolytope& hull, const Vector3d& point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const ConvexPolytope::Face& face : hull.faces) least = std::min(least, face.offset - face.normal.dot(point));
+  return least;
+}
+
+double least_upright_height(const ConvexPolytope& hull, const Vector3d& center_of_mass_O, const Vector3d& up_O,
+                            double angle) {
+  // Each vertex alone lifts the centre by what is left of its arm when tilted away from below by the whole angle.
+  double height = 0.0;
+  for (const Vector3d& v : hull.vertices) {
+    const Vector3d arm = v - center_of_mass_O;
+    const double off_axis = std::atan2(up_O.cross(arm).norm(), -up_O.dot(arm));
+    height = std::max(height, arm.norm() * std::cos(std::min(off_axis + angle, std::numbers::pi)));
+  }
+  return height;
 }
 
 double Trap::tilt(double height) const {

@@ -31,6 +31,13 @@ std::vector<ConvexPolytope> shape_hulls(const std::vector<belief::CollisionShape
 void append_level_faces(const std::vector<ConvexPolytope>& hulls, const Pose& X_WB, double tolerance,
                         std::vector<LevelFace>& faces);
 
+/// Distance from a point inside to the nearest face (m); negative outside.
+double least_depth(const ConvexPolytope& hull, const Vector3d& point);
+/// What the centre of mass is at least above a plane that the hull is above, while the axis `up_O` (unit) is within
+/// `angle` (rad) of upright; m.
+double least_upright_height(const ConvexPolytope& hull, const Vector3d& center_of_mass_O, const Vector3d& up_O,
+                            double angle);
+
 /// What a body that stays on its present lowest face can still do.
 struct Trap {
   double barrier = 0.0;  ///< Height of the centre of mass above the plane, m, below which it can't leave the face.

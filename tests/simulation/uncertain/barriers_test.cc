@@ -57,6 +57,33 @@ TEST(FaceTrap, WhatRollsHasHardlyABarrier) {
   EXPECT_LT(rise, 5e-4);
 }
 
+TEST(UprightHeight, IsReachedByNoOrientation) {
+  const Vector3d center(0.005, -0.003, 0.01);
+  for (const geometry::Primitive& shape :
+       {geometry::Primitive(geometry::Cylinder{0.035, 0.24}), geometry::Primitive(BoxShape{{0.10, 0.08, 0.06}})}) {
+    const ConvexPolytope hull = hull_of(shape);
+    for (const double angle : {0.0, 0.1, 0.35, 1.0}) {
+      const Vector3d up = Vector3d(0.1, 0.2, 1.0).normalized();
+      const double bound = least_upright_height(hull, center, up, angle);
+      double least = std::numeric_limits<double>::infinity();
+      const Vector3d across = up.unitOrthogonal();
+      for (int i = 0; i < 72; ++i) {
+        const Vector3d around = Eigen::AngleAxisd(i * 0.0872665, up) * across;
+        for (int k = 0; k <= 20; ++k) {
+          const Vector3d down = -(Eigen::AngleAxisd(angle * k / 20.0, around) * up);
+          double height = -std::numeric_limits<double>::infinity();
+          for (const Vector3d& v : hull.vertices) height = std::max(height, down.dot(v - center));
+          least = std::min(least, height);
+        }
+      }
+      EXPECT_LE(bound, least + 1e-12) << angle;
+      if (angle < 0.5) {
+        EXPECT_GE(bound, 0.6 * least) << angle;
+      }
+    }
+  }
+}
+
 /// Levels of leaving the hollow of an open bin of 18 cm inner width and 24 cm depth, whose rim is at 25 cm.
 SpillLevels leaving(const std::vector<TriangleMesh>& surfaces, double radius) {
   const auto outside = [](const Vector3d& low, const Vector3d& high) {

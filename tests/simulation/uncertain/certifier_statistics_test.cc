@@ -255,24 +255,69 @@ TEST(Certificates, KnowWhereTheWorldEnds) {
   }
 }
 
-TEST(Certificates, AreNeverGivenToWhatRolls) {
-  // A bottle on its side rolls towards the edge, slowly; whether it gets there is not for its energy to say.
+/// Scene B with a bottle that rolls on its side at `speed` (m/s) towards the table's edge, `way` (m) from it.
+std::optional<std::vector<int>> certified_while_rolling(double rolling_friction, double way, double speed) {
+  auto scene = std::make_shared<belief::Scene>(tests::bottle_at_edge());
+  scene->models[0].contact.rolling_friction = rolling_friction;
+  const Problem problem(scene);
+  const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+  belief::WorldState state = belief::mean_start(*scene);
+  state.objects[0].X_WO.rotation = geometry::exp_rotation({1.5707963267948966, 0.0, 0.0});
+  state.objects[0].X_WO.translation = {-way, 0.0, 0.035};
+  state.objects[0].V_WO.linear = {speed, 0.0, 0.0};
+  state.objects[0].V_WO.angular = {0.0, speed / 0.035, 0.0};
+  return certifier->classes(state, 4.0);
+}
+
+TEST(Certificates, OfWhatRollsNeedFrictionThatStopsIt) {
+  const std::vector<int> lies = {2};  // neither falls nor stands
+  EXPECT_EQ(certified_while_rolling(0.001, 0.2, 0.1), lies);
+  // It rolls 3/2 v^2 / (2 g) / (1 mm / 35 mm) = 2.7 v^2.
+  EXPECT_FALSE(certified_while_rolling(0.001, 0.02, 0.1));
+  EXPECT_FALSE(certified_while_rolling(0.001, 0.2, 0.3));
+  EXPECT_FALSE(certified_while_rolling(0.0, 0.2, 0.01));
+}
+
+TEST(Certificates, OfWhatStandsEndAtTheEdge) {
   const Problem problem(tests::uncertain_scenes()[1].scene);
   const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
   belief::WorldState state = belief::mean_start(*problem.scene);
-  state.objects[0].X_WO.rotation = geometry::exp_rotation({1.5707963267948966, 0.0, 0.0});
-  state.objects[0].X_WO.translation = {-0.2, 0.0, 0.035};
-  state.objects[0].V_WO.linear = {0.01, 0.0, 0.0};
-  state.objects[0].V_WO.angular = {0.0, 0.01 / 0.035, 0.0};
-  EXPECT_FALSE(certifier->classes(state, 4.0));
-  // One that stands still at the same place does stand.
-  state = belief::mean_start(*problem.scene);
   state.objects[0].X_WO = geometry::Pose::from_translation({-0.2, 0.0, 0.12});
   state.objects[0].V_WO = {};
   EXPECT_EQ(certifier->classes(state, 4.0), std::vector<int>{1});
   // Half of its foot beyond the edge it is not sure.
   state.objects[0].X_WO.translation.x() = -0.001;
   EXPECT_FALSE(certifier->classes(state, 4.0));
+}
+
+TEST(Certificates, OfWhatTipsOverAnEdgeNeedItsCentreBeyondIt) {
+  auto scene = std::make_shared<belief::Scene>(tests::bottle_at_edge());
+  const auto classes = [&](double beyond, double speed_out, double spin_out, double speed_up) {
+    const Problem problem(scene);
+    const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+    belief::WorldState state = belief::mean_start(*scene);
+    state.objects[0].X_WO = {geometry::exp_rotation({0.0, 0.8, 0.0}), {beyond, 0.0, 0.09}};
+    state.objects[0].V_WO.linear = {speed_out, 0.0, speed_up};
+    state.objects[0].V_WO.angular = {0.0, spin_out, 0.0};
+    return certifier->classes(state, 4.0);
+  };
+  const std::vector<int> falls = {0};
+  EXPECT_EQ(classes(0.01, 0.1, 1.0, -0.1), falls);
+  EXPECT_FALSE(classes(0.003, 0.1, 1.0, -0.1));  // too near above the edge
+  EXPECT_FALSE(classes(0.01, -0.1, 1.0, -0.1));  // on its way back
+  EXPECT_FALSE(classes(0.01, 0.1, -1.0, -0.1));  // turns back
+  EXPECT_FALSE(classes(0.01, 0.1, 1.0, 0.1));    // rises
+  // What is not convex may hang by a hook.
+  belief::ObjectModel& bottle = scene->models[0];
+  bottle.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{{0.01, 0.01, 0.01}}, {}});
+  EXPECT_FALSE(classes(0.01, 0.1, 1.0, -0.1));
+  // Between two tables it may get stuck.
+  bottle.collision.pop_back();
+  belief::Support second = scene->supports[0];
+  second.name = "second_table";
+  second.X_WS.translation.x() = 1.1;
+  scene->supports.push_back(second);
+  EXPECT_FALSE(classes(0.01, 0.1, 1.0, -0.1));
 }
 
 }  // namespace
