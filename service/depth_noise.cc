@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "prescene/core/text.h"
 #include "prescene/rendering/local_surface.h"
@@ -16,11 +17,12 @@ using core::fixed_text;
 using rendering::SensorModelOptions;
 
 constexpr std::size_t kMostSamples = std::size_t{1} << 25;
-constexpr double kEdge = 0.02;        // m: a jump between neighbours that is an edge
-constexpr double kFrontal = 0.6;      // cosine from which incidence changes nothing in the model
-constexpr double kMoved = 0.006;      // of depth squared, 1/m: a change of the median between the ends is motion ...
-constexpr double kMovedShare = 0.02;  // ... when so many pixels have it
-constexpr int kEnoughPixels = 300;    // of a class that may change a setting
+constexpr double kEdge = 0.02;            // m: a jump between neighbours that is an edge
+constexpr double kFrontal = 0.6;          // cosine from which incidence changes nothing in the model
+constexpr double kMoved = 0.006;          // of depth squared, 1/m: a change of depth that lasts is motion ...
+constexpr double kMovedDeviations = 4.0;  // ... with so many standard deviations more ...
+constexpr double kMovedShare = 0.02;      // ... when so many pixels have it
+constexpr int kEnoughPixels = 300;        // of a class that may change a setting
 
 double median_of(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -99,24 +101,46 @@ geometry::Image<float> edge_distances(const geometry::DepthImage& depth) {
   return distance;
 }
 
-/// The share of the pixels measured at both ends of the recording whose median depth changes between them.
+/// Whether a pixel sees something else for a while: its returns, in time, have a near and a far value farther apart
+/// than noise explains, and stay at each for longer than those of an edge, which come now from the one side and now
+/// from the other.
+bool sees_motion(const std::vector<float>& returns, std::vector<float>& scratch) {
+  const auto count = static_cast<std::ptrdiff_t>(returns.size());
+  scratch.clear();
+  for (std::size_t i = 1; i < returns.size(); ++i) scratch.push_back(std::abs(returns[i] - returns[i - 1]));
+  const double sigma = 1.4826 * median_of(scratch) / std::numbers::sqrt2;
+  scratch = returns;
+  std::ranges::nth_element(scratch, scratch.begin() + count / 10);
+  const auto near = static_cast<double>(scratch[static_cast<std::size_t>(count / 10)]);
+  std::ranges::nth_element(scratch, scratch.begin() + count - 1 - count / 10);
+  const auto far = static_cast<double>(scratch[static_cast<std::size_t>(count - 1 - count / 10)]);
+  if (far - near <= kMoved * near * near + 0.002 + kMovedDeviations * sigma) return false;
+  // Of so many tosses of a coin the longest run is some log2 of the number.
+  const std::ptrdiff_t enough =
+      std::min(count / 3, static_cast<std::ptrdiff_t>(std::log2(static_cast<double>(count)) + 3.0));
+  std::ptrdiff_t run = 0, longest[2] = {0, 0};
+  bool was_far = false;
+  for (const float z : returns) {
+    const bool is_far = static_cast<double>(z) > 0.5 * (near + far);
+    run = is_far == was_far ? run + 1 : 1;
+    was_far = is_far;
+    longest[is_far] = std::max(longest[is_far], run);
+  }
+  return std::min(longest[0], longest[1]) >= enough;
+}
+
+/// Of the pixels that mostly return something.
 double moved_share(const std::vector<geometry::DepthImage>& frames) {
-  const std::size_t third = frames.size() / 3;
   int judged = 0, moved = 0;
-  std::vector<float> first, last;
+  std::vector<float> returns, scratch;
   for (int y = 0; y < frames[0].height(); y += 2)
     for (int x = 0; x < frames[0].width(); x += 2) {
-      first.clear();
-      last.clear();
-      for (std::size_t i = 0; i < third; ++i) {
-        if (frames[i](x, y) > 0.0f) first.push_back(frames[i](x, y));
-        const float z = frames[frames.size() - 1 - i](x, y);
-        if (z > 0.0f) last.push_back(z);
-      }
-      if (2 * first.size() < third || 2 * last.size() < third) continue;
-      const double a = median_of(first), b = median_of(last);
+      returns.clear();
+      for (const geometry::DepthImage& frame : frames)
+        if (frame(x, y) > 0.0f) returns.push_back(frame(x, y));
+      if (2 * returns.size() < frames.size()) continue;
       ++judged;
-      moved += std::abs(a - b) > kMoved * a * a + 0.002 ? 1 : 0;
+      moved += sees_motion(returns, scratch);
     }
   return judged > 0 ? static_cast<double>(moved) / judged : 0.0;
 }
@@ -205,7 +229,7 @@ core::Result<DepthNoise> DepthNoiseEstimator::finish() const {
   const double moved = moved_share(frames_);
   if (moved > kMovedShare)
     return core::invalid_input("something moves: " + fixed_text(100.0 * moved, 0) +
-                               " % of the pixels change their depth between begin and end: record a scene in which "
+                               " % of the pixels change their depth within the recording: record a scene in which "
                                "neither camera nor things move");
 
   const int width = camera_.width, height = camera_.height;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "prescene/geometry/primitives.h"
@@ -32,16 +33,16 @@ class DepthNoiseTest : public testing::Test {
                         box({1.2, 0.6, 0.01}, {0.35, 0.0, 1.2}, {0, 1.25, 0})};
   }
 
-  core::Result<DepthNoise> measure(const rendering::SensorModelOptions& sensor,
-                                   const rendering::SimulatedCameraOptions& options, int frames,
-                                   double shift_a_frame = 0.0) {
+  core::Result<DepthNoise> measure(
+      const rendering::SensorModelOptions& sensor, const rendering::SimulatedCameraOptions& options, int frames,
+      const std::function<double(int)>& shift_of = [](int) { return 0.0; }) {
     const rendering::SimulatedCamera simulated(rendering::SensorModel(sensor), options);
     const auto renderer = rendering::make_reference_renderer();
     rendering::RenderOptions with_normals;
     with_normals.normals = true;
     DepthNoiseEstimator estimator;
     for (int frame = 0; frame < frames; ++frame) {
-      const Pose X_WC = Pose::from_translation({shift_a_frame * frame, 0.0, 0.0});
+      const Pose X_WC = Pose::from_translation({shift_of(frame), 0.0, 0.0});
       rendering::RenderedView view;
       EXPECT_TRUE(renderer->render(scene_, camera_, X_WC, with_normals, &view).ok());
       geometry::DepthImage depth;
@@ -126,9 +127,25 @@ TEST_F(DepthNoiseTest, AnotherFixedShareIsNotTold) {
 }
 
 TEST_F(DepthNoiseTest, RefusesWhatMoves) {
-  const auto noise = measure({}, {}, 24, 0.004);
-  ASSERT_FALSE(noise.ok());
-  EXPECT_NE(noise.status().message().find("moves"), std::string::npos) << noise.status().message();
+  const std::function<double(int)> shifts[] = {[](int frame) { return 0.004 * frame; },
+                                               // There and back again.
+                                               [](int frame) { return frame >= 8 && frame < 16 ? 0.05 : 0.0; }};
+  for (const auto& shift : shifts) {
+    const auto noise = measure({}, {}, 24, shift);
+    ASSERT_FALSE(noise.ok());
+    EXPECT_NE(noise.status().message().find("moves"), std::string::npos) << noise.status().message();
+  }
+}
+
+TEST_F(DepthNoiseTest, TakesNoNoiseForMotion) {
+  for (const double s : {0.004, 0.008, 0.02}) {
+    for (const int frames : {12, 13, 40}) {
+      rendering::SensorModelOptions sensor;
+      sensor.sigma_per_depth_squared = s;
+      const auto noise = measure(sensor, {}, frames);
+      ASSERT_TRUE(noise.ok()) << s << ", " << frames << " frames: " << noise.status().message();
+    }
+  }
 }
 
 TEST_F(DepthNoiseTest, RefusesTooFewFramesAndViewsWithoutSurfaces) {
