@@ -2,8 +2,30 @@
 #include "prescene/service/topics.h"
 
 #include <cctype>
+#include <map>
+#include <utility>
 
 namespace prescene::service {
+
+core::Status validate(const InputTopics& topics) {
+  const std::pair<const char*, const std::string*> named[] = {{"depth", &topics.depth},
+                                                              {"color", &topics.color},
+                                                              {"camera info", &topics.camera_info},
+                                                              {"tf", &topics.tf},
+                                                              {"static tf", &topics.tf_static}};
+  std::map<std::string, const char*> seen;
+  for (const auto& [what, topic] : named) {
+    if (topic->empty()) {
+      if (topic == &topics.color) continue;
+      return core::invalid_input(std::string("the ") + what + " topic has no name: only colour can be left out");
+    }
+    const auto [other, is_new] = seen.emplace(*topic, what);
+    if (!is_new)
+      return core::invalid_input(std::string("the ") + what + " topic is the " + other->second + " topic, " + *topic +
+                                 ": name the two that the camera has");
+  }
+  return core::ok_status();
+}
 
 std::string pose_topic(const std::string& object) {
   std::string name = "/prescene/pose/";

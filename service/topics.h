@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "prescene/core/status.h"
+
 namespace prescene::service {
 
 /// Names of what comes in; the defaults are those of common RGB-D drivers.
@@ -15,6 +17,9 @@ struct InputTopics {
   std::string tf_static = "/tf_static";                            ///< tf2_msgs/TFMessage, latched
   friend bool operator==(const InputTopics&, const InputTopics&) = default;
 };
+
+/// kInvalidInput where a topic but colour is empty, or two are one.
+core::Status validate(const InputTopics& topics);
 
 // Our own topics. JSON is carried by std_msgs/String, so that `ros2 topic pub` and `echo` can speak it.
 inline constexpr const char* kControlTopic = "/prescene/control";  ///< in: {"actions": [...]}, what the robot does

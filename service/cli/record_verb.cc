@@ -51,15 +51,18 @@ Verb add_record_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   verb->add_option("-o,--output", options->output, "Recording to write (MCAP)")->check(file_name())->required();
   verb->add_option("--simulate", options->simulate,
-                   "Scene file to play with a simulated RGB-D camera, instead of listening");
+                   "Scene file to play with a simulated RGB-D camera, instead of listening")
+      ->check(file_name());
   verb->add_option("--rate", options->simulation.rate, "Simulated frames a second")
       ->check(number_between(0.1, 240.0))
+      ->needs("--simulate")
       ->capture_default_str();
   add_bus_options(*verb, options->dds, options->topics);
   verb->footer(
       "Examples: prescene record -o run.mcap                  (until Ctrl-C)\n"
       "          prescene record --simulate scenarios/milk_on_bin.yaml -o milk.mcap --seed 1");
   return {verb, [options](VerbContext& context) {
+            PRESCENE_RETURN_IF_ERROR(validate(options->topics));
             options->simulation.topics = options->topics;
             return options->simulate.empty() ? record_bus(*options, context) : record_simulation(*options, context);
           }};

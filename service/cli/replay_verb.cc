@@ -257,14 +257,17 @@ Verb add_replay_verb(CLI::App& app) {
                    "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
       ->required();
   verb->add_option(
-      "--scene", options->scene,
-      "Scene file; default: the one that the recording holds; a folder without one is searched for its support");
+          "--scene", options->scene,
+          "Scene file; default: the one that the recording holds; a folder without one is searched for its support")
+      ->check(file_name());
   verb->add_flag("--over-dds", options->over_dds,
                  "Publish the robot's messages as they were, and listen to a running `serve`");
   verb->add_option("--speed", options->bus.speed, "Over DDS: times as fast as recorded")
       ->check(positive_number())
+      ->needs("--over-dds")
       ->capture_default_str();
-  verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable");
+  verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable")
+      ->needs("--over-dds");
   verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
       ->check(positive_number())
       ->capture_default_str();
@@ -282,6 +285,7 @@ Verb add_replay_verb(CLI::App& app) {
       "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");
   return {verb, [options](VerbContext& context) -> core::Status {
             PRESCENE_RETURN_IF_ERROR(check_output("--report", options->report, {options->input, options->scene}));
+            PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
             return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);
           }};
 }

@@ -17,6 +17,7 @@ struct Options {
 };
 
 core::Status run(Options& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(validate(options.settings.tracker.topics));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
   PRESCENE_RETURN_IF_ERROR(check_output("--record", options.record, {options.scene}));

@@ -245,6 +245,27 @@ TEST(CommandLine, TwoOutputsAreTwoFiles) {
   EXPECT_FALSE(std::filesystem::exists(output));
 }
 
+TEST(CommandLine, OptionsThatWouldDoNothingAreRefused) {
+  const ScratchDir folder;
+  const std::string output = (folder.path() / "run.mcap").string();
+  const std::string scene = scenario("milk_on_bin");
+  const std::pair<std::vector<std::string>, std::string> all[] = {
+      {{"replay", scene, "--speed", "2"}, "--over-dds"},
+      {{"replay", scene, "--ask", "1:{}"}, "--over-dds"},
+      {{"replay", scene, "--scene", ""}, "file name"},
+      {{"record", "-o", output, "--rate", "10"}, "--simulate"},
+      {{"record", "-o", output, "--simulate", scene, "--depth-topic", ""}, "depth topic has no name"},
+      {{"record", "-o", output, "--simulate", scene, "--depth-topic", "/a", "--color-topic", "/a"},
+       "is the depth topic"},
+      {{"serve", "--scene", scene, "--tf-topic", "/tf_static"}, "is the tf topic"}};
+  for (const auto& [arguments, reason] : all) {
+    const Finished finished = run_program(arguments);
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_NE(finished.err.find(reason), std::string::npos) << finished.err;
+    EXPECT_FALSE(std::filesystem::exists(output));
+  }
+}
+
 TEST(CommandLine, AnInputIsNeverOverwritten) {
   const ScratchDir folder;
   const std::string scene = (folder.path() / "scene.yaml").string();
