@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace prescene::simulation {
 
@@ -36,6 +37,18 @@ inline SpinRates spin_rates(const Eigen::Vector3d& unit_moments, double dt) {
   spin.about_most[most] = dt * (rates[most] - rates[middle]);
   spin.about_momentum = dt * rates[middle];
   return spin;
+}
+
+/// 1 for the principal axes that a body can't be turned about without changing the energy of a given spin; 0 where the
+/// moments about the other two axes are alike (to a tenth).
+inline Eigen::Vector3d uneven_axes(const Eigen::Vector3d& unit_moments) {
+  constexpr double kAlike = 0.1;
+  Eigen::Vector3d uneven;
+  for (int k = 0; k < 3; ++k) {
+    const double one = unit_moments[(k + 1) % 3], other = unit_moments[(k + 2) % 3];
+    uneven[k] = std::abs(one - other) > kAlike * std::max(one, other) ? 1.0 : 0.0;
+  }
+  return uneven;
 }
 
 }  // namespace prescene::simulation

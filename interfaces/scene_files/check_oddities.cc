@@ -26,21 +26,6 @@ void warn_of_mass_ratios(const LocatedValue& objects, const belief::Scene& scene
   }
 }
 
-// What is thinner rolls and spins by more than a radian a step, and contacts then make energy.
-void warn_of_needles(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
-  constexpr double kThin = 0.005, kSlender = 20.0;
-  for (const belief::ObjectModel& model : scene.models) {
-    geometry::Vector3d extents = geometry::bounding_box(belief::collision_mesh(model)).sizes();
-    std::sort(extents.begin(), extents.end());
-    if (extents[1] >= kThin || extents[2] <= kSlender * extents[1]) continue;
-    const LocatedValue& at = *document.find("models")->find(model.name);
-    problems.warn(at.place, at.path,
-                  "it is a needle, " + core::rounded_text(1e3 * extents[1]) + " mm thick and " +
-                      core::rounded_text(1e3 * extents[2]) + " mm long: some in a hundred leap up when they strike",
-                  "trust no outcome that such a leap decides (docs/simulation.md, Limits)");
-  }
-}
-
 }  // namespace
 
 void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
@@ -55,7 +40,6 @@ void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, 
         "raise 'duration'");
   }
   warn_of_mass_ratios(*document.find("objects"), scene, problems);
-  warn_of_needles(document, scene, problems);
 }
 
 }  // namespace prescene::interfaces

@@ -31,8 +31,14 @@ inline Spin spun(const Quaterniond& R_WO, const Vector3d& w_WO, const CompiledBo
   return {R, R * (body.R_OP * L_P.cwiseQuotient(body.unit_moments))};
 }
 
-inline Quaterniond turned(const Quaterniond& R, const Vector3d& rotation_vector) {
-  return (geometry::exp_rotation(rotation_vector) * R).normalized();
+/// Turned by a rotation vector in W, without a change of its energy: the spin turns along, but for where the body looks
+/// the same about an axis, which keeps more of its angular momentum.
+inline Spin turned(const Spin& spin, const Vector3d& rotation_vector, const CompiledBody& body) {
+  const Vector3d turn_P = body.R_OP.transpose() * (spin.R_WO.conjugate() * rotation_vector);
+  const Vector3d with_spin_P = uneven_axes(body.unit_moments).cwiseProduct(turn_P);
+  const Quaterniond along = geometry::exp_rotation(spin.R_WO * (body.R_OP * with_spin_P));
+  const Quaterniond alone = geometry::exp_rotation(body.R_OP * (turn_P - with_spin_P));
+  return {(along * spin.R_WO * alone).normalized(), along * spin.w_WO};
 }
 
 }  // namespace prescene::simulation

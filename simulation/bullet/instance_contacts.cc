@@ -27,7 +27,7 @@ void InstanceWorld::sweep(int index) {
   m.low = box.low;
   m.high = box.high;
   const double speed = std::max(m.velocity.norm(), m.velocity_before.norm());
-  const double spin = std::max(m.spin.norm(), m.spin_before.norm());
+  const double spin = std::max(m.spin.norm(), m.spin_after.norm());
   m.travel = dt() * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));
   const Vector3d swell = Vector3d::Constant(m.travel + 0.5 * kContactMargin);
   m.low -= swell;
@@ -135,8 +135,8 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
     c.impact_friction = impact_friction(a, body_a) * impact_friction(b, body_b);
     c.restitution = restitution(a, body_a) * restitution(b, body_b);
     c.rolling_arm = std::max(body_a.rolling_arm, body_b.rolling_arm);
-    c.speed_before = point.normal.dot(ma.velocity_before + ma.spin_before.cross(point.position - ma.p_WCm) -
-                                      mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm)) +
+    c.speed_before = point.normal.dot(ma.velocity_before + ma.spin.cross(point.position - ma.p_WCm) -
+                                      mb.velocity_before - mb.spin.cross(point.position - mb.p_WCm)) +
                      point.turning;
     const Vector3d p_B = mb.X_WO.inverse_times(point.position);
     double nearest = reach * reach;

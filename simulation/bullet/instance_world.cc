@@ -147,7 +147,7 @@ void InstanceWorld::place_kinematic() {
     m.velocity = (X_next.translation - X_now.translation) / dt();
     m.spin = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt();
     m.velocity_before = m.velocity;
-    m.spin_before = m.spin;
+    m.spin_after = m.spin;
     m.dynamic = false;
     m.present = true;
     sweep(body);
@@ -184,9 +184,10 @@ void InstanceWorld::place_dynamic() {
     m.X_WO = Frame(object_pose(object));
     m.p_WCm = object.p_WCm;
     m.velocity = flight.v_WCm;
-    m.spin = flight.w_WO;
+    // Contacts act at the step's beginning, on the spin of there: its energy is that of this pose.
+    m.spin = object.w_WO;
     m.velocity_before = object.v_WCm;
-    m.spin_before = object.w_WO;
+    m.spin_after = flight.w_WO;
     sweep(static_cast<int>(i));
   }
 }
@@ -225,14 +226,19 @@ void InstanceWorld::integrate() {
       const double falls_after = impact.supported || !impact.bounced ? 0.0 : -0.5 * after;
       const Vector3d flown = before * (object.v_WCm + falls_before * gravity);
       object.v_WCm = from_bullet(rigid_[i]->getLinearVelocity());
-      object.w_WO = from_bullet(rigid_[i]->getAngularVelocity());
       object.p_WCm += flown + after * (object.v_WCm + falls_after * gravity) + dt() * result.push;
-      object.R_WO = turned(flight.R_WO, after * (object.w_WO - flight.w_WO) + dt() * result.turn);
+      const Vector3d w = from_bullet(rigid_[i]->getAngularVelocity());
+      const CompiledBody& body = scene_->bodies[i];
+      const Spin spin = turned(spun(object.R_WO, w, body, dt()), before * (object.w_WO - w) + dt() * result.turn, body);
+      object.R_WO = spin.R_WO;
+      object.w_WO = spin.w_WO;
     } else {
       object.v_WCm = flight.v_WCm;
-      object.w_WO = flight.w_WO;
       object.p_WCm = flight.p_WCm + dt() * result.push;
-      object.R_WO = result.turn.isZero(0.0) ? flight.R_WO : turned(flight.R_WO, dt() * result.turn);
+      Spin spin{flight.R_WO, flight.w_WO};
+      if (!result.turn.isZero(0.0)) spin = turned(spin, dt() * result.turn, scene_->bodies[i]);
+      object.R_WO = spin.R_WO;
+      object.w_WO = spin.w_WO;
     }
   }
 }

@@ -107,9 +107,9 @@ class InstanceWorld {
     Vector3d velocity = Vector3d::Zero();
     Vector3d spin = Vector3d::Zero();
     Vector3d velocity_before = Vector3d::Zero();  // without this step's gravity
-    Vector3d spin_before = Vector3d::Zero();
-    Vector3d low, high;   // bounding box swept over the step
-    double travel = 0.0;  // bound of any point's way in the step, m
+    Vector3d spin_after = Vector3d::Zero();       // with nothing in the way
+    Vector3d low, high;                           // bounding box swept over the step
+    double travel = 0.0;                          // bound of any point's way in the step, m
     bool present = true;
     bool dynamic = false;
   };

@@ -136,6 +136,8 @@ core::Status Compiler::add_objects() {
     compiled_.R_OP.push_back(R_OP);
     LaneBody body;
     body.unit_moments = plain(principal.moments);
+    body.spin_rates = spin_rates(principal.moments, compiled_.options.step);
+    body.uneven_axes = uneven_axes(principal.moments);
     const Pose X_PO{R_OP.conjugate(), Vector3d::Zero()};
     PRESCENE_RETURN_IF_ERROR(add_parts(object.name, model.collision, model.contact, X_PO, body.parts));
     PRESCENE_RETURN_IF_ERROR(check_count(object.name + " has", body.parts.size(), kMostParts));

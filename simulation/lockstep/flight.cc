@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "lane_state.h"
-#include "prescene/simulation/free_spin.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "flight.cc"
@@ -12,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include "lane_math-inl.h"
+#include "lane_spin-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
@@ -58,12 +58,6 @@ void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* sta
   const V dt = set<V>(scene->settings.dt);
   const V half_dt = set<V>(0.5 * scene->settings.dt);
   const Vec3<V> gravity = set3<V>(scene->settings.gravity);
-  const Vec3<V> moments = set3<V>(body.unit_moments);
-  const Vec3<V> inverse = set3<V>(1.0 / body.unit_moments[0], 1.0 / body.unit_moments[1], 1.0 / body.unit_moments[2]);
-  const SpinRates rates = spin_rates(Eigen::Vector3d(body.unit_moments.data()), scene->settings.dt);
-  const Vec3<V> about_least = set3<V>(rates.about_least[0], rates.about_least[1], rates.about_least[2]);
-  const Vec3<V> about_most = set3<V>(rates.about_most[0], rates.about_most[1], rates.about_most[2]);
-  const V about_momentum = set<V>(rates.about_momentum);
   const V radius = set<V>(body.radius);
   const int first = state->at(object, 0);
   for (int at = first; at < first + count; at += static_cast<int>(hn::Lanes(d))) {
@@ -75,19 +69,12 @@ void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* sta
     const Vec3<V> flown_v = v + gravity * dt;
     const Vec3<V> flown_p = p + (v + flown_v) * half_dt;
     const Mat3<V> R = matrix_of(q);
-    Vec3<V> momentum = times(moments, transposed(R, w));
-    Quat<V> spun = q;
-    for (const Vec3<V>* about : {&about_least, &about_most, &about_least}) {
-      const Quat<V> turn = exp_rotation(times(*about, momentum));
-      spun = spun * turn;
-      momentum = rotated(conjugate(turn), momentum);
-    }
-    const Quat<V> flown_q = turned(spun, rotated(spun, momentum) * about_momentum);
-    const Vec3<V> flown_w = rotated(flown_q, times(inverse, momentum));
+    const Spin<V> flown = spun(body, Spin<V>{q, transposed(R, w)});
+    const Vec3<V> flown_w = rotated(flown.q, flown.w_P);
     store(flown_p, state->flown_p, at);
     store(flown_v, state->flown_v, at);
     store(flown_w, state->flown_w, at);
-    store(flown_q, state->flown_q, at);
+    store(flown.q, state->flown_q, at);
     store(R, state->R, at);
     const V speed = hn::Max(length(v), length(flown_v));
     const V spin = hn::Max(length(w), length(flown_w));

@@ -74,6 +74,7 @@ struct RowGroup {
 
 /// What rows need of an object.
 struct ObjectLanes {
+  const LaneBody* body;
   Mat3<V> R;
   Vec3<V> p;
   Rates before, flown;
@@ -260,14 +261,16 @@ template <bool kMany>
 void ContactRows<kMany>::load_objects() {
   for (int index = 0; index < objects(); ++index) {
     ObjectLanes& o = objects_[index];
-    const auto& m = scene_.bodies[static_cast<std::size_t>(index)].unit_moments;
+    o.body = &scene_.bodies[static_cast<std::size_t>(index)];
+    const auto& m = o.body->unit_moments;
     o.root = set3<V>(std::sqrt(m[0]), std::sqrt(m[1]), std::sqrt(m[2]));
     o.inverse_root = set3<V>(1.0 / std::sqrt(m[0]), 1.0 / std::sqrt(m[1]), 1.0 / std::sqrt(m[2]));
     const auto entry = [&](std::size_t k) HWY_ATTR { return lanes_of(state_.R[k], index); };
     o.R = {{entry(0), entry(1), entry(2)}, {entry(3), entry(4), entry(5)}, {entry(6), entry(7), entry(8)}};
     o.p = lanes_of(state_.p, index);
     o.before = {lanes_of(state_.v, index), times(transposed(o.R, lanes_of(state_.w, index)), o.root)};
-    o.flown = {lanes_of(state_.flown_v, index), times(transposed(o.R, lanes_of(state_.flown_w, index)), o.root)};
+    // Contacts act at the step's beginning, on the spin of there: its energy is that of this pose.
+    o.flown = {lanes_of(state_.flown_v, index), o.before.spin};
     o.friction = lanes_of(state_.friction, index);
     o.impact_friction = lanes_of(state_.impact_friction, index);
     o.restitution = lanes_of(state_.restitution, index);

@@ -15,6 +15,7 @@
 #include "impulse_load-inl.h"
 #include "impulse_rows-inl.h"
 #include "lane_math-inl.h"
+#include "lane_spin-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
@@ -310,19 +311,28 @@ void LaneSolver<kMany>::finish(int object) {
   const Vec3<V> gravity = set3<V>(settings_.gravity);
   const V falls_before = hn::IfThenElseZero(hn::Not(supported), half * before);
   const V falls_after = hn::IfThenElseZero(hn::AndNot(supported, bounced), hn::Neg(half * after));
-  const Vec3<V> flown_w = rows_.lanes_of(state_.flown_w, object);
   const Rates& change = changes_[object];
   const Rates& push = pushes_[object];
   const Vec3<V> new_v = select(touched, o.flown.velocity + change.velocity, o.flown.velocity);
-  const Vec3<V> new_w = select(touched, flown_w + o.R * times(change.spin, o.inverse_root), flown_w);
   const Vec3<V> push_v = push.velocity * dt;
-  const Vec3<V> push_w = o.R * times(push.spin, o.inverse_root) * dt;
 
   const Vec3<V> touched_p =
       o.p + (o.before.velocity + gravity * falls_before) * before + (new_v + gravity * falls_after) * after;
   const Vec3<V> new_p = select(touched, touched_p, rows_.lanes_of(state_.flown_p, object)) + push_v;
   // Not touched, it has the spin that it flew with.
-  const Quat<V> new_q = turned(rows_.lanes_of(state_.flown_q, object), (new_w - flown_w) * after + push_w);
+  const Vec3<V> change_w = times(change.spin, o.inverse_root);
+  const Spin<V> begun{rows_.lanes_of(state_.q, object), times(o.before.spin, o.inverse_root) + change_w};
+  const Spin<V> reacting = spun(*o.body, begun);
+  const Quat<V> flown_q = rows_.lanes_of(state_.flown_q, object);
+  const Vec3<V> flown_w = rows_.lanes_of(state_.flown_w, object);
+  const Spin<V> ahead{select(touched, reacting.q, flown_q),
+                      select(touched, reacting.w_P, rotated(conjugate(flown_q), flown_w))};
+  // Until the hit it turned with the spin of before.
+  const Vec3<V> turn = times(push.spin, o.inverse_root) * dt - change_w * hn::IfThenElseZero(touched, before);
+  const Spin<V> spin = turned(*o.body, ahead, rotated(conjugate(ahead.q), o.R * turn));
+  const Quat<V>& new_q = spin.q;
+  const auto left_alone = hn::AndNot(touched, hn::Eq(dot(turn, turn), zero));
+  const Vec3<V> new_w = select(left_alone, flown_w, rotated(new_q, spin.w_P));
   set_lanes(new_v, state_.v, object);
   set_lanes(new_w, state_.w, object);
   set_lanes(new_p, state_.p, object);

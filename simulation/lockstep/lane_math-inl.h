@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstddef>
+#include <numbers>
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
@@ -160,12 +161,19 @@ HWY_INLINE Vec3<V> rotated(const Quat<V>& q, const Vec3<V>& v) {
   const Vec3<V> twice = cross(axis, v) * set<V>(2.0);
   return v + twice * q.w + cross(axis, twice);
 }
-/// exp of a rotation vector. Series of sine and cosine of an eighth of the angle: exact to rounding up to 6 rad, far
-/// beyond what a step turns.
+/// exp of a rotation vector. Series of sine and cosine of an eighth of the angle: exact to rounding up to 6 rad, more
+/// than anything but a needle turns in a step; beyond, whole turns are taken off.
 template <class V>
 HWY_INLINE Quat<V> exp_rotation(const Vec3<V>& turn) {
-  const Vec3<V> h = turn * set<V>(0.125);
-  const V s = dot(h, h);
+  Vec3<V> h = turn * set<V>(0.125);
+  V s = dot(h, h);
+  const auto more = hn::Gt(s, set<V>(0.6));
+  if (HWY_UNLIKELY(!hn::AllFalse(DOf<V>(), more))) {
+    const V turns = hn::Sqrt(s) * set<V>(8.0 / (2.0 * std::numbers::pi));
+    const V share = (turns - hn::Round(turns)) / select(more, turns, set<V>(1.0));
+    h = select(more, h * share, h);
+    s = dot(h, h);
+  }
   const V cosine =
       set<V>(1.0) - s * (set<V>(1.0 / 2) - s * (set<V>(1.0 / 24) - s * (set<V>(1.0 / 720) - s * set<V>(1.0 / 40320))));
   const V sine = set<V>(1.0) -

@@ -11,6 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "prescene/simulation/free_spin.h"
+
 namespace prescene::simulation {
 
 /// What states, impulses and contacts are computed in. Nearest points are found in double precision: contact normals
@@ -62,7 +64,9 @@ struct FixedPart {
 struct LaneBody {
   std::vector<ConvexPart> parts;
   std::array<double, 3> unit_moments{1, 1, 1};  ///< m^2
-  double radius = 0.0;                          ///< Farthest point from O.
+  SpinRates spin_rates;                         ///< Of a step.
+  Eigen::Vector3d uneven_axes = Eigen::Vector3d::Zero();
+  double radius = 0.0;  ///< Farthest point from O.
   Real rolling_arm = 0;
   int number = 0;  ///< As belief::ContactInterval counts them.
 };

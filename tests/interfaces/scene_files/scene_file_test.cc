@@ -389,21 +389,6 @@ TEST(SceneFile, WarnsOfOdditiesButReads) {
   EXPECT_THAT(report.warnings[0].text(), HasSubstr("no support"));
 }
 
-TEST(SceneFile, WarnsOfNeedles) {
-  const auto warnings = [](const std::string& size) {
-    FileReport report;
-    const std::string text = "models:\n  rod: {box: " + size + ", density: 7800}\nsupports:\n  t: {box: [1, 1, 1]}\n" +
-                             "objects:\n  rod: {model: rod, pose: {position: [0, 0, 1]}}\n";
-    EXPECT_TRUE(parse_scene(text, "s.yaml", {}, &report).ok());
-    return report.warnings;
-  };
-  ASSERT_EQ(warnings("[0.001, 0.3, 0.002]").size(), 1U);
-  EXPECT_THAT(warnings("[0.001, 0.3, 0.002]")[0].text(), HasSubstr("2 mm thick and 300 mm long"));
-  EXPECT_TRUE(warnings("[0.006, 0.3, 0.006]").empty());
-  EXPECT_TRUE(warnings("[0.0005, 0.3, 0.3]").empty()) << "a plate";
-  EXPECT_TRUE(warnings("[0.003, 0.03, 0.003]").empty());
-}
-
 TEST(ReadScene, SaysThatAFileIsMissing) {
   FileReport report;
   const auto scene = read_scene("/nowhere/scene.yaml", {}, &report);
