@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -112,8 +113,17 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
   from_b.bottomRightCorner<3, 3>() = R_AW;
   const Matrix6d sum = from_a * a.covariance * from_a.transpose() + from_b * b.covariance * from_b.transpose();
   result.covariance_ = 0.5 * (sum + sum.transpose());
-  if (!factorize(result.covariance_, result.factor_))
-    return core::invalid_input("the covariances of the bodies are not positive semidefinite");
+  if (!factorize(result.covariance_, result.factor_)) {
+    // Variances too different for their sum: joined by their factors, which never fails.
+    Eigen::Matrix<double, 6, 12> joined;
+    joined.leftCols<6>() = -result.factor_a_;
+    joined.topRightCorner<3, 6>() = R_AB * result.factor_b_.topRows<3>();
+    joined.bottomRightCorner<3, 6>() =
+        cross_matrix(p_AB) * joined.topRightCorner<3, 6>() + result.factor_b_.bottomRows<3>();
+    const Eigen::HouseholderQR<Eigen::Matrix<double, 12, 6>> triangle(joined.transpose());
+    result.factor_ = triangle.matrixQR().topRows<6>().triangularView<Eigen::Upper>().transpose();
+    result.covariance_ = result.factor_ * result.factor_.transpose();
+  }
   result.set_growth(a, b);
   return result;
 }

@@ -24,8 +24,8 @@ constexpr double kLevelObject = 0.02;
 // Share of its energy above the floor that a body keeps when it lands; more would be a bouncing ball.
 constexpr double kKeptInLanding = 0.75;
 constexpr double kBouncy = 0.7;
-// s: a fall is over by then.
-constexpr double kFallTime = 1.0;
+// s: after it landed and bounced, a body has come down from its corner by then.
+constexpr double kCollapseTime = 0.5;
 // m beyond the side of a thing from which a convex body that tips over that side does not come back.
 constexpr double kTipped = 5e-3;
 // A body rolls over edges that lift its centre of mass by less than this share.
@@ -169,9 +169,9 @@ bool MotionCertifier::assess(const belief::WorldState& state, double seconds_lef
   let_roll(state, motions);
   for (std::size_t i = 0; i < motions.size(); ++i)
     if (!stays_in_world(motions[i], objects_[i])) return false;
-  if (!robot_ && seconds_left >= kFallTime)
+  if (!robot_)
     for (std::size_t i = 0; i < motions.size(); ++i)
-      if (state.objects[i].physical.restitution <= kBouncy) motions[i].landing = landing_of(motions, i);
+      motions[i].landing = landing_of(motions, i, state.objects[i].physical.restitution, seconds_left);
   return true;
 }
 
@@ -212,8 +212,7 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     const belief::PhysicalParameters* under =
         on_support ? nullptr : &state.objects[static_cast<std::size_t>(motion.base)].physical;
     const double friction = std::min(physical.friction, physical.impact_friction) *
-                            (on_support ? support_friction_[static_cast<std::size_t>(motion.base - count)]
-                                        : std::min(under->friction, under->impact_friction));
+                            (on_support ? friction_about(motion) : std::min(under->friction, under->impact_friction));
     const Vector3d relative = on_support
                                   ? motion.velocity
                                   : Vector3d(motion.velocity - motions[static_cast<std::size_t>(motion.base)].velocity);
@@ -223,6 +222,7 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     const double gap = std::max(0.0, motion.box.min().z() - motion.plane);
     const double upwards = relative.z() * relative.z() + turning + 2.0 * gravity_ * gap;
     motion.hop = 2.0 * std::sqrt(sideways * upwards) / gravity_;
+    motion.slide_time = kSlide * std::sqrt(sideways) / (std::max(friction, 1e-6) * gravity_);
     motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom + motion.hop;
     // What is below ends in round edges, too.
     const double round =
@@ -232,6 +232,17 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     motion.trap = trap_of(objects_[i].bearing, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
                           objects_[i].edge_radius);
   }
+}
+
+double MotionCertifier::friction_about(const SureMotion& motion) const {
+  double least = support_friction_[static_cast<std::size_t>(motion.base) - objects_.size()];
+  const Vector3d room = Vector3d::Constant(0.01);
+  geometry::Box about(motion.box.min() - room, motion.box.max() + room);
+  about.min().z() = std::min(about.min().z(), motion.plane);
+  for (const FixedShape& shape : shapes_)
+    if (about.intersects(shape.box))
+      least = std::min(least, support_friction_[static_cast<std::size_t>(shape.support)]);
+  return least;
 }
 
 std::vector<double> MotionCertifier::lowest_centers(const belief::WorldState& state, double seconds_left,
@@ -315,8 +326,9 @@ void MotionCertifier::let_roll(const belief::WorldState& state, std::vector<Sure
     if (motion.trap || !known.rolls || motion.base < count) continue;
     const auto support = static_cast<std::size_t>(motion.base - count);
     const belief::PhysicalParameters& physical = state.objects[i].physical;
-    const double friction = std::min(physical.friction, physical.impact_friction) * support_friction_[support];
-    const double rolling_arm = std::max(known.rolling_arm, support_rolling_arm_[support]);
+    const double friction = std::min(physical.friction, physical.impact_friction) * friction_about(motion);
+    const double rolling_arm =
+        alone_on_base(motions, i) ? std::max(known.rolling_arm, support_rolling_arm_[support]) : known.rolling_arm;
     const double resistance = std::min(friction, rolling_arm / (motion.highest - motion.plane));
     const double lowest = motion.plane + least_depth(known.bearing, physical.center_of_mass);
     motion.reach = kSlide * (motion.highest - kRise - lowest) / std::max(resistance, 1e-9) + kSlideRoom + motion.hop;
@@ -328,7 +340,9 @@ bool MotionCertifier::stays_in_world(const SureMotion& motion, const CertifiedOb
   return motion.center.norm() + (motion.lowest ? motion.reach : 0.0) + known.outer_radius < world_radius_;
 }
 
-std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>& motions, std::size_t object) const {
+std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>& motions, std::size_t object,
+                                                  double restitution, double seconds_left) const {
+  if (restitution > kBouncy) return std::nullopt;
   const SureMotion& motion = motions[object];
   double floor = -std::numeric_limits<double>::infinity();
   double lowest_beside = std::numeric_limits<double>::infinity();
@@ -359,6 +373,10 @@ std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>&
   if (!(height > 0.0)) return std::nullopt;
   const double up = motion.velocity.z();
   const double time = (up + std::sqrt(up * up + 2.0 * gravity_ * height)) / gravity_;
+  // Bounces take 2 e / (1 - e) of the time in which its speed of landing is gained.
+  const double landing_speed = std::sqrt(2.0 * gravity_ * std::max(0.0, motion.highest - landing));
+  const double bouncing = 2.0 * restitution / (1.0 - restitution) * landing_speed / gravity_;
+  if (seconds_left < time + (std::isfinite(floor) ? bouncing + kCollapseTime : 0.0)) return std::nullopt;
   const double sideways = motion.center.head<2>().norm() + time * motion.velocity.head<2>().norm();
   const double farthest_up = std::max(std::abs(motion.highest), std::abs(landing));
   if (std::hypot(sideways, farthest_up) + objects_[object].outer_radius >= world_radius_) return std::nullopt;
@@ -380,7 +398,7 @@ bool MotionCertifier::alone_on_base(const std::vector<SureMotion>& motions, std:
 
 bool MotionCertifier::support_above(int support, double height) const {
   return std::all_of(shapes_.begin(), shapes_.end(),
-                     [&](const FixedShape& shape) { return shape.support != support || shape.box.max().z() > height; });
+                     [&](const FixedShape& shape) { return shape.support != support || shape.box.min().z() > height; });
 }
 
 }  // namespace prescene::simulation

@@ -42,11 +42,12 @@ struct SureMotion {
   geometry::Box box;     ///< Of the hull as it is now, W.
   /// It stays on its lowest face, on a plane.
   std::optional<Trap> trap;
-  double plane = 0.0;   ///< z of the plane below it.
-  int base = -1;        ///< Body whose plane it is, numbered as in ContactInterval.
-  double inside = 0.0;  ///< Distance from below the centre of mass to where that plane ends, m.
-  double hop = 0.0;     ///< How far the centre of mass may still fly sideways, m.
-  double reach = 0.0;   ///< How far it may still go sideways altogether, m.
+  double plane = 0.0;       ///< z of the plane below it.
+  int base = -1;            ///< Body whose plane it is, numbered as in ContactInterval.
+  double inside = 0.0;      ///< Distance from below the centre of mass to where that plane ends, m.
+  double hop = 0.0;         ///< How far the centre of mass may still fly sideways, m.
+  double slide_time = 0.0;  ///< It has slid to a stop on that plane by then, s.
+  double reach = 0.0;       ///< How far it may still go sideways altogether, m.
   /// z that the centre of mass can't get below: it stays on its face, or rolls to a stop on the plane.
   std::optional<double> lowest;
   /// It has fallen past what is higher than this, and will not come up again: it lands here, or leaves the world below.
@@ -66,7 +67,7 @@ class MotionCertifier {
   bool alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const;
   /// The largest radius of a support's edges, m.
   double support_edge_radius() const { return support_edge_radius_; }
-  /// Every shape of the support ends above `height`.
+  /// All of the support is above `height`.
   bool support_above(int support, double height) const;
 
  private:
@@ -81,13 +82,16 @@ class MotionCertifier {
 
   void stand(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
   void bound_heights(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
+  /// The least of the support below an object and of those beside it.
+  double friction_about(const SureMotion& motion) const;
   void let_roll(const belief::WorldState& state, std::vector<SureMotion>& motions) const;
   /// z that the centres of mass of the objects without a trap do not get below before they could give what they have
   /// won by falling to another object, m.
   std::vector<double> lowest_centers(const belief::WorldState& state, double seconds_left,
                                      const std::vector<SureMotion>& motions) const;
   bool stays_in_world(const SureMotion& motion, const CertifiedObject& known) const;
-  std::optional<double> landing_of(const std::vector<SureMotion>& motions, std::size_t object) const;
+  std::optional<double> landing_of(const std::vector<SureMotion>& motions, std::size_t object, double restitution,
+                                   double seconds_left) const;
 
   CertifierOptions options_;
   double world_radius_ = 0.0;

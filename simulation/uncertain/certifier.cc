@@ -125,10 +125,12 @@ class Judge {
   }
   Truth operator()(const belief::RestingOn& resting) const {
     const std::optional<int> body = belief::body_index(scene_, resting.support);
-    if (!body || seconds_left_ < kSettleTime) return Truth::kPerhaps;
+    if (!body || seconds_left_ < kSettleTime + motion_.slide_time) return Truth::kPerhaps;
     const auto count = static_cast<int>(motions_.size());
+    // Lying there it may still lean on what it can reach.
     if (motion_.landing && *body >= count)
-      return certifier_.support_above(*body - count, *motion_.landing) ? Truth::kNo : Truth::kPerhaps;
+      return certifier_.support_above(*body - count, *motion_.landing + 2.0 * known_.outer_radius) ? Truth::kNo
+                                                                                                   : Truth::kPerhaps;
     if (!motion_.trap || !certifier_.alone_on_base(motions_, object_)) return Truth::kPerhaps;
     return *body == motion_.base ? Truth::kYes : Truth::kNo;
   }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "prescene/core/parallel.h"
+#include "prescene/geometry/sampling.h"
 #include "prescene/tests/support/allocations.h"
 #include "uncertain_settings.h"
 
@@ -233,6 +234,27 @@ TEST(UncertainSphereQueries, RefusesWhatIsNoCovariance) {
   EXPECT_THAT(refusal(covariance), testing::HasSubstr("not positive semidefinite"));
   EXPECT_THAT(refusal(Matrix6d::Identity(), 1.0), testing::HasSubstr("confidence"));
   EXPECT_THAT(refusal(Matrix6d::Identity(), 0.2), testing::HasSubstr("confidence"));
+}
+
+TEST(UncertainSphereQueries, CovariancesOfAnySizeAreJoined) {
+  core::RandomStream random(3, core::Purpose::kTest);
+  for (int i = 0; i < 20'000; ++i) {
+    UncertainPose poses[2];
+    for (UncertainPose& pose : poses) {
+      pose.X_WB = {geometry::uniform_rotation(random), random.uniform(0.0, 30.0) * geometry::normal_vector(random)};
+      // A few directions of very different sizes.
+      geometry::Matrix6d factor = geometry::Matrix6d::Zero();
+      for (int k = 0; k < static_cast<int>(1 + random.uniform_below(4)); ++k) {
+        const double size = std::pow(10.0, random.uniform(-7.0, 1.0));
+        for (int row = 0; row < 6; ++row) factor(row, k) = size * random.normal();
+      }
+      pose.covariance = factor * factor.transpose();
+    }
+    const auto joined = RelativeUncertainty::make(poses[0], poses[1]);
+    ASSERT_TRUE(joined.ok()) << i << ": " << joined.status().message();
+    const geometry::Matrix6d again = joined->factor() * joined->factor().transpose();
+    ASSERT_LT((again - joined->covariance()).norm(), 1e-6 * joined->covariance().norm()) << i;
+  }
 }
 
 TEST(UncertainSphereQueries, FirstOrderAndRemainderBoundTheDisplacement) {

@@ -320,5 +320,67 @@ TEST(Certificates, OfWhatTipsOverAnEdgeNeedItsCentreBeyondIt) {
   EXPECT_FALSE(classes(0.01, 0.1, 1.0, -0.1));
 }
 
+/// A box on a support, sliding off along x, and what is asked of it.
+std::shared_ptr<belief::Scene> slid_off(const geometry::Vector3d& size, belief::Support under, double start_x,
+                                        const belief::NormalScalar& speed, const belief::ScalarDistribution& friction,
+                                        const belief::Predicate& asked) {
+  auto scene = std::make_shared<belief::Scene>(tests::tumbling_box());
+  belief::ObjectModel model;
+  model.name = "box";
+  model.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{size}, {}});
+  model.mass = belief::FixedScalar{0.3};
+  model.contact.friction = friction;
+  scene->models = {*belief::with_derived_properties(std::move(model))};
+  belief::SceneObject& box = scene->objects[0];
+  box.pose = belief::FixedPose{geometry::Pose::from_translation({start_x, 0.0, 0.5 * size.z()})};
+  box.twist = {};
+  box.twist.linear = {speed, belief::FixedScalar{0.0}, belief::FixedScalar{0.0}};
+  scene->supports.insert(scene->supports.begin(), std::move(under));
+  scene->exclusive_outcomes.clear();
+  scene->outcomes = {{"asked", "box", {belief::Condition{asked}}}};
+  return scene;
+}
+
+belief::Support block_below(const std::string& name, double half_width, double height) {
+  belief::Support block;
+  block.name = name;
+  block.collision.push_back(
+      belief::PrimitiveShape{geometry::BoxShape{{2.0 * half_width, 2.0 * half_width, height}}, {}});
+  block.X_WS = geometry::Pose::from_translation({-half_width, 0.0, -0.5 * height});
+  block.contact.friction = belief::FixedScalar{1.0};
+  return block;
+}
+
+TEST(Certificates, LeaveTimeForWhatHasStillToHappen) {
+  const geometry::Vector3d cube(0.06, 0.06, 0.06), slab(0.2, 0.2, 0.05), board(0.3, 0.1, 0.02);
+  // Falls of more than a second; slabs that still slide at the end; boards that tip off a step and lean on it.
+  auto deep = slid_off(cube, block_below("table", 0.2, 0.04), 0.0, {0.6, 0.3}, belief::FixedScalar{0.5},
+                       belief::BelowHeight{-9.0});
+  deep->supports.pop_back();
+  deep->duration = 1.6;
+  auto sliding = slid_off(slab, block_below("floor", 10.0, 0.1), -10.0, {0.3, 0.1}, belief::UniformScalar{0.02, 0.5},
+                          belief::RestingOn{"floor"});
+  sliding->supports.pop_back();
+  sliding->duration = 1.2;
+  auto leaning = slid_off(board, block_below("step", 0.2, 0.05), 0.05, {0.9, 0.3},
+                          belief::NormalScalar{0.12, 0.05, 0.02, 1.0}, belief::RestingOn{"step"});
+  leaning->supports.back().X_WS.translation.z() -= 0.05;
+  for (const auto& scene : {deep, sliding, leaning}) {
+    ASSERT_TRUE(validate(*scene).ok()) << validate(*scene).message();
+    const Problem problem(scene);
+    const auto certifier = make_certifier(problem.scene, problem.variables, problem.request);
+    ASSERT_TRUE(certifier);
+#ifdef NDEBUG
+    constexpr int kCount = 1024;
+#else
+    constexpr int kCount = 128;
+#endif
+    const OutcomeEstimate whole = problem.run_exactly(kCount, nullptr, 0.0);
+    const OutcomeEstimate certified = problem.run_exactly(kCount, certifier.get(), 0.0);
+    EXPECT_LE(classed_otherwise(certified, whole), 1) << scene->outcomes[0].all_of[0].predicate.index();
+    EXPECT_GT(certified.certificates.certified, kCount / 2) << scene->outcomes[0].all_of[0].predicate.index();
+  }
+}
+
 }  // namespace
 }  // namespace prescene::simulation
