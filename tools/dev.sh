@@ -9,7 +9,7 @@ usage: ./dev VERB
 
   setup [run|develop]...       install the missing Debian packages (default: run)
   build [PRESET] [TARGET]...   build (default preset: release)
-  test [--preset P] [FILTER]   build, then run all tests, or those whose name matches FILTER (a regular expression)
+  test [--preset P] [FILTER]... build, then run all tests, or those whose name matches a FILTER (regular expressions)
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE]...               format, layer and clang-tidy checks
@@ -117,12 +117,13 @@ verb_test() {
   while [ $# -gt 0 ]; do
     case $1 in
       --preset) preset=${2:?--preset needs a name}; shift 2 ;;
-      *) filter+=(-R "$1"); shift ;;
+      *) filter+=("$1"); shift ;;
     esac
   done
   verb_build "$preset"
   if [ ${#filter[@]} -gt 0 ]; then
-    timed "tests that match ${filter[1]}" run_tests "$preset" "${filter[@]}"
+    # Of several -R ctest heeds the last.
+    timed "tests that match ${filter[*]}" run_tests "$preset" -R "$(IFS='|'; echo "${filter[*]}")"
   else
     timed "tests" run_tests "$preset"
   fi
