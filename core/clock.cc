@@ -11,6 +11,17 @@ TimeNs wall_now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count();
 }
 
+TimeNs steady_now_ns() {
+  using std::chrono::steady_clock;
+  struct Start {
+    TimeNs wall_ns = wall_now_ns();
+    steady_clock::time_point steady = steady_clock::now();
+  };
+  static const Start start;
+  return start.wall_ns +
+         std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start.steady).count();
+}
+
 double process_cpu_seconds() {
   timespec time{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);

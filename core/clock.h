@@ -12,8 +12,12 @@ using TimeNs = std::int64_t;
 
 inline double seconds_of(TimeNs ns) { return static_cast<double>(ns) * 1e-9; }
 
-/// Wall time now.
+/// Wall time now. It jumps when the system's clock is set: good for stamps, never for deadlines.
 TimeNs wall_now_ns();
+
+/// Wall time at the first call in this process, plus the steady time that has passed since. Never goes back and does
+/// not follow the system's clock when that is set: for deadlines, and for the order in which messages came.
+TimeNs steady_now_ns();
 
 /// Processor time of all threads of this process so far, s.
 double process_cpu_seconds();

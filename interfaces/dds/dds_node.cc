@@ -43,8 +43,11 @@ struct DdsNode::Impl {
   struct Subscription {
     std::string topic;
     std::string type;
-    dds_entity_t reader = 0;
     std::function<void(ReceivedMessage&&)> on_message;
+    dds_entity_t reader = 0;
+    std::atomic<std::uint64_t> arrived{0};  // samples that the middleware offered to the reader's history
+    std::uint64_t taken = 0;                // of them, those that the node's thread took; touched by it alone
+    std::uint64_t told_overwritten = 0;     // of them, those counted as dropped already
   };
   struct Publication {
     std::string topic;
@@ -77,6 +80,7 @@ struct DdsNode::Impl {
     thread.join();
   }
   void take(Subscription& subscription);
+  void count_losses(Subscription& subscription, std::uint64_t arrived);
   core::Result<dds_entity_t> make_topic(const std::string& topic, const std::string& type) const;
   template <class CType, class Message>
   core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
@@ -103,6 +107,8 @@ void DdsNode::Impl::run() {
 
 void DdsNode::Impl::take(Subscription& subscription) {
   constexpr std::uint32_t kBatch = 16;
+  // What has arrived by now is taken below, or was overwritten.
+  const std::uint64_t arrived = subscription.arrived.load(std::memory_order_acquire);
   for (;;) {
     ddsi_serdata* samples[kBatch] = {};
     dds_sample_info_t infos[kBatch];
@@ -110,10 +116,11 @@ void DdsNode::Impl::take(Subscription& subscription) {
     if (count <= 0) break;
     for (dds_return_t i = 0; i < count; ++i) {
       if (infos[i].valid_data) {
+        ++subscription.taken;
         const std::size_t size = ddsi_serdata_size(samples[i]);
         if (size <= options.max_message_bytes) {
           ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size),
-                                  infos[i].source_timestamp, core::wall_now_ns()};
+                                  infos[i].source_timestamp, core::steady_now_ns()};
           ddsi_serdata_to_ser(samples[i], 0, size, message.cdr.data());
           subscription.on_message(std::move(message));
         } else {
@@ -124,10 +131,15 @@ void DdsNode::Impl::take(Subscription& subscription) {
     }
     if (count < static_cast<dds_return_t>(kBatch)) break;
   }
-  dds_sample_lost_status_t lost;
-  if (dds_get_sample_lost_status(subscription.reader, &lost) == DDS_RETCODE_OK && lost.total_count_change > 0) {
-    dropped.fetch_add(static_cast<std::uint64_t>(lost.total_count_change), std::memory_order_relaxed);
-  }
+  count_losses(subscription, arrived);
+}
+
+// Cyclone's own count of lost samples leaves out those that newer ones push out of the reader's history.
+void DdsNode::Impl::count_losses(Subscription& subscription, std::uint64_t arrived) {
+  const std::uint64_t overwritten = arrived > subscription.taken ? arrived - subscription.taken : 0;
+  if (overwritten <= subscription.told_overwritten) return;
+  dropped.fetch_add(overwritten - subscription.told_overwritten, std::memory_order_relaxed);
+  subscription.told_overwritten = overwritten;
 }
 
 core::Result<dds_entity_t> DdsNode::Impl::make_topic(const std::string& topic, const std::string& type) const {
@@ -190,10 +202,31 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
 core::Status DdsNode::subscribe(const std::string& topic, const std::string& type, TopicQos qos,
                                 std::function<void(ReceivedMessage&&)> on_message) {
   PRESCENE_TRY(const dds_entity_t topic_entity, impl_->make_topic(topic, type));
-  const dds_entity_t reader = dds_create_reader(impl_->participant, topic_entity, make_qos(qos, type).get(), nullptr);
-  PRESCENE_RETURN_IF_ERROR(dds_status(reader, "reader of " + topic));
   const std::lock_guard lock(impl_->mutex);
-  impl_->subscriptions.push_back({topic, type, reader, std::move(on_message)});
+  Impl::Subscription& subscription = impl_->subscriptions.emplace_back();
+  subscription.topic = topic;
+  subscription.type = type;
+  subscription.on_message = std::move(on_message);
+  // A filter that lets everything pass sees each sample before it enters the history, from where newer ones push it
+  // out.
+  dds_topic_filter filter{};
+  filter.mode = DDS_TOPIC_FILTER_SAMPLEINFO_ARG;
+  filter.f.sampleinfo_arg = [](const dds_sample_info_t*, void* arrived) {
+    static_cast<std::atomic<std::uint64_t>*>(arrived)->fetch_add(1, std::memory_order_release);
+    return true;
+  };
+  filter.arg = &subscription.arrived;
+  core::Status made = dds_status(dds_set_topic_filter_extended(topic_entity, &filter), "topic " + topic);
+  dds_entity_t reader = 0;
+  if (made.ok()) {
+    reader = dds_create_reader(impl_->participant, topic_entity, make_qos(qos, type).get(), nullptr);
+    made = dds_status(reader, "reader of " + topic);
+  }
+  if (!made.ok()) {
+    impl_->subscriptions.pop_back();
+    return made;
+  }
+  subscription.reader = reader;
   impl_->announce();
   dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
   return dds_status(dds_waitset_attach(impl_->waitset, reader, static_cast<dds_attach_t>(impl_->subscriptions.size())),

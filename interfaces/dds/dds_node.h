@@ -40,7 +40,9 @@ struct DdsOptions {
 enum class TopicQos {
   kSensor,    ///< Best effort, keep last 5: readers of cameras match every driver.
   kImages,    ///< Reliable, keep last 2: writers of images serve best-effort and reliable readers.
-  kReliable,  ///< Reliable, keep last 10: poses, markers, diagnostics, queries and answers.
+  kReliable,  ///< Reliable, keep last 10: queries and answers of clients.
+  kState,     ///< As kReliable, but a writer never waits: for state that the next sample replaces (poses, markers).
+  kCommands,  ///< As kReliable, keep last 100: readers of questions and controls, none of which replaces another.
   kTf,        ///< Reliable, keep last 100.
   kLatched,   ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
   kTfStatic,  ///< Reader of /tf_static: reliable, transient local, keep last 100.
@@ -51,8 +53,8 @@ struct ReceivedMessage {
   std::string topic;  ///< "/camera/depth/image_raw"
   std::string type;   ///< "sensor_msgs/msg/Image"
   std::vector<std::uint8_t> cdr;
-  core::TimeNs source_ns = 0;    ///< The writer's time.
-  core::TimeNs received_ns = 0;  ///< Ours.
+  core::TimeNs source_ns = 0;    ///< The writer's wall time.
+  core::TimeNs received_ns = 0;  ///< Ours, of core::steady_now_ns(): does not jump when the wall clock is set.
 };
 
 /// Handle of a topic to publish on.
@@ -75,8 +77,9 @@ class DdsNode {
                          std::function<void(ReceivedMessage&&)> on_message);
 
   core::Result<DdsPublisher> advertise(const std::string& topic, const std::string& type, TopicQos qos);
-  /// Writes one sample (copied). kUnavailable when the middleware refuses; kInvalidInput when the message is not of the
-  /// publisher's type. May be called from any thread.
+  /// Writes one sample (copied). kUnavailable when the middleware refuses, as it does while a reliable reader that does
+  /// not read holds up the topic: at once for kState, after 100 ms otherwise. kInvalidInput when the message is not of
+  /// the publisher's type. May be called from any thread.
   core::Status publish(DdsPublisher publisher, const RosImage& message);
   core::Status publish(DdsPublisher publisher, const RosCameraInfo& message);
   core::Status publish(DdsPublisher publisher, const RosTfMessage& message);
@@ -96,7 +99,8 @@ class DdsNode {
   int matched_readers(DdsPublisher publisher) const;
   /// How many writers match a subscription now, 0 for an unknown topic.
   int matched_writers(const std::string& topic) const;
-  /// Samples that were dropped because they could not be decoded, were too large or were lost on the way.
+  /// Samples that reached this node and were dropped unread: too large, rejected by the middleware, or overwritten by
+  /// newer ones before the node's thread took them. What the network loses of best-effort topics nobody can count.
   std::uint64_t dropped_samples() const;
 
   struct Impl;

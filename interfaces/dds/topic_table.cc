@@ -52,6 +52,7 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
   int depth = 10;
   bool reliable = true;
   bool latched = false;
+  dds_duration_t longest_wait = DDS_MSECS(100);
   switch (kind) {
     case TopicQos::kSensor:
       depth = 5;
@@ -61,6 +62,12 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       depth = 2;
       break;
     case TopicQos::kReliable:
+      break;
+    case TopicQos::kState:
+      longest_wait = 0;
+      break;
+    case TopicQos::kCommands:
+      depth = 100;
       break;
     case TopicQos::kTf:
       depth = 100;
@@ -75,7 +82,7 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       break;
   }
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
-  dds_qset_reliability(qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));
+  dds_qset_reliability(qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, longest_wait);
   dds_qset_durability(qos.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   if (latched) {
     // Cyclone replays to late joiners what the durability service keeps, not what the history does.

@@ -171,6 +171,51 @@ TEST(DdsNode, BestEffortAndReliableReadersBothMatchAnImageWriter) {
   other->reset();
 }
 
+TEST(DdsNode, CountsWhatNewerSamplesPushOutBeforeItIsRead) {
+  auto writer = DdsNode::create(options(), {});
+  auto reader = DdsNode::create(options(), {});
+  ASSERT_TRUE(writer.ok() && reader.ok());
+  Inbox inbox;
+  std::mutex gate;
+  ASSERT_TRUE((*reader)
+                  ->subscribe("/many", "std_msgs/msg/String", TopicQos::kReliable,
+                              [&](ReceivedMessage&& message) {
+                                const std::lock_guard wait(gate);
+                                inbox.put(std::move(message));
+                              })
+                  .ok());
+  const auto publisher = (*writer)->advertise("/many", "std_msgs/msg/String", TopicQos::kReliable);
+  ASSERT_TRUE(publisher.ok());
+  std::size_t sent = 0;
+  const auto send = [&] {
+    ASSERT_TRUE((*writer)->publish(*publisher, RosString{std::to_string(sent)}).ok());
+    ++sent;
+  };
+  while (inbox.messages().empty()) {  // until the two have found each other
+    send();
+    inbox.wait_for(1, std::chrono::milliseconds(10));
+  }
+  {
+    const std::lock_guard closed(gate);
+    for (int i = 0; i < 1000; ++i) send();
+  }
+  // The last one comes in any case; what came before it was read or is counted.
+  const std::string last = std::to_string(sent - 1);
+  for (std::size_t known = inbox.messages().size();; known = inbox.messages().size()) {
+    const auto text = decode_cdr<RosString>(inbox.messages().back().cdr);
+    ASSERT_TRUE(text.ok());
+    if (text->data == last) break;
+    ASSERT_TRUE(inbox.wait_for(known + 1));
+  }
+  (*reader)->stop_receiving();
+  const std::vector<ReceivedMessage> read = inbox.messages();
+  const auto first = decode_cdr<RosString>(read.front().cdr);
+  ASSERT_TRUE(first.ok());
+  const std::size_t unheard = static_cast<std::size_t>(std::stoul(first->data));  // sent before they had met
+  EXPECT_LT(read.size(), 500u);
+  EXPECT_EQ(read.size() + (*reader)->dropped_samples(), sent - unheard);
+}
+
 TEST(DdsNode, AnnouncesItselfInEitherForm) {
   for (const RosDistro distro : {RosDistro::kHumble, RosDistro::kJazzy}) {
     DdsOptions announced = options();
