@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "prescene/core/text.h"
 
 namespace prescene::service {
 namespace {
 
+// Of each edge, however many there are: 3 s at 30 Hz.
+constexpr std::size_t kLeastSamplesOfAnEdge = 100;
 // So many transforms from before the history can't all be late.
 constexpr int kTooOldToBeWrong = 3;
 
@@ -35,22 +38,17 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
   if (!X_PC.is_finite()) {
     return core::invalid_input("transform " + parent + " -> " + child + " is not finite: correct the publisher");
   }
-  for (std::string frame = parent; edges_.contains(frame); frame = edges_.at(frame).parent) {
-    if (edges_.at(frame).parent == child) {
-      return core::invalid_input("transform " + parent + " -> " + child +
-                                 " would close a cycle: a frame has one parent");
-    }
-  }
   auto found = edges_.find(child);
-  if (found != edges_.end() && found->second.parent != parent) {
+  const bool is_known = found != edges_.end() && found->second.parent == parent;
+  if (!is_known) PRESCENE_RETURN_IF_ERROR(check_acyclic(parent, child));
+  if (found != edges_.end() && !is_known) {
     const bool expired =
         !found->second.is_static && found->second.samples.back().first + ns_of(settings_.history_s) < stamp_ns;
     if (!expired) {
       return core::invalid_input("frame '" + child + "' has the parent '" + found->second.parent + "' and now also '" +
                                  parent + "': stop one of the two publishers");
     }
-    if (--parents_[found->second.parent] == 0) parents_.erase(found->second.parent);
-    edges_.erase(found);
+    erase(found);
     found = edges_.end();
   }
   if (found == edges_.end()) {
@@ -64,11 +62,13 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
   Edge& edge = found->second;
   edge.is_static = edge.is_static || is_static;
   if (edge.is_static) {
+    sample_count_ += 1 - edge.samples.size();
     edge.samples.assign(1, {stamp_ns, X_PC});
     return core::ok_status();
   }
   if (!edge.samples.empty() && stamp_ns + ns_of(settings_.history_s) < edge.samples.back().first) {
     if (++edge.too_old_in_a_row < kTooOldToBeWrong) return core::ok_status();
+    sample_count_ -= edge.samples.size();
     edge.samples.clear();
   }
   edge.too_old_in_a_row = 0;
@@ -78,19 +78,48 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
     place->second = X_PC;
   } else {
     edge.samples.insert(place, {stamp_ns, X_PC});
+    ++sample_count_;
   }
-  while (edge.samples.front().first + ns_of(settings_.history_s) < edge.samples.back().first) edge.samples.pop_front();
+  forget_beyond_limits(edge);
   return core::ok_status();
+}
+
+core::Status TfBuffer::check_acyclic(const std::string& parent, const std::string& child) const {
+  for (auto edge = edges_.find(parent); edge != edges_.end(); edge = edges_.find(edge->second.parent)) {
+    if (edge->second.parent == child) {
+      return core::invalid_input("transform " + parent + " -> " + child +
+                                 " would close a cycle: a frame has one parent");
+    }
+  }
+  return core::ok_status();
+}
+
+void TfBuffer::forget_beyond_limits(Edge& edge) {
+  auto& samples = edge.samples;
+  const auto forget_oldest = [&] {
+    samples.pop_front();
+    --sample_count_;
+  };
+  while (samples.front().first + ns_of(settings_.history_s) < samples.back().first) forget_oldest();
+  const std::size_t share =
+      std::max(kLeastSamplesOfAnEdge, static_cast<std::size_t>(settings_.max_samples) / edges_.size());
+  while (samples.size() > share) {
+    forget_oldest();
+    ++forgotten_;
+  }
+}
+
+void TfBuffer::erase(std::map<std::string, Edge>::iterator edge) {
+  sample_count_ -= edge->second.samples.size();
+  if (--parents_[edge->second.parent] == 0) parents_.erase(edge->second.parent);
+  edges_.erase(edge);
 }
 
 void TfBuffer::forget_moving() {
   for (auto edge = edges_.begin(); edge != edges_.end();) {
-    if (edge->second.is_static) {
-      ++edge;
-      continue;
-    }
-    if (--parents_[edge->second.parent] == 0) parents_.erase(edge->second.parent);
-    edge = edges_.erase(edge);
+    const auto next = std::next(edge);
+    if (!edge->second.is_static) erase(edge);
+    edge = next;
   }
 }
 

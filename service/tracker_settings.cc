@@ -77,6 +77,7 @@ void for_each_setting(Settings& settings, const Visit& visit) {
   visit("mono16_is_depth", settings.assembler.mono16_is_depth);
   visit("tf_history_s", settings.tf.history_s);
   visit("tf_max_frames", settings.tf.max_frames);
+  visit("tf_max_samples", settings.tf.max_samples);
   visit("tf_max_extrapolation_s", settings.tf.max_extrapolation_s);
 }
 

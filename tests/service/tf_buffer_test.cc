@@ -112,5 +112,54 @@ TEST(TfBuffer, KeepsBoundedHistoryAndFrames) {
   EXPECT_TRUE(tf.knows("camera"));
 }
 
+TEST(TfBuffer, SharesItsRoomAmongTheEdgesAndCountsWhatItForgetsEarly) {
+  TfBuffer tf({.history_s = 1e6, .max_samples = 2000});
+  const auto add = [&](const std::string& child, int i) {
+    ASSERT_TRUE(tf.add("world", child, i * kSecond / 1000, Pose::identity(), false).ok());
+  };
+  for (int i = 0; i < 3000; ++i) add("hand", i);
+  EXPECT_EQ(tf.sample_count(), 2000u) << "alone it has all the room";
+  EXPECT_EQ(tf.forgotten(), 1000u);
+  for (int i = 0; i < 3000; ++i) {
+    for (int child = 0; child < 9; ++child) add("link" + std::to_string(child), i);
+    add("hand", 3000 + i);
+  }
+  EXPECT_EQ(tf.sample_count(), 2000u);
+  EXPECT_TRUE(tf.lookup("world", "link3", 2999 * kSecond / 1000).ok());
+  EXPECT_TRUE(tf.lookup("world", "link3", 2801 * kSecond / 1000).ok());
+  EXPECT_FALSE(tf.lookup("world", "link3", 2799 * kSecond / 1000).ok());
+  tf.forget_moving();
+  EXPECT_EQ(tf.sample_count(), 0u);
+}
+
+TEST(TfBuffer, EachOfManyEdgesKeepsEnoughForTheFramesThatWait) {
+  TfBuffer tf({.max_samples = 10});
+  for (int i = 0; i < 300; ++i) {
+    for (int child = 0; child < 20; ++child) {
+      ASSERT_TRUE(tf.add("world", std::to_string(child), i * kSecond / 30, Pose::identity(), false).ok());
+    }
+  }
+  EXPECT_TRUE(tf.lookup("world", "7", 201 * kSecond / 30).ok()) << "a hundred of each";
+  EXPECT_EQ(tf.sample_count(), 2000u);
+}
+
+TEST(TfBuffer, CountsItsTransformsThroughEveryChange) {
+  TfBuffer tf({.history_s = 1.0});
+  const auto add = [&](const char* parent, const char* child, core::TimeNs stamp_ns, bool is_static) {
+    return tf.add(parent, child, stamp_ns, Pose::identity(), is_static).ok();
+  };
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(add("world", "hand", i * kSecond / 10, false));
+  EXPECT_EQ(tf.sample_count(), 5u);
+  EXPECT_TRUE(add("world", "hand", 4 * kSecond / 10, false)) << "the same stamp again";
+  EXPECT_EQ(tf.sample_count(), 5u);
+  EXPECT_TRUE(add("other", "hand", 10 * kSecond, false)) << "the old parent has expired";
+  EXPECT_EQ(tf.sample_count(), 1u);
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(add("other", "hand", kSecond + i, false)) << "the clock went back";
+  EXPECT_EQ(tf.sample_count(), 1u);
+  EXPECT_TRUE(add("other", "hand", kSecond + 7, false));
+  EXPECT_TRUE(add("other", "hand", 0, true)) << "it is static now";
+  EXPECT_EQ(tf.sample_count(), 1u);
+}
+
 }  // namespace
 }  // namespace prescene::service

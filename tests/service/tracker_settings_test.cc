@@ -18,7 +18,7 @@ TrackerSettings unusual() {
       "base", "lens", geometry::normalized(geometry::Pose{{0.3, 0.1, -0.7, 0.2}, {0.1, 1.0 / 3.0, 2}}),
       0.07,   0.02,   false,
       true,   true};
-  settings.tf = {12.5, 77, 0.3};
+  settings.tf = {.history_s = 12.5, .max_frames = 77, .max_samples = 5000, .max_extrapolation_s = 0.3};
   return settings;
 }
 
@@ -32,6 +32,7 @@ TEST(TrackerSettings, ComeBackAsTheSameBits) {
   EXPECT_EQ(read->assembler.max_wait_s, 0.07);
   EXPECT_TRUE(read->assembler.rectified);
   EXPECT_EQ(read->tf.max_frames, 77);
+  EXPECT_EQ(read->tf.max_samples, 5000);
   // Every key says something: without it the default stays.
   const ordered_json whole = to_json(unusual());
   const ordered_json defaults = to_json(TrackerSettings{});
