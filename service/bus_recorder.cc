@@ -9,9 +9,9 @@ namespace prescene::service {
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval(100);
-// What may wait for the disk: two seconds of images at 30 Hz.
-constexpr std::size_t kWaitingImages = 60;
-constexpr std::size_t kWaitingTransforms = 10'000;
+// What may wait for the disk: two seconds of images of 640 x 480 at 30 Hz.
+constexpr InboxLimit kWaitingImages{.messages = 60, .bytes = std::size_t{64} << 20};
+constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t{16} << 20};
 
 }  // namespace
 

@@ -74,6 +74,7 @@ class FrameAssembler {
   std::string last_skip() const { return skipped_.empty() ? "" : skipped_.back().reason; }
   /// Since the start.
   std::uint64_t skipped_count() const { return skipped_count_; }
+  std::uint64_t tf_forgotten() const { return tf_.forgotten(); }
 
  private:
   struct Waiting {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/inbox.h"
 
-#include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace prescene::service {
@@ -9,18 +9,20 @@ namespace prescene::service {
 void Inbox::put(interfaces::ReceivedMessage&& message) {
   {
     const std::lock_guard lock(mutex_);
-    const auto limit = limits_.find(message.topic);
-    std::size_t& waiting = waiting_[message.topic];
-    if (waiting >= (limit == limits_.end() ? 100 : limit->second)) {
-      const auto oldest =
-          std::find_if(messages_.begin(), messages_.end(),
-                       [&](const interfaces::ReceivedMessage& other) { return other.topic == message.topic; });
-      messages_.erase(oldest);
-      --waiting;
-      ++dropped_;
+    const std::string topic = message.topic;
+    const auto limit_of = limits_.find(topic);
+    const InboxLimit limit = limit_of == limits_.end() ? InboxLimit{} : limit_of->second;
+    auto& waiting = by_topic_[topic];
+    std::size_t& bytes = bytes_[topic];
+    while (!waiting.empty() && (waiting.size() >= limit.messages || bytes + message.cdr.size() > limit.bytes)) {
+      bytes -= waiting.front()->cdr.size();
+      messages_.erase(waiting.front());
+      waiting.pop_front();
+      ++dropped_[topic];
     }
-    ++waiting;
+    bytes += message.cdr.size();
     messages_.push_back(std::move(message));
+    waiting.push_back(std::prev(messages_.end()));
   }
   changed_.notify_one();
 }
@@ -29,7 +31,8 @@ std::vector<interfaces::ReceivedMessage> Inbox::take_all(std::chrono::steady_clo
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, until, [&] { return !messages_.empty() || woken_; });
   woken_ = false;
-  waiting_.clear();
+  by_topic_.clear();
+  bytes_.clear();
   std::vector<interfaces::ReceivedMessage> taken(std::make_move_iterator(messages_.begin()),
                                                  std::make_move_iterator(messages_.end()));
   messages_.clear();
@@ -44,9 +47,15 @@ void Inbox::wake() {
   changed_.notify_one();
 }
 
-std::uint64_t Inbox::dropped() const {
+std::map<std::string, std::uint64_t> Inbox::dropped_by_topic() const {
   const std::lock_guard lock(mutex_);
   return dropped_;
+}
+
+std::uint64_t Inbox::dropped() const {
+  std::uint64_t sum = 0;
+  for (const auto& [topic, count] : dropped_by_topic()) sum += count;
+  return sum;
 }
 
 }  // namespace prescene::service

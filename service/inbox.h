@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the bus's thread and the one that steps the belief: bounded per topic, the oldest goes first when it is full.
+// Between the bus's thread and the one that steps the belief: bounded per topic, in messages and in bytes. When a topic
+// is full, its oldest messages are dropped and counted.
 #pragma once
 
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <list>
 #include <map>
 #include <mutex>
 #include <string>
@@ -15,27 +17,37 @@
 
 namespace prescene::service {
 
+/// How much of a topic may wait. A message that is larger than `bytes` waits alone.
+struct InboxLimit {
+  std::size_t messages = 100;  ///< >= 1.
+  std::size_t bytes = std::size_t{16} << 20;
+};
+
 /// Thread-safe.
 class Inbox {
  public:
-  /// How many messages of a topic may wait (>= 1); other topics' default is 100.
-  explicit Inbox(std::map<std::string, std::size_t> limits) : limits_(std::move(limits)) {}
+  /// Topics that are not named have the default limit.
+  explicit Inbox(std::map<std::string, InboxLimit> limits) : limits_(std::move(limits)) {}
 
   void put(interfaces::ReceivedMessage&& message);
   /// Everything that waits, in order of arrival; waits for something until `until` at most, or until wake().
   std::vector<interfaces::ReceivedMessage> take_all(std::chrono::steady_clock::time_point until);
   void wake();
-  /// Messages that were dropped because their topic was full.
+  /// Messages that were dropped because their topic was full, by topic; topics that lost none are left out.
+  std::map<std::string, std::uint64_t> dropped_by_topic() const;
+  /// Their sum.
   std::uint64_t dropped() const;
 
  private:
-  std::map<std::string, std::size_t> limits_;
+  std::map<std::string, InboxLimit> limits_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<interfaces::ReceivedMessage> messages_;
-  std::map<std::string, std::size_t> waiting_;
+  std::list<interfaces::ReceivedMessage> messages_;
+  /// Where each topic's waiting messages are, oldest first: the oldest is found at once, however many others wait.
+  std::map<std::string, std::deque<std::list<interfaces::ReceivedMessage>::iterator>> by_topic_;
+  std::map<std::string, std::size_t> bytes_;
   bool woken_ = false;
-  std::uint64_t dropped_ = 0;
+  std::map<std::string, std::uint64_t> dropped_;
 };
 
 }  // namespace prescene::service

@@ -2,7 +2,9 @@
 #include "prescene/service/live_service.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -12,6 +14,7 @@
 #include "prescene/service/answering_desk.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/inbox.h"
+#include "prescene/service/log_limiter.h"
 #include "prescene/service/service_health.h"
 
 namespace prescene::service {
@@ -25,8 +28,18 @@ using std::chrono::steady_clock;
 // How often a stop request is looked for while nothing comes in.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
-std::map<std::string, std::size_t> inbox_limits(const InputTopics& topics) {
-  return {{topics.depth, 4}, {topics.color, 4}, {topics.camera_info, 4}, {topics.tf, 1000}, {topics.tf_static, 100}};
+// A stop, a frame that is complete and the diagnostics wait no longer than this for a crowd of messages to be taken in.
+constexpr std::chrono::milliseconds kLongestIntake(20);
+
+// Of images the newest count; what else waits is bounded so that its intake takes some tens of milliseconds.
+std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
+  constexpr std::size_t kMiB = std::size_t{1} << 20;
+  const InboxLimit image{.messages = 4, .bytes = 64 * kMiB};
+  return {{topics.depth, image},
+          {topics.color, image},
+          {topics.camera_info, {.messages = 4, .bytes = kMiB}},
+          {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
+          {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}}};
 }
 
 /// True at most `rate` times a second.
@@ -54,18 +67,27 @@ struct LiveService::Impl {
         settings(a_settings),
         tracker(std::move(a_tracker)),
         recording(std::move(a_recording)),
-        log(std::move(a_log)),
+        log_limiter(std::move(a_log), {}),
+        log(log_limiter.sink()),
         meshes(marker_meshes(*scene)),
         inbox(inbox_limits(settings.tracker.topics)),
         marker_limit(settings.marker_rate),
         diagnostics_limit(settings.diagnostics_rate) {}
 
   core::Status join_bus();
-  void take_in(std::vector<ReceivedMessage> messages);
+  /// Takes in what came, in its order, and looks after frames in between.
+  void take_in(std::vector<ReceivedMessage> messages, const core::Cancellation& cancellation);
+  void take_in(ReceivedMessage& message);
   void refuse(const core::Status& status);
   void record(const std::string& topic, const std::string& json);
+  /// The recording ends here, and is an error of the run.
+  void give_up_recording(const core::Status& why);
+  /// Steps the belief if a frame is complete, records what was answered, publishes.
+  void look_after_frames();
+  /// Counts and logs a message that the middleware did not take.
+  void check_sent(const core::Status& status);
   void publish(const TrackerStep& step);
-  void publish_diagnostics(core::TimeNs now_ns);
+  void publish_diagnostics();
   core::TimeNs now();
   ServiceHealth health() const;
   void tell_what_changed(const ServiceHealth& health);
@@ -74,6 +96,8 @@ struct LiveService::Impl {
   LiveSettings settings;
   std::unique_ptr<Tracker> tracker;
   std::unique_ptr<RecordingWriter> recording;
+  core::Status recording_status;
+  LogLimiter log_limiter;
   core::LogSink log;
   MarkerMeshes meshes;
   Inbox inbox;
@@ -86,6 +110,8 @@ struct LiveService::Impl {
   core::TimeNs last_now_ns = 0;
   std::uint64_t steps = 0;
   std::uint64_t refused = 0;
+  std::uint64_t failures = 0;
+  std::atomic<std::uint64_t> unsent{0};
   double step_seconds = 0.0;
   std::vector<std::string> degraded;
   std::string last_refusal;
@@ -119,8 +145,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
   Impl* raw = impl.get();
   const auto on_answer = [raw](const std::string&, const std::string& answer) {
-    const core::Status published = raw->node->publish(raw->answers, interfaces::RosString{answer});
-    if (!published.ok()) core::log(raw->log, core::LogLevel::kWarning, published.message());
+    raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
     const std::lock_guard lock(raw->answered_mutex);
     raw->answered.push_back(answer);
   };
@@ -133,15 +158,14 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
 }
 
 core::Status LiveService::Impl::join_bus() {
-  PRESCENE_TRY(beliefs, node->advertise(kBeliefTopic, "std_msgs/msg/String", TopicQos::kReliable));
-  PRESCENE_TRY(detections, node->advertise(kDetectionsTopic, "vision_msgs/msg/Detection3DArray", TopicQos::kReliable));
-  PRESCENE_TRY(markers, node->advertise(kMarkersTopic, "visualization_msgs/msg/MarkerArray", TopicQos::kReliable));
+  PRESCENE_TRY(beliefs, node->advertise(kBeliefTopic, "std_msgs/msg/String", TopicQos::kState));
+  PRESCENE_TRY(detections, node->advertise(kDetectionsTopic, "vision_msgs/msg/Detection3DArray", TopicQos::kState));
+  PRESCENE_TRY(markers, node->advertise(kMarkersTopic, "visualization_msgs/msg/MarkerArray", TopicQos::kState));
   PRESCENE_TRY(diagnostics,
-               node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kReliable));
+               node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState));
   for (const belief::SceneObject& object : scene->objects) {
-    PRESCENE_TRY(
-        poses[object.name],
-        node->advertise(pose_topic(object.name), "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kReliable));
+    PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name),
+                                                     "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kState));
   }
   const auto deliver = [this](ReceivedMessage&& message) { inbox.put(std::move(message)); };
   const InputTopics& topics = settings.tracker.topics;
@@ -153,8 +177,8 @@ core::Status LiveService::Impl::join_bus() {
       node->subscribe(topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor, deliver));
   PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf, deliver));
   PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, deliver));
-  PRESCENE_RETURN_IF_ERROR(node->subscribe(kControlTopic, "std_msgs/msg/String", TopicQos::kReliable, deliver));
-  return node->subscribe(kQueryTopic, "std_msgs/msg/String", TopicQos::kReliable, [this](ReceivedMessage&& message) {
+  PRESCENE_RETURN_IF_ERROR(node->subscribe(kControlTopic, "std_msgs/msg/String", TopicQos::kCommands, deliver));
+  return node->subscribe(kQueryTopic, "std_msgs/msg/String", TopicQos::kCommands, [this](ReceivedMessage&& message) {
     const auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
     if (question) desk->ask(question->data);
     inbox.put(std::move(message));  // for the recording
@@ -163,7 +187,7 @@ core::Status LiveService::Impl::join_bus() {
 
 core::TimeNs LiveService::Impl::now() {
   // Never back, so that a recording's order by time is the order of arrival.
-  last_now_ns = std::max(last_now_ns, core::wall_now_ns());
+  last_now_ns = std::max(last_now_ns, core::steady_now_ns());
   return last_now_ns;
 }
 
@@ -177,46 +201,89 @@ void LiveService::Impl::refuse(const core::Status& status) {
 void LiveService::Impl::record(const std::string& topic, const std::string& json) {
   if (!recording) return;
   const core::Status written = recording->write_json(topic, json, last_now_ns);
-  if (written.ok()) return;
-  core::log(log, core::LogLevel::kError, written.message() + "; going on without recording");
+  if (!written.ok()) give_up_recording(written);
+}
+
+void LiveService::Impl::give_up_recording(const core::Status& why) {
+  recording_status = why;
+  core::log(log, core::LogLevel::kError, why.message() + "; going on without recording");
   recording.reset();
 }
 
-void LiveService::Impl::take_in(std::vector<ReceivedMessage> messages) {
-  for (ReceivedMessage& message : messages) {
-    message.received_ns = std::max(message.received_ns, last_now_ns);
-    last_now_ns = message.received_ns;
-    MessageIndex index = next_index++;
-    if (recording) {
-      const auto written = recording->write(message);
-      if (written) {
-        index = *written;
-      } else {
-        core::log(log, core::LogLevel::kError, written.status().message() + "; going on without recording");
-        recording.reset();
-      }
+void LiveService::Impl::take_in(ReceivedMessage& message) {
+  message.received_ns = std::max(message.received_ns, last_now_ns);
+  last_now_ns = message.received_ns;
+  MessageIndex index = next_index++;
+  if (recording) {
+    const auto written = recording->write(message);
+    if (written) {
+      index = *written;
+    } else {
+      give_up_recording(written.status());
     }
-    const core::Status taken = tracker->take_in(message, index);
-    if (!taken.ok()) refuse(taken);
   }
+  const core::Status taken = tracker->take_in(message, index);
+  if (!taken.ok()) refuse(taken);
+}
+
+void LiveService::Impl::take_in(std::vector<ReceivedMessage> messages, const core::Cancellation& cancellation) {
+  auto look_up = steady_clock::now() + kLongestIntake;
+  for (ReceivedMessage& message : messages) {
+    if (cancellation.requested()) return;
+    try {
+      take_in(message);
+    } catch (const std::exception& error) {
+      ++failures;
+      core::log(log, core::LogLevel::kError, message.topic + ": a message was left out: " + error.what());
+    }
+    if (steady_clock::now() < look_up) continue;
+    look_after_frames();
+    look_up = steady_clock::now() + kLongestIntake;
+  }
+}
+
+void LiveService::Impl::look_after_frames() {
+  std::vector<std::string> answers_given;
+  {
+    const std::lock_guard lock(answered_mutex);
+    answers_given.swap(answered);
+  }
+  const core::TimeNs now_ns = now();
+  for (const std::string& answer : answers_given) record(kAnswerTopic, answer);
+  try {
+    if (const auto step = tracker->step(now_ns)) {
+      ++steps;
+      since_frame.emplace();
+      step_seconds = step->record.seconds;
+      degraded = step->record.degraded;
+      publish(*step);
+    }
+  } catch (const std::exception& error) {
+    ++failures;
+    core::log(log, core::LogLevel::kError, std::string("a frame was left out: ") + error.what());
+  }
+  if (diagnostics_limit.due()) publish_diagnostics();
+}
+
+void LiveService::Impl::check_sent(const core::Status& status) {
+  if (status.ok()) return;
+  unsent.fetch_add(1, std::memory_order_relaxed);
+  core::log(log, core::LogLevel::kWarning, status.message());
 }
 
 void LiveService::Impl::publish(const TrackerStep& step) {
   const std::shared_ptr<const belief::Belief> belief = tracker->belief();
   const BeliefSummary summary = summary_of(*belief);
   const std::string& world = settings.tracker.assembler.world_frame;
-  const auto check = [this](const core::Status& status) {
-    if (!status.ok()) core::log(log, core::LogLevel::kWarning, status.message());
-  };
   const std::string json = to_json(summary).dump();
-  check(node->publish(beliefs, interfaces::RosString{json}));
-  check(node->publish(detections, detections_of(summary, *belief->scene, world)));
+  check_sent(node->publish(beliefs, interfaces::RosString{json}));
+  check_sent(node->publish(detections, detections_of(summary, *belief->scene, world)));
   for (const ObjectSummary& object : summary.objects) {
     const auto publisher = poses.find(object.name);
     if (publisher == poses.end() || object.state == belief::TrackState::kLost) continue;
-    check(node->publish(publisher->second, pose_of(object, summary.stamp_ns, world)));
+    check_sent(node->publish(publisher->second, pose_of(object, summary.stamp_ns, world)));
   }
-  if (marker_limit.due()) check(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
+  if (marker_limit.due()) check_sent(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
   record(kBeliefTopic, json);
   record(kStepTopic, to_json(step.record).dump());
 }
@@ -227,8 +294,14 @@ ServiceHealth LiveService::Impl::health() const {
   health.steps = steps;
   health.skipped_frames = tracker->skipped_count();
   health.refused_messages = refused;
-  health.dropped_in_inbox = inbox.dropped();
+  health.dropped_in_inbox = inbox.dropped_by_topic();
   health.lost_on_bus = node->dropped_samples();
+  health.unsent = unsent.load(std::memory_order_relaxed);
+  health.failures = failures;
+  health.unlogged = log_limiter.held_back();
+  health.tf_forgotten = tracker->tf_forgotten();
+  health.is_recording = recording != nullptr;
+  if (!recording_status.ok()) health.recording_failure = recording_status.message();
   if (since_frame) health.seconds_since_frame = since_frame->seconds();
   health.last_step_seconds = step_seconds;
   health.degraded = degraded;
@@ -252,13 +325,12 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
   was_degraded = !health.degraded.empty();
 }
 
-void LiveService::Impl::publish_diagnostics(core::TimeNs now_ns) {
+void LiveService::Impl::publish_diagnostics() {
   const ServiceHealth now = health();
   tell_what_changed(now);
-  const core::Status sent =
-      node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(now_ns), ""},
-                                                                {to_diagnostic(now, settings.dds.node_name)}});
-  if (!sent.ok()) core::log(log, core::LogLevel::kWarning, sent.message());
+  check_sent(
+      node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(core::wall_now_ns()), ""},
+                                                                {to_diagnostic(now, settings.dds.node_name)}}));
 }
 
 core::Status LiveService::run(const core::Cancellation& cancellation) {
@@ -272,25 +344,11 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
       until = std::min(
           until, steady_clock::now() + std::chrono::nanoseconds(std::max<core::TimeNs>(0, *deadline - impl.now())));
     }
-    impl.take_in(impl.inbox.take_all(until));
-    std::vector<std::string> answered;
-    {
-      const std::lock_guard lock(impl.answered_mutex);
-      answered.swap(impl.answered);
-    }
-    const core::TimeNs now_ns = impl.now();
-    for (const std::string& answer : answered) impl.record(kAnswerTopic, answer);
-    if (const auto step = impl.tracker->step(now_ns)) {
-      ++impl.steps;
-      impl.since_frame.emplace();
-      impl.step_seconds = step->record.seconds;
-      impl.degraded = step->record.degraded;
-      impl.publish(*step);
-    }
-    if (impl.diagnostics_limit.due()) impl.publish_diagnostics(now_ns);
+    impl.take_in(impl.inbox.take_all(until), cancellation);
+    impl.look_after_frames();
   }
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
-  return impl.recording ? impl.recording->close() : core::ok_status();
+  return impl.recording ? impl.recording->close() : impl.recording_status;
 }
 
 }  // namespace prescene::service

@@ -2,7 +2,8 @@
 // The live service: listens on the bus, steps the belief, publishes it, answers questions, and records what happened.
 //
 // One thread owns the belief and steps it; the bus has its own; questions are answered by a third from a snapshot, so
-// that a slow question never delays a frame. The newest frame wins, and skipped ones are counted.
+// that a slow question never delays a frame. The newest frame wins, and skipped ones are counted. Whatever is lost,
+// refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its rate.
 #pragma once
 
 #include <memory>
@@ -33,7 +34,8 @@ class LiveService {
                                                            const core::LogSink& log);
   ~LiveService();
 
-  /// Works until cancelled, then closes the recording.
+  /// Works until cancelled, then closes the recording. A recording that fails on the way (a full disk) ends there,
+  /// while tracking goes on; the status then tells of it.
   core::Status run(const core::Cancellation& cancellation);
 
  private:

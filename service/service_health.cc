@@ -9,9 +9,28 @@ namespace {
 using interfaces::RosDiagnosticLevel;
 
 RosDiagnosticLevel level_of(const ServiceHealth& health) {
+  if (!health.recording_failure.empty()) return RosDiagnosticLevel::kError;
   if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
   if (!is_tracking(health)) return RosDiagnosticLevel::kError;
   return health.degraded.empty() ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
+}
+
+std::uint64_t sum_of(const std::map<std::string, std::uint64_t>& counts) {
+  std::uint64_t sum = 0;
+  for (const auto& [topic, count] : counts) sum += count;
+  return sum;
+}
+
+/// "/camera/depth 3, /tf 12".
+std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
+  std::string text;
+  for (const auto& [topic, count] : counts) text += (text.empty() ? "" : ", ") + topic + " " + std::to_string(count);
+  return text;
+}
+
+std::string recording_text(const ServiceHealth& health) {
+  if (!health.recording_failure.empty()) return "failed: " + health.recording_failure;
+  return health.is_recording ? "on" : "off";
 }
 
 }  // namespace
@@ -21,16 +40,18 @@ bool is_tracking(const ServiceHealth& health) {
 }
 
 std::string health_text(const ServiceHealth& health) {
+  const std::string recording =
+      health.recording_failure.empty() ? "" : "; the recording failed: " + health.recording_failure;
   if (is_tracking(health)) {
     std::string text = "tracking";
     for (const std::string& word : health.degraded) text += "; " + word;
-    return text;
+    return text + recording;
   }
   std::string text =
       health.seconds_since_frame ? "no frame is used any more" : "waiting for frames on " + health.depth_topic;
   if (!health.last_skip.empty()) text += "; the last one was skipped: " + health.last_skip;
   if (!health.last_refusal.empty()) text += "; the last message refused: " + health.last_refusal;
-  return text;
+  return text + recording;
 }
 
 interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const std::string& hardware_id) {
@@ -43,8 +64,14 @@ interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const
       {"steps", std::to_string(health.steps)},
       {"skipped frames", std::to_string(health.skipped_frames)},
       {"refused messages", std::to_string(health.refused_messages)},
-      {"dropped in the inbox", std::to_string(health.dropped_in_inbox)},
+      {"dropped in the inbox", std::to_string(sum_of(health.dropped_in_inbox))},
+      {"dropped by topic", counts_text(health.dropped_in_inbox)},
       {"lost on the bus", std::to_string(health.lost_on_bus)},
+      {"not sent", std::to_string(health.unsent)},
+      {"failures", std::to_string(health.failures)},
+      {"lines not logged", std::to_string(health.unlogged)},
+      {"transforms forgotten early", std::to_string(health.tf_forgotten)},
+      {"recording", recording_text(health)},
       {"since the last frame, s", health.seconds_since_frame ? core::fixed_text(*health.seconds_since_frame, 1) : ""},
       {"last step, s", core::rounded_text(health.last_step_seconds)},
       {"last refusal", health.last_refusal}};

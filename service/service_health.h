@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,8 +20,15 @@ struct ServiceHealth {
   std::uint64_t steps = 0;
   std::uint64_t skipped_frames = 0;
   std::uint64_t refused_messages = 0;
-  std::uint64_t dropped_in_inbox = 0;
-  std::uint64_t lost_on_bus = 0;
+  /// Messages that waited for the tracker and were dropped because too many did, by topic.
+  std::map<std::string, std::uint64_t> dropped_in_inbox;
+  std::uint64_t lost_on_bus = 0;   ///< Samples that reached this process and were never read.
+  std::uint64_t unsent = 0;        ///< Messages of ours that the middleware did not take: a reader does not keep up.
+  std::uint64_t failures = 0;      ///< Messages and frames that ended in an exception and were left out.
+  std::uint64_t unlogged = 0;      ///< Lines that were left out of the log because too many came.
+  std::uint64_t tf_forgotten = 0;  ///< Transforms that were forgotten early for want of room.
+  bool is_recording = false;
+  std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
   double last_step_seconds = 0.0;
   std::vector<std::string> degraded;  ///< What the last step could not do fully.
@@ -34,7 +42,7 @@ bool is_tracking(const ServiceHealth& health);
 /// What it does and, while it does not track, why not: "no frame is used: tf does not connect ...".
 std::string health_text(const ServiceHealth& health);
 
-/// kWarn before the first frame and for degraded steps, kError when frames stopped.
+/// kWarn before the first frame and for degraded steps, kError when frames stopped or the recording failed.
 interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const std::string& hardware_id);
 
 }  // namespace prescene::service

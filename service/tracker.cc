@@ -18,6 +18,10 @@ namespace {
 // More than a robot does between two frames; a sender in a loop must not fill the memory.
 constexpr std::size_t kMaxControls = 1000;
 
+// A control that was sent so near to the newest frame's stamp was sent by the clock of the frames. Otherwise that clock
+// is another one (a simulated time, a camera's own), or was set; then the control counts from the newest frame.
+constexpr core::TimeNs kSameClockNs = 2'000'000'000;
+
 // The end of ROS's 32 bit seconds.
 constexpr core::TimeNs kLatestNs = (core::TimeNs{1} << 31) * 1'000'000'000;
 
@@ -109,7 +113,7 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
 
 core::Status Tracker::take_control(const interfaces::ReceivedMessage& message) {
   PRESCENE_TRY(const auto text, decoded<interfaces::RosString>(message, "std_msgs/msg/String"));
-  PRESCENE_TRY(const auto actions, parse_control(text.data, message.received_ns));
+  PRESCENE_TRY(const auto actions, parse_control(text.data, sent_at(message)));
   if (controls_.size() + actions.size() > kMaxControls) {
     return core::resource_exhausted("more than " + std::to_string(kMaxControls) +
                                     " actions wait for a frame: send fewer");
@@ -117,6 +121,13 @@ core::Status Tracker::take_control(const interfaces::ReceivedMessage& message) {
   controls_.insert(controls_.end(), actions.begin(), actions.end());
   std::stable_sort(controls_.begin(), controls_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return core::ok_status();
+}
+
+core::TimeNs Tracker::sent_at(const interfaces::ReceivedMessage& message) const {
+  const core::TimeNs sent_ns = message.source_ns > 0 ? message.source_ns : message.received_ns;
+  if (belief_->step == 0) return sent_ns;
+  const bool is_same_clock = std::abs(sent_ns - belief_->stamp_ns) <= kSameClockNs;
+  return is_same_clock ? sent_ns : belief_->stamp_ns;
 }
 
 void Tracker::start_again() {
@@ -179,12 +190,12 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
 }
 
 core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control(const std::string& text,
-                                                                                 core::TimeNs received_ns) {
+                                                                                 core::TimeNs sent_ns) {
   const auto json = parse_or_discard(text);
   if (!json.is_object() || !json.contains("actions") || !json["actions"].is_array()) {
     return core::invalid_input("a control is {\"stamp_ns\": n, \"actions\": [...]}, this one is not");
   }
-  core::TimeNs begin_ns = received_ns;
+  core::TimeNs begin_ns = sent_ns;
   if (json.contains("stamp_ns")) {
     if (!json["stamp_ns"].is_number_integer())
       return core::invalid_input("stamp_ns: not a whole number of nanoseconds");

@@ -49,6 +49,8 @@ class Tracker {
   /// Frames that were not used, since the start, and why the newest since the last step was not ("" = none was).
   std::uint64_t skipped_count() const { return assembler_.skipped_count(); }
   std::string last_skip() const { return assembler_.last_skip(); }
+  /// Transforms that tf's buffer forgot early for want of room, since the start.
+  std::uint64_t tf_forgotten() const { return assembler_.tf_forgotten(); }
 
   /// The newest belief; a snapshot that never changes. Safe from any thread.
   std::shared_ptr<const belief::Belief> belief() const;
@@ -61,6 +63,8 @@ class Tracker {
   /// Forgets the belief: after a jump of the sender's clock nothing is known of the time between.
   void start_again();
   core::Status take_control(const interfaces::ReceivedMessage& message);
+  /// When a message was sent, in the time of the frames' stamps.
+  core::TimeNs sent_at(const interfaces::ReceivedMessage& message) const;
   belief::Control control_until(core::TimeNs stamp_ns);
 
   TrackerSettings settings_;
@@ -76,8 +80,8 @@ class Tracker {
 };
 
 /// The actions of a control message: {"stamp_ns": n, "actions": [...]}; times of the actions count from the stamp (from
-/// `received_ns` if there is none).
+/// `sent_ns` if there is none).
 core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control(const std::string& json,
-                                                                                 core::TimeNs received_ns);
+                                                                                 core::TimeNs sent_ns);
 
 }  // namespace prescene::service

@@ -13,7 +13,7 @@ interfaces::ReceivedMessage message(const std::string& topic, core::TimeNs time)
 }
 
 TEST(Inbox, DropsTheOldestOfAFullTopicAndCounts) {
-  Inbox inbox({{"/depth", 2}});
+  Inbox inbox({{"/depth", {.messages = 2}}});
   for (int i = 0; i < 5; ++i) inbox.put(message("/depth", i));
   inbox.put(message("/tf", 9));
   const auto taken = inbox.take_all(std::chrono::steady_clock::now());
@@ -25,6 +25,23 @@ TEST(Inbox, DropsTheOldestOfAFullTopicAndCounts) {
   EXPECT_TRUE(inbox.take_all(std::chrono::steady_clock::now()).empty());
   inbox.put(message("/depth", 7));
   EXPECT_EQ(inbox.take_all(std::chrono::steady_clock::now()).size(), 1u) << "taking makes room";
+}
+
+TEST(Inbox, BoundsTheBytesOfATopicButKeepsItsNewestMessage) {
+  Inbox inbox({{"/tf", {.messages = 100, .bytes = 1000}}});
+  const auto put = [&](const std::string& topic, std::size_t bytes) {
+    inbox.put({topic, "t", std::vector<std::uint8_t>(bytes), 0, 0});
+  };
+  for (int i = 0; i < 50; ++i) put("/tf", 300);
+  put("/image", 5000);
+  EXPECT_EQ(inbox.dropped(), 47u) << "three of 300 bytes fit";
+  put("/tf", 4000);
+  EXPECT_EQ(inbox.dropped(), 50u);
+  EXPECT_EQ(inbox.dropped_by_topic(), (std::map<std::string, std::uint64_t>{{"/tf", 50}}));
+  const auto taken = inbox.take_all(std::chrono::steady_clock::now());
+  ASSERT_EQ(taken.size(), 2u);
+  EXPECT_EQ(taken[0].topic, "/image");
+  EXPECT_EQ(taken[1].cdr.size(), 4000u) << "a message beyond the limit waits alone";
 }
 
 TEST(Inbox, WaitingEndsWithAMessageOrAWake) {

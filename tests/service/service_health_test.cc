@@ -52,5 +52,36 @@ TEST(ServiceHealth, CarriesItsCounts) {
   for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
 }
 
+TEST(ServiceHealth, TellsOfEveryLossByItsPlace) {
+  ServiceHealth health;
+  health.dropped_in_inbox = {{"/tf", 12}, {"/camera/depth", 3}};
+  health.unsent = 4;
+  health.failures = 1;
+  health.unlogged = 900;
+  health.tf_forgotten = 6;
+  const auto status = to_diagnostic(health, "here");
+  const std::vector<interfaces::RosKeyValue> some = {{"dropped in the inbox", "15"},
+                                                     {"dropped by topic", "/camera/depth 3, /tf 12"},
+                                                     {"not sent", "4"},
+                                                     {"failures", "1"},
+                                                     {"lines not logged", "900"},
+                                                     {"transforms forgotten early", "6"},
+                                                     {"recording", "off"}};
+  for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
+}
+
+TEST(ServiceHealth, AFailedRecordingIsAnErrorHoweverWellItTracks) {
+  ServiceHealth health;
+  health.seconds_since_frame = 0.1;
+  health.is_recording = true;
+  EXPECT_EQ(level(health), RosDiagnosticLevel::kOk);
+  health.is_recording = false;
+  health.recording_failure = "run.mcap: no space left";
+  EXPECT_EQ(level(health), RosDiagnosticLevel::kError);
+  EXPECT_THAT(health_text(health), HasSubstr("run.mcap: no space left"));
+  EXPECT_THAT(to_diagnostic(health, "here").values,
+              ::testing::Contains(interfaces::RosKeyValue{"recording", "failed: run.mcap: no space left"}));
+}
+
 }  // namespace
 }  // namespace prescene::service

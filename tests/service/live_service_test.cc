@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/live_service.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/belief_summary.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/tests/service/robot_on_bus.h"
+#include "prescene/tests/support/paths.h"
+
+namespace prescene::service {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr core::TimeNs kSecond = 1'000'000'000;
+constexpr core::TimeNs kNoon = 1'700'000'000 * kSecond;
+
+int own_domain() { return 10 + static_cast<int>(getpid() % 200); }
+
+/// No file of this process grows beyond `bytes` while it lives, as on a disk that is full.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    EXPECT_EQ(getrlimit(RLIMIT_FSIZE, &before_), 0);
+    rlimit low = before_;
+    low.rlim_cur = bytes;
+    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &low), 0);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, SIG_DFL);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+/// The service and a robot beside it, in this process.
+class LiveServiceTest : public ::testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(robot_.good()); }
+  void TearDown() override {
+    if (runner_.joinable()) {
+      EXPECT_TRUE(stop().ok());
+    }
+  }
+
+  void start(std::unique_ptr<RecordingWriter> recording = nullptr) {
+    const auto scene = load_scene_text(tests::kBoxScene, "box.yaml", {});
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    LiveSettings settings;
+    settings.dds.domain = own_domain();
+    settings.diagnostics_rate = 50.0;
+    const core::LogSink log = [this](core::LogLevel, const std::string& text) {
+      const std::lock_guard lock(log_mutex_);
+      log_.push_back(text);
+    };
+    auto service = LiveService::create(*scene, settings, 1, backends_, std::move(recording), log);
+    ASSERT_TRUE(service.ok()) << service.status().message();
+    service_ = *std::move(service);
+    runner_ = std::thread([this] { status_ = service_->run(cancellation_); });
+  }
+  core::Status stop() {
+    cancellation_.request();
+    runner_.join();
+    service_.reset();
+    return status_;
+  }
+
+  /// Sends frames from `stamp_ns` on until one of that time and its successors was stepped `count` times.
+  bool tracks_from(core::TimeNs stamp_ns, std::size_t count = 3) {
+    const std::size_t before = robot_.beliefs().size();
+    return robot_.send_until(
+        [&] {
+          std::size_t found = 0;
+          const std::vector<std::string> beliefs = robot_.beliefs();
+          for (std::size_t i = before; i < beliefs.size(); ++i) {
+            const auto summary = belief_summary_from_json(beliefs[i]);
+            if (summary && summary->stamp_ns >= stamp_ns && summary->stamp_ns < stamp_ns + 600 * kSecond) ++found;
+          }
+          return found >= count;
+        },
+        stamp_ns);
+  }
+  /// Sends frames until a diagnostic has that value.
+  bool diagnostics_become(const std::string& key, const std::string& value, core::TimeNs stamp_ns) {
+    return robot_.send_until([&] { return robot_.diagnostics()[key] == value; }, stamp_ns);
+  }
+
+  core::ThreadPool pool_{1};
+  Backends backends_{pool_};
+  tests::RobotOnBus robot_{tests::kBoxScene, own_domain()};
+  std::mutex log_mutex_;
+  std::vector<std::string> log_;
+  core::Cancellation cancellation_;
+  core::Status status_;
+  std::unique_ptr<LiveService> service_;
+  std::thread runner_;
+};
+
+TEST_F(LiveServiceTest, TracksPublishesAndAnswers) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  const auto summary = belief_summary_from_json(robot_.beliefs().back());
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  ASSERT_EQ(summary->objects.size(), 1u);
+  EXPECT_LT((summary->objects[0].X_WO.translation - geometry::Vector3d(0.0, 0.0, 0.05)).norm(), 0.03);
+  ASSERT_TRUE(diagnostics_become("refused messages", "0", kNoon + 1000 * kSecond));
+  EXPECT_THAT(robot_.diagnosis(), HasSubstr("tracking"));
+  EXPECT_EQ(robot_.diagnostics()["recording"], "off");
+  ASSERT_TRUE(robot_.send_until(
+      [&] {
+        robot_.ask(R"({"id": "7", "where": {}})");
+        return !robot_.answers().empty();
+      },
+      kNoon + 2000 * kSecond));
+  EXPECT_THAT(robot_.answers().front(), HasSubstr("\"7\""));
+  EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, GoesOnTrackingWhenTheSendersClockIsSet) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  EXPECT_TRUE(tracks_from(kNoon - 3600 * kSecond)) << robot_.diagnosis();
+  EXPECT_TRUE(tracks_from(kNoon + 3600 * kSecond)) << robot_.diagnosis();
+  EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, ARecordingThatFailsStandsInDiagnosticsAndInTheStatus) {
+  const tests::ScratchDir folder;
+  auto recording = RecordingWriter::create(folder.path() / "run.mcap", {});
+  ASSERT_TRUE(recording.ok()) << recording.status().message();
+  const FullDisk full(20'000);
+  start(*std::move(recording));
+  ASSERT_TRUE(tracks_from(kNoon));
+  ASSERT_TRUE(robot_.send_until([&] { return robot_.diagnostics()["recording"].starts_with("failed: "); },
+                                kNoon + 1000 * kSecond));
+  EXPECT_THAT(robot_.diagnosis(), HasSubstr("run.mcap"));
+  EXPECT_TRUE(tracks_from(kNoon + 2000 * kSecond)) << "tracking goes on";
+  const core::Status status = stop();
+  EXPECT_FALSE(status.ok());
+  EXPECT_THAT(status.message(), HasSubstr("run.mcap"));
+}
+
+TEST_F(LiveServiceTest, RefusesWhatMakesNoSenseAndGoesOn) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  interfaces::RosImage nonsense = robot_.depth();
+  nonsense.header.stamp = interfaces::RosTime{5, 4'000'000'000U};
+  robot_.send_depth(nonsense);
+  nonsense = robot_.depth();
+  nonsense.step = 1;
+  robot_.send_depth(nonsense);
+  nonsense = robot_.depth();
+  nonsense.header.frame_id = "lens\xff\xfe";
+  robot_.send_depth(nonsense);
+  EXPECT_TRUE(robot_.send_until([&] { return robot_.diagnostics()["refused messages"] == "3"; }, kNoon + kSecond));
+  EXPECT_TRUE(tracks_from(kNoon + 1000 * kSecond));
+  EXPECT_EQ(robot_.diagnostics()["failures"], "0");
+  EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, AStormOfTransformsCostsNeitherFramesNorMemoryAndStopsAtOnce) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  // A chain of 4,090 frames: more than are kept, and the longest way to a root.
+  interfaces::RosTfMessage storm;
+  for (int i = 0; i < 4090; ++i) {
+    interfaces::RosTransformStamped link;
+    link.header.stamp = interfaces::to_ros_time(kNoon);
+    link.header.frame_id = "link" + std::to_string(i);
+    link.child_frame_id = "link" + std::to_string(i + 1);
+    link.transform.rotation.w = 1.0;
+    storm.transforms.push_back(link);
+  }
+  for (int i = 0; i < 200; ++i) robot_.send_tf(storm);
+  EXPECT_TRUE(tracks_from(kNoon + kSecond, 10)) << robot_.diagnosis();
+  for (int i = 0; i < 200; ++i) robot_.send_tf(storm);
+  EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, LogsARepeatedFaultOnceInAWhile) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  interfaces::RosImage nonsense = robot_.depth();
+  for (int i = 0; i < 500; ++i) {
+    nonsense.header.stamp = interfaces::to_ros_time(kNoon + 2000 * kSecond);
+    nonsense.encoding = "unknown" + std::to_string(i);
+    robot_.send_depth(nonsense);
+    robot_.wait(std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(robot_.send_until([&] { return robot_.diagnostics()["lines not logged"] != "0"; }, kNoon + kSecond));
+  EXPECT_TRUE(stop().ok());
+  EXPECT_LT(log_.size(), 60u);
+}
+
+}  // namespace
+}  // namespace prescene::service
