@@ -18,9 +18,10 @@ extern char** environ;
 namespace prescene::tests {
 namespace {
 
-pid_t start(const std::vector<std::string>& args, const std::vector<std::string>& environment, const std::string& out,
-            const std::string& err) {
-  const std::string program = (build_dir() / "prescene").string();
+std::filesystem::path prescene() { return build_dir() / "prescene"; }
+
+pid_t start(const std::string& program, const std::vector<std::string>& args,
+            const std::vector<std::string>& environment, const std::string& out, const std::string& err) {
   std::vector<char*> argv{const_cast<char*>(program.c_str())};
   for (const std::string& arg : args) argv.push_back(const_cast<char*>(arg.c_str()));
   argv.push_back(nullptr);
@@ -51,21 +52,29 @@ int wait_for_end(pid_t pid) {
 Finished run_program(const std::vector<std::string>& args, const std::vector<std::string>& environment) {
   const ScratchDir folder;
   Finished finished;
-  finished.exit_code =
-      wait_for_end(start(args, environment, (folder.path() / "out").string(), (folder.path() / "err").string()));
+  finished.exit_code = wait_for_end(
+      start(prescene(), args, environment, (folder.path() / "out").string(), (folder.path() / "err").string()));
   finished.out = read_file(folder.path() / "out");
   finished.err = read_file(folder.path() / "err");
   return finished;
 }
 
 int run_program_writing_to(const std::string& out, const std::vector<std::string>& args) {
-  return wait_for_end(start(args, {}, out, "/dev/null"));
+  return wait_for_end(start(prescene(), args, {}, out, "/dev/null"));
 }
 
 BackgroundProgram::BackgroundProgram(const std::vector<std::string>& args, const std::vector<std::string>& environment)
-    : pid_(start(args, environment, "/dev/null", "/dev/null")) {}
+    : BackgroundProgram(prescene(), args, environment, "/dev/null") {}
+
+BackgroundProgram::BackgroundProgram(const std::filesystem::path& program, const std::vector<std::string>& args,
+                                     const std::vector<std::string>& environment, const std::string& err)
+    : pid_(start(program, args, environment, "/dev/null", err)) {}
 
 BackgroundProgram::~BackgroundProgram() { stop(SIGKILL); }
+
+void BackgroundProgram::signal(int signal_number) const {
+  if (pid_ > 0) kill(pid_, signal_number);
+}
 
 int BackgroundProgram::stop(int signal_number) {
   if (pid_ <= 0) return -1;

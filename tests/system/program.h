@@ -25,11 +25,16 @@ int run_program_writing_to(const std::string& out, const std::vector<std::string
 /// A program that runs beside the test; killed with the object if it still runs.
 class BackgroundProgram {
  public:
+  /// `prescene args...`, its output thrown away.
   explicit BackgroundProgram(const std::vector<std::string>& args, const std::vector<std::string>& environment = {});
+  /// Another program; its standard error goes to the file `err`.
+  BackgroundProgram(const std::filesystem::path& program, const std::vector<std::string>& args,
+                    const std::vector<std::string>& environment, const std::string& err);
   ~BackgroundProgram();
   BackgroundProgram(const BackgroundProgram&) = delete;
   BackgroundProgram& operator=(const BackgroundProgram&) = delete;
 
+  void signal(int signal_number) const;
   /// Sends a signal and waits for the end; the exit code as above.
   int stop(int signal_number);
 
