@@ -2,10 +2,14 @@
 #include "prescene/service/live_service.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <exception>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -63,6 +67,7 @@ struct LiveService::Impl {
   core::Status join_bus();
   void take_in(std::vector<ReceivedMessage> messages);
   void refuse(const core::Status& status);
+  void note_failure(const std::exception& error);
   void record(const std::string& topic, const std::string& json);
   void publish(const TrackerStep& step);
   void publish_diagnostics(core::TimeNs now_ns);
@@ -95,6 +100,9 @@ struct LiveService::Impl {
   bool told_why_not = false;
   std::mutex answered_mutex;  // guards what the desk hands over to the recording
   std::vector<std::string> answered;
+  std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
+  std::uint64_t failed_steps = 0;
+  std::string last_failure;
 
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
@@ -118,7 +126,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
   Impl* raw = impl.get();
-  const auto on_answer = [raw](const std::string&, const std::string& answer) {
+  const auto on_answer = [raw](const std::string& answer) {  // on two threads
     const core::Status published = raw->node->publish(raw->answers, interfaces::RosString{answer});
     if (!published.ok()) core::log(raw->log, core::LogLevel::kWarning, published.message());
     const std::lock_guard lock(raw->answered_mutex);
@@ -155,8 +163,15 @@ core::Status LiveService::Impl::join_bus() {
   PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, deliver));
   PRESCENE_RETURN_IF_ERROR(node->subscribe(kControlTopic, "std_msgs/msg/String", TopicQos::kReliable, deliver));
   return node->subscribe(kQueryTopic, "std_msgs/msg/String", TopicQos::kReliable, [this](ReceivedMessage&& message) {
-    const auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
-    if (question) desk->ask(question->data);
+    try {
+      auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+      if (question)
+        desk->ask((*std::move(question)).data);
+      else
+        ++unreadable_questions;
+    } catch (const std::bad_alloc&) {
+      ++unreadable_questions;
+    }
     inbox.put(std::move(message));  // for the recording
   });
 }
@@ -172,6 +187,13 @@ void LiveService::Impl::refuse(const core::Status& status) {
   if (status.message() == last_refusal) return;  // a driver repeats its mistake with each frame
   last_refusal = status.message();
   core::log(log, core::LogLevel::kWarning, "message refused: " + last_refusal);
+}
+
+void LiveService::Impl::note_failure(const std::exception& error) {
+  ++failed_steps;
+  if (error.what() == last_failure) return;
+  last_failure = error.what();
+  core::log(log, core::LogLevel::kError, "the work on what came in was broken off: " + last_failure + "; going on");
 }
 
 void LiveService::Impl::record(const std::string& topic, const std::string& json) {
@@ -208,7 +230,7 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   const auto check = [this](const core::Status& status) {
     if (!status.ok()) core::log(log, core::LogLevel::kWarning, status.message());
   };
-  const std::string json = to_json(summary).dump();
+  const std::string json = belief::json_text(to_json(summary));
   check(node->publish(beliefs, interfaces::RosString{json}));
   check(node->publish(detections, detections_of(summary, *belief->scene, world)));
   for (const ObjectSummary& object : summary.objects) {
@@ -218,7 +240,7 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   }
   if (marker_limit.due()) check(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
   record(kBeliefTopic, json);
-  record(kStepTopic, to_json(step.record).dump());
+  record(kStepTopic, belief::json_text(to_json(step.record)));
 }
 
 ServiceHealth LiveService::Impl::health() const {
@@ -229,6 +251,10 @@ ServiceHealth LiveService::Impl::health() const {
   health.refused_messages = refused;
   health.dropped_in_inbox = inbox.dropped();
   health.lost_on_bus = node->dropped_samples();
+  health.questions = desk->counts();
+  health.unreadable_questions = unreadable_questions;
+  health.failed_steps = failed_steps;
+  health.last_failure = last_failure.empty() ? health.questions.last_failure : last_failure;
   if (since_frame) health.seconds_since_frame = since_frame->seconds();
   health.last_step_seconds = step_seconds;
   health.degraded = degraded;
@@ -266,7 +292,7 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
   core::log(impl.log, core::LogLevel::kInfo,
             "listening in DDS domain " + std::to_string(impl.settings.dds.domain) + " for " +
                 impl.settings.tracker.topics.depth);
-  while (!cancellation.requested()) {
+  const auto turn = [&] {
     auto until = steady_clock::now() + kPollInterval;
     if (const auto deadline = impl.tracker->next_deadline()) {
       until = std::min(
@@ -288,6 +314,13 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
       impl.publish(*step);
     }
     if (impl.diagnostics_limit.due()) impl.publish_diagnostics(now_ns);
+  };
+  while (!cancellation.requested()) {
+    try {
+      turn();
+    } catch (const std::exception& error) {  // of a library below, or no memory: the next frame may do
+      impl.note_failure(error);
+    }
   }
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
   return impl.recording ? impl.recording->close() : core::ok_status();

@@ -11,6 +11,7 @@ using interfaces::RosDiagnosticLevel;
 RosDiagnosticLevel level_of(const ServiceHealth& health) {
   if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
   if (!is_tracking(health)) return RosDiagnosticLevel::kError;
+  if (health.failed_steps > 0 || health.questions.failed > 0) return RosDiagnosticLevel::kWarn;
   return health.degraded.empty() ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
 }
 
@@ -47,7 +48,12 @@ interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const
       {"lost on the bus", std::to_string(health.lost_on_bus)},
       {"since the last frame, s", health.seconds_since_frame ? core::fixed_text(*health.seconds_since_frame, 1) : ""},
       {"last step, s", core::rounded_text(health.last_step_seconds)},
-      {"last refusal", health.last_refusal}};
+      {"last refusal", health.last_refusal},
+      {"questions answered", std::to_string(health.questions.answered)},
+      {"questions refused", std::to_string(health.questions.refused)},
+      {"questions without an answer", std::to_string(health.questions.unanswered + health.unreadable_questions)},
+      {"failures", std::to_string(health.failed_steps + health.questions.failed)},
+      {"last failure", health.last_failure}};
   return status;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/service/answering_desk.h"
 
 namespace prescene::service {
 
@@ -21,11 +22,15 @@ struct ServiceHealth {
   std::uint64_t refused_messages = 0;
   std::uint64_t dropped_in_inbox = 0;
   std::uint64_t lost_on_bus = 0;
+  DeskCounts questions;
+  std::uint64_t unreadable_questions = 0;     ///< Messages on the topic of questions that hold no text.
+  std::uint64_t failed_steps = 0;             ///< Turns of the loop that an exception ended; it went on.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
   double last_step_seconds = 0.0;
   std::vector<std::string> degraded;  ///< What the last step could not do fully.
   std::string last_skip;              ///< Why the last frame since the last step was skipped; "" = none was.
   std::string last_refusal;           ///< Why the last refused message was.
+  std::string last_failure;           ///< What the last exception said, of a step or of a question.
 };
 
 /// True while frames come and are used.
