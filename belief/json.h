@@ -4,6 +4,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 #include <string_view>
 
 #include "prescene/belief/query.h"
@@ -24,8 +25,13 @@ nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);
 nlohmann::ordered_json to_json(const Answer& answer);
 
+/// The text of a document; all JSON that is written goes through here. In one line, or with so many spaces a level. It
+/// never fails on what a document holds: bytes that are not UTF-8 become U+FFFD, numbers that are not finite null.
+std::string json_text(const nlohmann::ordered_json& document, int indent = -1);
+
 /// The document, or where it stops being JSON. What is nested deeper than 64 lists and objects is refused too: such a
-/// value could be neither copied nor printed without running out of stack. For texts from outside.
+/// value could be neither copied nor printed without running out of stack. So are objects of more than 1024 keys, each
+/// of which is compared with all before it. For texts from outside.
 core::Result<nlohmann::ordered_json> parse_json(std::string_view text, std::size_t max_bytes = 16u << 20);
 /// {"id": "...", "where": {...}} or "predict", "stability", "view".
 core::Result<Query> query_from_json(std::string_view text);

@@ -5,13 +5,13 @@
 
 #include "json_values.h"
 #include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
 #include "prescene/core/text.h"
 
 namespace prescene::belief {
 namespace {
 
-constexpr std::int64_t kMostPaths = 1000;
 constexpr std::size_t kLongestQuery = std::size_t{1} << 20;
 
 Json effort_json(const Effort& effort) {
@@ -22,29 +22,28 @@ Json effort_json(const Effort& effort) {
   return json;
 }
 
-// A number of an open range; what is outside would make no sense to work on.
-void read_between(JsonObject& fields, const std::string& key, double low, double high, double& to) {
+/// A number of a range; what is outside would make no sense to work on.
+std::optional<double> read_number(JsonObject& fields, const std::string& key, const ScalarRange& range) {
   const auto at = fields.find(key);
-  if (!at) return;
+  if (!at) return std::nullopt;
   const double number = at->number();
-  if (!(number > low) || !(number < high)) {
-    at->fail("the number has to be above " + std::to_string(low) + " and below " + std::to_string(high));
-    return;
-  }
-  to = number;
+  const core::Status in_range = check_number(number, range);
+  if (!in_range.ok()) at->fail(in_range.message());
+  return number;
+}
+
+void read_number(JsonObject& fields, const std::string& key, const ScalarRange& range, double& to) {
+  if (const std::optional<double> number = read_number(fields, key, range)) to = *number;
 }
 
 Effort effort_from(const JsonAt& at) {
-  constexpr int kMostInstances = 10'000'000;
   Effort effort;
   JsonObject fields(at);
-  read_between(fields, "tolerance", 0.0, 1.0, effort.tolerance);
-  read_between(fields, "confidence", 0.0, 1.0, effort.confidence);
+  read_number(fields, "tolerance", kTolerances, effort.tolerance);
+  read_number(fields, "confidence", kConfidences, effort.confidence);
   if (const auto count = fields.find("max_instances"))
     effort.max_instances = static_cast<int>(count->integer(1, kMostInstances));
-  double seconds = 0.0;
-  read_between(fields, "max_seconds", 0.0, 1e6, seconds);
-  if (seconds > 0.0) effort.max_seconds = seconds;
+  effort.max_seconds = read_number(fields, "max_seconds", kWallSeconds);
   if (const auto count = fields.find("exact_instances"))
     effort.exact_instances = static_cast<int>(count->integer(1, kMostInstances));
   return effort;
@@ -136,9 +135,7 @@ PredictQuery predict_from(JsonObject& fields) {
     for (const JsonAt& item : at->items()) predict.outcomes.push_back(outcome_from(item));
   if (const auto at = fields.find("exclusive_outcomes"))
     for (const JsonAt& item : at->items()) predict.exclusive_outcomes.push_back(exclusive_from(item));
-  double duration = 0.0;
-  read_between(fields, "duration", 0.0, 1e5, duration);
-  if (duration > 0.0) predict.duration = duration;
+  predict.duration = read_number(fields, "duration", kDurations);
   if (const auto at = fields.find("effort")) predict.effort = effort_from(*at);
   if (const auto at = fields.find("tell")) predict.tell = tell_from(*at);
   if (const auto at = fields.find("paths")) predict.tell.paths = static_cast<int>(at->integer(0, kMostPaths));
@@ -148,9 +145,9 @@ PredictQuery predict_from(JsonObject& fields) {
 StabilityQuery stability_from(JsonObject& fields) {
   StabilityQuery stability;
   if (const auto at = fields.require("object")) stability.object = at->text();
-  read_between(fields, "max_move", 0.0, 1e3, stability.max_move);
-  read_between(fields, "max_turn", 0.0, 3.2, stability.max_turn);
-  read_between(fields, "duration", 0.0, 1e5, stability.duration);
+  read_number(fields, "max_move", kMoves, stability.max_move);
+  read_number(fields, "max_turn", kTurns, stability.max_turn);
+  read_number(fields, "duration", kDurations, stability.duration);
   if (const auto at = fields.find("effort")) stability.effort = effort_from(*at);
   return stability;
 }
@@ -158,10 +155,7 @@ StabilityQuery stability_from(JsonObject& fields) {
 ViewQuery view_from(JsonObject& fields) {
   ViewQuery view;
   view.actions = actions_from(fields);
-  if (const auto at = fields.find("time")) {
-    view.time = at->number();
-    if (view.time < 0.0 || view.time > 1e5) at->fail("seconds between 0 and 1e5 are needed");
-  }
+  read_number(fields, "time", kViewTimes, view.time);
   return view;
 }
 
@@ -240,6 +234,7 @@ core::Result<Query> query_from_json(std::string_view text) {
     }
   }
   if (!errors.ok()) return errors.status();
+  PRESCENE_RETURN_IF_ERROR(validate(query));
   return query;
 }
 

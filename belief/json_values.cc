@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "json_values.h"
 
+#include <array>
+
 #include "prescene/belief/json.h"
 
 namespace prescene::belief {
 namespace {
 
-constexpr int kDeepest = 64;
+constexpr std::size_t kDeepest = 64;
+constexpr int kMostKeys = 1024;
 
-/// Where brackets outside of texts are open deeper than kDeepest.
-std::optional<std::size_t> too_deep_at(std::string_view text) {
-  int depth = 0;
+/// Fails where brackets outside of texts are open deeper than kDeepest, or an object has more than kMostKeys keys.
+core::Status check_structure(std::string_view text) {
+  std::array<int, kDeepest + 1> keys{};  // by depth, of what is open there
+  std::size_t depth = 0;
   bool quoted = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -20,11 +24,18 @@ std::optional<std::size_t> too_deep_at(std::string_view text) {
       continue;
     }
     if (c == '"') quoted = true;
-    if (c == '[' || c == '{') ++depth;
-    if (c == ']' || c == '}') --depth;
-    if (depth > kDeepest) return i;
+    if (c == '[' || c == '{') {
+      if (depth == kDeepest)
+        return core::invalid_input("byte " + std::to_string(i) + ": nested deeper than " + std::to_string(kDeepest) +
+                                   " lists and objects: this is not meant for Prescene");
+      keys[++depth] = 0;
+    }
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if (c == ':' && ++keys[depth] > kMostKeys)
+      return core::invalid_input("byte " + std::to_string(i) + ": an object of more than " + std::to_string(kMostKeys) +
+                                 " keys: this is not meant for Prescene");
   }
-  return std::nullopt;
+  return {};
 }
 
 Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -220,13 +231,15 @@ const std::vector<std::pair<std::string, When>>& when_words() {
   return kWords;
 }
 
+std::string json_text(const Json& document, int indent) {
+  return document.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
 core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes) {
   if (text.size() > max_bytes)
     return core::resource_exhausted("the text has " + std::to_string(text.size()) + " bytes, at most " +
                                     std::to_string(max_bytes) + " are read: make it smaller");
-  if (const std::optional<std::size_t> byte = too_deep_at(text))
-    return core::invalid_input("byte " + std::to_string(*byte) + ": nested deeper than " + std::to_string(kDeepest) +
-                               " lists and objects: this is not meant for Prescene");
+  PRESCENE_RETURN_IF_ERROR(check_structure(text));
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {

@@ -12,6 +12,8 @@ using core::invalid_input;
 using core::not_found;
 using core::Status;
 
+constexpr double kMostTurns = 100.0;  // rad of a pour
+
 std::string quoted(const char* what, const std::string& name) { return std::string(what) + " '" + name + "'"; }
 
 Status check_finite_positive(double value, const char* what) {
@@ -22,6 +24,12 @@ Status check_finite_positive(double value, const char* what) {
 
 Status check_object_name(const Scene& scene, const std::string& name) {
   if (!find_object(scene, name)) return not_found("there is no object '" + name + "': name one of the scene's objects");
+  return {};
+}
+
+Status check_point(const Vector3d& point, const char* what) {
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kLengthRange.high)
+    return invalid_input(std::string(what) + " is out of range: " + kLengthRange.remedy);
   return {};
 }
 
@@ -55,7 +63,7 @@ struct ActionCheck {
   const Scene& scene;
   Status operator()(const Release& release) const {
     PRESCENE_RETURN_IF_ERROR(check_object_name(scene, release.object));
-    if (!release.retreat.allFinite()) return invalid_input("the retreat is not finite: give metres");
+    PRESCENE_RETURN_IF_ERROR(check_point(release.retreat, "the retreat"));
     PRESCENE_RETURN_IF_ERROR(check_vector(release.disturbance.linear, kSpeedRange).at("velocity"));
     PRESCENE_RETURN_IF_ERROR(check_vector(release.disturbance.angular, kSpeedRange).at("angular_velocity"));
     return check_finite_positive(release.retreat_duration, "a retreat_duration");
@@ -65,15 +73,18 @@ struct ActionCheck {
     return check_move(transport.object, transport.X_WO, transport.duration);
   }
   Status operator()(const Push& push) const {
-    if (!push.from.allFinite() || !push.to.allFinite()) return invalid_input("the path is not finite: give metres");
+    PRESCENE_RETURN_IF_ERROR(check_point(push.from, "the path"));
+    PRESCENE_RETURN_IF_ERROR(check_point(push.to, "the path"));
     PRESCENE_RETURN_IF_ERROR(check_finite_positive(push.duration, "a duration"));
     PRESCENE_RETURN_IF_ERROR(check_finite_positive(push.radius, "a radius"));
     return check_scalar(push.lateral_error, kLengthRange).at("lateral_error");
   }
   Status operator()(const Pour& pour) const {
     PRESCENE_RETURN_IF_ERROR(check_object_name(scene, pour.container));
-    if (!pour.axis_W.allFinite() || !(pour.axis_W.norm() > 1e-9) || !std::isfinite(pour.angle))
-      return invalid_input("the axis or the angle is not a number: give an axis of some length and radians");
+    if (!pour.axis_W.allFinite() || !(pour.axis_W.norm() > 1e-9) || !(pour.axis_W.norm() <= kLengthRange.high))
+      return invalid_input("the axis is not a direction: give one of some length, like [0, 1, 0]");
+    if (!(std::abs(pour.angle) <= kMostTurns))
+      return invalid_input("the angle is not a number between -100 and 100: give radians");
     return check_finite_positive(pour.duration, "a duration");
   }
   Status operator()(const Grasp& grasp) const {

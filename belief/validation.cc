@@ -45,6 +45,9 @@ struct PrimitiveCheck {
 Status check_covariance(const Matrix6d& covariance) {
   if (!covariance.allFinite()) return invalid_input("the covariance is not finite: give variances in rad^2 and m^2");
   const double scale = covariance.cwiseAbs().maxCoeff();
+  if (scale > kLengthRange.high * kLengthRange.high)
+    return invalid_input("the covariance has entries above " + rounded_text(kLengthRange.high * kLengthRange.high) +
+                         ": give variances in rad^2 and m^2");
   if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > 1e-9 * scale)
     return invalid_input("the covariance is not symmetric: give the same value on both sides of the diagonal");
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(covariance, Eigen::EigenvaluesOnly);
@@ -88,6 +91,9 @@ Status check_scalar(const ScalarDistribution& distribution, const ScalarRange& r
     return invalid_input("normal of mean " + rounded_text(normal.mean) + " and standard deviation " +
                          rounded_text(normal.standard_deviation) +
                          ": both have to be finite, the deviation at least 0");
+  if (normal.standard_deviation > range.high - range.low)
+    return invalid_input("a standard deviation of " + rounded_text(normal.standard_deviation) +
+                         " is out of range: " + range.remedy);
   if (std::isnan(normal.low) || std::isnan(normal.high) || normal.low > normal.high)
     return invalid_input("the cut from " + rounded_text(normal.low) + " to " + rounded_text(normal.high) +
                          " is empty: give a min below the max");

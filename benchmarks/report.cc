@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/check.h"
 
 namespace prescene::benchmarks {
@@ -193,7 +194,7 @@ core::Status Report::write(const std::filesystem::path& path) const {
     std::filesystem::path svg_path = path;
     PRESCENE_RETURN_IF_ERROR(write_file(svg_path.replace_extension(plot.name + ".svg"), svg_of(plot)));
   }
-  return write_file(path, json.dump(1) + "\n");
+  return write_file(path, belief::json_text(json, 1) + "\n");
 }
 
 std::string text_of(const Table& table) {

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t kMostPairs = 40;
 constexpr int kTimes = 51;
+constexpr std::size_t kBetweenLooks = 256;  // instances, at whether it is stopped
 
 /// A value of each instance that touches, with its weight.
 using Weighted = std::vector<std::pair<double, double>>;
@@ -35,7 +36,8 @@ struct Pair {
 
 }  // namespace
 
-void forecast_contacts(const Foresight& foresight, double confidence, belief::PredictAnswer& answer) {
+bool forecast_contacts(const Foresight& foresight, double confidence, const core::Cancellation* abandoned,
+                       belief::PredictAnswer& answer) {
   const std::vector<simulation::InstanceRecord>& instances = foresight.estimate.instances;
   double longest = 0.0, mass = 0.0;
   for (const simulation::InstanceRecord& record : instances) {
@@ -43,12 +45,19 @@ void forecast_contacts(const Foresight& foresight, double confidence, belief::Pr
     longest = std::max(longest, record.simulated_seconds);
     mass += record.weight;
   }
-  if (!(mass > 0.0)) return;
+  if (!(mass > 0.0)) return true;
+  const auto stopped = [&] {
+    if (!abandoned || !abandoned->requested()) return false;
+    answer.contact_times.clear();
+    answer.contacts.clear();
+    return true;
+  };
   for (int i = 0; i < kTimes; ++i) answer.contact_times.push_back(longest * i / (kTimes - 1));
 
   std::map<std::pair<int, int>, Pair> pairs;
   for (std::size_t n = 0; n < instances.size(); ++n) {
     const simulation::InstanceRecord& record = instances[n];
+    if (n % kBetweenLooks == 0 && stopped()) return false;
     if (record.failed) continue;
     const double start = record.final.time - record.simulated_seconds;
     std::map<std::pair<int, int>, std::vector<const belief::ContactInterval*>> touches;
@@ -76,6 +85,7 @@ void forecast_contacts(const Foresight& foresight, double confidence, belief::Pr
   std::map<int, double> component_weights;
   for (const simulation::InstanceRecord& record : instances) component_weights[record.component] += record.weight;
   for (auto& [key, pair] : pairs) {
+    if (stopped()) return false;
     std::vector<simulation::ComponentClasses> components;
     std::map<int, std::size_t> index;
     for (const auto& [component, weight] : component_weights) {
@@ -99,6 +109,7 @@ void forecast_contacts(const Foresight& foresight, double confidence, belief::Pr
       answer.contacts.begin(), answer.contacts.end(),
       [](const belief::ContactForecast& a, const belief::ContactForecast& b) { return a.probability > b.probability; });
   if (answer.contacts.size() > kMostPairs) answer.contacts.resize(kMostPairs);
+  return true;
 }
 
 }  // namespace prescene::queries

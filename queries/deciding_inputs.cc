@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "prediction_parts.h"
 #include "prescene/simulation/action_draws.h"
@@ -15,8 +16,9 @@ namespace {
 using belief::Vector3d;
 
 constexpr std::size_t kFewestInstances = 128;
-constexpr std::size_t kFewestForRest = 512;  // below, first_order_effect() cuts inputs into 4 intervals only
-constexpr double kLargestTurn = 2.0;         // rad: beyond it a rotation is no longer told by a turn from its mean
+constexpr std::size_t kMostLookedAt = 65536;  // shares of a prefix of the net are those of the whole
+constexpr std::size_t kFewestForRest = 512;   // below, first_order_effect() cuts inputs into 4 intervals only
+constexpr double kLargestTurn = 2.0;          // rad: beyond it a rotation is no longer told by a turn from its mean
 const char* const kAxes[] = {"x", "y", "z"};
 
 bool varies(const std::vector<double>& values) {
@@ -93,7 +95,7 @@ void add_actions(const Foresight& foresight, const Prior& prior, Columns& column
   const std::vector<belief::Action>& actions = foresight.request.actions;
   if (actions.empty()) return;
   std::vector<std::vector<simulation::DrawnAction>> drawn;
-  for (std::size_t i = 0; i < foresight.estimate.instances.size(); ++i)
+  for (std::size_t i = 0; i < std::min(kMostLookedAt, foresight.estimate.instances.size()); ++i)
     drawn.push_back(simulation::draw_actions(actions, prior.stream.at(0, static_cast<std::uint32_t>(i))));
   for (std::size_t a = 0; a < actions.size(); ++a) {
     const auto of = [&](std::size_t i) -> const simulation::DrawnAction& { return drawn[i][a]; };
@@ -121,7 +123,7 @@ void add_actions(const Foresight& foresight, const Prior& prior, Columns& column
 
 std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const Prior& prior,
                                              const QueryContext& context) {
-  const std::size_t count = foresight.estimate.instances.size();
+  const std::size_t count = std::min(kMostLookedAt, foresight.estimate.instances.size());
   const std::vector<belief::WorldState> starts =
       simulation::starts_of(prior.starts, foresight.estimate, count, prior.stream, *context.pool);
   Columns columns(count);
@@ -134,7 +136,9 @@ std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const P
 
 std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, const Prior& prior,
                                                     const QueryContext& context) {
-  const std::vector<simulation::InstanceRecord>& instances = foresight.estimate.instances;
+  const std::span instances =
+      std::span(foresight.estimate.instances).first(std::min(kMostLookedAt, foresight.estimate.instances.size()));
+  const auto stopped = [&] { return context.abandoned && context.abandoned->requested(); };
   std::vector<belief::DecidingInputs> all;
   if (instances.size() < kFewestInstances) return all;
   const std::vector<UncertainInput> inputs = uncertain_inputs(foresight, prior, context);
@@ -149,6 +153,7 @@ std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, 
     found.about = name_of(variable);
     found.inputs.resize(inputs.size());
     context.pool->for_each_index(inputs.size(), [&](std::size_t i) {
+      if (stopped()) return;
       const simulation::InputEffect effect =
           simulation::first_order_effect(inputs[i].values, classes, static_cast<int>(variable.classes.size()), weights);
       belief::InputShare& input = found.inputs[i];
@@ -160,6 +165,10 @@ std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, 
           input.effects.push_back({variable.classes[c], effect.low_fifth[c], effect.high_fifth[c]});
       }
     });
+    if (stopped()) {
+      all.pop_back();
+      return all;
+    }
     if (found.inputs.size() == 1) {
       // Nothing else could: what its values, cut into intervals, do not show is finer than these.
       found.inputs[0].share = 1.0;

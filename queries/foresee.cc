@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/queries/typical_runs.h"
 #include "tasks.h"
@@ -16,26 +17,10 @@ constexpr double kJudgingInterval = 0.02;
 constexpr double kTimelineInterval = 1.0 / 30.0;
 // Where nothing is asked but where things end, as many instances as a heat map of good quality takes.
 constexpr int kUnaskedInstances = 256;
-constexpr int kMostInstances = 1 << 24;
-constexpr double kLongest = 3600.0;  // s
-
-core::Status check_effort(const belief::Effort& effort) {
-  if (!(effort.tolerance > 0.0 && effort.tolerance < 1.0))
-    return core::invalid_input("effort.tolerance of " + std::to_string(effort.tolerance) +
-                               ": give a half width between 0 and 1, like 0.02");
-  if (!(effort.confidence > 0.0 && effort.confidence < 1.0))
-    return core::invalid_input("effort.confidence of " + std::to_string(effort.confidence) +
-                               ": give a probability between 0 and 1, like 0.95");
-  if (effort.max_instances < 1 || effort.max_instances > kMostInstances)
-    return core::invalid_input("effort.max_instances of " + std::to_string(effort.max_instances) +
-                               ": give between 1 and 16777216");
-  if (effort.exact_instances && (*effort.exact_instances < 1 || *effort.exact_instances > kMostInstances))
-    return core::invalid_input("effort.exact_instances of " + std::to_string(*effort.exact_instances) +
-                               ": give between 1 and 16777216");
-  if (effort.max_seconds && !(*effort.max_seconds > 0.0))
-    return core::invalid_input("effort.max_seconds has to be more than 0");
-  return {};
-}
+// Of an instance's record besides its objects' states: its classes, and contacts where they are kept.
+constexpr std::size_t kRecordBytes = 256, kContactsBytes = 4096;
+// Object states of a run that is told: an answer holds twelve such, about 3 MB each.
+constexpr double kMostStatesTold = 8000.0;
 
 bool needs_states_along_the_way(const belief::Scene& scene) {
   const auto needs = [](const belief::Outcome& outcome) { return belief::needs_states_along_the_way(outcome); };
@@ -51,13 +36,12 @@ bool needs_states_along_the_way(const belief::Scene& scene) {
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
                                 const belief::Effort& effort, const QueryContext& context,
                                 const ForesightDetail& detail) {
-  PRESCENE_RETURN_IF_ERROR(check_effort(effort));
   if (!context.make_simulator) return core::unavailable("no simulator: this service was set up without one");
 
   Foresight foresight;
   PRESCENE_TRY(foresight.simulator, context.make_simulator(scene));
   const double step = foresight.simulator->step_size();
-  if (!(duration >= step && duration <= kLongest))
+  if (!(duration >= step && duration <= belief::kDurations.high))
     return core::invalid_input("a duration of " + core::rounded_text(duration) +
                                " s: give at least one step of the simulator, " + core::rounded_text(step) +
                                " s, and at most 3600 s");
@@ -66,24 +50,43 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   foresight.request.stop.stop_at_rest = scene->stop_at_rest;
   foresight.request.sample_interval = needs_states_along_the_way(*scene) ? kJudgingInterval : 0.0;
   foresight.variables = simulation::variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
+  const std::size_t objects = scene->objects.size();
   foresight.scene = std::move(scene);
+
+  const std::size_t of_run = simulation::bytes_of_run(foresight.request, objects);
+  if (of_run > context.most_bytes / 4)
+    return core::resource_exhausted("the states of one instance would take " + std::to_string(of_run >> 20) +
+                                    " MiB: ask for a shorter duration");
+  const std::size_t of_record =
+      kRecordBytes + objects * sizeof(belief::ObjectState) + (detail.keep_contacts ? kContactsBytes : 0);
+  const std::size_t most_instances = std::max<std::size_t>(1, context.most_bytes / 2 / of_record);
+  if (effort.exact_instances && static_cast<std::size_t>(*effort.exact_instances) > most_instances)
+    return core::resource_exhausted("effort.exact_instances: " + std::to_string(*effort.exact_instances) +
+                                    " instances do not fit into the memory for a question: ask for at most " +
+                                    std::to_string(most_instances));
+
+  const core::Cancellation never;
+  const core::Cancellation& outer = context.cancellation ? *context.cancellation : never;
+  const core::Cancellation until(outer, context.simulate_until.value_or(core::Cancellation::Clock::time_point::max()));
+  const core::Cancellation* cancellation = context.simulate_until ? &until : context.cancellation;
 
   simulation::EstimatorOptions options;
   options.tolerance = effort.tolerance;
   options.confidence = effort.confidence;
-  options.max_instances = effort.max_instances;
+  options.max_instances = static_cast<int>(std::min(static_cast<std::size_t>(effort.max_instances), most_instances));
+  options.bytes_of_runs = std::min(options.bytes_of_runs, context.most_bytes / 4);
   options.max_seconds = effort.max_seconds;
   options.exact_instances = effort.exact_instances;
   options.keep_contacts = detail.keep_contacts;
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
   if (!detail.to_rest && !foresight.variables.empty())
-    foresight.certifier =
-        simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
-                                   {.shapes = context.shapes, .edge_rounding = context.edge_rounding});
+    foresight.certifier = simulation::make_certifier(
+        foresight.scene, foresight.variables, foresight.request,
+        {.shapes = context.shapes, .edge_rounding = context.edge_rounding, .cancellation = cancellation});
   options.certifier = foresight.certifier.get();
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,
-                                    prior.stream, options, *context.pool, context.cancellation, context.progress);
+                                    prior.stream, options, *context.pool, cancellation, context.progress);
   if (foresight.estimate.instances.empty())
     return core::cancelled(
         "stopped before the first simulated instance was finished: give more time, or a shorter duration");
@@ -106,10 +109,15 @@ std::optional<std::size_t> typical_instance(const Foresight& foresight, std::siz
   return members[*middle];
 }
 
+double interval_told(const Foresight& foresight, double interval) {
+  const auto objects = static_cast<double>(std::max<std::size_t>(1, foresight.scene->objects.size()));
+  return std::max(interval, foresight.request.stop.duration * objects / kMostStatesTold);
+}
+
 std::optional<belief::Trajectory> run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
                                             const QueryContext& context) {
   simulation::RunRequest request = foresight.request;
-  request.sample_interval = kTimelineInterval;
+  request.sample_interval = interval_told(foresight, kTimelineInterval);
   belief::Trajectory run = simulation::run_instance(*foresight.simulator, prior.starts, foresight.estimate, instance,
                                                     request, prior.stream, *context.pool, context.cancellation);
   if (run.end == belief::TrajectoryEnd::kCancelled) return std::nullopt;

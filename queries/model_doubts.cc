@@ -19,6 +19,8 @@ constexpr std::size_t kFewestPairs = 32, kMostPairs = 128;
 constexpr std::size_t kRepeated = 256;
 constexpr double kLowEnd = 0.05, kHighEnd = 0.95;  // of priors
 constexpr double kPathInterval = 1.0 / 30.0;
+constexpr std::size_t kPathsAtOnce = 48;          // bounds the memory; does not change results
+constexpr std::size_t kMostPathPoints = 300'000;  // of all paths: 20 MB of JSON
 
 void tell(const QueryContext& context, double fraction, const std::string& text) {
   if (context.progress) context.progress({fraction, std::nullopt, text});
@@ -205,27 +207,39 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
 }
 
 std::vector<belief::ObjectPath> paths_of(const Foresight& foresight, const Prior& prior, int count,
-                                         const std::vector<std::size_t>& objects, const QueryContext& context) {
+                                         const std::vector<std::size_t>& objects, const QueryContext& context,
+                                         bool& complete) {
   const auto runs = std::min(static_cast<std::size_t>(std::max(0, count)), foresight.estimate.instances.size());
   const std::vector<belief::WorldState> starts =
       simulation::starts_of(prior.starts, foresight.estimate, runs, prior.stream, *context.pool);
   simulation::RunRequest request = foresight.request;
-  request.sample_interval = kPathInterval;
-  std::vector<belief::Trajectory> trajectories(runs);
-  foresight.simulator->run(starts, request, prior.stream, 0, *context.pool, trajectories, context.cancellation);
+  request.sample_interval = interval_told(foresight, kPathInterval);
   std::vector<belief::ObjectPath> paths;
-  for (std::size_t i = 0; i < runs; ++i) {
-    if (trajectories[i].end == belief::TrajectoryEnd::kCancelled || foresight.estimate.instances[i].failed) continue;
-    for (const std::size_t object : objects) {
-      belief::ObjectPath& path = paths.emplace_back();
-      path.object = foresight.scene->objects[object].name;
-      if (const auto variable = variable_about(*foresight.scene, path.object)) {
-        const int which = foresight.estimate.instances[i].classes[*variable];
-        path.outcome = foresight.variables[*variable].classes[static_cast<std::size_t>(which)];
+  std::vector<belief::Trajectory> trajectories;
+  std::size_t points = 0;
+  for (std::size_t begin = 0; begin < runs; begin += trajectories.size()) {
+    trajectories.assign(std::min(kPathsAtOnce, runs - begin), {});
+    foresight.simulator->run(std::span(starts).subspan(begin, trajectories.size()), request, prior.stream,
+                             static_cast<std::uint32_t>(begin), *context.pool, trajectories, context.cancellation);
+    for (std::size_t n = 0; n < trajectories.size(); ++n) {
+      const std::size_t i = begin + n;
+      if (foresight.estimate.instances[i].failed) continue;
+      points += trajectories[n].states.size() * objects.size();
+      if (trajectories[n].end == belief::TrajectoryEnd::kCancelled || points > kMostPathPoints) {
+        complete = false;
+        return paths;
       }
-      for (const belief::WorldState& state : trajectories[i].states) {
-        if (state.objects[object].mode == belief::MotionMode::kHeld) path.points.clear();  // its way begins when let go
-        path.points.push_back(state.objects[object].X_WO.translation);
+      for (const std::size_t object : objects) {
+        belief::ObjectPath& path = paths.emplace_back();
+        path.object = foresight.scene->objects[object].name;
+        if (const auto variable = variable_about(*foresight.scene, path.object)) {
+          const int which = foresight.estimate.instances[i].classes[*variable];
+          path.outcome = foresight.variables[*variable].classes[static_cast<std::size_t>(which)];
+        }
+        for (const belief::WorldState& state : trajectories[n].states) {
+          if (state.objects[object].mode == belief::MotionMode::kHeld) path.points.clear();  // it begins when let go
+          path.points.push_back(state.objects[object].X_WO.translation);
+        }
       }
     }
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // State anticipation: X*_t+1 ~ P(X_t+1 | U_t, X_t).
 #include <algorithm>
+#include <map>
+#include <span>
 #include <utility>
 
 #include "prediction_parts.h"
@@ -11,6 +13,8 @@ namespace prescene::queries {
 namespace {
 
 constexpr std::size_t kMostTypicalRuns = 12;
+// Densities are made of the first so many instances, which are a net as well: more show no more, and take long.
+constexpr std::size_t kMostKernels = 8192;
 
 /// Indices of the objects that outcomes judge or actions move; all when there are none.
 std::vector<std::size_t> objects_asked_about(const belief::Scene& scene) {
@@ -26,18 +30,31 @@ std::vector<std::size_t> objects_asked_about(const belief::Scene& scene) {
   return indices;
 }
 
+/// Of the components of the start among these instances.
+std::map<int, double> shares_of(std::span<const simulation::InstanceRecord> instances) {
+  std::map<int, double> shares;
+  for (const simulation::InstanceRecord& record : instances) shares[record.component] += record.weight;
+  return shares;
+}
+
 belief::FinalPoses final_poses_of(const Foresight& foresight, std::size_t object, core::ThreadPool& pool) {
   const belief::Scene& scene = *foresight.scene;
   const belief::SceneObject& known = scene.objects[object];
   const std::optional<std::size_t> variable = variable_about(scene, known.name);
+  const std::span all(foresight.estimate.instances);
+  const std::span looked_at = all.first(std::min(kMostKernels, all.size()));
+  const std::map<int, double> shares = shares_of(all), looked_at_shares = shares_of(looked_at);
   std::vector<FinalSample> samples;
   double mass = 0.0;
-  for (const simulation::InstanceRecord& record : foresight.estimate.instances) {
+  for (const simulation::InstanceRecord& record : looked_at) {
     if (record.failed) continue;
-    samples.push_back({record.final.objects[object].X_WO, record.weight, variable ? record.classes[*variable] : 0});
-    mass += record.weight;
+    double weight = record.weight;
+    if (looked_at.size() < all.size()) weight *= shares.at(record.component) / looked_at_shares.at(record.component);
+    samples.push_back({record.final.objects[object].X_WO, weight, variable ? record.classes[*variable] : 0});
+    mass += weight;
   }
-  if (foresight.estimate.failed > 0)
+  if (samples.empty()) return {};
+  if (foresight.estimate.failed > 0 || looked_at.size() < all.size())
     for (FinalSample& sample : samples) sample.weight /= mass;
   const std::vector<std::string> nothing_asked{""};
   const std::vector<std::string>& names = variable ? foresight.variables[*variable].classes : nothing_asked;
@@ -58,7 +75,7 @@ std::vector<belief::OutcomeProbability> probabilities_of(const Foresight& foresi
 
 /// One run for each outcome that happened, the likeliest first.
 std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, const Prior& prior,
-                                                const QueryContext& context) {
+                                                const QueryContext& context, bool& complete) {
   struct Candidate {
     double share;
     std::size_t variable;
@@ -87,7 +104,10 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
         typical_instance(foresight, candidate.variable, {candidate.which}, static_cast<std::size_t>(*object));
     if (!instance) continue;
     std::optional<belief::Trajectory> trajectory = run_again(foresight, prior, *instance, context);
-    if (!trajectory) break;  // stopped: the probabilities are there, which matter most
+    if (!trajectory) {  // stopped: the probabilities are there, which matter most
+      complete = false;
+      break;
+    }
     belief::TypicalRun& run = runs.emplace_back();
     run.outcome = foresight.variables[candidate.variable].classes[static_cast<std::size_t>(candidate.which)];
     run.group = foresight.variables[candidate.variable].name;
@@ -134,6 +154,14 @@ void account(const Foresight& foresight, belief::PredictAnswer& answer) {
   answer.cpu_seconds = estimate.cpu_seconds;
   answer.converged = estimate.converged;
   answer.stopped = simulation::to_string(estimate.stop);
+}
+
+std::string missing_text(const std::vector<std::string>& missing) {
+  std::string names;
+  for (const std::string& part : missing) names += (names.empty() ? "" : ", ") + part;
+  return "The time ran out, or the question was stopped, before all of the answer was worked out. Missing or "
+         "incomplete: " +
+         names + ". Give more time, or ask for less.";
 }
 
 /// What is too far away is not simulated any more: what is said of it then may not be what is meant.
@@ -195,21 +223,57 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   answer.outcomes = probabilities_of(foresight);
   answer.history = history_of(foresight);
   const std::vector<std::size_t> objects = objects_asked_about(*foresight.scene);
-  if (tell.final_poses)
-    for (std::size_t object : objects) answer.final_poses.push_back(final_poses_of(foresight, object, *context.pool));
-  if (tell.typical_runs) answer.typical_runs = typical_runs_of(foresight, prior, context);
-  if (tell.inputs) answer.inputs = deciding_inputs(foresight, prior, context);
-  if (tell.contacts) {
-    forecast_contacts(foresight, query.effort.confidence, answer);
+  // What was not worked out when the time ran out or somebody stopped it.
+  std::vector<std::string> missing;
+  const auto abandoned = [&] { return context.abandoned && context.abandoned->requested(); };
+  const auto stopped = [&] { return abandoned() || (context.cancellation && context.cancellation->requested()); };
+  const auto work_out = [&](bool asked, const char* part, const auto& work) {
+    if (asked && (abandoned() || !work())) missing.emplace_back(part);
+  };
+  work_out(tell.final_poses, "final_poses", [&] {
+    for (std::size_t object : objects) {
+      if (abandoned()) return false;
+      belief::FinalPoses poses = final_poses_of(foresight, object, *context.pool);
+      if (poses.components.empty()) continue;  // every instance that would be looked at failed
+      answer.final_poses.push_back(std::move(poses));
+    }
+    return true;
+  });
+  work_out(tell.typical_runs, "typical_runs", [&] {
+    bool complete = true;
+    answer.typical_runs = typical_runs_of(foresight, prior, context, complete);
+    return complete;
+  });
+  work_out(tell.inputs, "inputs", [&] {
+    answer.inputs = deciding_inputs(foresight, prior, context);
+    return !abandoned();
+  });
+  work_out(tell.contacts, "contacts",
+           [&] { return forecast_contacts(foresight, query.effort.confidence, context.abandoned, answer); });
+  work_out(tell.contacts, "flight", [&] {
     answer.flight = forecast_flight(foresight, prior, context);
-  }
-  if (tell.paths > 0) answer.paths = paths_of(foresight, prior, tell.paths, objects, context);
-  if (tell.chaos) answer.chaos = check_for_chaos(foresight, prior, query.effort.confidence, context);
-  if (tell.model_error) {
-    PRESCENE_TRY(answer.model_error, model_error(foresight, prior, query.effort.confidence, context));
-  }
+    return answer.flight || !stopped();
+  });
+  work_out(tell.paths > 0, "paths", [&] {
+    bool complete = true;
+    answer.paths = paths_of(foresight, prior, tell.paths, objects, context, complete);
+    return complete;
+  });
+  work_out(tell.chaos, "chaos", [&] {
+    answer.chaos = check_for_chaos(foresight, prior, query.effort.confidence, context);
+    return !answer.chaos.empty() || !stopped();
+  });
+  core::Status model_status;
+  work_out(tell.model_error, "model_error", [&] {
+    auto error = model_error(foresight, prior, query.effort.confidence, context);
+    if (!error) model_status = error.status();
+    if (error) answer.model_error = *std::move(error);
+    return answer.model_error || !error || !stopped();
+  });
+  PRESCENE_RETURN_IF_ERROR(model_status);
   if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.remarks = remarks_of(answer, query.effort);
+  if (!missing.empty()) answer.remarks.push_back(missing_text(missing));
   remark_on_leaving(foresight.estimate, answer.remarks);
   if (foresight.estimate.certain)
     answer.remarks.push_back(

@@ -19,12 +19,15 @@ struct UncertainInput {
 std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const Prior& prior,
                                              const QueryContext& context);
 
-/// Of each variable whose classes vary; empty with fewer than 128 instances.
+/// Of each variable whose classes vary; empty with fewer than 128 instances, from the first 65536 where there are more.
+/// Those worked out so far when abandoned.
 std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, const Prior& prior,
                                                     const QueryContext& context);
 
-/// Into `contact_times` and `contacts`, from instances that ran to rest with their contacts kept.
-void forecast_contacts(const Foresight& foresight, double confidence, belief::PredictAnswer& answer);
+/// Into `contact_times` and `contacts`, from instances that ran to rest with their contacts kept. False, and nothing,
+/// when abandoned.
+bool forecast_contacts(const Foresight& foresight, double confidence, const core::Cancellation* abandoned,
+                       belief::PredictAnswer& answer);
 
 /// For how long nothing can touch anything. Nothing when stopped, without a shape store, or where a shape can't be made
 /// of spheres.
@@ -40,9 +43,11 @@ std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, cons
 core::Result<std::optional<belief::ModelError>> model_error(const Foresight& foresight, const Prior& prior,
                                                             double confidence, const QueryContext& context);
 
-/// Up to `count` instances' ways of the objects (by index).
+/// Up to `count` instances' ways of the objects (by index). Not `complete` when stopped, or where the points of all of
+/// them would not fit into an answer.
 std::vector<belief::ObjectPath> paths_of(const Foresight& foresight, const Prior& prior, int count,
-                                         const std::vector<std::size_t>& objects, const QueryContext& context);
+                                         const std::vector<std::size_t>& objects, const QueryContext& context,
+                                         bool& complete);
 
 /// The variable whose classes an object's ends are told apart by: the first exclusive group about it, else the first
 /// outcome about it.

@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
 #include "tasks.h"
 
@@ -21,24 +22,23 @@ void put(core::Result<Value> result, belief::Answer& answer) {
     answer.error = core::to_string(result.status());
 }
 
-/// The estimator looks at its time limit between instances, which may be long ones; beyond this nothing goes on. What
-/// is finished by then is the answer.
-std::optional<core::Cancellation::Clock::time_point> last_moment(const belief::Effort& effort) {
-  if (!effort.max_seconds || effort.exact_instances) return std::nullopt;
-  constexpr double kMost = 1e6;  // s: far from the end of the clock
-  const std::chrono::duration<double> most(2.0 * std::min(*effort.max_seconds, kMost) + 2.0);
-  return core::Cancellation::Clock::now() + std::chrono::duration_cast<core::Cancellation::Clock::duration>(most);
-}
-
-/// Calls `task` with a context that ends at the last moment.
+/// Calls `task` with a context that ends a little after the effort's time.
 template <class Task>
 auto within_time(const belief::Effort& effort, const QueryContext& context, const Task& task) {
+  if (!effort.max_seconds || effort.exact_instances) return task(context);
+  const auto after = [start = core::Cancellation::Clock::now()](double seconds) {
+    return start +
+           std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
+  };
   const core::Cancellation never;
-  const auto end = last_moment(effort);
-  if (!end) return task(context);
-  const core::Cancellation limit(context.cancellation != nullptr ? *context.cancellation : never, *end);
+  const auto end = after(*effort.max_seconds + kEndAfter);
+  const core::Cancellation cancelled(context.cancellation ? *context.cancellation : never, end);
+  const core::Cancellation abandoned(context.abandoned ? *context.abandoned : never, end);
   QueryContext limited = context;
-  limited.cancellation = &limit;
+  limited.cancellation = &cancelled;
+  limited.abandoned = &abandoned;
+  const auto cut = after(*effort.max_seconds + kCutAfter);
+  limited.simulate_until = std::min(context.simulate_until.value_or(cut), cut);
   return task(limited);
 }
 
@@ -48,6 +48,7 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
               belief::Answer& answer) {
   PRESCENE_CHECK(context.pool != nullptr);
   answer.id = query.id;
+  if (const core::Status asked = belief::validate(query); !asked.ok()) return put<belief::WhereAnswer>(asked, answer);
   std::visit(
       [&](const auto& what) {
         using Asked = std::decay_t<decltype(what)>;

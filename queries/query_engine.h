@@ -11,8 +11,10 @@
 // what will the camera see (observation anticipation). docs/queries.md says what the answers mean.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "prescene/belief/query.h"
 #include "prescene/core/parallel.h"
@@ -43,11 +45,22 @@ struct QueryContext {
   core::ThreadPool* pool = nullptr;
   /// Meshes to draw, kept over queries; may be null.
   filter::MeshCache* meshes = nullptr;
-  /// May be null. A cancelled query is answered from the instances that were finished.
+  /// May be null. A cancelled query simulates no more: it is answered from the instances that were finished, without
+  /// the parts that take further ones; those are named in its remarks.
   const core::Cancellation* cancellation = nullptr;
+  /// May be null. Nobody waits for the answer any more: the rest of the work is left out too.
+  const core::Cancellation* abandoned = nullptr;
+  /// From this moment on the probabilities are those of the instances that were finished; all else is still worked out.
+  std::optional<core::Cancellation::Clock::time_point> simulate_until;
+  /// Memory that instances and their states may take, bytes: no more are run, and what needs more is refused.
+  std::size_t most_bytes = std::size_t{16} << 30;
   /// Called from the calling thread; may be empty.
   core::ProgressSink progress;
 };
+
+/// How long an answer takes beyond its Effort::max_seconds, s: instances under way are cut off after the first, and all
+/// else ends after the second; what had to be left out is told in the remarks.
+inline constexpr double kCutAfter = 0.6, kEndAfter = 1.5;
 
 /// Answers from a snapshot. Objects that are lost or probably not there (existence below 1/2) take no part. The same
 /// snapshot and query give the same answer (wall times aside), unless time ran out: then the answer's number of

@@ -36,8 +36,9 @@ struct ForesightDetail {
   bool to_rest = true;  ///< Else instances end as soon as they are decided, where that can be told.
   bool keep_contacts = false;
 };
-/// Fails when the effort or the duration is out of range, when no simulator can be made, or when the query was
-/// cancelled before an instance was finished. The scene's outcomes are what is judged, its actions what is done.
+/// Fails when the duration is out of range, when the memory for a question does not hold it, when no simulator can be
+/// made, or when the query was cancelled before an instance was finished. The scene's outcomes are what is judged, its
+/// actions what is done.
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
                                 const belief::Effort& effort, const QueryContext& context,
                                 const ForesightDetail& detail = {});
@@ -46,7 +47,10 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
 /// did.
 std::optional<std::size_t> typical_instance(const Foresight& foresight, std::size_t variable,
                                             const std::set<int>& class_indices, std::size_t object);
-/// That instance again, with states every 1/30 s.
+/// Between two states of a run that is told: the interval given, longer where the whole duration of it would not fit
+/// into an answer (above 266 s of one object at 30 Hz).
+double interval_told(const Foresight& foresight, double interval);
+/// That instance again, with states every 1/30 s as far as interval_told() lets it.
 std::optional<belief::Trajectory> run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
                                             const QueryContext& context);
 

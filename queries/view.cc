@@ -63,6 +63,9 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   PRESCENE_TRY(const Foresight foresight,
                foresee(prior, std::move(moving), std::max(query.time, kNow), effort, foreseen));
 
+  if (foresight.estimate.instances.size() < kViews && !foresight.estimate.certain)
+    return core::cancelled("stopped when " + std::to_string(foresight.estimate.instances.size()) + " of " +
+                           std::to_string(kViews) + " views were foreseen: ask for an earlier time");
   belief::Trajectory likeliest;
   foresight.simulator->run(std::span(&prior.likeliest, 1), foresight.request, prior.stream, 0, *context.pool,
                            std::span(&likeliest, 1), context.cancellation);
@@ -85,6 +88,8 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   answer.presence = geometry::Image<float>(camera.width, camera.height, 0.0f);
   rendering::RenderedView images;
   for (const simulation::InstanceRecord& record : foresight.estimate.instances) {
+    if (context.cancellation && context.cancellation->requested())
+      return core::cancelled("stopped before all views were drawn: give more time, or a smaller camera image");
     const auto [drawn, status] = draw(record.final, &images);
     PRESCENE_RETURN_IF_ERROR(status);
     for (int y = 0; y < camera.height; ++y) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers questions that come in as JSON, one after the other on a thread of its own, from snapshots of the belief.
+// Answers questions that come in as JSON, from snapshots of the belief, on two threads of its own: one reads questions,
+// answers `where` and refuses what it must; the other answers what has to be simulated, one question after the other.
+// So `where` never waits for a simulation.
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -12,41 +15,71 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/core/progress.h"
+#include "prescene/core/status.h"
 #include "prescene/queries/query_engine.h"
 #include "prescene/service/backends.h"
 
 namespace prescene::service {
 
 struct DeskSettings {
-  std::size_t max_waiting = 16;  ///< More questions are answered with an error at once.
+  std::size_t max_waiting = 16;  ///< That have to be simulated; more are answered with an error at once.
+  std::size_t max_unread = 64;   ///< Come, but not looked at yet; more are answered with an error.
+  std::size_t max_unread_bytes = 4u << 20;
   double default_seconds = 0.8;  ///< Time that a question without limits of its own may take.
-  double most_seconds = 10.0;    ///< Time that any question may take: questions are answered one after the other.
+  double most_seconds = 10.0;    ///< Time that any question may take, and at most 2 s more.
+  /// Memory that the instances of a question may take; what needs more is refused, or ends with fewer instances.
+  std::size_t most_bytes = std::size_t{512} << 20;
+};
+
+/// What became of the questions since the start.
+struct DeskCounts {
+  std::uint64_t answered = 0;    ///< As asked.
+  std::uint64_t refused = 0;     ///< Answered with an error: not understood, not possible, or too many waited.
+  std::uint64_t unanswered = 0;  ///< Dropped without an answer: so many came that not even an error could be sent.
+  std::uint64_t repeated = 0;    ///< Came again while the same id waited: not counted above.
+  std::uint64_t failed = 0;      ///< Of those refused: an exception ended the work on them, which is a bug.
+  std::string last_failure;      ///< What the last exception said.
+  friend bool operator==(const DeskCounts&, const DeskCounts&) = default;
 };
 
 /// In the error of a question that came when too many waited.
 inline constexpr const char* kQuestionsWait = "questions wait already";
 
-/// A question's text as JSON and its answer's. Called on the desk's thread.
-using AnswerSink = std::function<void(const std::string& question, const std::string& answer)>;
+/// The answer's text as JSON. Called on the desk's threads, on both at once.
+using AnswerSink = std::function<void(const std::string& answer)>;
 
 class AnsweringDesk {
  public:
-  /// `threads` of its own for simulating; `snapshot` gives the belief to ask. All must outlive the desk.
+  /// `threads` of its own for simulating; `snapshot` gives the belief to ask, from any thread. All must outlive the
+  /// desk.
   AnsweringDesk(Backends& backends, int threads, const DeskSettings& settings,
                 std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer);
-  /// Cancels what is being answered and drops what waits.
+  /// Stops what is being answered and drops what waits.
   ~AnsweringDesk();
   AnsweringDesk(const AnsweringDesk&) = delete;
   AnsweringDesk& operator=(const AnsweringDesk&) = delete;
 
-  /// Takes a question. `where` comes before what has to be simulated. One that is not understood or comes when too many
-  /// wait gets an answer that says so. A question that waits or is being answered is not taken again under the same id:
-  /// clients ask again when an answer is late.
+  /// Takes a question; returns at once, from any thread. One that is not understood or comes when too many wait gets an
+  /// answer that says so. A question whose id waits to be simulated, or is being simulated, is not taken again: clients
+  /// ask again when an answer is late.
   void ask(std::string question_json);
 
+  DeskCounts counts() const;
+
  private:
-  void work();
-  std::string answer(const std::string& question_json);
+  void read_questions();
+  void read(const std::string& question_json);
+  void simulate_questions();
+  struct Reply {
+    std::string text;
+    bool is_answer = false;  ///< Else the reason why there is none.
+  };
+  /// Answers and counts; no exception leaves it.
+  void answer(const belief::Query& query);
+  Reply reply_to(const belief::Query& query);
+  void refuse(const std::string& id, const core::Status& reason);
+  void send(const std::string& answer);
+  void note_failure(const std::string& what);
 
   Backends& backends_;
   core::ThreadPool pool_;
@@ -54,19 +87,20 @@ class AnsweringDesk {
   std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
   AnswerSink on_answer_;
   core::Cancellation stop_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  struct Waiting {
-    std::string id;
-    std::string question;
-    bool is_quick = false;
-  };
-  std::deque<Waiting> waiting_;
+
+  mutable std::mutex mutex_;  // guards all below
+  std::condition_variable read_changed_, simulate_changed_;
+  std::deque<std::string> unread_;
+  std::size_t unread_bytes_ = 0;
+  std::deque<std::string> too_many_;  // ids of questions that found no room
+  std::deque<belief::Query> waiting_;
   std::string id_in_work_;
-  std::thread thread_;
+  DeskCounts counts_;
+
+  std::thread reader_, simulator_;  // last: they use all above
 };
 
-/// {"id": the question's if it can be read, "error": text}.
-std::string error_answer(const std::string& question_json, const std::string& text);
+/// {"id": `id` unless it is empty, "error": text}.
+std::string error_answer(const std::string& id, const std::string& text);
 
 }  // namespace prescene::service

@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "prescene/belief/json.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/topics.h"
@@ -119,7 +120,7 @@ class BusPlayer {
     const std::string id = "replay-" + std::to_string(core::wall_now_ns()) + "-" + std::to_string(number);
     json["id"] = id;
     listener_.expect(id, question.at, question.json);
-    return node_.publish(questions_, interfaces::RosString{json.dump()});
+    return node_.publish(questions_, interfaces::RosString{belief::json_text(json)});
   }
 
   /// The topics are found one by one: every one that is listened to must be, before the first message.

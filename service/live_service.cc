@@ -5,9 +5,11 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -79,6 +81,8 @@ struct LiveService::Impl {
   void take_in(std::vector<ReceivedMessage> messages, const core::Cancellation& cancellation);
   void take_in(ReceivedMessage& message);
   void refuse(const core::Status& status);
+  /// Counts an exception of a library, or the end of memory: what came next may do better.
+  void note_failure(const std::string& of, const std::exception& error);
   void record(const std::string& topic, const std::string& json);
   /// The recording ends here, and is an error of the run.
   void give_up_recording(const core::Status& why);
@@ -121,6 +125,8 @@ struct LiveService::Impl {
   bool told_why_not = false;
   std::mutex answered_mutex;  // guards what the desk hands over to the recording
   std::vector<std::string> answered;
+  std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
+  std::string last_failure;
 
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
@@ -144,7 +150,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
   Impl* raw = impl.get();
-  const auto on_answer = [raw](const std::string&, const std::string& answer) {
+  const auto on_answer = [raw](const std::string& answer) {  // on two threads
     raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
     const std::lock_guard lock(raw->answered_mutex);
     raw->answered.push_back(answer);
@@ -179,8 +185,15 @@ core::Status LiveService::Impl::join_bus() {
   PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, deliver));
   PRESCENE_RETURN_IF_ERROR(node->subscribe(kControlTopic, "std_msgs/msg/String", TopicQos::kCommands, deliver));
   return node->subscribe(kQueryTopic, "std_msgs/msg/String", TopicQos::kCommands, [this](ReceivedMessage&& message) {
-    const auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
-    if (question) desk->ask(question->data);
+    try {
+      auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+      if (question)
+        desk->ask((*std::move(question)).data);
+      else
+        ++unreadable_questions;
+    } catch (const std::bad_alloc&) {
+      ++unreadable_questions;
+    }
     inbox.put(std::move(message));  // for the recording
   });
 }
@@ -196,6 +209,12 @@ void LiveService::Impl::refuse(const core::Status& status) {
   if (status.message() == last_refusal) return;  // a driver repeats its mistake with each frame
   last_refusal = status.message();
   core::log(log, core::LogLevel::kWarning, "message refused: " + last_refusal);
+}
+
+void LiveService::Impl::note_failure(const std::string& of, const std::exception& error) {
+  ++failures;
+  last_failure = of + " was left out: " + error.what();
+  core::log(log, core::LogLevel::kError, last_failure);
 }
 
 void LiveService::Impl::record(const std::string& topic, const std::string& json) {
@@ -233,8 +252,7 @@ void LiveService::Impl::take_in(std::vector<ReceivedMessage> messages, const cor
     try {
       take_in(message);
     } catch (const std::exception& error) {
-      ++failures;
-      core::log(log, core::LogLevel::kError, message.topic + ": a message was left out: " + error.what());
+      note_failure(message.topic, error);
     }
     if (steady_clock::now() < look_up) continue;
     look_after_frames();
@@ -259,8 +277,7 @@ void LiveService::Impl::look_after_frames() {
       publish(*step);
     }
   } catch (const std::exception& error) {
-    ++failures;
-    core::log(log, core::LogLevel::kError, std::string("a frame was left out: ") + error.what());
+    note_failure("a frame", error);
   }
   if (diagnostics_limit.due()) publish_diagnostics();
 }
@@ -275,7 +292,7 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   const std::shared_ptr<const belief::Belief> belief = tracker->belief();
   const BeliefSummary summary = summary_of(*belief);
   const std::string& world = settings.tracker.assembler.world_frame;
-  const std::string json = to_json(summary).dump();
+  const std::string json = belief::json_text(to_json(summary));
   check_sent(node->publish(beliefs, interfaces::RosString{json}));
   check_sent(node->publish(detections, detections_of(summary, *belief->scene, world)));
   for (const ObjectSummary& object : summary.objects) {
@@ -285,7 +302,7 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   }
   if (marker_limit.due()) check_sent(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
   record(kBeliefTopic, json);
-  record(kStepTopic, to_json(step.record).dump());
+  record(kStepTopic, belief::json_text(to_json(step.record)));
 }
 
 ServiceHealth LiveService::Impl::health() const {
@@ -297,11 +314,14 @@ ServiceHealth LiveService::Impl::health() const {
   health.dropped_in_inbox = inbox.dropped_by_topic();
   health.lost_on_bus = node->dropped_samples();
   health.unsent = unsent.load(std::memory_order_relaxed);
-  health.failures = failures;
   health.unlogged = log_limiter.held_back();
   health.tf_forgotten = tracker->tf_forgotten();
   health.is_recording = recording != nullptr;
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
+  health.questions = desk->counts();
+  health.unreadable_questions = unreadable_questions;
+  health.failures = failures;
+  health.last_failure = last_failure.empty() ? health.questions.last_failure : last_failure;
   if (since_frame) health.seconds_since_frame = since_frame->seconds();
   health.last_step_seconds = step_seconds;
   health.degraded = degraded;
@@ -338,7 +358,7 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
   core::log(impl.log, core::LogLevel::kInfo,
             "listening in DDS domain " + std::to_string(impl.settings.dds.domain) + " for " +
                 impl.settings.tracker.topics.depth);
-  while (!cancellation.requested()) {
+  const auto turn = [&] {
     auto until = steady_clock::now() + kPollInterval;
     if (const auto deadline = impl.tracker->next_deadline()) {
       until = std::min(
@@ -346,6 +366,13 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     }
     impl.take_in(impl.inbox.take_all(until), cancellation);
     impl.look_after_frames();
+  };
+  while (!cancellation.requested()) {
+    try {
+      turn();
+    } catch (const std::exception& error) {
+      impl.note_failure("a turn of the loop", error);
+    }
   }
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
   return impl.recording ? impl.recording->close() : impl.recording_status;

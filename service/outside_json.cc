@@ -10,6 +10,8 @@ namespace {
 
 // Above all that is sent: the images of a view of 4 million pixels are 54 MB.
 constexpr std::size_t kMostBytes = 256u << 20;
+// Bytes: what is refused for its long id is still told to whoever sent it, unless that were a burden.
+constexpr std::size_t kLongestIdKept = 4096;
 
 }  // namespace
 
@@ -23,7 +25,9 @@ std::string id_of(std::string_view text) { return id_of_document(parse_or_discar
 std::string id_of_document(const nlohmann::ordered_json& document) {
   if (!document.is_object()) return "";
   const auto id = document.find("id");
-  return id != document.end() && id->is_string() ? id->get<std::string>() : "";
+  if (id == document.end() || !id->is_string()) return "";
+  const auto& text = id->get_ref<const std::string&>();
+  return text.size() <= kLongestIdKept ? text : "";
 }
 
 }  // namespace prescene::service

@@ -10,7 +10,7 @@ namespace prescene::service {
 
 /// The document; discarded (is_discarded()) where it is no JSON or nested too deep to be copied.
 nlohmann::ordered_json parse_or_discard(std::string_view text);
-/// The "id" of a question or an answer; empty where there is none.
+/// The "id" of a question or an answer; empty where there is none, or a very long one.
 std::string id_of_document(const nlohmann::ordered_json& document);
 std::string id_of(std::string_view text);
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/answering_desk.h"
@@ -86,7 +87,7 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
     const bool there = node_->matched_readers(queries_) > 0 && node_->matched_writers(kAnswerTopic) > 0;
     found_service = found_service || there;
     if (there && steady_clock::now() >= ask_at) {
-      PRESCENE_RETURN_IF_ERROR(node_->publish(queries_, interfaces::RosString{question.dump()}));
+      PRESCENE_RETURN_IF_ERROR(node_->publish(queries_, interfaces::RosString{belief::json_text(question)}));
       ask_at = steady_clock::now() + kAskAgain;
     }
     std::unique_lock lock(mutex_);

@@ -12,6 +12,7 @@ RosDiagnosticLevel level_of(const ServiceHealth& health) {
   if (!health.recording_failure.empty()) return RosDiagnosticLevel::kError;
   if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
   if (!is_tracking(health)) return RosDiagnosticLevel::kError;
+  if (health.failures > 0 || health.questions.failed > 0) return RosDiagnosticLevel::kWarn;
   return health.degraded.empty() ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
 }
 
@@ -68,13 +69,17 @@ interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const
       {"dropped by topic", counts_text(health.dropped_in_inbox)},
       {"lost on the bus", std::to_string(health.lost_on_bus)},
       {"not sent", std::to_string(health.unsent)},
-      {"failures", std::to_string(health.failures)},
       {"lines not logged", std::to_string(health.unlogged)},
       {"transforms forgotten early", std::to_string(health.tf_forgotten)},
       {"recording", recording_text(health)},
       {"since the last frame, s", health.seconds_since_frame ? core::fixed_text(*health.seconds_since_frame, 1) : ""},
       {"last step, s", core::rounded_text(health.last_step_seconds)},
-      {"last refusal", health.last_refusal}};
+      {"last refusal", health.last_refusal},
+      {"questions answered", std::to_string(health.questions.answered)},
+      {"questions refused", std::to_string(health.questions.refused)},
+      {"questions without an answer", std::to_string(health.questions.unanswered + health.unreadable_questions)},
+      {"failures", std::to_string(health.failures + health.questions.failed)},
+      {"last failure", health.last_failure}};
   return status;
 }
 

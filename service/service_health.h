@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/service/answering_desk.h"
 
 namespace prescene::service {
 
@@ -22,7 +23,9 @@ struct ServiceHealth {
   std::uint64_t refused_messages = 0;
   /// Messages that waited for the tracker and were dropped because too many did, by topic.
   std::map<std::string, std::uint64_t> dropped_in_inbox;
-  std::uint64_t lost_on_bus = 0;   ///< Samples that reached this process and were never read.
+  std::uint64_t lost_on_bus = 0;  ///< Samples that reached this process and were never read.
+  DeskCounts questions;
+  std::uint64_t unreadable_questions = 0;  ///< Messages on the topic of questions that hold no text.
   std::uint64_t unsent = 0;        ///< Messages of ours that the middleware did not take: a reader does not keep up.
   std::uint64_t failures = 0;      ///< Messages and frames that ended in an exception and were left out.
   std::uint64_t unlogged = 0;      ///< Lines that were left out of the log because too many came.
@@ -34,6 +37,7 @@ struct ServiceHealth {
   std::vector<std::string> degraded;  ///< What the last step could not do fully.
   std::string last_skip;              ///< Why the last frame since the last step was skipped; "" = none was.
   std::string last_refusal;           ///< Why the last refused message was.
+  std::string last_failure;           ///< What the last exception said, of a step or of a question.
 };
 
 /// True while frames come and are used.

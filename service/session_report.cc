@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -67,6 +68,11 @@ void add_prediction(const ordered_json& predict, const belief::Scene& scene, int
     block.caption = "Where " + poses.value("object", "") + " ends, from above";
     block.map = {map.value("cell", 0.02), map.value("x0", 0.0), map.value("y0", 0.0),
                  map.value("nx", 0),      map.value("ny", 0),   map.value("mass", std::vector<double>{})};
+    if (block.map.nx < 0 || block.map.ny < 0 ||
+        block.map.mass.size() != static_cast<std::size_t>(block.map.nx) * static_cast<std::size_t>(block.map.ny)) {
+      section.blocks.push_back(interfaces::TextBlock{"The heat map has not the form of docs/queries.md."});
+      continue;
+    }
     block.outlines = interfaces::support_outlines(scene);
     section.blocks.push_back(std::move(block));
   }
@@ -194,7 +200,7 @@ void SessionReport::add_answers(interfaces::ReportContents& contents) const {
   for (const auto& [at, text] : answers_) {
     try {
       add_answer_section(at, parse_or_discard(text), contents);
-    } catch (const ordered_json::exception&) {
+    } catch (const std::exception&) {  // ordered_json's, or an interval of one number
       contents.sections.push_back({"Asked at " + fixed_text(at, 1) + " s",
                                    {interfaces::TextBlock{"The answer has not the form of docs/queries.md."}}});
     }

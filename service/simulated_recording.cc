@@ -61,7 +61,7 @@ class Player {
     const ordered_json json = {{"stamp_ns", stamp(action.time)},
                                {"actions", ordered_json::array({belief::to_json(now)})}};
     return write(kControlTopic, "std_msgs/msg/String", stamp(action.time),
-                 interfaces::encode_cdr(interfaces::RosString{json.dump()}));
+                 interfaces::encode_cdr(interfaces::RosString{belief::json_text(json)}));
   }
 
   core::Status write_frame(std::uint64_t number, const belief::WorldState& state) {
@@ -88,7 +88,7 @@ class Player {
                                    interfaces::encode_cdr(interfaces::to_ros_image(color, header))));
     PRESCENE_RETURN_IF_ERROR(write(options_.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
                                    interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
-    return recording_.write_json(kTruthTopic, to_json(truth(state, view, images)).dump(),
+    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(state, view, images))),
                                  stamp_ns + ns_of(options_.latency));
   }
 

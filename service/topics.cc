@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "prescene/core/utf8.h"
+
 namespace prescene::service {
 
 core::Status validate(const InputTopics& topics) {
@@ -15,6 +17,9 @@ core::Status validate(const InputTopics& topics) {
                                                               {"static tf", &topics.tf_static}};
   std::map<std::string, const char*> seen;
   for (const auto& [what, topic] : named) {
+    if (!core::is_utf8(*topic))
+      return core::invalid_input(std::string("the ") + what +
+                                 " topic's name is not UTF-8: give one of letters, digits, _ and /");
     if (topic->empty()) {
       if (topic == &topics.color) continue;
       return core::invalid_input(std::string("the ") + what + " topic has no name: only colour can be left out");

@@ -91,6 +91,9 @@ function read_rules(    line, n, part, i, j, k, changed, pair, order, count) {
       outside_pattern[++outsides] = part[2]
       outside_folders[outsides] = part[3]
       for (i = 4; i <= n; ++i) outside_folders[outsides] = outside_folders[outsides] " " part[i]
+    } else if (part[1] == "text" && n == 3) {
+      once_text[++onces] = part[2]
+      once_file[onces] = part[3]
     } else if (part[1] == "generated" && n == 3) {
       generated_folder[++generateds] = part[2]
       generated_pattern[generateds] = part[3]
@@ -156,6 +159,9 @@ END {
     number = 0
     while ((getline line < path) > 0) {
       ++number
+      for (i = 1; i <= onces; ++i)
+        if (index(line, once_text[i]) && path != once_file[i] && path !~ /^tests\//)
+          complain(path ":" number, "'" once_text[i] "' is for " once_file[i] " only (its 'text' line in tools/layers.txt)")
       if (line !~ /^[ \t]*#[ \t]*include/) continue
       ++includes
       header = line

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -105,6 +106,9 @@ Result<std::string> to_frame_id(std::string_view frame_id) {
   if (name.size() > kMaxFrameIdBytes) {
     return core::invalid_input("the frame id " + quote(name, 24) + " has " + std::to_string(name.size()) +
                                " bytes; use at most " + std::to_string(kMaxFrameIdBytes));
+  }
+  if (!core::is_utf8(name)) {
+    return core::invalid_input("the frame id " + quote(name) + " is not UTF-8; use letters, digits, _ and /");
   }
   if (has_control_bytes(name)) {
     return core::invalid_input("the frame id " + quote(name) + " has control bytes; use letters, digits, _ and /");
@@ -229,6 +233,9 @@ Result<std::vector<JointSample>> to_joint_samples(const RosJointState& state) {
   std::vector<JointSample> samples;
   std::set<std::string_view> seen;
   for (std::size_t i = 0; i < count; ++i) {
+    if (!core::is_utf8(state.name[i])) {
+      return core::invalid_input("name: joint " + quote(state.name[i]) + " is not UTF-8; use letters, digits and _");
+    }
     if (state.name[i].empty()) return core::invalid_input("name[" + std::to_string(i) + "]: is empty; name the joint");
     if (!seen.insert(state.name[i]).second) {
       return core::invalid_input("name: joint " + quote(state.name[i]) + " stands twice; send each joint once");

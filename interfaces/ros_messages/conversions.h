@@ -25,8 +25,8 @@ core::Result<std::int64_t> to_stamp_ns(const RosTime& stamp);
 /// 0 <= stamp_ns < 2^31 s (checked).
 RosTime to_ros_time(std::int64_t stamp_ns);
 
-/// The frame's name without the leading '/' of ROS 1. kInvalidInput when empty, longer than 255 bytes or with control
-/// bytes.
+/// The frame's name without the leading '/' of ROS 1. kInvalidInput when empty, longer than 255 bytes, not UTF-8 or
+/// with control bytes.
 core::Result<std::string> to_frame_id(std::string_view frame_id);
 
 struct PoseRules {

@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <exception>
 #include <map>
+#include <optional>
 #include <sstream>
 
+#include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -210,10 +212,25 @@ const LocatedValue* LocatedValue::find(std::string_view key) const {
   return nullptr;
 }
 
+namespace {
+
+/// Begins as YAML in UTF-16 or UTF-32 does [YAML 1.2, section 5.2], which the parser turns into UTF-8.
+bool is_wide(std::string_view text) {
+  return text.substr(0, 2).find('\0') != std::string_view::npos || text.starts_with("\xfe\xff") ||
+         text.starts_with("\xff\xfe");
+}
+
+}  // namespace
+
 core::Result<LocatedValue> parse_yaml(std::string_view text, const std::string& file, const YamlLimits& limits) {
   if (text.size() > limits.max_bytes)
     return core::resource_exhausted(file + ": " + size_text(text.size()) + " are more than the limit of " +
                                     size_text(limits.max_bytes) + ": make the file smaller");
+  if (const std::optional<std::size_t> byte = core::not_utf8_at(text); byte && !is_wide(text))
+    return core::invalid_input(
+        file + ": byte " + std::to_string(*byte) + " (line " +
+        std::to_string(1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*byte), '\n')) +
+        ") is not UTF-8: save the file in that encoding");
   try {
     std::istringstream stream{std::string(text)};
     YAML::Parser parser(stream);

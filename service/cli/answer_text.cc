@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 
 #include "verb.h"
@@ -51,7 +52,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
     }
     return table(rows);
   }
-  return answer.dump(2) + "\n";
+  return belief::json_text(answer, 2) + "\n";
 }
 
 }  // namespace
@@ -61,9 +62,9 @@ std::string answer_text(const nlohmann::ordered_json& answer) {
     const bool nothing_seen = !answer.contains("step") || answer.at("step") == 0;
     return short_form(answer) + (nothing_seen ? "no frame was seen yet: this is what the scene file says\n" : "");
   } catch (const nlohmann::ordered_json::exception&) {  // somebody else's answer, of another form
-    return answer.dump(2) + "\n";
+    return belief::json_text(answer, 2) + "\n";
   } catch (const std::out_of_range&) {
-    return answer.dump(2) + "\n";
+    return belief::json_text(answer, 2) + "\n";
   }
 }
 

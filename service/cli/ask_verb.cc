@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/question_client.h"
 #include "verb.h"
@@ -46,11 +48,12 @@ core::Result<nlohmann::ordered_json> question_of(const Options& options) {
 core::Status run(const Options& options, VerbContext& context) {
   PRESCENE_TRY(const auto question, question_of(options));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
-  PRESCENE_TRY(const std::string text, client->ask(question.dump(), options.timeout, context.cancellation()));
+  PRESCENE_TRY(const std::string text,
+               client->ask(belief::json_text(question), options.timeout, context.cancellation()));
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
   if (const auto error = answer.find("error"); error != answer.end()) {
-    return status_of_error("", error->is_string() ? error->get<std::string>() : error->dump());
+    return status_of_error("", error->is_string() ? error->get<std::string>() : belief::json_text(*error));
   }
   context.print(answer, answer_text(answer));
   return core::ok_status();
@@ -62,11 +65,12 @@ Verb add_ask_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("ask", "Ask a running `serve`: where | stability OBJECT | release OBJECT");
   auto options = std::make_shared<Options>();
   verb->add_option("KIND", options->kind,
-                   "where: poses and confidence; stability: does it stay; release: what if it is let go");
-  verb->add_option("OBJECT", options->object, "The object's name in the scene");
-  verb->add_option("--question", options->json, "Any question as JSON (docs/queries.md) instead");
+                   "where: poses and confidence; stability: does it stay; release: what if it is let go")
+      ->check(utf8_text());
+  verb->add_option("OBJECT", options->object, "The object's name in the scene")->check(utf8_text());
+  verb->add_option("--question", options->json, "Any question as JSON (docs/queries.md) instead")->check(utf8_text());
   verb->add_option("--timeout", options->timeout, "How long to wait for an answer, s")
-      ->check(positive_number())
+      ->check(in_range(belief::kWallSeconds))
       ->capture_default_str();
   add_domain_option(*verb, options->dds);
   verb->footer("Example: prescene ask stability carton");

@@ -26,16 +26,18 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics) {
   add_domain_option(verb, dds);
   auto* group = verb.add_option_group("Topics", "Names of the robot's topics");
-  group->add_option("--depth-topic", topics.depth)->capture_default_str();
-  group->add_option("--color-topic", topics.color, "Empty = no colour")->capture_default_str();
-  group->add_option("--camera-info-topic", topics.camera_info)->capture_default_str();
-  group->add_option("--tf-topic", topics.tf)->capture_default_str();
-  group->add_option("--tf-static-topic", topics.tf_static)->capture_default_str();
+  group->add_option("--depth-topic", topics.depth)->check(utf8_text())->capture_default_str();
+  group->add_option("--color-topic", topics.color, "Empty = no colour")->check(utf8_text())->capture_default_str();
+  group->add_option("--camera-info-topic", topics.camera_info)->check(utf8_text())->capture_default_str();
+  group->add_option("--tf-topic", topics.tf)->check(utf8_text())->capture_default_str();
+  group->add_option("--tf-static-topic", topics.tf_static)->check(utf8_text())->capture_default_str();
 }
 
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
   auto* group = verb.add_option_group("Camera", "Where the camera is");
-  group->add_option("--world-frame", assembler.world_frame, "Frame of the scene in tf")->capture_default_str();
+  group->add_option("--world-frame", assembler.world_frame, "Frame of the scene in tf")
+      ->check(utf8_text())
+      ->capture_default_str();
   group
       ->add_option_function<std::vector<double>>(
           "--camera-pose",

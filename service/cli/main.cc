@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <iostream>
 #include <new>
 #include <string>
@@ -24,12 +25,16 @@ extern "C" void on_interrupt(int signal_number) {
   std::signal(signal_number, SIG_DFL);
 }
 
-/// The libraries below throw where memory ends; everything else is a Status.
+/// The libraries below throw where memory ends; everything else is a Status, or a bug that should not look like a
+/// crash.
 prescene::core::Status run(const prescene::service::Verb& verb, prescene::service::VerbContext& context) {
   try {
     return verb.run(context);
   } catch (const std::bad_alloc&) {
     return prescene::core::unavailable("the memory is used up: give smaller images, meshes or limits");
+  } catch (const std::exception& error) {
+    return prescene::core::unavailable(std::string("a library gave up: ") + error.what() +
+                                       ": this is a bug of prescene, please report it with the command");
   }
 }
 

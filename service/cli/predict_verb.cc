@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/heat_map_picture.h"
@@ -118,7 +119,7 @@ std::optional<double> seconds_of(const std::string& text) {
   if (unit == "ms") factor = 1e-3;
   if (unit == "min") factor = 60.0;
   const double seconds = factor * value;
-  return seconds > 0.0 && seconds <= 1e6 ? std::optional(seconds) : std::nullopt;
+  return belief::check_number(seconds, belief::kWallSeconds).ok() ? std::optional(seconds) : std::nullopt;
 }
 
 /// What is printed and drawn decides what is asked for; what is not shown is not worked out.
@@ -186,17 +187,17 @@ Verb add_predict_verb(CLI::App& app) {
   auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "Scene file (docs/scene_files.md)")->required();
   verb->add_option("--tolerance", options->effort.tolerance, "Half width of the intervals to reach")
-      ->check(number_between(1e-4, 0.5))
+      ->check(in_range(belief::kTolerances))
       ->capture_default_str();
   verb->add_option("--confidence", options->effort.confidence, "Of the intervals")
-      ->check(number_between(0.5, 0.9999))
+      ->check(in_range(belief::kConfidences))
       ->capture_default_str();
   verb->add_option("--max-instances", options->effort.max_instances, "Most simulated instances")
-      ->check(CLI::Range(1, 1 << 22))
+      ->check(CLI::Range(1, belief::kMostInstances))
       ->capture_default_str();
   verb->add_option("--max-seconds", options->max_seconds,
                    "Wall time, s, after which no more instances begin; the answer then depends on the machine's speed")
-      ->check(positive_number());
+      ->check(in_range(belief::kWallSeconds));
   verb->add_option("--budget", options->budget,
                    "The same with a unit, as 0.1s, 100ms or 2min (a number alone is seconds); what takes further "
                    "instances is left out")
@@ -215,7 +216,7 @@ Verb add_predict_verb(CLI::App& app) {
                  "Also repeat instances at half and double step and at the ends of uncertain parameters");
   verb->add_option("--heat-map", options->heat_map, "Write a PNG picture of where objects end")->check(file_name());
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
-      ->check(positive_number());
+      ->check(in_range(belief::kDurations));
   verb->add_option("--stepper", options->stepper,
                    "Who simulates: in lockstep, 3 to 7 times faster, what can be and Bullet the rest (automatic), or "
                    "one of them "

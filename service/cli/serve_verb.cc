@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
 #include "prescene/service/live_service.h"
 #include "prescene/service/load_scene.h"
 #include "verb.h"
@@ -24,8 +25,9 @@ core::Status run(Options& options, VerbContext& context) {
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
-    PRESCENE_TRY(recording, RecordingWriter::create(options.record, {options.scene, text, context.options().seed,
-                                                                     to_json(options.settings.tracker).dump()}));
+    PRESCENE_TRY(recording,
+                 RecordingWriter::create(options.record, {options.scene, text, context.options().seed,
+                                                          belief::json_text(to_json(options.settings.tracker))}));
   }
   Backends backends(context.pool(), options.backends);
   PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,

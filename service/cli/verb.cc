@@ -17,7 +17,11 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
+#include "prescene/core/utf8.h"
+#include "prescene/interfaces/bytes/text.h"
 #include "prescene/service/recording.h"
 
 namespace prescene::service {
@@ -119,8 +123,7 @@ void VerbContext::end_progress() {
 void VerbContext::print(const nlohmann::ordered_json& document, const std::string& text) {
   end_progress();
   // Bytes that are not UTF-8 (a file name, say) are replaced, not thrown on.
-  const std::string out =
-      options_.json ? document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n" : text;
+  const std::string out = options_.json ? belief::json_text(document, 2) + "\n" : text;
   write_out(out);
   printed_ = true;
 }
@@ -144,10 +147,7 @@ ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
   return exit_code_of(status);
 }
 
-std::string error_document(const std::string& text) {
-  return nlohmann::ordered_json{{"error", text}}.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-         "\n";
-}
+std::string error_document(const std::string& text) { return belief::json_text({{"error", text}}, 2) + "\n"; }
 
 core::Status status_of_error(const std::string& place, const std::string& error) {
   using core::StatusCode;
@@ -177,6 +177,25 @@ CLI::Validator number_between(double low, double high) {
                        : "a number from " + range + " is needed, not '" + text + "'";
           },
           range};
+}
+
+CLI::Validator in_range(const belief::ScalarRange& range) {
+  return {[range](std::string& text) -> std::string {
+            const std::optional<double> value = finite_number(text);
+            if (!value) return "a number is needed, not '" + text + "'";
+            return belief::check_number(*value, range).message();
+          },
+          core::rounded_text(range.low) + " to " + core::rounded_text(range.high)};
+}
+
+CLI::Validator utf8_text() {
+  return {[](std::string& text) -> std::string {
+            const std::optional<std::size_t> byte = core::not_utf8_at(text);
+            return byte ? interfaces::quote(text) + " is not UTF-8 (byte " + std::to_string(*byte) +
+                              "): give text in that encoding"
+                        : "";
+          },
+          "", "UTF-8"};
 }
 
 CLI::Validator file_name() {

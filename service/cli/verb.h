@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/belief/validation.h"
 #include "prescene/core/log.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
@@ -115,6 +116,10 @@ std::string answer_text(const nlohmann::ordered_json& answer);
 /// Checks of options: finite numbers only (CLI11's own let NaN pass).
 CLI::Validator positive_number();
 CLI::Validator number_between(double low, double high);
+/// As questions over the bus and in JSON are checked: belief::check_number.
+CLI::Validator in_range(const belief::ScalarRange& range);
+/// Text that others can read: UTF-8.
+CLI::Validator utf8_text();
 /// A name that is not empty.
 CLI::Validator file_name();
 /// Where to record a robot live, see unused_recording_path(); says so when it is another file than the one asked for.

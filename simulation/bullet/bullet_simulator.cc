@@ -17,6 +17,8 @@ namespace prescene::simulation {
 namespace {
 
 constexpr std::uint32_t kSnapshotVersion = 0x62540002;
+// Between two looks at whether the run is cancelled; a step of a crowded scene takes 10 ms.
+constexpr std::int64_t kCancellationTurns = 16;
 
 /// What one thread needs to run instances one after another.
 struct Worker {
@@ -144,10 +146,11 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
   // A duration is met to the nearest step; rounding in its division must not add one.
   const auto steps = static_cast<std::int64_t>(std::ceil(request.stop.duration / dt - 1e-6));
   double next_sample = request.sample_interval;
-  std::int64_t done = 0, flights = 0;
+  std::int64_t done = 0, flights = 0, turns = 0;
   int until_asked = request.end_rule_steps;
   while (done < steps) {
-    if (cancellation && (done & 63) == 0 && cancellation->requested()) {
+    // Counted by turns: a flight takes many steps in one, and could jump over every step that is looked at.
+    if (cancellation && turns++ % kCancellationTurns == 0 && cancellation->requested()) {
       trajectory.end = belief::TrajectoryEnd::kCancelled;
       break;
     }

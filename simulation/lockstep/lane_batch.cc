@@ -83,12 +83,15 @@ void LaneBatch::run(LaneQueue& queue, int live) {
   most_steps_ = static_cast<std::int64_t>(std::ceil(queue.request->stop.duration / dt - 1e-6));
   live = std::min(live, engine_.slots());
   std::int64_t ticks = 0;
+  bool cancelled = false;
   for (;;) {
     while (live_ < live && take(queue)) {
     }
     if (live_ == 0) return;
     ended_.assign(static_cast<std::size_t>(live_), 0);
-    if (queue.cancellation && ticks++ % kCancellationSteps == 0 && queue.cancellation->requested()) {
+    cancelled =
+        cancelled || (queue.cancellation && ticks++ % kCancellationSteps == 0 && queue.cancellation->requested());
+    if (cancelled) {
       for (int at = 0; at < live_; ++at) {
         Slot& slot = *slots_[static_cast<std::size_t>(at)];
         if (slot.mode == Mode::kNudged) slot.nudges.cancel(engine_, at);

@@ -282,6 +282,7 @@ std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const beli
       EnergyCertifier::Answer& answer = answers.emplace_back();
       answer.object = static_cast<std::size_t>(*object);
       for (const belief::Condition& condition : outcome.all_of) {
+        if (options.cancellation && options.cancellation->requested()) return nullptr;
         EnergyCertifier::Question& question = answer.all_of.emplace_back();
         question.condition = condition;
         const auto* volume = std::get_if<belief::InsideVolume>(&condition.predicate);

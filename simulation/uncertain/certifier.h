@@ -29,6 +29,8 @@ struct CertifierOptions {
   double edge_rounding = MechanicsOptions{}.edge_rounding;
   /// Off only to see that the audit catches it: supports are taken to be without edges.
   bool shorten_arms = true;
+  /// Looked at between the conditions, each of which takes some milliseconds; may be null.
+  const core::Cancellation* cancellation = nullptr;
 };
 
 class Certifier : public EndRule {
@@ -42,7 +44,7 @@ class Certifier : public EndRule {
 
 /// Understands conditions at the end: inside a volume, below a height, upright, a face up, resting on a support or
 /// object; and actions that let go. Null where any variable needs something else, gravity is not along -z of W, or
-/// spheres stand for a support. `request` tells actions and duration.
+/// spheres stand for a support, or when it is cancelled. `request` tells actions and duration.
 std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const belief::Scene>& scene,
                                                 std::span<const Variable> variables, const RunRequest& request,
                                                 const CertifierOptions& options = {});

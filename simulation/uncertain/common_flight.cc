@@ -168,8 +168,10 @@ class Flyer {
       : options_(options), stream_(stream), samplers_(samplers_of(starts, stream)) {
     for (const belief::SceneObject& object : scene.objects) actions_.push_back(actions_of(actions, object.name));
   }
-  core::Status make_simulators(const belief::Scene& scene, const SimulatorFactory& make) {
+  core::Status make_simulators(const belief::Scene& scene, const SimulatorFactory& make,
+                               const core::Cancellation* cancellation) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+      if (cancellation && cancellation->requested()) return core::cancelled("the flight was not followed to its end");
       PRESCENE_TRY(auto simulator, make(alone(scene, i)));
       simulators_.push_back(std::move(simulator));
     }
@@ -241,7 +243,7 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
   for (const StartComponent& component : starts.components) total += component.weight;
 
   Flyer flyer(scene, starts, request.actions, stream, options);
-  PRESCENE_RETURN_IF_ERROR(flyer.make_simulators(scene, make_simulator));
+  PRESCENE_RETURN_IF_ERROR(flyer.make_simulators(scene, make_simulator, cancellation));
   Touching touching(scene, bodies);
   std::vector<std::vector<bool>> parting = held_pairs(scene, body_count);
   std::vector<std::vector<Flights>> flights;
@@ -272,6 +274,7 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
 
     for (std::size_t i = 0; i < objects; ++i)
       for (std::size_t other = i + 1; other < body_count; ++other) {
+        if (cancellation && cancellation->requested()) return core::cancelled("the flight was not followed to its end");
         FlightOpening opening{static_cast<int>(i), static_cast<int>(other)};
         bool apart = true;
         for (std::size_t k = 0; k < components; ++k) {

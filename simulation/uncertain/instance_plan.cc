@@ -2,6 +2,7 @@
 #include "instance_plan.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "prescene/simulation/uncertain/outcome_estimator.h"
@@ -26,13 +27,13 @@ std::uint32_t even_size(double wanted) {
 }  // namespace
 
 int next_net_size(int count) {
-  int size = 64;
+  std::int64_t size = 64;  // wider than the result, so that it passes every count
   bool power_of_two = true;
   while (size <= count) {
     size = power_of_two ? size / 2 * 3 : size / 3 * 4;
     power_of_two = !power_of_two;
   }
-  return size;
+  return static_cast<int>(std::min<std::int64_t>(size, std::numeric_limits<int>::max()));
 }
 
 InstancePlan::InstancePlan(const std::vector<double>& weights) : shares_(weights), sizes_(weights.size(), 0) {

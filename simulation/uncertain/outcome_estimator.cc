@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -25,6 +26,14 @@ std::size_t chunk_size(const core::ThreadPool& pool) {
   return std::max<std::size_t>(32, 8 * static_cast<std::size_t>(pool.threads()));
 }
 
+/// Most instances whose states fit into the memory for runs under way, each kept for the whole of the duration.
+std::size_t largest_chunk(const StartDistribution& starts, const std::vector<StartSampler>& samplers,
+                          const RunRequest& request, std::size_t bytes) {
+  if (!(request.sample_interval > 0.0) || starts.components.empty()) return kLargestChunk;
+  const std::size_t objects = samplers.front().draw(0).objects.size();
+  return std::clamp<std::size_t>(bytes / bytes_of_run(request, objects), 1, kLargestChunk);
+}
+
 /// Foretells how many instances the stop rule will take, from how the widest interval shrank so far.
 class Forecast {
  public:
@@ -37,6 +46,10 @@ class Forecast {
     if (options_.exact_instances) return;
     // Between the rates of independent draws (1/2) and of nets in smooth problems (1); 0.6 until two stages are known.
     double rate = 0.6;
+    if (!std::isfinite(widest)) {
+      expected_ = options_.max_instances;
+      return;
+    }
     if (first_count_ == 0.0) {
       first_count_ = count;
       first_widest_ = widest;
@@ -45,8 +58,9 @@ class Forecast {
     }
     const double wanted = count * std::pow(std::max(1.0, widest / options_.tolerance), 1.0 / rate);
     const double limit = options_.max_instances;
+    // Of an interval without end nothing can be foretold; `wanted` is no number then.
     expected_ =
-        wanted >= limit ? limit : std::min(limit, static_cast<double>(next_net_size(static_cast<int>(wanted) - 1)));
+        wanted < limit ? std::min(limit, static_cast<double>(next_net_size(static_cast<int>(wanted) - 1))) : limit;
   }
 
   void tell(double done) {
@@ -158,12 +172,17 @@ bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, s
   std::size_t finished = 0;
   while (finished < runs.size() && runs[finished].end != belief::TrajectoryEnd::kCancelled) ++finished;
   records.resize(first + finished);
+  std::vector<std::uint8_t> noted(finished, 0);  // judging many outcomes over many states takes its time too
   runner.pool.for_each_index(finished, [&](std::size_t i) {
+    if (runner.cancellation && runner.cancellation->requested()) return;
     InstanceRecord& record = records[first + i];
     record.component = planned[i].component;
     record.point = planned[i].point;
     note_run(runner, runs[i], record);
+    noted[i] = 1;
   });
+  finished = static_cast<std::size_t>(std::find(noted.begin(), noted.end(), 0) - noted.begin());
+  records.resize(first + finished);
   std::vector<std::uint32_t> audited;
   for (auto n = static_cast<std::uint32_t>(first); n < first + finished; ++n) {
     if (!records[n].certified) continue;
@@ -266,7 +285,8 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
 double widest_half(const OutcomeEstimate& estimate) {
   double widest = 0.0;
   for (const VariableEstimate& variable : estimate.variables)
-    for (const ClassEstimate& one : variable.classes) widest = std::max(widest, one.half_width);
+    for (const ClassEstimate& one : variable.classes)
+      widest = std::isnan(one.half_width) ? std::numeric_limits<double>::infinity() : std::max(widest, one.half_width);
   return widest;
 }
 
@@ -304,6 +324,12 @@ std::string to_string(EstimateStop stop) {
   return "unknown";
 }
 
+std::size_t bytes_of_run(const RunRequest& request, std::size_t objects) {
+  const double states = 2.0 + (request.sample_interval > 0.0 ? request.stop.duration / request.sample_interval : 0.0);
+  const auto state = static_cast<double>(sizeof(belief::WorldState) + objects * sizeof(belief::ObjectState));
+  return static_cast<std::size_t>(std::min(states * state, 1e15));
+}
+
 OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistribution& starts,
                                   std::span<const Variable> variables, const RunRequest& request,
                                   const core::RandomStream& stream, const EstimatorOptions& options,
@@ -339,7 +365,8 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
                                  [](const StartComponent& component) { return component.dimensions == 0; }) &&
                      starts.components.size() <= limit;
   Forecast forecast(options, progress);
-  std::size_t chunk = chunk_size(pool);
+  const std::size_t most_at_once = largest_chunk(starts, samplers, request, options.bytes_of_runs);
+  std::size_t chunk = std::min(chunk_size(pool), most_at_once);
   std::optional<EstimateStop> stop;
   while (!stop) {
     if (estimate.certain)
@@ -355,7 +382,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
         stop = EstimateStop::kCancelled;
       else if (options.max_seconds && !options.exact_instances && watch.seconds() >= *options.max_seconds)
         stop = EstimateStop::kTimeLimit;
-      if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, kLargestChunk);
+      if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, most_at_once);
       forecast.tell(static_cast<double>(estimate.instances.size()));
     }
     bool switched_off = estimate.certificates.switched_off;

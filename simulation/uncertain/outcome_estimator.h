@@ -55,6 +55,8 @@ struct EstimatorOptions {
   const Certifier* certifier = nullptr;
   /// Keep each instance's contacts. Of an instance that a certificate ended they are those until then.
   bool keep_contacts = false;
+  /// Memory that the states of runs under way may take, bytes: so many are run at once. Does not change results.
+  std::size_t bytes_of_runs = std::size_t{256} << 20;
   double audit_share = 0.02;         ///< Of the decided instances that are run to rest all the same, in [0, 1].
   double tolerated_mismatch = 0.01;  ///< Share of the audited with another class beyond which nothing is certified.
 };
@@ -151,7 +153,11 @@ belief::Trajectory run_instance(const Simulator& simulator, const StartDistribut
                                 const core::RandomStream& stream, core::ThreadPool& pool,
                                 const core::Cancellation* cancellation = nullptr);
 
-/// Number of instances after `count` in the growth of the net: 64, 96, 128, 192, 256, ...
+/// Memory of one trajectory's states when it takes its whole duration, bytes.
+std::size_t bytes_of_run(const RunRequest& request, std::size_t objects);
+
+/// Number of instances after `count` in the growth of the net: 64, 96, 128, 192, 256, ... The largest int where the
+/// next is larger.
 int next_net_size(int count);
 
 /// Classes of a set of instances, as an interval sees them: per component its weight and the class of its points in

@@ -38,5 +38,6 @@ plant core/planted.cc '#include <Eigen/Core>' 'is not for core'
 plant geometry/planted.cc '#include <boost/any.hpp>' 'belongs to no library'
 plant geometry/planted.cc '#include "../core/check.h"' 'climbs out'
 plant geometry/planted.cc '#include "no_such_file.h"' 'is not a file beside this one'
+plant service/planted.cc 'const std::string text = json.dump();' 'is for belief/json_values.cc only'
 plant novelty/planted.cc '#include <vector>' 'lies in no folder'
 echo "$plants planted arrows are seen"

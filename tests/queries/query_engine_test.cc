@@ -185,6 +185,113 @@ TEST(Predict, ATimeLimitedAnswerComesAgainFromItsInstanceCount) {
   EXPECT_EQ(std::get<PredictAnswer>(limited.what).final_poses, std::get<PredictAnswer>(again.what).final_poses);
 }
 
+TEST(Predict, WhatIsAbandonedTellsTheProbabilitiesAndWhatIsMissing) {
+  core::ThreadPool pool(1);
+  core::Cancellation abandoned;
+  abandoned.request();
+  QueryContext context = context_with(slide, pool);
+  context.abandoned = &abandoned;
+  PredictQuery query;
+  query.tell = {true, true, true, true, true, true, 3};
+  const Answer answer = queries::answer(sliding_scene(), 1, {"", query}, context);
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  EXPECT_EQ(predicted.outcomes.size(), 3u);
+  EXPECT_TRUE(predicted.final_poses.empty());
+  ASSERT_FALSE(predicted.remarks.empty());
+  for (const char* part : {"final_poses", "typical_runs", "inputs", "contacts", "paths", "chaos", "model_error"})
+    EXPECT_THAT(predicted.remarks.back(), HasSubstr(part));
+}
+
+TEST(Predict, BeyondTheMomentToStopSimulatingAllElseIsStillWorkedOut) {
+  core::ThreadPool pool(1);
+  // The moment comes once the 100th instance has begun: before the next chunk.
+  std::atomic<int> begun{0};
+  const core::Cancellation* never = nullptr;
+  core::Cancellation cancellation;
+  QueryContext context = context_with(
+      [&](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream stream) {
+        if (++begun == 100) cancellation.request();
+        return slide(start, request, stream);
+      },
+      pool);
+  PredictQuery query;
+  query.effort.exact_instances = 2000;
+  context.cancellation = &cancellation;
+  const Answer cut = queries::answer(sliding_scene(), 1, {"", query}, context);
+  const auto& predicted = std::get<PredictAnswer>(cut.what);
+  EXPECT_LT(predicted.instances, 100);
+  EXPECT_EQ(predicted.stopped, "cancelled");
+  EXPECT_EQ(predicted.final_poses.size(), 2u);
+  EXPECT_THAT(predicted.remarks.back(), HasSubstr("typical_runs"));
+
+  context.cancellation = never;
+  context.simulate_until = core::Cancellation::Clock::now();  // over before it begins
+  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", query}, context).error, HasSubstr("cancelled"));
+}
+
+TEST(Predict, MemoryBoundsTheInstances) {
+  core::ThreadPool pool(1);
+  QueryContext context = context_with(slide, pool);
+  context.most_bytes = 1 << 20;
+  PredictQuery query;
+  query.effort.tolerance = 1e-4;
+  const Answer bounded = queries::answer(sliding_scene(), 1, {"", query}, context);
+  const auto& predicted = std::get<PredictAnswer>(bounded.what);
+  EXPECT_EQ(predicted.stopped, "max_instances");
+  EXPECT_GT(predicted.instances, 100);
+  EXPECT_LT(predicted.instances, 4096);
+  query.effort.exact_instances = predicted.instances;
+  const Answer same = queries::answer(sliding_scene(), 1, {"", query}, context);
+  EXPECT_EQ(std::get<PredictAnswer>(same.what).outcomes, predicted.outcomes);
+  query.effort.exact_instances = 100000;
+  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", query}, context).error,
+              HasSubstr("resource exhausted: effort.exact_instances"));
+  query.effort.exact_instances = 10;
+  query.duration = 3600.0;
+  query.outcomes.push_back(
+      {"ever", "carton", {belief::Condition{belief::MovedMoreThan{0.5}, belief::When::kEver, false}}});
+  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", query}, context).error, HasSubstr("shorter duration"));
+}
+
+TEST(Predict, AVeryLargeAnswersDensityIsThatOfItsFirstInstances) {
+  core::ThreadPool pool(2);
+  const auto carton_of = [&](int instances) {
+    PredictQuery query;
+    query.effort.exact_instances = instances;
+    query.tell = {};
+    query.tell.typical_runs = false;
+    const Answer answer = queries::answer(two_hypotheses(), {"", query}, context_with(slide, pool));
+    return std::get<PredictAnswer>(answer.what).final_poses.at(0);
+  };
+  const belief::FinalPoses all = carton_of(8192), more = carton_of(12288);
+  // The hypotheses keep their weights of 0.25, which slides, and 0.75.
+  const auto slid = [](const belief::FinalPoses& poses) {
+    double weight = 0.0;
+    for (const belief::PoseComponent& component : poses.components)
+      if (component.outcome == "slides") weight += component.weight;
+    return weight;
+  };
+  EXPECT_NEAR(slid(all), 0.25, 1e-9);
+  EXPECT_NEAR(slid(more), 0.25, 1e-9);
+  EXPECT_TRUE(more.mean_position.isApprox(all.mean_position, 1e-4));
+  EXPECT_TRUE(more.position_covariance.isApprox(all.position_covariance, 1e-2));
+}
+
+TEST(Predict, PathsOfALongDurationStayFewEnoughToBeTold) {
+  core::ThreadPool pool(1);
+  PredictQuery query;
+  query.duration = 3600.0;
+  query.effort.exact_instances = 256;
+  query.tell = {false, false, false, false, false, false, 1000};
+  const Answer answer = queries::answer(sliding_scene(), 1, {"", query}, context_with(slide, pool));
+  const auto& predicted = std::get<PredictAnswer>(answer.what);
+  std::size_t points = 0;
+  for (const belief::ObjectPath& path : predicted.paths) points += path.points.size();
+  EXPECT_GT(points, 100000u);
+  EXPECT_LE(points, 300000u);
+  EXPECT_THAT(predicted.remarks.back(), HasSubstr("paths"));
+}
+
 TEST(Predict, WhatCannotBeAnsweredSaysWhy) {
   core::ThreadPool pool(1);
   const QueryContext context = context_with(slide, pool);

@@ -4,83 +4,43 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <atomic>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <thread>
 
-#include "prescene/service/load_scene.h"
+#include "desk_fixture.h"
+#include "prescene/core/utf8.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
 
 using ::testing::HasSubstr;
+using tests::Desk;
 
-constexpr const char* kScene = R"(name: box
-duration: 2
-models:
-  box: {box: [0.1, 0.1, 0.1], mass: 0.4}
-supports:
-  floor: {ground: {size: 2}}
-objects:
-  box: {model: box, pose: {position: [0, 0, 0.2], rotation: any}}
-outcomes:
-  lies: {resting_on: floor}
-)";
+/// Goes on until the desk's limit, or for ever where there is none.
+constexpr const char* kLong = R"({"id": "long", "predict": {"effort": {"exact_instances": 4000000}}})";
 
-/// Keeps the answers and waits for them.
-class Desk {
- public:
-  explicit Desk(const DeskSettings& settings)
-      : pool_(2),
-        backends_(pool_),
-        belief_(start()),
-        desk_(std::make_unique<AnsweringDesk>(
-            backends_, 1, settings, [this] { return belief_; },
-            [this](const std::string&, const std::string& answer) {
-              const std::lock_guard lock(mutex_);
-              answers_.push_back(answer);
-              changed_.notify_all();
-            })) {}
+/// The long question is not refused for its memory.
+DeskSettings limited_to(double most_seconds) {
+  DeskSettings settings;
+  settings.most_seconds = most_seconds;
+  settings.most_bytes = std::size_t{1} << 40;
+  return settings;
+}
 
-  void ask(const std::string& question) { desk_->ask(question); }
-  /// All of them before the second answer is begun: the first can't be handed over meanwhile.
-  void ask_at_once(const std::vector<std::string>& questions) {
-    const std::lock_guard lock(mutex_);
-    for (const std::string& question : questions) desk_->ask(question);
-  }
-  std::vector<std::string> answers(std::size_t count) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return answers_.size() >= count; });
-    return answers_;
-  }
-
- private:
-  static std::shared_ptr<const belief::Belief> start() {
-    const auto scene = load_scene_text(kScene, "box.yaml", {});
-    EXPECT_TRUE(scene.ok()) << scene.status().message();
-    auto belief = std::make_shared<belief::Belief>();
-    belief->scene = *scene;
-    belief->objects.resize(1);
-    belief->objects[0].name = "box";
-    belief->objects[0].particles.resize(1);
-    belief->objects[0].particles[0].X_WO.translation = {0.0, 0.0, 0.2};
-    return belief;
-  }
-
-  core::ThreadPool pool_;
-  Backends backends_;
-  std::shared_ptr<const belief::Belief> belief_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<std::string> answers_;
-  std::unique_ptr<AnsweringDesk> desk_;  // last: its thread ends first
-};
+nlohmann::ordered_json without_times(const std::string& answer) {
+  auto document = parse_or_discard(answer);
+  for (const char* task : {"predict", "stability"})
+    if (document.contains(task))
+      for (const char* time : {"wall_seconds", "cpu_seconds"}) document[task].erase(time);
+  return document;
+}
 
 TEST(AnsweringDesk, NoQuestionKeepsTheOthersWaitingForEver) {
-  DeskSettings settings;
-  settings.most_seconds = 0.2;
-  Desk desk(settings);
-  desk.ask(R"({"id": "long", "predict": {"effort": {"exact_instances": 4000000}}})");
+  Desk desk(limited_to(0.2));
+  desk.ask(kLong);
   desk.ask(R"({"id": "short", "stability": {"object": "box"}})");
   const std::vector<std::string> answers = desk.answers(2);
   EXPECT_EQ(id_of(answers[0]), "long");
@@ -92,19 +52,87 @@ TEST(AnsweringDesk, NoQuestionKeepsTheOthersWaitingForEver) {
   EXPECT_TRUE(answers[1].find("stable") != std::string::npos);
 }
 
-TEST(AnsweringDesk, WhereComesBeforeWhatHasToBeSimulated) {
-  DeskSettings settings;
-  settings.most_seconds = 0.2;
-  Desk desk(settings);
-  const auto slow = [](const std::string& id) {
-    return R"({"predict": {"effort": {"exact_instances": 4000000}}, "id": ")" + id + "\"}";
+TEST(AnsweringDesk, WhereIsAnsweredWhileAnotherQuestionIsSimulatedForEver) {
+  Desk desk(limited_to(1e5));
+  desk.ask(kLong);
+  for (int i = 0; i < 20; ++i) desk.ask(R"({"id": "w)" + std::to_string(i) + R"(", "where": {}})");
+  const std::vector<std::string> answers = desk.answers(20);
+  for (std::size_t i = 0; i < answers.size(); ++i) EXPECT_EQ(id_of(answers[i]), "w" + std::to_string(i));
+  EXPECT_EQ(desk.counts().answered, 20u);
+  // Here the desk is torn down: the question under way ends with it.
+}
+
+TEST(AnsweringDesk, AnswersAreThoseOfADeskThatIsAskedNothingElse) {
+  const auto ask = [](bool others) {
+    Desk desk(limited_to(1e5));
+    std::vector<std::string> questions;
+    if (others) questions.assign(10, R"({"where": {}})");
+    questions.push_back(R"({"id": "q", "predict": {"effort": {"exact_instances": 100}}})");
+    if (others) questions.insert(questions.end(), 10, R"({"where": {"object": "box"}})");
+    desk.ask_at_once(questions);
+    for (const std::string& answer : desk.answers(questions.size()))
+      if (id_of(answer) == "q") return without_times(answer);
+    return nlohmann::ordered_json();
   };
-  desk.ask_at_once({slow("first"), slow("second"), slow("third"), R"({"id": "quick", "where": {}})",
-                    R"({"id": "quick too", "where": {}})"});
-  std::vector<std::string> ids;
-  for (const std::string& answer : desk.answers(5)) ids.push_back(id_of(answer));
-  EXPECT_LT(std::ranges::find(ids, "quick too"), std::ranges::find(ids, "second"));
-  EXPECT_LT(std::ranges::find(ids, "quick"), std::ranges::find(ids, "quick too"));
+  EXPECT_EQ(ask(false), ask(true));
+}
+
+TEST(AnsweringDesk, QuestionsThatFindNoRoomAreRefusedOrCounted) {
+  DeskSettings settings = limited_to(1e5);
+  settings.max_waiting = 2;
+  settings.max_unread = 4;
+  Desk desk(settings);
+  desk.ask(kLong);
+  constexpr std::uint64_t kAsked = 3000;
+  std::vector<std::string> flood;
+  for (std::uint64_t i = 1; i < kAsked; ++i)
+    flood.push_back(R"({"id": ")" + std::to_string(i) + R"(", "stability": {"object": "box"}})");
+  desk.ask_at_once(flood);
+  // One is simulated and two wait; every other is told or counted.
+  while (desk.counts().refused + desk.counts().unanswered < kAsked - 3) std::this_thread::yield();
+  const DeskCounts counts = desk.counts();
+  EXPECT_EQ(counts.answered, 0u);
+  EXPECT_EQ(counts.refused + counts.unanswered, kAsked - 3);
+  EXPECT_GT(counts.refused, 0u);
+  for (const std::string& answer : desk.answers(counts.refused)) {
+    EXPECT_THAT(answer, HasSubstr(kQuestionsWait));
+    EXPECT_NE(id_of(answer), "");
+  }
+}
+
+TEST(AnsweringDesk, LongQuestionsDoNotFillTheMemoryBeforeTheyAreRead) {
+  Desk desk({});
+  const std::string huge = R"({"id": "h", "where": {"object": ")" + std::string(std::size_t{30} << 20, 'x') + "\"}}";
+  for (int i = 0; i < 3; ++i) desk.ask(huge);
+  for (const std::string& answer : desk.answers(3)) EXPECT_THAT(answer, HasSubstr("longer than 1048576 bytes"));
+  EXPECT_EQ(desk.counts().refused, 3u);
+}
+
+TEST(AnsweringDesk, AnExceptionEndsNeitherThread) {
+  std::atomic<bool> broken{true};
+  const auto belief = tests::belief_of(tests::kBoxScene);
+  Desk desk(limited_to(0.2), belief, [&]() -> std::shared_ptr<const belief::Belief> {
+    if (broken) throw std::runtime_error("the belief is not there");
+    return belief;
+  });
+  const std::vector<std::string> questions = {R"({"id": "a", "where": {}})",
+                                              R"({"id": "b", "stability": {"object": "box"}})"};
+  for (const std::string& question : questions) desk.ask(question);
+  for (const std::string& answer : desk.answers(2)) EXPECT_THAT(answer, HasSubstr("the belief is not there"));
+  EXPECT_EQ(desk.counts().failed, 2u);
+  EXPECT_EQ(desk.counts().last_failure, "the belief is not there");
+  broken = false;
+  for (const std::string& question : questions) desk.ask(question);
+  desk.answers(4);
+  EXPECT_EQ(desk.counts().answered, 2u);
+}
+
+TEST(AnsweringDesk, AnIdThatIsNotUtf8IsRefusedAndTheAnswerIsText) {
+  Desk desk({});
+  desk.ask("{\"id\": \"\xff\", \"where\": {}}");
+  const std::vector<std::string> answers = desk.answers(1);
+  EXPECT_THAT(answers[0], HasSubstr("not JSON"));
+  EXPECT_TRUE(core::is_utf8(answers[0]));
 }
 
 TEST(AnsweringDesk, BeforeTheFirstFrameTheSceneFileAnswers) {
@@ -117,10 +145,8 @@ TEST(AnsweringDesk, BeforeTheFirstFrameTheSceneFileAnswers) {
 }
 
 TEST(AnsweringDesk, AQuestionThatIsAskedAgainWhileItWaitsIsAnsweredOnce) {
-  DeskSettings settings;
-  settings.most_seconds = 0.2;
-  Desk desk(settings);
-  std::vector<std::string> questions = {R"({"id": "long", "predict": {"effort": {"exact_instances": 4000000}}})"};
+  Desk desk(limited_to(0.2));
+  std::vector<std::string> questions = {kLong};
   questions.insert(questions.end(), 40, R"({"id": "a", "stability": {"object": "box"}})");
   questions.push_back(R"({"id": "last", "stability": {"object": "box"}})");
   desk.ask_at_once(questions);

@@ -5,6 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
+#include "prescene/core/utf8.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/tests/support/paths.h"
 
@@ -35,6 +37,17 @@ TEST(StepRecord, ReadsBackWhatWasWritten) {
   EXPECT_EQ(read->belief_hash, record.belief_hash);
   record.color.reset();
   EXPECT_EQ(step_record_from_json(to_json(record).dump())->color, std::nullopt);
+}
+
+// Reasons repeat what others sent.
+TEST(StepRecord, IsWrittenWhateverBytesItsReasonsHold) {
+  StepRecord record;
+  record.skipped = {{12, 5, "tf does not connect world to \xff"}};
+  record.degraded = {"\xc3"};
+  record.belief_hash = "0123456789abcdef";
+  const std::string text = belief::json_text(to_json(record));
+  EXPECT_TRUE(core::is_utf8(text)) << text;
+  EXPECT_TRUE(step_record_from_json(text).ok());
 }
 
 TEST(StepRecord, RefusesWhatIsNotOne) {

@@ -46,9 +46,18 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.steps = 3;
   health.skipped_frames = 5;
   health.lost_on_bus = 7;
+  health.questions = {11, 13, 17, 19, 2, "no"};
+  health.unreadable_questions = 1;
+  health.failures = 4;
   const auto status = to_diagnostic(health, "here");
   EXPECT_EQ(status.hardware_id, "here");
-  const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"}, {"skipped frames", "5"}, {"lost on the bus", "7"}};
+  const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"},
+                                                     {"skipped frames", "5"},
+                                                     {"lost on the bus", "7"},
+                                                     {"questions answered", "11"},
+                                                     {"questions refused", "13"},
+                                                     {"questions without an answer", "18"},
+                                                     {"failures", "6"}};
   for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
 }
 

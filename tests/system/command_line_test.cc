@@ -180,10 +180,31 @@ TEST(CommandLine, PredictRefusesWhatMeansNothingAndSaysWhatWould) {
   refused({"--duration", "1e-12"}, "at least one step of the simulator, 0.00");
   refused({"--max-instances", "0"}, "1");
   refused({"--budget", "1e9"}, "up to 1000000 s");
+  refused({"--confidence", "0.9999999999999999"}, "between 0.5 and 0.9999");
+  refused({"--duration", "3601"}, "up to 3600");
   EXPECT_EQ(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).exit_code, 2);
   EXPECT_NE(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).err.find("--stepper bullet"),
             std::string::npos);
   EXPECT_NE(run_program({"validate", scene}).out.find("1 object, "), std::string::npos);
+}
+
+TEST(CommandLine, TextThatIsNotUtf8IsRefusedWhereItIsGiven) {
+  const ScratchDir folder;
+  const std::string output = (folder.path() / "r.mcap").string();
+  const std::vector<std::vector<std::string>> commands = {
+      {"ask", "where", "\xff"},
+      {"ask", "\xff"},
+      {"ask", "--question", "{\"id\": \"\xff\", \"where\": {}}"},
+      {"serve", "--scene", scenario("milk_on_bin"), "--record", output, "--world-frame", "w\xc3"},
+      {"serve", "--scene", scenario("milk_on_bin"), "--record", output, "--depth-topic", "/\xff"}};
+  for (const std::vector<std::string>& command : commands) {
+    std::vector<std::string> args = command;
+    args.emplace_back("--json");
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << finished.err;
+    EXPECT_NE(finished.err.find("is not UTF-8"), std::string::npos) << finished.err;
+    EXPECT_TRUE(parsed(finished).contains("error")) << finished.out;
+  }
 }
 
 TEST(CommandLine, TooLittleTimeIsNoBadInput) {

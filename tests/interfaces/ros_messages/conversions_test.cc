@@ -38,6 +38,11 @@ TEST(FrameIds, LoseOneSlashAndAreChecked) {
   EXPECT_TRUE(to_frame_id(std::string(255, 'a')).ok());
   EXPECT_THAT(to_frame_id(std::string(256, 'a')).status().message(), HasSubstr("has 256 bytes; use at most 255"));
   EXPECT_THAT(to_frame_id("a\x1b[2J").status().message(), HasSubstr("'a\\x1b[2J' has control bytes"));
+  EXPECT_THAT(to_frame_id("cam\xff").status().message(), HasSubstr("'cam\\xff' is not UTF-8"));
+  EXPECT_EQ(*to_frame_id("k\xc3\xbc"
+                         "che"),
+            "k\xc3\xbc"
+            "che");
 }
 
 TEST(Rotations, AreNormalisedOrRefused) {

@@ -104,6 +104,17 @@ TEST(ParseYaml, DoesNotPrintWhatCouldHarmATerminal) {
   EXPECT_EQ(status.message().find('\x1b'), std::string::npos);
 }
 
+TEST(ParseYaml, RefusesWhatIsNotUtf8AndNamesTheLine) {
+  EXPECT_THAT(status_of("name: a\noutcome: \"\xff\"\n").message(), testing::HasSubstr("(line 2) is not UTF-8"));
+  EXPECT_TRUE(parse_yaml("name: \"\xc3\xbc\"\n", "f.yaml", {}).ok());
+  const std::string wide(
+      "\xff\xfe"
+      "a\0:\0 \0"
+      "1\0\n\0",
+      12);  // UTF-16 is YAML too
+  EXPECT_TRUE(parse_yaml(wide, "f.yaml", {}).ok());
+}
+
 TEST(ReadYaml, SaysWhatIsWrongWithTheFile) {
   const tests::ScratchDir folder;
   EXPECT_EQ(read_yaml(folder.path() / "none.yaml").status().code(), StatusCode::kNotFound);

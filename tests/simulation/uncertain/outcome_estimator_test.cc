@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <set>
+#include <string>
 
 #include "expect_equal_estimates.h"
 #include "toy_problems.h"
@@ -117,6 +120,57 @@ TEST(OutcomeEstimator, ATimeLimitIsReplayedAsItsInstanceCount) {
   const OutcomeEstimate replayed = estimate(tests::curved_boundary(), options, pool);
   EXPECT_EQ(replayed.stop, EstimateStop::kExact);
   expect_equal(replayed, limited);
+}
+
+TEST(OutcomeEstimator, AnIntervalWithoutEndStopsAtTheMostInstances) {
+  core::ThreadPool pool(1);
+  EstimatorOptions options;
+  options.confidence = 0.9999999999999999;  // rounds to a quantile of 1, which is infinite
+  options.max_instances = 300;
+  bool finite = true;
+  const OutcomeEstimate found =
+      estimate(tests::curved_boundary(), options, pool, nullptr, [&](const core::Progress& progress) {
+        finite = finite && std::isfinite(progress.fraction) && std::isfinite(progress.seconds_left.value_or(0.0));
+      });
+  EXPECT_EQ(found.stop, EstimateStop::kMaxInstances);
+  EXPECT_EQ(found.instances.size(), 300u);
+  EXPECT_FALSE(found.converged);
+  EXPECT_TRUE(finite);
+}
+
+TEST(OutcomeEstimator, NetsGrowUpToTheLargestNumberAndNoFurther) {
+  EXPECT_EQ(next_net_size(std::numeric_limits<int>::min()), 64);
+  EXPECT_EQ(next_net_size(64), 96);
+  EXPECT_EQ(next_net_size((1 << 30) - 1), 1 << 30);
+  EXPECT_EQ(next_net_size(1 << 30), 3 << 29);
+  EXPECT_EQ(next_net_size(3 << 29), std::numeric_limits<int>::max());
+  EXPECT_EQ(next_net_size(std::numeric_limits<int>::max()), std::numeric_limits<int>::max());
+}
+
+TEST(OutcomeEstimator, LittleMemoryForRunsChangesNoResult) {
+  core::ThreadPool pool(1);
+  const ToyProblem problem = tests::curved_boundary();
+  RunRequest request;
+  request.sample_interval = 0.01;
+  std::size_t most_at_once = 0;
+  const auto run = [&](std::size_t bytes) {
+    EstimatorOptions options;
+    options.exact_instances = 150;
+    options.bytes_of_runs = bytes;
+    std::size_t before = 0;
+    most_at_once = 0;
+    return estimate_outcomes(tests::standing_still(), problem.starts(), problem.variables(), request, test_stream(1),
+                             options, pool, nullptr, [&](const core::Progress& progress) {
+                               const std::size_t done = std::stoul(progress.text);
+                               most_at_once = std::max(most_at_once, done - before);
+                               before = done;
+                             });
+  };
+  const OutcomeEstimate roomy = run(std::size_t{1} << 30);
+  EXPECT_GE(most_at_once, 32u);
+  const OutcomeEstimate tight = run(3 * bytes_of_run(request, roomy.instances[0].final.objects.size()));
+  EXPECT_EQ(most_at_once, 3u);
+  expect_equal(tight, roomy);
 }
 
 TEST(OutcomeEstimator, AnExactCountIsAPrefixOfALongerRun) {

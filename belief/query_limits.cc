@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/belief/query_limits.h"
+
+#include <cmath>
+
+#include "prescene/core/text.h"
+#include "prescene/core/utf8.h"
+
+namespace prescene::belief {
+namespace {
+
+using core::Status;
+
+Status check_count(std::size_t count, std::size_t most, const char* what) {
+  if (count <= most) return {};
+  return core::resource_exhausted(std::to_string(count) + " " + what + ": ask for at most " + std::to_string(most) +
+                                  " at a time");
+}
+
+Status check_text(const std::string& text, std::size_t most, const char* what) {
+  if (text.size() > most)
+    return core::invalid_input(std::string(what) + " has " + std::to_string(text.size()) + " bytes: give at most " +
+                               std::to_string(most));
+  if (!core::is_utf8(text)) return core::invalid_input(std::string(what) + " is not UTF-8: give text");
+  return {};
+}
+
+/// Counts what is judged.
+struct Judged {
+  std::size_t outcomes = 0, conditions = 0;
+
+  Status add(const Outcome& outcome) {
+    ++outcomes;
+    conditions += outcome.all_of.size();
+    return check_text(outcome.name, kLongestName, "an outcome's name");
+  }
+  Status check() const {
+    PRESCENE_RETURN_IF_ERROR(check_count(outcomes, kMostOutcomes, "outcomes"));
+    return check_count(conditions, kMostConditions, "conditions");
+  }
+};
+
+struct QueryCheck {
+  Status operator()(const WhereQuery& where) const {
+    return where.object ? check_text(*where.object, kLongestName, "object: the name") : Status();
+  }
+  Status operator()(const PredictQuery& predict) const {
+    PRESCENE_RETURN_IF_ERROR(check_count(predict.actions.size(), kMostActions, "actions"));
+    PRESCENE_RETURN_IF_ERROR(check_count(predict.exclusive_outcomes.size(), kMostOutcomes, "exclusive_outcomes"));
+    Judged judged;
+    for (const Outcome& outcome : predict.outcomes) PRESCENE_RETURN_IF_ERROR(judged.add(outcome).at("outcomes"));
+    for (const ExclusiveOutcomes& group : predict.exclusive_outcomes) {
+      PRESCENE_RETURN_IF_ERROR(check_text(group.name, kLongestName, "a group's name").at("exclusive_outcomes"));
+      for (const Outcome& outcome : group.outcomes)
+        PRESCENE_RETURN_IF_ERROR(judged.add(outcome).at("exclusive_outcomes"));
+    }
+    PRESCENE_RETURN_IF_ERROR(judged.check());
+    if (predict.duration) PRESCENE_RETURN_IF_ERROR(check_number(*predict.duration, kDurations).at("duration"));
+    if (predict.tell.paths < 0 || predict.tell.paths > kMostPaths)
+      return core::invalid_input("paths: " + std::to_string(predict.tell.paths) + " is out of range: give 0 to " +
+                                 std::to_string(kMostPaths));
+    return validate(predict.effort);
+  }
+  Status operator()(const StabilityQuery& stability) const {
+    PRESCENE_RETURN_IF_ERROR(check_text(stability.object, kLongestName, "object: the name"));
+    PRESCENE_RETURN_IF_ERROR(check_number(stability.max_move, kMoves).at("max_move"));
+    PRESCENE_RETURN_IF_ERROR(check_number(stability.max_turn, kTurns).at("max_turn"));
+    PRESCENE_RETURN_IF_ERROR(check_number(stability.duration, kDurations).at("duration"));
+    return validate(stability.effort);
+  }
+  Status operator()(const ViewQuery& view) const {
+    PRESCENE_RETURN_IF_ERROR(check_count(view.actions.size(), kMostActions, "actions"));
+    return check_number(view.time, kViewTimes).at("time");
+  }
+};
+
+}  // namespace
+
+Status check_number(double value, const ScalarRange& range) {
+  if (value >= range.low && value <= range.high) return {};
+  return core::invalid_input(core::rounded_text(value) + " is out of range: " + range.remedy);
+}
+
+Status validate(const Effort& effort) {
+  PRESCENE_RETURN_IF_ERROR(check_number(effort.tolerance, kTolerances).at("effort.tolerance"));
+  PRESCENE_RETURN_IF_ERROR(check_number(effort.confidence, kConfidences).at("effort.confidence"));
+  PRESCENE_RETURN_IF_ERROR(check_number(effort.max_instances, kInstances).at("effort.max_instances"));
+  if (effort.exact_instances)
+    PRESCENE_RETURN_IF_ERROR(check_number(*effort.exact_instances, kInstances).at("effort.exact_instances"));
+  if (effort.max_seconds)
+    PRESCENE_RETURN_IF_ERROR(check_number(*effort.max_seconds, kWallSeconds).at("effort.max_seconds"));
+  return {};
+}
+
+Status validate(const Query& query) {
+  PRESCENE_RETURN_IF_ERROR(check_text(query.id, kLongestId, "id: the text"));
+  return std::visit(QueryCheck{}, query.what);
+}
+
+}  // namespace prescene::belief

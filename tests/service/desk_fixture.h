@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// A desk over a belief of one box, whose answers are kept.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "prescene/service/answering_desk.h"
+#include "prescene/service/load_scene.h"
+
+namespace prescene::tests {
+
+inline constexpr const char* kBoxScene = R"(name: box
+duration: 2
+models:
+  box: {box: [0.1, 0.1, 0.1], mass: 0.4}
+supports:
+  floor: {ground: {size: 2}}
+objects:
+  box: {model: box, pose: {position: [0, 0, 0.2], rotation: any}}
+outcomes:
+  lies: {resting_on: floor}
+)";
+
+/// The scene's objects where the scene says that they are on average, as before the first frame.
+inline std::shared_ptr<belief::Belief> belief_of(const char* scene_text) {
+  const auto scene = service::load_scene_text(scene_text, "scene.yaml", {});
+  EXPECT_TRUE(scene.ok()) << scene.status().message();
+  auto belief = std::make_shared<belief::Belief>();
+  belief->scene = *scene;
+  for (const belief::SceneObject& object : (*scene)->objects) {
+    belief::ObjectBelief& known = belief->objects.emplace_back();
+    known.name = object.name;
+    known.model = object.model;
+    known.particles.resize(1);
+    known.particles[0].X_WO = belief::mean(object.pose);
+    known.particles[0].X_WO.rotation = geometry::Quaterniond::Identity();
+  }
+  return belief;
+}
+
+/// Keeps the answers and waits for them.
+class Desk {
+ public:
+  using Snapshot = std::function<std::shared_ptr<const belief::Belief>()>;
+
+  explicit Desk(const service::DeskSettings& settings, std::shared_ptr<const belief::Belief> belief = {},
+                const Snapshot& snapshot = {})
+      : pool_(2), backends_(pool_), belief_(belief ? std::move(belief) : belief_of(kBoxScene)) {
+    desk_ = std::make_unique<service::AnsweringDesk>(
+        backends_, 1, settings, snapshot ? snapshot : [this] { return belief_; },
+        [this](const std::string& answer) {
+          const std::lock_guard lock(mutex_);
+          answers_.push_back(answer);
+          changed_.notify_all();
+        });
+  }
+
+  void ask(const std::string& question) { desk_->ask(question); }
+  /// All of them before any answer that comes meanwhile can be handed over.
+  void ask_at_once(const std::vector<std::string>& questions) {
+    const std::lock_guard lock(mutex_);
+    for (const std::string& question : questions) desk_->ask(question);
+  }
+  std::vector<std::string> answers(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return answers_.size() >= count; });
+    return answers_;
+  }
+  /// As long as `patience` lasts; fewer than asked for then.
+  std::vector<std::string> answers(std::size_t count, std::chrono::seconds patience) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, patience, [&] { return answers_.size() >= count; });
+    return answers_;
+  }
+  service::DeskCounts counts() const { return desk_->counts(); }
+
+ private:
+  core::ThreadPool pool_;
+  service::Backends backends_;
+  std::shared_ptr<const belief::Belief> belief_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> answers_;
+  std::unique_ptr<service::AnsweringDesk> desk_;  // last: its threads end first
+};
+
+}  // namespace prescene::tests
