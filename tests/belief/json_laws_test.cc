@@ -121,6 +121,11 @@ TEST(QueryFromJson, NamesThePathOfWhatIsWrong) {
       message(
           R"({"where": {"object": "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["}, "a": 1})"),
       HasSubstr("unknown key"));
+  EXPECT_THAT(
+      message(R"({"stability": {"object": "cup", "max_mvoe": 1}})"),
+      HasSubstr("stability.max_mvoe: unknown key; did you mean 'max_move'? The keys here are object, max_move"));
+  EXPECT_THAT(message(R"({"stability": {"object": "cup", "weather": 1}})"),
+              HasSubstr("stability.weather: unknown key; the keys here are object, max_move"));
 }
 
 TEST(QueryFromJson, FillsInWhatIsNotSaid) {
