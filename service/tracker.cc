@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 #include <utility>
 
 #include "prescene/belief/json.h"
@@ -33,7 +34,8 @@ core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const 
     return core::invalid_input("carries " + message.type + ", expected " + type +
                                ": correct the topic's name in the settings");
   }
-  return interfaces::decode_cdr<Message>(message.cdr);
+  const bool large = std::is_same_v<Message, interfaces::RosImage>;
+  return interfaces::decode_cdr<Message>(message.cdr, large ? interfaces::CdrLimits{} : interfaces::kSmallMessage);
 }
 
 /// Frames do not wait for the colour of a topic that nobody named.

@@ -17,14 +17,14 @@ namespace prescene::interfaces {
 
 // What a recording may make us keep, whatever it claims. A recording of ours of a week stays below all of them.
 constexpr std::uint64_t kMaxSummaryBytes = std::uint64_t{64} << 20;
-constexpr std::uint64_t kMaxMetadataBytes = std::uint64_t{16} << 20;  ///< Of all metadata records.
+constexpr std::uint64_t kMaxMetadataBytes = std::uint64_t{20} << 20;  ///< Of all metadata records: a scene file and more.
 constexpr std::size_t kMaxSegments = std::size_t{1} << 20;
 constexpr std::size_t kMaxDefinitionBytes = std::size_t{4} << 20;    ///< Of one schema or channel record.
 constexpr std::size_t kMaxDefinitionsBytes = std::size_t{64} << 20;  ///< Of all schemas and channels, in memory.
 
 /// How the errors about damage end.
 constexpr const char* kDamageRemedy =
-    " (a checksum or a record is wrong); copy it again, or read what is sound with the option to salvage";
+    " (a checksum or a record is wrong); copy it again, or read what is sound by `replay --salvage`";
 
 /// A chunk, or a run of messages (and their schemas and channels) outside of chunks.
 struct McapSegment {

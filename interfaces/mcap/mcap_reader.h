@@ -66,7 +66,7 @@ struct McapUnchecked {
 
 /// Not thread-safe. Memory is bounded by the chunks that overlap in time, together at most max_chunk_bytes (then the
 /// order of time is given up before memory is), and what is kept of each chunk (at most 2^20, some 150 bytes each),
-/// schemas, channels and metadata (at most 64 MiB, 64 MiB and 16 MiB as stored); not by the file.
+/// schemas, channels and metadata (at most 64 MiB, 64 MiB and 20 MiB as stored); not by the file.
 class McapReader {
  public:
   /// Fails with kNotFound (no such file), kInvalidInput (not an MCAP file), kDataLoss (nothing readable, or damaged),

@@ -65,7 +65,7 @@ Replayed replay(const std::filesystem::path& path, std::shared_ptr<const belief:
     score.add(replayed.last_truth);
     return core::ok_status();
   };
-  const auto summary = service::replay_recording(path, **tracker, {}, {}, on_step, on_json);
+  const auto summary = service::replay_recording(path, {}, **tracker, {}, {}, on_step, on_json);
   if (!summary.ok()) {
     ADD_FAILURE() << summary.status().message();
     return replayed;

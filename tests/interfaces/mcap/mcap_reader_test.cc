@@ -210,7 +210,7 @@ TEST(McapReader, MetadataIsBounded) {
   put_u32(static_cast<std::uint32_t>(texts.size()), &content);
   const Bytes metadata = hand_record(0x0c, joined({content, texts}));
   Bytes bytes = kStart;
-  for (int i = 0; i < 20; ++i) bytes.insert(bytes.end(), metadata.begin(), metadata.end());
+  for (int i = 0; i < 21; ++i) bytes.insert(bytes.end(), metadata.begin(), metadata.end());
   EXPECT_EQ(failure_of(bytes).code(), StatusCode::kResourceExhausted);
 }
 
