@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "prescene/tests/support/paths.h"
 #include "program.h"
@@ -61,6 +62,46 @@ TEST(CommandLine, AMistypedVerbIsNamedWithTheNearest) {
   const Finished finished = run_program({"inspec", "cup.ply"});
   EXPECT_EQ(finished.exit_code, 2);
   EXPECT_NE(finished.err.find("'inspec': did you mean 'inspect'?"), std::string::npos) << finished.err;
+}
+
+TEST(CommandLine, AMistypedOptionIsNamedWithTheNearest) {
+  for (const auto& [args, said] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"predict", scenario("milk_on_bin"), "--tolerence", "0.1"},
+            "there is no option '--tolerence': did you mean '--tolerance'?"},
+           {{"predict", scenario("milk_on_bin"), "--sed=3"}, "there is no option '--sed': did you mean '--seed'?"},
+           // Also where something else is missing because of it.
+           {{"record", "--outptu", "x.mcap"}, "there is no option '--outptu': did you mean '--output'?"},
+           {{"serve", "--scene", "x", "--depth-topics", "/d"}, "did you mean '--depth-topic'?"},
+           {{"--versoin"}, "did you mean '--version'?"},
+           {{"replay", "x.mcap", "--weather-forecast"}, "there is no option '--weather-forecast'\n"}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << args[0];
+    EXPECT_NE(finished.err.find(said), std::string::npos) << finished.err;
+    std::vector<std::string> with_json = args;
+    with_json.push_back("--json");
+    EXPECT_NE(run_program(with_json).out.find("there is no option"), std::string::npos) << args[0];
+  }
+}
+
+TEST(CommandLine, ProgressFitsTheTerminal) {
+  for (const int columns : {24, 60, 80, 200}) {
+    const std::string seen =
+        run_program_in_terminal({"predict", scenario("milk_on_bin"), "--max-instances", "600"}, columns);
+    EXPECT_NE(seen.find("%"), std::string::npos) << seen;
+    // Each line of progress begins anew at the left.
+    std::size_t begin = seen.find("\r\033[K");
+    ASSERT_NE(begin, std::string::npos) << seen;
+    while (begin != std::string::npos) {
+      begin += 4;
+      const std::size_t end = seen.find('\r', begin);
+      const std::string line = seen.substr(begin, end - begin);
+      EXPECT_LT(line.size(), static_cast<std::size_t>(columns)) << line;
+      begin = seen.find("\r\033[K", begin);
+    }
+  }
+  const Finished piped = run_program({"predict", scenario("milk_on_bin"), "--max-instances", "600"});
+  std::istringstream lines(piped.err);
+  for (std::string line; std::getline(lines, line);) EXPECT_LT(line.size(), 80U) << line;
 }
 
 TEST(CommandLine, MissingFilesAreNamed) {
