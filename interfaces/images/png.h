@@ -23,7 +23,7 @@ using ColorView = geometry::ImageView<const geometry::Rgb>;
 /// What an image file may make us allocate.
 struct ImageLimits {
   int max_side = 16384;                             ///< Pixels.
-  std::int64_t max_pixels = std::int64_t{1} << 26;  ///< 67 million.
+  std::int64_t max_pixels = std::int64_t{1} << 24;  ///< 4096 x 4096, as of images in messages.
   std::size_t max_file_bytes = std::size_t{256} << 20;
 };
 

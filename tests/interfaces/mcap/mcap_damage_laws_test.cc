@@ -71,6 +71,13 @@ Bytes with_one_wrong_byte(const std::vector<TopicMessage>& messages, core::Rando
   return bytes;
 }
 
+/// By log time, in which files are read by their index; without one it is the order of the file.
+std::vector<TopicMessage> in_time_order(std::vector<TopicMessage> messages) {
+  std::stable_sort(messages.begin(), messages.end(),
+                   [](const TopicMessage& a, const TopicMessage& b) { return a.log_time_ns < b.log_time_ns; });
+  return messages;
+}
+
 TEST(McapDamageLaws, ADamagedFileIsRefusedOrReadAsItWasWritten) {
   EXPECT_TRUE(rc::check([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
@@ -89,9 +96,9 @@ TEST(McapDamageLaws, ADamagedFileIsRefusedOrReadAsItWasWritten) {
       read.push_back({channel.topic, (*message)->sequence, (*message)->log_time_ns, (*message)->publish_time_ns,
                       (*message)->data});
     }
-    // What is left is damage behind the data, which looks like a cut: read in the order of the file.
-    RC_ASSERT((*reader)->loss().truncated);
-    RC_ASSERT(read == messages);
+    // What is left is damage to the record that ends the data, or behind it, which looks like a cut.
+    RC_ASSERT((*reader)->loss().truncated || (*reader)->unchecked().data);
+    RC_ASSERT(in_time_order(read) == in_time_order(messages));
   }));
 }
 
@@ -105,7 +112,7 @@ TEST(McapDamageLaws, WhatIsSalvagedFromADamagedFileWasWritten) {
     for (const TopicMessage& message : read) {
       RC_ASSERT(std::find(messages.begin(), messages.end(), message) != messages.end());
     }
-    RC_ASSERT(!(*reader)->loss().nothing());
+    RC_ASSERT(!(*reader)->loss().nothing() || (*reader)->unchecked().data);
   }));
 }
 
