@@ -88,7 +88,8 @@ void exchange(belief::ObjectBelief& first, belief::ObjectBelief& second);
 /// Whether an object is to be looked for in the frame of this number.
 bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, std::uint64_t frame);
 
-/// Points in C of measured pixels that nothing known explains, row-major.
+/// Points in C of measured pixels that nothing known explains, row-major: those `tolerance` (m) or more in front of
+/// what the frame expects there without the objects, and those where it expects nothing.
 std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const rendering::FrameTerms& terms,
                                          double tolerance);
 

@@ -101,7 +101,6 @@ class ParticleFilter {
   StepResult step(const belief::Belief& belief, const belief::Observation& observation, const belief::Control& control);
 
  private:
-  struct Work;
   std::vector<Pose> robot_poses(const belief::Scene& scene, const belief::Observation& observation,
                                 std::uint32_t* degraded) const;
   void follow_supports(const belief::Observation& observation, StepResult& result) const;
