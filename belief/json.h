@@ -23,6 +23,12 @@ nlohmann::ordered_json to_json(const ObjectBelief& object);
 nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);
 nlohmann::ordered_json to_json(const Answer& answer);
+/// {"error": "there is no object 'mug'", "code": "not_found"}: why something could not be done. The codes are the names
+/// of core::StatusCode in lower case. `status` is not ok (checked).
+nlohmann::ordered_json error_to_json(const core::Status& status);
+/// The error of an answer, or of anything that error_to_json wrote; ok where it has no "error". Without a code that is
+/// known it is kInvalidInput.
+core::Status error_from_json(const nlohmann::ordered_json& document);
 
 /// The document, or where it stops being JSON. What is nested deeper than 64 lists and objects is refused too: such a
 /// value could be neither copied nor printed without running out of stack. For texts from outside.

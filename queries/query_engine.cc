@@ -18,7 +18,7 @@ void put(core::Result<Value> result, belief::Answer& answer) {
   if (result)
     answer.what = *std::move(result);
   else
-    answer.error = core::to_string(result.status());
+    answer.error = result.status();
 }
 
 /// The estimator looks at its time limit between instances, which may be long ones; beyond this nothing goes on. What

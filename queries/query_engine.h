@@ -5,7 +5,7 @@
 //   context.make_simulator = [&](auto scene) { return simulation::make_bullet_simulator(scene, shapes, {}); };
 //   context.pool = &pool;
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
-//   if (!answer.error.empty()) ...
+//   if (!answer.error.ok()) ...
 //
 // Four questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
 // what will the camera see (observation anticipation). docs/queries.md says what the answers mean.

@@ -32,10 +32,10 @@ void bound_effort(belief::Query& query, double seconds) {
 
 }  // namespace
 
-std::string error_answer(const std::string& question_json, const std::string& text) {
+std::string error_answer(const std::string& question_json, const core::Status& error) {
   nlohmann::ordered_json answer = nlohmann::ordered_json::object();
   if (const std::string id = id_of(question_json); !id.empty()) answer["id"] = id;
-  answer["error"] = text;
+  answer.update(belief::error_to_json(error));
   return answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
@@ -73,8 +73,8 @@ void AnsweringDesk::ask(std::string question_json) {
       return;
     }
   }
-  on_answer_(question_json, error_answer(question_json, "unavailable: " + std::to_string(settings_.max_waiting) + " " +
-                                                            kQuestionsWait + ": ask again later"));
+  on_answer_(question_json, error_answer(question_json, core::unavailable(std::to_string(settings_.max_waiting) + " " +
+                                                                          kQuestionsWait + ": ask again later")));
 }
 
 void AnsweringDesk::work() {
@@ -99,7 +99,7 @@ void AnsweringDesk::work() {
 
 std::string AnsweringDesk::answer(const std::string& question_json) {
   auto query = belief::query_from_json(question_json);
-  if (!query) return error_answer(question_json, query.status().message());
+  if (!query) return error_answer(question_json, query.status());
   bound_effort(*query, settings_.default_seconds);
   queries::QueryContext context = backends_.query_context(pool_);
   const core::Cancellation limit(stop_, deadline_after(settings_.most_seconds));
@@ -111,10 +111,12 @@ std::string AnsweringDesk::answer(const std::string& question_json) {
                                                     : queries::answer(*belief, *query, context);
     std::string text = belief::to_json(answer).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
     if (text.size() <= interfaces::CdrLimits().max_string_bytes) return text;
-    return error_answer(question_json, "resource exhausted: the answer has " + std::to_string(text.size() >> 20) +
-                                           " MiB, more than clients take: ask for less at a time");
+    return error_answer(question_json,
+                        core::resource_exhausted("the answer has " + std::to_string(text.size() >> 20) +
+                                                 " MiB, more than clients take: ask for less at a time"));
   } catch (const std::bad_alloc&) {
-    return error_answer(question_json, "resource exhausted: the answer does not fit into the memory: ask for less");
+    return error_answer(question_json,
+                        core::resource_exhausted("the answer does not fit into the memory: ask for less"));
   }
 }
 

@@ -66,7 +66,7 @@ class AnsweringDesk {
   std::thread thread_;
 };
 
-/// {"id": the question's if it can be read, "error": text}.
-std::string error_answer(const std::string& question_json, const std::string& text);
+/// {"id": the question's if it can be read, "error": why, "code": ...}, see belief::error_to_json.
+std::string error_answer(const std::string& question_json, const core::Status& error);
 
 }  // namespace prescene::service

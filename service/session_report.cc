@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/belief_overlay.h"
@@ -208,8 +209,8 @@ void SessionReport::add_answer_section(double at, const ordered_json& answer,
     section.title = "Asked at " + fixed_text(at, 1) + " s";
     if (!answer.is_object()) {
       section.blocks.push_back(interfaces::TextBlock{"No answer came."});
-    } else if (const std::string error = answer.value("error", ""); !error.empty()) {
-      section.blocks.push_back(interfaces::TextBlock{error});
+    } else if (const core::Status error = belief::error_from_json(answer); !error.ok()) {
+      section.blocks.push_back(interfaces::TextBlock{core::to_string(error)});
     } else if (answer.contains("predict")) {
       section.title += ": what happens?";
       add_prediction(answer["predict"], *scene_, section);

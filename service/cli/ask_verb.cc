@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/question_client.h"
 #include "verb.h"
@@ -49,9 +50,7 @@ core::Status run(const Options& options, VerbContext& context) {
   PRESCENE_TRY(const std::string text, client->ask(question.dump(), options.timeout, context.cancellation()));
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
-  if (const auto error = answer.find("error"); error != answer.end()) {
-    return status_of_error("", error->is_string() ? error->get<std::string>() : error->dump());
-  }
+  PRESCENE_RETURN_IF_ERROR(belief::error_from_json(answer));
   context.print(answer, answer_text(answer));
   return core::ok_status();
 }

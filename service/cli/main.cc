@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     app.exit(error);
     const bool json = std::any_of(argv + 1, argv + argc, [](const char* arg) { return std::string(arg) == "--json"; });
-    if (json) std::fputs(service::error_document(error.what()).c_str(), stdout);
+    if (json) std::fputs(service::error_document(core::invalid_input(error.what())).c_str(), stdout);
     return static_cast<int>(service::ExitCode::kBadInput);
   }
 

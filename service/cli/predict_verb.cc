@@ -163,7 +163,7 @@ core::Status run(const Options& options, VerbContext& context) {
   query_context.progress = context.progress("predicting");
   const belief::Answer answer = queries::answer(scene, context.options().seed, {"predict", question}, query_context);
   context.end_progress();
-  if (!answer.error.empty()) return status_of_error(options.scene + ": ", answer.error);
+  PRESCENE_RETURN_IF_ERROR(answer.error.at(options.scene));
 
   const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
   if (!options.heat_map.empty()) {

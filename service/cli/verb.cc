@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/service/recording.h"
 
@@ -132,7 +133,7 @@ void VerbContext::write_out(const std::string& out) {
 
 ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
   end_progress();
-  if (!status.ok() && options_.json && !printed_) write_out(error_document(to_string(status)));
+  if (!status.ok() && options_.json && !printed_) write_out(error_document(status));
   if (print_failed_) {
     const std::string text = "standard output can't be written: is the disk full, or was the pipe closed?";
     if (status.ok())
@@ -144,20 +145,8 @@ ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
   return exit_code_of(status);
 }
 
-std::string error_document(const std::string& text) {
-  return nlohmann::ordered_json{{"error", text}}.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-         "\n";
-}
-
-core::Status status_of_error(const std::string& place, const std::string& error) {
-  using core::StatusCode;
-  for (const StatusCode code :
-       {StatusCode::kInvalidInput, StatusCode::kNotFound, StatusCode::kDataLoss, StatusCode::kUnsupported,
-        StatusCode::kCancelled, StatusCode::kUnavailable, StatusCode::kResourceExhausted}) {
-    const std::string prefix = std::string(core::to_string(code)) + ": ";
-    if (error.starts_with(prefix)) return {code, place + error.substr(prefix.size())};
-  }
-  return core::invalid_input(place + error);
+std::string error_document(const core::Status& status) {
+  return belief::error_to_json(status).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 CLI::Validator positive_number() {

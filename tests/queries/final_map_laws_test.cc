@@ -51,7 +51,7 @@ belief::FinalPoses final_poses(std::shared_ptr<const belief::Scene> scene, int i
   query.tell.typical_runs = false;
   query.effort.exact_instances = instances;
   const belief::Answer answer = queries::answer(scene, 1, {"", query}, context);
-  EXPECT_EQ(answer.error, "");
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
   const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
   if (run) *run = predicted.instances;
   return predicted.final_poses.at(0);

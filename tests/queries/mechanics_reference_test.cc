@@ -66,7 +66,7 @@ PredictAnswer predicted(std::shared_ptr<belief::Scene> scene, double tolerance,
   belief::PredictQuery query;
   query.effort.tolerance = tolerance;
   const belief::Answer answer = queries::answer(std::move(scene), 1, {"", query}, context);
-  EXPECT_EQ(answer.error, "");
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
   return std::get<PredictAnswer>(answer.what);
 }
 
@@ -184,7 +184,7 @@ TEST(Mechanics, TheMilkCartonsAnswerIsTheSameOnOneThreadAndOnThree) {
     belief::PredictQuery query;
     query.effort.exact_instances = 48;
     belief::Answer answer = queries::answer(shared, 1, {"", query}, context);
-    EXPECT_EQ(answer.error, "");
+    EXPECT_TRUE(answer.error.ok()) << answer.error.message();
     return std::get<PredictAnswer>(std::move(answer.what));
   };
   const PredictAnswer one = ask(1), three = ask(3);

