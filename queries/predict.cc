@@ -121,6 +121,9 @@ void account(const Foresight& foresight, belief::PredictAnswer& answer) {
   answer.simulated_seconds = estimate.simulated_seconds;
   answer.flown_seconds = estimate.flown_seconds;
   answer.step = foresight.simulator->step_size();
+  const simulation::StepperUse stepper = foresight.simulator->stepper();
+  answer.stepper = stepper.name;
+  answer.not_lockstep = stepper.not_lockstep;
   answer.certificates = {foresight.certifier != nullptr, estimate.certificates.certified, estimate.certificates.audited,
                          estimate.certificates.mismatches, estimate.certificates.switched_off};
   for (const simulation::InstanceRecord& record : estimate.instances) {
@@ -199,9 +202,10 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
     for (std::size_t object : objects) answer.final_poses.push_back(final_poses_of(foresight, object, *context.pool));
   if (tell.typical_runs) answer.typical_runs = typical_runs_of(foresight, prior, context);
   if (tell.inputs) answer.inputs = deciding_inputs(foresight, prior, context);
+  core::Status flight;
   if (tell.contacts) {
     forecast_contacts(foresight, query.effort.confidence, answer);
-    answer.flight = forecast_flight(foresight, prior, context);
+    flight = forecast_flight(foresight, prior, context, answer);
   }
   if (tell.paths > 0) answer.paths = paths_of(foresight, prior, tell.paths, objects, context);
   if (tell.chaos) answer.chaos = check_for_chaos(foresight, prior, query.effort.confidence, context);
@@ -211,6 +215,8 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.remarks = remarks_of(answer, query.effort);
   remark_on_leaving(foresight.estimate, answer.remarks);
+  if (!flight.ok())
+    answer.remarks.push_back("For how long nothing can touch anything is not told: " + flight.message() + ".");
   if (foresight.estimate.certain)
     answer.remarks.push_back(
         "Nothing in the scene is uncertain: one instance tells what the simulator does, not how sure that is.");

@@ -170,7 +170,7 @@ class Flyer {
   }
   core::Status make_simulators(const belief::Scene& scene, const SimulatorFactory& make) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-      PRESCENE_TRY(auto simulator, make(alone(scene, i)));
+      PRESCENE_TRY(auto simulator, make(alone(scene, i), 1.0));
       simulators_.push_back(std::move(simulator));
     }
     return core::ok_status();

@@ -180,6 +180,17 @@ TEST(ErrorFromJson, TakesErrorsOfOthersForBadInput) {
   EXPECT_TRUE(error_from_json(Json::parse("[1]")).ok());
 }
 
+TEST(AnswerToJson, TellsWhoSimulatedAndWhyNotInLockstep) {
+  PredictAnswer predict;
+  EXPECT_FALSE(to_json(Answer{"", 0, {}, predict})["predict"].contains("stepper"));
+  predict.stepper = "lockstep";
+  EXPECT_EQ(to_json(Answer{"", 0, {}, predict})["predict"]["stepper"], Json::parse(R"({"name": "lockstep"})"));
+  predict.stepper = "bullet";
+  predict.not_lockstep = "five objects";
+  EXPECT_EQ(to_json(Answer{"", 0, {}, predict})["predict"]["stepper"],
+            Json::parse(R"({"name": "bullet", "not_lockstep": "five objects"})"));
+}
+
 TEST(AnswerToJson, WritesImagesInBase64) {
   ViewAnswer view;
   view.depth = geometry::DepthImage(2, 1, 1.0F);  // 00 00 80 3f twice

@@ -44,8 +44,8 @@ belief::FinalPoses final_poses(std::shared_ptr<const belief::Scene> scene, int i
   simulation::ShapeStore shapes(nullptr);
   QueryContext context;
   context.pool = &pool;
-  context.make_simulator = [&](const std::shared_ptr<const belief::Scene>& asked) {
-    return simulation::make_bullet_simulator(*asked, shapes, {});
+  context.make_simulator = [&](const belief::Scene& asked, double) {
+    return simulation::make_bullet_simulator(asked, shapes, {});
   };
   belief::PredictQuery query;
   query.tell.typical_runs = false;

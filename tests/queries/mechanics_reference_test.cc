@@ -60,8 +60,8 @@ PredictAnswer predicted(std::shared_ptr<belief::Scene> scene, double tolerance,
   simulation::ShapeStore shapes(simulation::hacd_decomposer());
   QueryContext context;
   context.pool = &pool;
-  context.make_simulator = [&](std::shared_ptr<const belief::Scene> asked) {
-    return simulation::make_bullet_simulator(*asked, shapes, options);
+  context.make_simulator = [&](const belief::Scene& asked, double) {
+    return simulation::make_bullet_simulator(asked, shapes, options);
   };
   belief::PredictQuery query;
   query.effort.tolerance = tolerance;
@@ -178,8 +178,8 @@ TEST(Mechanics, TheMilkCartonsAnswerIsTheSameOnOneThreadAndOnThree) {
     core::ThreadPool pool(threads);
     QueryContext context;
     context.pool = &pool;
-    context.make_simulator = [&](std::shared_ptr<const belief::Scene> asked) {
-      return simulation::make_bullet_simulator(*asked, shapes);
+    context.make_simulator = [&](const belief::Scene& asked, double) {
+      return simulation::make_bullet_simulator(asked, shapes);
     };
     belief::PredictQuery query;
     query.effort.exact_instances = 48;

@@ -118,8 +118,8 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
 
   std::vector<double> factors;
   // With longer steps things slide more easily, so that the probability shifts by a known amount.
-  context.make_simulator_of_step = [&](std::shared_ptr<const belief::Scene>,
-                                       double factor) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+  context.make_simulator = [&](const belief::Scene&,
+                               double factor) -> core::Result<std::unique_ptr<simulation::Simulator>> {
     factors.push_back(factor);
     return std::unique_ptr<simulation::Simulator>(std::make_unique<tests::FakeSimulator>(
         [factor](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
@@ -132,7 +132,7 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
   const PredictAnswer answer = predicted(queries::answer(sliding_scene(), 1, {"", all}, context));
   ASSERT_TRUE(answer.model_error);
   EXPECT_EQ(answer.model_error->instances, 256);
-  EXPECT_EQ(factors, (std::vector<double>{0.5, 2.0, 1.0, 1.0}));
+  EXPECT_EQ(factors, (std::vector<double>{1.0, 0.5, 2.0, 1.0, 1.0}));
   ASSERT_EQ(answer.model_error->variants.size(), 4u);
   const auto shift = [&](std::size_t variant) { return answer.model_error->variants[variant].shifts[0]; };
   EXPECT_EQ(shift(0).outcome, "slides");
@@ -208,8 +208,8 @@ class TouchingSimulator final : public simulation::Simulator {
 QueryContext touching(double failing, core::ThreadPool& pool) {
   QueryContext context;
   context.pool = &pool;
-  context.make_simulator =
-      [failing](std::shared_ptr<const belief::Scene>) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+  context.make_simulator = [failing](const belief::Scene&,
+                                     double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
     return std::unique_ptr<simulation::Simulator>(std::make_unique<TouchingSimulator>(failing));
   };
   return context;
@@ -240,6 +240,24 @@ TEST(Contacts, TellWhoTouchesWhenAndHowHard) {
     EXPECT_NEAR(cup.touching[i], during ? cup.probability : 0.0, 1e-9);
     EXPECT_NEAR(table.touching[i], 1.0, 1e-9);
   }
+}
+
+TEST(Flight, SaysWhyItIsNotTold) {
+  core::ThreadPool pool(1);
+  simulation::ShapeStore shapes;
+  QueryContext context = context_with(slide, pool);
+  context.shapes = &shapes;
+  int made = 0;
+  context.make_simulator = [&made, make = context.make_simulator](
+                               const belief::Scene& scene,
+                               double step_factor) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    if (made++ > 0) return core::unsupported("carton: can't fly");  // the scene can be simulated, its objects alone not
+    return make(scene, step_factor);
+  };
+  const PredictAnswer answer =
+      predicted(queries::answer(sliding_scene(), 1, {"", asking([](auto& tell) { tell.contacts = true; })}, context));
+  EXPECT_FALSE(answer.flight.has_value());
+  EXPECT_THAT(answer.remarks, testing::Contains(HasSubstr("carton: can't fly")));
 }
 
 TEST(Failures, AreToldAndNotDropped) {

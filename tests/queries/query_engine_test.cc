@@ -123,12 +123,12 @@ TEST(Predict, ABeliefsHypothesesKeepTheirMasses) {
 
 TEST(Predict, SimulatesTheBeliefsObjectsAndRobotAtTheSnapshot) {
   core::ThreadPool pool(1);
-  std::shared_ptr<const belief::Scene> simulated;
+  std::optional<belief::Scene> simulated;
   QueryContext context = context_with(slide, pool);
   const auto make = context.make_simulator;
-  context.make_simulator = [&](std::shared_ptr<const belief::Scene> scene) {
+  context.make_simulator = [&](const belief::Scene& scene, double step_factor) {
     simulated = scene;
-    return make(scene);
+    return make(scene, step_factor);
   };
   belief::Belief belief = two_hypotheses();
   belief.objects[0].particles[0].mode = belief.objects[0].particles[1].mode = belief::MotionMode::kHeld;
@@ -218,7 +218,7 @@ TEST(Predict, WhatCannotBeAnsweredSaysWhy) {
   bare.pool = &pool;
   EXPECT_THAT(queries::answer(two_hypotheses(), {"", PredictQuery{}}, bare).error.message(), HasSubstr("no simulator"));
   QueryContext broken = context;
-  broken.make_simulator = [](auto) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+  broken.make_simulator = [](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
     return core::unsupported("carton: a surface can't move");
   };
   EXPECT_THAT(queries::answer(two_hypotheses(), {"", PredictQuery{}}, broken).error.message(),

@@ -181,6 +181,10 @@ TEST(CommandLine, PredictRefusesWhatMeansNothingAndSaysWhatWould) {
   refused({"--max-instances", "0"}, "1");
   refused({"--budget", "1e9"}, "up to 1000000 s");
   EXPECT_EQ(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).exit_code, 2);
+  const std::vector<std::string> few = {"predict", scenario("mug_on_hook"), "--max-instances", "8"};
+  const Finished automatic = run_program(few);
+  EXPECT_EQ(automatic.exit_code, 0) << automatic.err;
+  EXPECT_NE(automatic.out.find("Simulated by Bullet's stepper"), std::string::npos) << automatic.out;
   EXPECT_NE(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).err.find("--stepper bullet"),
             std::string::npos);
   EXPECT_NE(run_program({"validate", scene}).out.find("1 object, "), std::string::npos);

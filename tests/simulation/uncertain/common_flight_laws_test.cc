@@ -27,7 +27,7 @@ Flown flown(const std::shared_ptr<const Scene>& scene, const simulation::StartDi
   simulation::ShapeStore shapes;
   core::ThreadPool pool(threads);
   const core::RandomStream stream(1, core::Purpose::kStartBelief);
-  const simulation::SimulatorFactory make = [&](const Scene& asked) {
+  const simulation::SimulatorFactory make = [&](const Scene& asked, double) {
     return simulation::make_bullet_simulator(asked, shapes, {});
   };
   simulation::RunRequest request;
