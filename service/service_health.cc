@@ -47,7 +47,12 @@ interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const
       {"lost on the bus", std::to_string(health.lost_on_bus)},
       {"since the last frame, s", health.seconds_since_frame ? core::fixed_text(*health.seconds_since_frame, 1) : ""},
       {"last step, s", core::rounded_text(health.last_step_seconds)},
-      {"last refusal", health.last_refusal}};
+      {"last refusal", health.last_refusal},
+      {"particles without physics", std::to_string(health.not_simulated)},
+      {"last failure of physics", health.physics_failure},
+      {"simulators in lockstep", std::to_string(health.steppers.lockstep)},
+      {"simulators on Bullet instead", std::to_string(health.steppers.bullet_instead)},
+      {"last reason for Bullet", health.steppers.last_reason}};
   return status;
 }
 

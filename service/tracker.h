@@ -9,6 +9,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "prescene/belief/belief.h"
@@ -24,6 +25,7 @@ namespace prescene::service {
 struct TrackerStep {
   StepRecord record;
   filter::StepCounters counters;
+  std::string physics_failure;  ///< As in filter::StepResult.
   filter::HashTrace trace;
   std::vector<filter::SupportMeasurement> supports;
   belief::Observation observation;

@@ -46,9 +46,19 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.steps = 3;
   health.skipped_frames = 5;
   health.lost_on_bus = 7;
+  health.not_simulated = 11;
+  health.physics_failure = "no simulator could be made";
+  health.steppers = {13, 17, "the scene has 5"};
   const auto status = to_diagnostic(health, "here");
   EXPECT_EQ(status.hardware_id, "here");
-  const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"}, {"skipped frames", "5"}, {"lost on the bus", "7"}};
+  const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"},
+                                                     {"skipped frames", "5"},
+                                                     {"lost on the bus", "7"},
+                                                     {"particles without physics", "11"},
+                                                     {"last failure of physics", "no simulator could be made"},
+                                                     {"simulators in lockstep", "13"},
+                                                     {"simulators on Bullet instead", "17"},
+                                                     {"last reason for Bullet", "the scene has 5"}};
   for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
 }
 
