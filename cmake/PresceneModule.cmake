@@ -85,6 +85,15 @@ function(prescene_module name)
   target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${root}>"
                                                 "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
 
+  # For tests/examples.
+  if(M_FOLDER MATCHES "^(tests|benchmarks)(/|$)" OR NOT M_NO_INSTALL)
+    string(REGEX REPLACE "/.*" "" group "${M_FOLDER}")
+    list(TRANSFORM linked PREPEND "${name} ${M_FOLDER}/")
+    set_property(GLOBAL APPEND PROPERTY PRESCENE_HEADER_GROUPS ${group})
+    set_property(GLOBAL APPEND PROPERTY "PRESCENE_HEADERS_OF_${group}" ${linked})
+    set_property(GLOBAL APPEND PROPERTY "PRESCENE_LIBRARIES_OF_${group}" ${name})
+  endif()
+
   if(NOT M_NO_INSTALL)
     set_property(GLOBAL APPEND PROPERTY PRESCENE_INSTALLED_MODULES ${name})
     # The file of targets that prescene-config.cmake includes for this library.

@@ -2,8 +2,8 @@
 // Operator 3, augment: what the belief does not explain yet. Objects that are not supported by the frame are looked for
 // in the whole image; clusters that no object explains may be new objects.
 //
-//   if (recover(...)) ...           // an object that was unseen, doubtful or lost
-//   new_objects(...)                // clusters that nobody explains
+//   recover(frame, terms, target, current, options, weighting, spread, tools, stream, object);  // unseen or lost
+//   new_objects(frame, observation, known, options, spread, tools, stream, belief);  // clusters that nothing explains
 #pragma once
 
 #include <array>

@@ -2,7 +2,7 @@
 // Finds known objects in a single frame without knowing where they are: clusters above a support, poses proposed per
 // cluster and model, the best explanation accepted first, then a second look at what is left.
 //
-//   std::vector<Detection> found = detect(terms, sampled, support, wanted, options, tools, stream);
+//   std::vector<Detection> found = detect(terms, known, sampled, support, wanted, options, tools, stream);
 #pragma once
 
 #include <span>

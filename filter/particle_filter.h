@@ -2,7 +2,7 @@
 // The particle filter: five operators in a row, one frame after the other.
 //
 //   ParticleFilter filter(likelihood, renderer, threads, settings);
-//   Belief belief = filter.start(scene, seed);
+//   belief::Belief belief = filter.start(scene, seed);
 //   for (;;) {
 //     StepResult result = filter.step(belief, observation, control);
 //     belief = std::move(result.belief);

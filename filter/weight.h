@@ -3,7 +3,7 @@
 // by the Laplace evidence of the frame. A particle whose pose is hidden may stay hidden instead of moving onto what
 // hides it.
 //
-//   WeightReport report = weight(terms, target, X_WC, options, tools, stream, object.particles);
+//   WeightReport report = weight(terms, target, X_WC, dt, options, tools, stream, object.particles);
 #pragma once
 
 #include <span>

@@ -2,7 +2,7 @@
 // Answers questions about a belief, or about a scene of which nothing has been seen yet.
 //
 //   QueryContext context;
-//   context.make_simulator = [&](auto scene) { return simulation::make_bullet_simulator(scene, shapes, {}); };
+//   context.make_simulator = make_simulator;        // of a scene, by a backend: simulation/bullet or lockstep
 //   context.pool = &pool;
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
 //   if (!answer.error.empty()) ...

@@ -5,7 +5,7 @@
 //
 //   Backends backends(pool);
 //   auto simulator = backends.make_simulator(scene);
-//   belief::Answer answer = queries::answer(snapshot, query, backends.query_context());
+//   belief::Answer answer = queries::answer(snapshot, query, backends.query_context(pool));
 #pragma once
 
 #include <memory>

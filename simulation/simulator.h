@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The contract of a forward simulator: many independent instances of one scene, each from its own world state.
 //
-//   auto simulator = simulation::make_bullet_simulator(scene, shapes, options);     // prescene/simulation/bullet/...
+//   PRESCENE_TRY(auto simulator, make_simulator(scene));     // of a backend: prescene/simulation/bullet/...
 //   std::vector<belief::Trajectory> runs(starts.size());
-//   simulator->run(starts, request, stream, pool, runs);
+//   simulator->run(starts, request, stream, 0, pool, runs);
 //
 // The same scene, starts, request and stream give the same bits, for any number of threads and any split into calls.
 #pragma once

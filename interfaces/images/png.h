@@ -2,7 +2,7 @@
 // PNG files: colour, depth in 16-bit grey with a scale, and labels in 8- or 16-bit grey or a palette. Sizes are checked
 // against limits, and against what the bytes could hold at best, before memory is taken; broken bytes are a status.
 //
-//   PRESCENE_TRY(DepthImage depth, read_png_depth(path, 0.001));
+//   PRESCENE_TRY(geometry::DepthImage depth, read_png_depth(path, 0.001));
 #pragma once
 
 #include <cstddef>

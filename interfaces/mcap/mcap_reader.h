@@ -6,7 +6,7 @@
 //   while (true) {
 //     PRESCENE_TRY(auto message, reader->next());
 //     if (!message) break;
-//     use(reader->channels()[message->channel].topic, *message);
+//     ... reader->channels()[message->channel].topic, *message
 //   }
 #pragma once
 

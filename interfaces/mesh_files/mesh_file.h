@@ -3,7 +3,7 @@
 // COLLADA through assimp, behind a size cap, for files that you trust. Whatever is read is repaired, with a report.
 //
 //   PRESCENE_TRY(LoadedMesh cup, read_mesh("cup.stl", {.metres_per_unit = 0.001}));
-//   for (const std::string& warning : cup.warnings) log(sink, LogLevel::kWarning, warning);
+//   for (const std::string& warning : cup.warnings) core::log(sink, core::LogLevel::kWarning, warning);
 #pragma once
 
 #include <cstddef>

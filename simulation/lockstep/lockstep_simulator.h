@@ -37,8 +37,7 @@ core::Status lockstep_supports(const RunRequest& request);
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
 ///   - one to four objects of boxes, spheres, cylinders, cones, capsules and hulls (convex_hull, convex_parts,
-///   decompose) of at
-///     most 64 vertices, sides of at most 16, and at most 16 parts each;
+///     decompose) of at most 64 vertices, sides of at most 16, and at most 16 parts each;
 ///   - supports of the same shapes, at most 256 parts together;
 ///   - robot bodies of the same shapes, at most 16 parts each and 32 bodies with a shape.
 core::Result<std::unique_ptr<Simulator>> make_lockstep_simulator(const belief::Scene& scene, ShapeStore& shapes,

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene file, played, recorded, tracked from its recording, and asked about.
-//
-//   const auto scene = scenario("milk_on_bin");
-//   record(*scene, 10.0, 4.0, seed, path);
-//   const Replayed replayed = replay(path, scene, seed, threads);
-//
-// Failures of these steps are reported to GoogleTest.
+// A scene file (`scenario`), played and recorded (`record`), tracked from its recording (`replay`), and asked about
+// (`predict`). Failures of these steps are reported to GoogleTest.
 #pragma once
 
 #include <filesystem>
