@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/cancellable.h"
 #include "prescene/geometry/triangle_mesh.h"
 
 namespace prescene::geometry {
@@ -54,19 +55,24 @@ struct Face {
   std::vector<std::uint32_t> outside;  // Points above it that no earlier face took.
   bool alive = true;
   bool visible = false;
+  std::uint32_t skipped = kNone;  // First of the skipped points that are above it, see Quickhull::next_skipped_.
 };
 
 // The hull of distinct points in lexicographic order, which do not lie in a plane.
 class Quickhull {
  public:
-  explicit Quickhull(const std::vector<GridPoint>& points) : points_(points), face_from_(points.size(), kNone) {}
+  explicit Quickhull(const std::vector<GridPoint>& points)
+      : points_(points), next_skipped_(points.size(), kNone), face_from_(points.size(), kNone) {}
 
-  // False when all points lie in (almost) one plane.
-  bool build() {
+  // False when all points lie in (almost) one plane, and where it was stopped.
+  bool build(const core::Cancellation* cancellation) {
     if (!make_simplex()) return false;
     for (std::uint32_t f = 0; f < faces_.size();) {
       for (; f < faces_.size(); ++f) {
-        while (faces_[f].alive && !faces_[f].outside.empty()) add_point(f, farthest(f));
+        while (faces_[f].alive && !faces_[f].outside.empty()) {
+          if (cancellation && cancellation->requested()) return false;
+          add_point(f, farthest(f));
+        }
       }
       // A point may be just above a face that is gone but clearly above one of those that stayed.
       f = reconsider_skipped();
@@ -154,30 +160,77 @@ class Quickhull {
   // skipped.
   void assign(const std::vector<std::uint32_t>& candidates, std::uint32_t begin) {
     for (const std::uint32_t point : candidates) {
-      bool above = false;
+      std::uint32_t first_below = kNone;
       bool taken = false;
       for (std::uint32_t f = begin; f < faces_.size() && !taken; ++f) {
         const Wide h = height(faces_[f], point);
-        above = above || h > 0;
+        if (h > 0 && first_below == kNone) first_below = f;
         taken = h > faces_[f].tolerance;
         if (taken) faces_[f].outside.push_back(point);
       }
-      if (above && !taken) skipped_.push_back(point);
+      if (first_below == kNone || taken) continue;
+      skipped_.push_back(point);
+      keep_above(first_below, point);
     }
+  }
+
+  // Remembers for a skipped point one face that it is above.
+  void keep_above(std::uint32_t f, std::uint32_t point) {
+    next_skipped_[point] = std::exchange(faces_[f].skipped, point);
+  }
+
+  // The skipped points of a face that is gone are kept at one of the new faces from `begin`: a point above both a gone
+  // face and one that stayed is above the new face at some edge of the outline, because what it sees is connected.
+  // Who is above none of them has become a point inside.
+  void keep_above_new(std::uint32_t gone, std::uint32_t begin) {
+    for (std::uint32_t point = std::exchange(faces_[gone].skipped, kNone); point != kNone;) {
+      const std::uint32_t next = next_skipped_[point];
+      for (std::uint32_t f = begin; f < faces_.size(); ++f) {
+        if (height(faces_[f], point) <= 0) continue;
+        keep_above(f, point);
+        break;
+      }
+      point = next;
+    }
+  }
+
+  // Of the faces that a point sees, `seen` one of them, the first that it is more than twice the tolerance above.
+  std::uint32_t first_far_below(std::uint32_t seen, std::uint32_t point) {
+    std::uint32_t first = kNone;
+    std::vector<std::uint32_t> visible = {seen};
+    faces_[seen].visible = true;
+    for (std::size_t i = 0; i < visible.size(); ++i) {
+      const Face& face = faces_[visible[i]];
+      if (height(face, point) > 2 * face.tolerance) first = std::min(first, visible[i]);
+      for (const std::uint32_t n : face.neighbours) {
+        if (faces_[n].visible || height(faces_[n], point) <= 0) continue;
+        faces_[n].visible = true;
+        visible.push_back(n);
+      }
+    }
+    for (const std::uint32_t f : visible) faces_[f].visible = false;
+    return first;
   }
 
   // Gives skipped points to faces that they are more than twice the tolerance above; returns the first such face, or
   // the number of faces when there is none.
   std::uint32_t reconsider_skipped() {
+    std::vector<std::uint32_t> witness(points_.size(), kNone);
+    for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+      for (std::uint32_t point = faces_[f].skipped; point != kNone; point = next_skipped_[point]) witness[point] = f;
+      faces_[f].skipped = kNone;
+    }
     auto first = static_cast<std::uint32_t>(faces_.size());
     std::erase_if(skipped_, [&](std::uint32_t point) {
-      for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-        if (!faces_[f].alive || height(faces_[f], point) <= 2 * faces_[f].tolerance) continue;
-        faces_[f].outside.push_back(point);
-        first = std::min(first, f);
-        return true;
+      if (witness[point] == kNone) return true;  // Inside by now.
+      const std::uint32_t f = first_far_below(witness[point], point);
+      if (f == kNone) {
+        keep_above(witness[point], point);
+        return false;
       }
-      return false;
+      faces_[f].outside.push_back(point);
+      first = std::min(first, f);
+      return true;
     });
     return first;
   }
@@ -255,13 +308,15 @@ class Quickhull {
       faces_[f].alive = faces_[f].visible = false;
       const std::vector<std::uint32_t> orphans = std::exchange(faces_[f].outside, {});
       assign(orphans, first_new);
+      keep_above_new(f, first_new);
     }
   }
 
   const std::vector<GridPoint>& points_;
   std::vector<Face> faces_;
-  std::vector<std::uint32_t> skipped_;    // Points above a face by less than the tolerance.
-  std::vector<std::uint32_t> face_from_;  // While a cone is made: its face whose outline edge starts at the vertex.
+  std::vector<std::uint32_t> skipped_;  // Points above a face by less than the tolerance, in the order of skipping.
+  std::vector<std::uint32_t> next_skipped_;  // For a skipped point the next one of the same face, see Face::skipped.
+  std::vector<std::uint32_t> face_from_;     // While a cone is made: its face whose outline edge starts at the vertex.
 };
 
 struct GridEntry {
@@ -302,7 +357,9 @@ std::vector<GridPoint> places_of(const std::vector<GridEntry>& entries) {
 
 }  // namespace
 
-core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) {
+core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) { return convex_hull(points, nullptr); }
+
+core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points, const core::Cancellation* cancellation) {
   for (const Vector3d& p : points) {
     if (!p.allFinite()) return core::invalid_input("a point for a convex hull is not finite: repair the mesh first");
   }
@@ -311,7 +368,8 @@ core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) {
   while (true) {
     const std::vector<GridPoint> places = places_of(entries);
     Quickhull hull(places);
-    if (!hull.build()) {
+    if (!hull.build(cancellation)) {
+      if (cancellation && cancellation->requested()) return core::cancelled("the making of a convex hull was stopped");
       return core::invalid_input("a convex hull needs points that do not lie in one plane; these " +
                                  std::to_string(points.size()) + " do: give the body a thickness");
     }
