@@ -3,7 +3,9 @@
 // know.
 #include <cstdio>
 #include <filesystem>
+#include <initializer_list>
 #include <string>
+#include <utility>
 
 #include "prescene/collision/tree_file.h"
 #include "prescene/core/check.h"
@@ -12,6 +14,7 @@
 #include "prescene/interfaces/images/jpeg.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/mcap/mcap_writer.h"
+#include "prescene/interfaces/mesh_files/import_reply.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -80,6 +83,15 @@ void write_mesh_seeds() {
              std::string("# x\nv 0 0 0 1 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1/1/1 2//2 -2 \\\n 4\n"));
   write_seed("stl", "binary", encode_stl(box));
   write_seed("stl", "text", encode_stl(box, MeshEncoding::kText));
+  for (const auto& [name, answer] : std::initializer_list<std::pair<const char*, core::Result<ImportedMesh>>>{
+           {"mesh", ImportedMesh{box, ""}},
+           {"not_finite", ImportedMesh{box, "vertex 7 (mesh 2)"}},
+           {"refusal", core::invalid_input("'GLTF: no such node'")},
+           {"too_large", core::resource_exhausted("has more than the limit")}}) {
+    const auto bytes = run_in_child([&answer = answer](ChildOutput& out) { send_reply(answer, out); }, {});
+    PRESCENE_CHECK(bytes.ok());
+    write_seed("import_reply", name, *bytes);
+  }
 }
 
 void write_tree_file_seeds() {
