@@ -2,7 +2,6 @@
 #include "prescene/interfaces/mesh_files/limited_child.h"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <sys/poll.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -13,6 +12,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <csignal>
 #include <exception>
 #include <new>
 #include <string>

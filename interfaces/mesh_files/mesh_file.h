@@ -39,7 +39,7 @@ struct MeshReadOptions {
   UpAxis up_axis = UpAxis::kDeclared;
   std::size_t max_file_bytes = std::size_t{256} << 20;
   std::size_t max_assimp_file_bytes = std::size_t{64} << 20;  ///< For glTF and COLLADA.
-  /// Also of vertices. Reading, repairing and inspecting as many takes less than 1 GB.
+  /// Also of vertices. Reading and repairing as many takes less than 1 GB.
   std::size_t max_triangles = 4'000'000;
   std::size_t max_importer_memory = std::size_t{800} << 20;  ///< For glTF and COLLADA: address space.
   std::chrono::milliseconds max_importer_time{8000};         ///< For glTF and COLLADA: by the wall clock.
