@@ -24,6 +24,12 @@ nlohmann::ordered_json to_json(const ObjectBelief& object);
 nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);
 nlohmann::ordered_json to_json(const Answer& answer);
+/// {"error": "there is no object 'mug'", "code": "not_found"}: why something could not be done. The codes are the names
+/// of core::StatusCode in lower case. `status` is not ok (checked).
+nlohmann::ordered_json error_to_json(const core::Status& status);
+/// The error of an answer, or of anything that error_to_json wrote; ok where it has no "error". Without a code that is
+/// known it is kInvalidInput.
+core::Status error_from_json(const nlohmann::ordered_json& document);
 
 /// The text of a document; all JSON that is written goes through here. In one line, or with so many spaces a level. It
 /// never fails on what a document holds: bytes that are not UTF-8 become U+FFFD, numbers that are not finite null.

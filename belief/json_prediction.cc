@@ -135,6 +135,12 @@ Json paths_json(const std::vector<ObjectPath>& paths) {
   return json;
 }
 
+Json stepper_json(const PredictAnswer& predict) {
+  Json json{{"name", predict.stepper}};
+  if (!predict.not_lockstep.empty()) json["not_lockstep"] = predict.not_lockstep;
+  return json;
+}
+
 Json certificates_json(const CertificateSummary& use) {
   if (!use.used) return {{"used", false}};
   return {{"used", true},
@@ -182,6 +188,7 @@ Json prediction_json(const PredictAnswer& predict) {
             {"final_poses", std::move(poses)},
             {"typical_runs", std::move(runs)},
             {"left_out", predict.left_out}};
+  if (!predict.stepper.empty()) json["stepper"] = stepper_json(predict);
   if (!predict.inputs.empty()) json["inputs"] = inputs_json(predict.inputs);
   if (!predict.chaos.empty()) json["chaos"] = chaos_json(predict.chaos);
   if (!predict.contact_times.empty()) json["contacts"] = contacts_json(predict);

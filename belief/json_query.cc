@@ -2,6 +2,9 @@
 // JSON of queries, both ways, and of answers.
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <string_view>
+#include <utility>
 
 #include "json_values.h"
 #include "prescene/belief/json.h"
@@ -13,6 +16,16 @@ namespace prescene::belief {
 namespace {
 
 constexpr std::size_t kLongestQuery = std::size_t{1} << 20;
+
+struct CodeName {
+  core::StatusCode code;
+  std::string_view name;
+};
+constexpr CodeName kCodes[] = {
+    {core::StatusCode::kInvalidInput, "invalid_input"}, {core::StatusCode::kNotFound, "not_found"},
+    {core::StatusCode::kDataLoss, "data_loss"},         {core::StatusCode::kUnsupported, "unsupported"},
+    {core::StatusCode::kUnavailable, "unavailable"},    {core::StatusCode::kResourceExhausted, "resource_exhausted"},
+    {core::StatusCode::kCancelled, "cancelled"}};
 
 Json effort_json(const Effort& effort) {
   Json json{
@@ -238,9 +251,31 @@ core::Result<Query> query_from_json(std::string_view text) {
   return query;
 }
 
+Json error_to_json(const core::Status& status) {
+  PRESCENE_CHECK(!status.ok());
+  const auto code = std::ranges::find(kCodes, status.code(), &CodeName::code);
+  PRESCENE_CHECK(code != std::end(kCodes));
+  return {{"error", status.message()}, {"code", code->name}};
+}
+
+core::Status error_from_json(const Json& document) {
+  if (!document.is_object()) return core::ok_status();
+  const auto error = document.find("error");
+  if (error == document.end()) return core::ok_status();
+  std::string message =
+      error->is_string() ? error->get<std::string>() : error->dump(-1, ' ', false, Json::error_handler_t::replace);
+  core::StatusCode code = core::StatusCode::kInvalidInput;
+  const auto named = document.find("code");
+  if (named != document.end() && named->is_string()) {
+    const auto known = std::ranges::find(kCodes, named->get<std::string>(), &CodeName::name);
+    if (known != std::end(kCodes)) code = known->code;
+  }
+  return {code, std::move(message)};
+}
+
 Json to_json(const Answer& answer) {
   Json json{{"id", answer.id}, {"step", answer.step}};
-  if (!answer.error.empty()) json["error"] = answer.error;
+  if (!answer.error.ok()) json.update(error_to_json(answer.error));
   if (answer.what.index() > 0) json[kTasks[answer.what.index() - 1]] = std::visit(AnswerJson{}, answer.what);
   return json;
 }

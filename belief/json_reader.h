@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "prescene/core/spelling.h"
 #include "prescene/core/status.h"
 
 namespace prescene::belief {
@@ -115,7 +116,11 @@ class JsonObject {
         known = known || name == key;
         names += (names.empty() ? "" : ", ") + name;
       }
-      if (!known) at_.errors.add(path_of(key), "unknown key; the keys here are " + names);
+      if (known) continue;
+      const std::vector<std::string> nearest = core::nearest_words(key, known_);
+      const std::string meant = nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ";
+      at_.errors.add(path_of(key),
+                     "unknown key; " + meant + (nearest.empty() ? "the" : "The") + " keys here are " + names);
     }
   }
   JsonObject(const JsonObject&) = delete;

@@ -204,6 +204,8 @@ struct PredictAnswer {
   double simulated_seconds = 0.0;
   double flown_seconds = 0.0;  ///< Of these, in free flight without looking for contacts.
   double step = 0.0;           ///< s of one simulated step; 0 = unknown.
+  std::string stepper;         ///< Who simulated: "lockstep" or "bullet"; "" = unknown.
+  std::string not_lockstep;    ///< Why the faster "lockstep" could not, where it was tried first; else "".
   CertificateSummary certificates;
   /// Share of instances in which things were in each other by more than 2 mm (they are parted gently), and the deepest
   /// of it, m.

@@ -9,6 +9,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/prediction.h"
+#include "prescene/core/status.h"
 #include "prescene/geometry/image.h"
 
 namespace prescene::belief {
@@ -108,7 +109,7 @@ struct ViewAnswer {
 struct Answer {
   std::string id;
   std::uint64_t step = 0;  ///< Of the belief that was asked.
-  std::string error;       ///< Not empty: could not be answered, and why.
+  core::Status error;      ///< Not ok: could not be answered, and why.
   std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer> what;
 
   friend bool operator==(const Answer&, const Answer&) = default;

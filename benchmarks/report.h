@@ -3,8 +3,9 @@
 // table to read, a JSON file, CSV files and plots.
 //
 //   Report report("collision", "AVX3");
-//   report.add({.work = "boolean vs FCL", .must = at_least(20), .aim = at_least(40), .reached = 31.5, .unit = "x",
-//   ...}); std::fputs(report.text().c_str(), stdout); report.write("build/bench/collision.json");
+//   report.add({.work = "boolean vs FCL", .must = at_least(20), .aim = at_least(40), .reached = 31.5, .unit = "x"});
+//   std::fputs(report.text().c_str(), stdout);
+//   PRESCENE_RETURN_IF_ERROR(report.write("build/bench/collision.json"));
 //
 // JSON: {"name", "machine", "simd_target", "notes": [...], "targets": [{"work", "must", "aim", "reached", "better",
 // "unit", "n", "baseline", "why"?}], "raw": {TABLE: [{COLUMN: value}]}}. "better" is "higher", "lower" or "within";

@@ -1,37 +1,85 @@
 # SPDX-License-Identifier: Apache-2.0
-# Every outside library, found once. tools/packages.txt says which Debian package each comes from; tools/layers.txt says
-# which module may include which. The same finds stand in prescene-config.cmake.in for those that the libraries link.
-find_package(Threads REQUIRED)
-find_package(Eigen3 REQUIRED NO_MODULE)        # Eigen3::Eigen
-find_package(tl-expected REQUIRED)             # tl::expected
-find_package(TBB REQUIRED)                     # TBB::tbb
-find_package(Random123 REQUIRED)               # Random123::Random123
-find_package(hwy REQUIRED)                     # hwy::hwy
-find_package(nlohmann_json REQUIRED)           # nlohmann_json::nlohmann_json
-find_package(yaml-cpp REQUIRED)                # yaml-cpp
-find_package(PNG REQUIRED)                     # PNG::PNG
-find_package(JPEG REQUIRED)                    # JPEG::JPEG
-find_package(ZLIB REQUIRED)                    # ZLIB::ZLIB
-find_package(LZ4 REQUIRED)                     # LZ4::lz4
-find_package(Zstd REQUIRED)                    # Zstd::zstd
-find_package(Ceres REQUIRED)                   # Ceres::ceres
-find_package(assimp REQUIRED)                  # assimp::assimp
-find_package(meshoptimizer REQUIRED)          # meshoptimizer::meshoptimizer
-find_package(Bullet64 REQUIRED)                # Bullet::float64, Bullet::hacd
-find_package(CycloneDDS REQUIRED)              # CycloneDDS::ddsc, idlc_generate()
-option(PRESCENE_EGL "Build what draws and computes on OpenGL" ON)
-if(PRESCENE_EGL)
-  find_package(OpenGL REQUIRED COMPONENTS OpenGL EGL)  # OpenGL::OpenGL, OpenGL::EGL
-endif()
-find_package(CLI11 REQUIRED)                   # CLI11::CLI11
-find_package(spdlog REQUIRED)                  # spdlog::spdlog
+# Every outside library: the target that modules and tests name in LINKS or PRIVATE_LINKS, and the arguments of find_package
+# that bring it. A package is looked for when something that links it is built, and never before. tools/packages.txt says
+# which Debian package each comes from; tools/layers.txt says which module may include which.
+set(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL ON)
 
-if(BUILD_TESTING)
-  find_package(GTest REQUIRED)                 # GTest::gmock, GTest::gtest_main
-  find_package(rapidcheck REQUIRED)            # rapidcheck, rapidcheck_gtest
-  find_package(benchmark REQUIRED)             # benchmark::benchmark
-  find_package(fcl REQUIRED)                   # fcl
-  find_package(embree 3 REQUIRED)              # embree
-  find_package(ODE REQUIRED)                   # ODE::ode
-  find_package(MuJoCo REQUIRED)                # MuJoCo::mujoco
-endif()
+function(prescene_outside target)
+  set_property(GLOBAL PROPERTY "PRESCENE_PACKAGE_OF_${target}" "${ARGN}")
+  list(GET ARGN 0 package)
+  set_property(GLOBAL APPEND PROPERTY PRESCENE_OUTSIDE_PACKAGES "${package}")
+endfunction()
+
+prescene_outside(Threads::Threads Threads)
+prescene_outside(Eigen3::Eigen Eigen3 NO_MODULE)
+prescene_outside(tl::expected tl-expected)
+prescene_outside(TBB::tbb TBB)
+prescene_outside(Random123::Random123 Random123)
+prescene_outside(hwy::hwy hwy)
+prescene_outside(nlohmann_json::nlohmann_json nlohmann_json)
+prescene_outside(yaml-cpp yaml-cpp)
+prescene_outside(PNG::PNG PNG)
+prescene_outside(JPEG::JPEG JPEG)
+prescene_outside(ZLIB::ZLIB ZLIB)
+prescene_outside(LZ4::lz4 LZ4)
+prescene_outside(Zstd::zstd Zstd)
+prescene_outside(Ceres::ceres Ceres)
+prescene_outside(assimp::assimp assimp)
+prescene_outside(meshoptimizer::meshoptimizer meshoptimizer)
+prescene_outside(Bullet::float64 Bullet64)
+prescene_outside(Bullet::hacd Bullet64)
+prescene_outside(CycloneDDS::ddsc CycloneDDS)  # idlc_generate(), too
+prescene_outside(OpenGL::OpenGL OpenGL COMPONENTS OpenGL EGL)
+prescene_outside(OpenGL::EGL OpenGL COMPONENTS OpenGL EGL)
+prescene_outside(CLI11::CLI11 CLI11)
+prescene_outside(spdlog::spdlog spdlog)
+# Of tests and benchmarks.
+prescene_outside(GTest::gmock GTest)
+prescene_outside(GTest::gtest_main GTest)
+prescene_outside(rapidcheck rapidcheck)
+prescene_outside(benchmark::benchmark benchmark)
+prescene_outside(GMP::gmpxx GMP)
+prescene_outside(fcl fcl)
+prescene_outside(embree embree 3)
+prescene_outside(ODE::ode ODE)
+prescene_outside(MuJoCo::mujoco MuJoCo)
+
+# prescene_package_of(<target> <result>): the arguments of find_package for an outside library.
+function(prescene_package_of target result)
+  get_property(package GLOBAL PROPERTY "PRESCENE_PACKAGE_OF_${target}")
+  if(NOT package)
+    message(FATAL_ERROR "${target} is not in cmake/PresceneDependencies.cmake, which says what package it comes from.")
+  endif()
+  set(${result} ${package} PARENT_SCOPE)
+endfunction()
+
+# prescene_find(<who> <target>...): looks for outside libraries; ends with a message that names `who` where one is missing.
+# Generator expressions are passed over.
+function(prescene_find who)
+  foreach(target IN LISTS ARGN)
+    if(NOT target MATCHES "^\\$<" AND NOT TARGET "${target}")
+      prescene_package_of("${target}" package)
+      find_package(${package})
+      if(NOT TARGET "${target}")
+        list(JOIN package " " package)
+        message(FATAL_ERROR "${who} needs ${target}, which find_package(${package}) did not bring. tools/packages.txt names "
+                            "the Debian package; PRESCENE_MODULES selects what is built.")
+      endif()
+    endif()
+  endforeach()
+endfunction()
+
+# prescene_find_optional(<result> <target>...): looks for outside libraries and gives those that are missing.
+function(prescene_find_optional result)
+  set(missing)
+  foreach(target IN LISTS ARGN)
+    if(NOT target MATCHES "^\\$<" AND NOT TARGET "${target}")
+      prescene_package_of("${target}" package)
+      find_package(${package} QUIET)
+      if(NOT TARGET "${target}")
+        list(APPEND missing "${target}")
+      endif()
+    endif()
+  endforeach()
+  set(${result} ${missing} PARENT_SCOPE)
+endfunction()

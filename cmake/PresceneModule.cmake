@@ -39,7 +39,8 @@ endfunction()
 #   LINKS <target>...         outside libraries that public headers include
 #   PRIVATE_LINKS <target>... outside libraries that only the sources include
 #   NO_INSTALL)               for libraries of tests
-# makes the library prescene_<name>, alias and installed name prescene::<name>.
+# makes the library prescene_<name>, alias and installed name prescene::<name>, if this build is to have it
+# (PresceneParts.cmake).
 function(prescene_module name)
   cmake_parse_arguments(PARSE_ARGV 1 M "NO_INSTALL" "FOLDER"
                         "HEADERS;SHARED_HEADERS;PRIVATE_HEADERS;SOURCES;USES;PRIVATE_USES;LINKS;PRIVATE_LINKS")
@@ -50,6 +51,18 @@ function(prescene_module name)
     file(RELATIVE_PATH M_FOLDER "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   endif()
   set(target prescene_${name})
+
+  if(M_FOLDER MATCHES "^(tests|benchmarks)(/|$)")
+    prescene_test_wanted(wanted ${name} LIBRARY USES ${M_USES} ${M_PRIVATE_USES} LINKS ${M_LINKS} ${M_PRIVATE_LINKS})
+  else()
+    prescene_wanted(${name} wanted)
+    if(wanted)
+      prescene_use(${name} USES ${M_USES} ${M_PRIVATE_USES} LINKS ${M_LINKS} ${M_PRIVATE_LINKS})
+    endif()
+  endif()
+  if(NOT wanted)
+    return()
+  endif()
   list(TRANSFORM M_USES PREPEND prescene::)
   list(TRANSFORM M_PRIVATE_USES PREPEND prescene::)
 
@@ -72,12 +85,25 @@ function(prescene_module name)
   target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${root}>"
                                                 "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
 
+  # For tests/examples.
+  if(M_FOLDER MATCHES "^(tests|benchmarks)(/|$)" OR NOT M_NO_INSTALL)
+    string(REGEX REPLACE "/.*" "" group "${M_FOLDER}")
+    list(TRANSFORM linked PREPEND "${name} ${M_FOLDER}/")
+    set_property(GLOBAL APPEND PROPERTY PRESCENE_HEADER_GROUPS ${group})
+    set_property(GLOBAL APPEND PROPERTY "PRESCENE_HEADERS_OF_${group}" ${linked})
+    set_property(GLOBAL APPEND PROPERTY "PRESCENE_LIBRARIES_OF_${group}" ${name})
+  endif()
+
   if(NOT M_NO_INSTALL)
-    set_property(GLOBAL PROPERTY PRESCENE_INSTALLED_MODULES TRUE)
-    install(TARGETS ${target} EXPORT prescene-targets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+    set_property(GLOBAL APPEND PROPERTY PRESCENE_INSTALLED_MODULES ${name})
+    # The file of targets that prescene-config.cmake includes for this library.
+    install(TARGETS ${target} EXPORT prescene-${name} ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT ${name})
+    install(EXPORT prescene-${name} FILE ${name}.cmake NAMESPACE prescene::
+            DESTINATION "${PRESCENE_PACKAGE_DIR}/libraries" COMPONENT ${name})
     foreach(header IN LISTS M_HEADERS)
       get_filename_component(subfolder "${header}" DIRECTORY)
-      install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/prescene/${M_FOLDER}/${subfolder}")
+      install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/prescene/${M_FOLDER}/${subfolder}"
+              COMPONENT ${name})
     endforeach()
   endif()
 endfunction()
@@ -96,6 +122,9 @@ endif()
 list(JOIN _disabled "|" _disabled)
 set(PRESCENE_DISABLED_SIMD_TARGETS "HWY_DISABLED_TARGETS=(${_disabled})")
 function(prescene_simd_sources target)
+  if(NOT TARGET ${target})  # not part of this build
+    return()
+  endif()
   target_compile_definitions(${target} PRIVATE "${PRESCENE_DISABLED_SIMD_TARGETS}")
   target_include_directories(${target} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
 endfunction()
@@ -105,6 +134,10 @@ endfunction()
 # (benchmarks/report.h) to the path given as --benchmark_out=PATH.
 function(prescene_benchmark name)
   cmake_parse_arguments(PARSE_ARGV 1 B "" "" "SOURCES;USES;PRIVATE_LINKS")
+  prescene_test_wanted(wanted bench_${name} USES ${B_USES} LINKS ${B_PRIVATE_LINKS} benchmark::benchmark)
+  if(NOT wanted)
+    return()
+  endif()
   list(TRANSFORM B_USES PREPEND prescene::)
   add_executable(bench_${name} ${B_SOURCES})
   target_link_libraries(bench_${name} PRIVATE ${B_USES} ${B_PRIVATE_LINKS} benchmark::benchmark)

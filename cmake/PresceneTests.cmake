@@ -20,7 +20,7 @@ add_custom_target(prescene_fuzzers)
 # prescene_tests(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...
 #   TIMEOUT <seconds>         of each case, default 300
 #   RESOURCE_LOCK <names>)    cases that share one of these names never run at the same time
-# makes the executable <name>_tests.
+# makes the executable <name>_tests, if this build has what it uses (PresceneParts.cmake).
 function(prescene_tests name)
   cmake_parse_arguments(PARSE_ARGV 1 T "" "TIMEOUT" "SOURCES;USES;PRIVATE_LINKS;RESOURCE_LOCK")
   if(T_UNPARSED_ARGUMENTS)
@@ -30,6 +30,11 @@ function(prescene_tests name)
     set(T_TIMEOUT 300)
   endif()
   set(target ${name}_tests)
+  set(libraries GTest::gmock GTest::gtest_main ${T_PRIVATE_LINKS})
+  prescene_test_wanted(wanted ${target} USES ${T_USES} LINKS ${libraries})
+  if(NOT wanted)
+    return()
+  endif()
   list(TRANSFORM T_USES PREPEND prescene::)
   add_executable(${target} ${T_SOURCES})
   target_link_libraries(${target} PRIVATE ${T_USES} ${T_PRIVATE_LINKS} GTest::gmock GTest::gtest_main)
@@ -52,11 +57,31 @@ include(\"${PROJECT_SOURCE_DIR}/cmake/discover_tests.cmake\")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${include_file}")
 endfunction()
 
+# prescene_more_tests(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...) adds sources to <name>_tests, or
+# leaves them out of the build of a part that lacks what they use: references, above all.
+function(prescene_more_tests name)
+  cmake_parse_arguments(PARSE_ARGV 1 T "" "" "SOURCES;USES;PRIVATE_LINKS")
+  if(NOT TARGET ${name}_tests)
+    return()
+  endif()
+  list(JOIN T_SOURCES " " sources)
+  prescene_test_wanted(wanted "${sources}" USES ${T_USES} LINKS ${T_PRIVATE_LINKS})
+  if(wanted)
+    list(TRANSFORM T_USES PREPEND prescene::)
+    target_sources(${name}_tests PRIVATE ${T_SOURCES})
+    target_link_libraries(${name}_tests PRIVATE ${T_USES} ${T_PRIVATE_LINKS})
+  endif()
+endfunction()
+
 # prescene_fuzz_target(<name> SOURCES <name>_fuzz.cc USES <module>... PRIVATE_LINKS <target>...)
 # With PRESCENE_FUZZERS the libFuzzer program fuzz_<name>; otherwise fuzz_<name> feeds each file of
 # tests/fuzz/corpus/<name> through the same entry point once, as a CTest test with the label fuzz.
 function(prescene_fuzz_target name)
   cmake_parse_arguments(PARSE_ARGV 1 F "" "" "SOURCES;USES;PRIVATE_LINKS")
+  prescene_test_wanted(wanted fuzz_${name} USES ${F_USES} LINKS ${F_PRIVATE_LINKS})
+  if(NOT wanted)
+    return()
+  endif()
   list(TRANSFORM F_USES PREPEND prescene::)
   add_executable(fuzz_${name} ${F_SOURCES})
   target_link_libraries(fuzz_${name} PRIVATE ${F_USES} ${F_PRIVATE_LINKS})

@@ -2,7 +2,7 @@
 // Where rays hit a body. Rays are given in the frame of the body's mesh; `in_frame` brings them there.
 //
 //   QueryScratch scratch;                                                // one a thread, kept
-//   if (const auto hit = nearest_hit(cup, in_frame(X_CW, ray), scratch)) // p = origin + hit->t direction
+//   if (const auto hit = nearest_hit(cup, in_frame(X_CW, ray), scratch)) ... hit->t  // p = origin + t direction
 //   nearest_hits(cup, rays_of_a_depth_image, hits, scratch);             // rays that go together are faster together
 //
 // Both sides of triangles count, and so do edges, corners and the ends of the range of t. Which triangles are hit is

@@ -2,7 +2,7 @@
 // The file that every tree of this library is kept in, so that a service starts without building it anew: sections of
 // plain values behind a header that says which tree of which mesh and settings they are.
 //
-//   TreeFileKey key{.kind = "boxes", .layout = 1, .mesh_hash = mesh.content_hash(), .settings_hash = ...};
+//   TreeFileKey key{.kind = "boxes", .layout = 1, .mesh_hash = mesh.content_hash(), .settings_hash = hash};
 //   PRESCENE_RETURN_IF_ERROR(TreeFileWriter(key).add(nodes.span()).add(triangles.span()).write(path));
 //
 //   PRESCENE_TRY(const TreeFile file, TreeFile::open(path, key));

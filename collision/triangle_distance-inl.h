@@ -3,7 +3,7 @@
 // compiled for each target by foreach_target.h. The layouts are those of triangle_pairs-inl.h.
 //
 //   alignas(64) std::array<float, 16> distance;
-//   PairVerdict v = distance_of_pairs(a, b, nearest_so_far, distance.data());
+//   PairVerdict v = distance_of_4_against_4(leaf_a, leaf_b, nearest_so_far, distance.data());
 //
 // The smallest of the distances of nine pairs of edges and of six corners from the other's face, or zero where the
 // triangles certainly intersect. In double precision, and with the points: triangle_pair_distance.h.

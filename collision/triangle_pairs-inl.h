@@ -2,9 +2,9 @@
 // Intersection tests of up to 16 pairs of triangles at once, for the kernels of this library: include it in a source
 // that is compiled for each target by foreach_target.h.
 //
-//   PairVerdict v = test_16(SixteenOf{a}, SixteenOf{b}, active);   // 16 arbitrary pairs: a and b are float[9][16]
-//   PairVerdict v = test_4_against_4(a, b);                        // two leaves of four: float[9][4] each, pair 4 i +
-//   k LaneVerdict<D> v = test_lanes(d, a, b, active);                // vectors at hand
+//   PairVerdict each = test_16(SixteenOf{a}, SixteenOf{b}, active);  // 16 arbitrary pairs: a and b are float[9][16]
+//   PairVerdict four = test_4_against_4(leaf_a, leaf_b);             // two leaves, float[9][4] each: 4 i + k is (i, k)
+//   LaneVerdict<PairTag> lanes = test_lanes(d, corners_a, corners_b, mask);                 // vectors at hand
 //
 // An answer is never wrong: a pair whose determinants are not clear of rounding is "unsure". With the corners of one
 // triangle on both sides of the other's plane and vice versa, both meet the line of the two planes in an interval;

@@ -17,9 +17,9 @@ TimeNs steady_now_ns() {
     TimeNs wall_ns = wall_now_ns();
     steady_clock::time_point steady = steady_clock::now();
   };
-  static const Start start;
-  return start.wall_ns +
-         std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start.steady).count();
+  static const Start kStart;
+  return kStart.wall_ns +
+         std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - kStart.steady).count();
 }
 
 double process_cpu_seconds() {

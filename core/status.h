@@ -2,7 +2,7 @@
 // How a function says that the outside (a file, the bus, a driver, a setting) did not let it do its work.
 //
 //   Result<TriangleMesh> mesh = read_mesh(path, options);
-//   if (!mesh) return mesh.status();   // or PRESCENE_TRY(mesh, read_mesh(path, options));
+//   if (!mesh) return mesh.status();   // or PRESCENE_TRY(TriangleMesh mesh, read_mesh(path, options));
 //
 // The text of a status names the place (file, line, byte, key, topic) and the remedy. Our own bugs are PRESCENE_CHECK.
 #pragma once

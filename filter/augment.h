@@ -2,8 +2,8 @@
 // Operator 3, augment: what the belief does not explain yet. Objects that are not supported by the frame are looked for
 // in the whole image; clusters that no object explains may be new objects.
 //
-//   if (recover(...)) ...           // an object that was unseen, doubtful or lost
-//   new_objects(...)                // clusters that nobody explains
+//   recover(frame, terms, target, current, options, weighting, spread, tools, stream, object);  // unseen or lost
+//   new_objects(frame, observation, known, options, spread, tools, stream, belief);  // clusters that nothing explains
 #pragma once
 
 #include <array>
@@ -88,7 +88,8 @@ void exchange(belief::ObjectBelief& first, belief::ObjectBelief& second);
 /// Whether an object is to be looked for in the frame of this number.
 bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, std::uint64_t frame);
 
-/// Points in C of measured pixels that nothing known explains, row-major.
+/// Points in C of measured pixels that nothing known explains, row-major: those `tolerance` (m) or more in front of
+/// what the frame expects there without the objects, and those where it expects nothing.
 std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const rendering::FrameTerms& terms,
                                          double tolerance);
 

@@ -2,7 +2,7 @@
 // Finds known objects in a single frame without knowing where they are: clusters above a support, poses proposed per
 // cluster and model, the best explanation accepted first, then a second look at what is left.
 //
-//   std::vector<Detection> found = detect(terms, sampled, support, wanted, options, tools, stream);
+//   std::vector<Detection> found = detect(terms, known, sampled, support, wanted, options, tools, stream);
 #pragma once
 
 #include <span>
@@ -25,7 +25,8 @@ struct DetectionOptions {
   double min_log_ratio = 40.0;  ///< nats, untempered, at the likelihood's resolution.
   double max_sinking =
       0.03;                  ///< m below the support's plane that a pose may reach: planes and meshes are off by 15 mm.
-  double explained = 0.015;  ///< m; a measurement so near to a known surface (or behind it) is explained.
+  double explained = 0.015;  ///< m; a measurement so little in front of a known surface, or up to twice as much behind
+                             ///< it, is explained.
   RefineOptions settle = {
       .steps = 8, .first_gate = 0.02, .last_gate = 0.008};  ///< Joint refinement of what is accepted.
 };
@@ -50,7 +51,8 @@ std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry
                               const FilterTools& tools, const core::RandomStream& stream);
 
 /// The measured pixels of `sampled` that a surface of `known` (depth in `camera`) explains, as a mask of the sampled
-/// camera's size.
+/// camera's size: less than `tolerance` (m) in front of the surface and less than twice that behind it, where a surface
+/// reaches one pixel of `camera` past its outline.
 geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, const geometry::DepthImage& known,
                                                const geometry::PinholeCamera& camera, double tolerance);
 

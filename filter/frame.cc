@@ -127,7 +127,8 @@ geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, cons
   rendering::RenderScene scene;
   scene.instances.push_back({target.mesh, X_CO, target.material});
   geometry::DepthImage depth;
-  // The camera was checked when the frame was prepared, so a failure is a lost device: the object then hides nothing.
+  // The camera was checked when the frame was prepared, so a failure is a lost device: the object then hides nothing,
+  // and the filter's WatchedRenderer knows of it.
   if (!render_depth(scene, camera, Pose::identity(), renderer, &depth).ok())
     depth = geometry::DepthImage(camera.width, camera.height);
   return depth;

@@ -4,7 +4,7 @@
 //
 //   FrameCache cache;                                        // once
 //   FilterFrame frame;
-//   PRESCENE_RETURN_IF_ERROR(prepare_frame(scene, observation, robot, options, tools, cache, &frame));
+//   PRESCENE_RETURN_IF_ERROR(prepare_frame(scene, observation, X_WG, colors, options, tools, cache, &frame));
 #pragma once
 
 #include <map>

@@ -2,8 +2,8 @@
 // Operator 1, initialise: the first belief, from what the scene says of each object's start or, where it says too
 // little, from the first frame alone: support plane, clusters above it, poses proposed per model, refined.
 //
-//   Belief belief = belief_from_priors(scene, seed, options);          // no frame needed
-//   find_in_frame(observation, options, ..., belief);                  // objects whose place the scene leaves open
+//   belief::Belief belief = belief_from_priors(scene, seed, stamp_ns, options);  // no frame needed
+//   find_in_frame(frame, observation, options, tools, stream, belief);  // objects whose place the scene leaves open
 #pragma once
 
 #include <memory>

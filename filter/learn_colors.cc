@@ -80,7 +80,8 @@ void learn_colors(const FilterFrame& frame, const belief::Observation& observati
       seen.push_back(i);
   }
   SampledView view;
-  // The camera was checked when the frame was prepared, so a failure is a lost device: nothing is learned.
+  // The camera was checked when the frame was prepared, so a failure is a lost device: nothing is learned,
+  // and the filter's WatchedRenderer knows of it.
   if (seen.empty() || !render_belief(frame, observation.frame.camera, options.target_width, tools, belief, &view).ok())
     return;
   const geometry::LabelImage& labels = view.rendered.labels;

@@ -38,7 +38,9 @@ std::string degraded_text(std::uint32_t bits) {
                                                                 {kNoSupportFound, "no support found"},
                                                                 {kObjectsMissing, "objects missing"},
                                                                 {kImpossibleWeights, "impossible weights"},
-                                                                {kRobotPoseAssumed, "robot pose assumed"}};
+                                                                {kRobotPoseAssumed, "robot pose assumed"},
+                                                                {kPhysicsFailed, "physics failed"},
+                                                                {kRenderingFailed, "rendering failed"}};
   std::string text;
   for (const auto& [bit, name] : kNames) {
     if ((bits & bit) == 0) continue;
@@ -49,11 +51,13 @@ std::string degraded_text(std::uint32_t bits) {
 }
 
 ParticleFilter::ParticleFilter(const rendering::LikelihoodBatch& likelihood, rendering::Renderer& renderer,
-                               core::ThreadPool& threads, FilterSettings settings, SimulatorSource simulators)
+                               core::ThreadPool& threads, FilterSettings settings,
+                               simulation::SimulatorFactory simulators)
     : settings_(std::move(settings)),
       simulators_(std::move(simulators)),
       search_(likelihood, threads),
-      tools_{&search_, &renderer, &meshes_} {}
+      renderer_(renderer),
+      tools_{&search_, &renderer_, &meshes_} {}
 
 Belief ParticleFilter::start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const {
   return belief_from_priors(std::move(scene), seed, 0, settings_.initialise);
@@ -74,6 +78,14 @@ std::vector<Pose> ParticleFilter::robot_poses(const belief::Scene& scene, const 
     }
   }
   return X_WG;
+}
+
+void ParticleFilter::note_failed_rendering(StepResult& result) {
+  RenderFailures failures = renderer_.take_failures();
+  if (failures.count == 0) return;
+  result.degraded |= kRenderingFailed;
+  result.counters.not_drawn = failures.count;
+  result.rendering_failure = std::move(failures.first);
 }
 
 void ParticleFilter::follow_supports(const belief::Observation& observation, StepResult& result) const {
@@ -237,9 +249,14 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   if (has_depth && observation.X_WC.is_finite()) follow_supports(observation, result);
 
   const std::vector<Pose> X_WG = robot_poses(*belief.scene, observation, &result.degraded);
-  if (!first)
-    predict(belief, control, X_WG, dt, settings_.predict, simulators_,
-            core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads());
+  if (!first) {
+    PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, simulators_,
+                                   core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads());
+    result.counters.simulated = report.simulated;
+    result.counters.not_simulated = report.not_simulated;
+    result.physics_failure = std::move(report.failure);
+    if (report.not_simulated > 0) result.degraded |= kPhysicsFailed;
+  }
   belief.robot = X_WG;
   note("predict", result);
 
@@ -251,6 +268,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
     result.degraded |= kFrameRejected;
     if (first) belief.step = 0;  // the first look is still to be taken
     for (ObjectBelief& object : belief.objects) mark_unseen(observation.stamp_ns, settings_.track, object);
+    note_failed_rendering(result);
     return result;
   }
   belief.X_WC = observation.X_WC;
@@ -277,6 +295,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   if (settings_.recover) recover_all(frame, reports, result, depths);
   look_for_more(frame, observation, depths, result);
   number_islands(settings_.island_gap, meshes_, belief);
+  note_failed_rendering(result);
   note("augment", result);
   return result;
 }

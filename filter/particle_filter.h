@@ -2,7 +2,7 @@
 // The particle filter: five operators in a row, one frame after the other.
 //
 //   ParticleFilter filter(likelihood, renderer, threads, settings);
-//   Belief belief = filter.start(scene, seed);
+//   belief::Belief belief = filter.start(scene, seed);
 //   for (;;) {
 //     StepResult result = filter.step(belief, observation, control);
 //     belief = std::move(result.belief);
@@ -27,6 +27,7 @@
 #include "prescene/filter/resample.h"
 #include "prescene/filter/support_tracking.h"
 #include "prescene/filter/track_state.h"
+#include "prescene/filter/watched_renderer.h"
 #include "prescene/filter/weight.h"
 
 namespace prescene::filter {
@@ -58,11 +59,16 @@ enum Degraded : std::uint32_t {
   kObjectsMissing = 1u << 4,     ///< Some that were looked for at the start were not found.
   kImpossibleWeights = 1u << 5,  ///< A set's weights were all zero or not finite and were made equal.
   kRobotPoseAssumed = 1u << 6,   ///< A robot body was put where its timeline says: the observation did not name it.
+  kPhysicsFailed = 1u << 7,      ///< Particles went on at constant velocity in place of physics (see physics_failure).
+  kRenderingFailed = 1u << 8,    ///< A picture was not drawn (see rendering_failure): what it was to show hid nothing.
 };
 std::string degraded_text(std::uint32_t bits);
 
 struct StepCounters {
-  int resampled = 0;  ///< Particle sets.
+  int simulated = 0;      ///< Particles that physics moved.
+  int not_simulated = 0;  ///< That it was to move and could not: they went on at constant velocity.
+  int not_drawn = 0;      ///< Calls of the renderer that failed.
+  int resampled = 0;      ///< Particle sets.
   int recoveries_tried = 0;
   int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
@@ -79,7 +85,9 @@ using HashTrace = std::vector<std::pair<std::string, std::uint64_t>>;
 struct StepResult {
   belief::Belief belief;
   std::uint32_t degraded = 0;
-  core::Status frame_status;  ///< Why the frame was rejected; ok otherwise.
+  core::Status frame_status;       ///< Why the frame was rejected; ok otherwise.
+  std::string physics_failure;     ///< Why physics could not move the first of not_simulated; "" = it moved all.
+  core::Status rendering_failure;  ///< Why the first of not_drawn failed; ok otherwise.
   StepCounters counters;
   HashTrace trace;
   std::vector<SupportMeasurement> supports;  ///< Those flat ones that the frame shows, against the belief before it.
@@ -89,7 +97,7 @@ class ParticleFilter {
  public:
   /// All must outlive the filter.
   ParticleFilter(const rendering::LikelihoodBatch& likelihood, rendering::Renderer& renderer, core::ThreadPool& threads,
-                 FilterSettings settings, SimulatorSource simulators = {});
+                 FilterSettings settings, simulation::SimulatorFactory simulators = {});
 
   const FilterSettings& settings() const { return settings_; }
   MeshCache& meshes() { return meshes_; }
@@ -101,9 +109,9 @@ class ParticleFilter {
   StepResult step(const belief::Belief& belief, const belief::Observation& observation, const belief::Control& control);
 
  private:
-  struct Work;
   std::vector<Pose> robot_poses(const belief::Scene& scene, const belief::Observation& observation,
                                 std::uint32_t* degraded) const;
+  void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result) const;
   void first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result);
   void weigh_all(const FilterFrame& frame, double dt, StepResult& result, std::vector<geometry::DepthImage>& depths,
@@ -118,9 +126,10 @@ class ParticleFilter {
                                  const SearchTarget& target, const std::vector<geometry::DepthImage>& depths) const;
 
   FilterSettings settings_;
-  SimulatorSource simulators_;
+  simulation::SimulatorFactory simulators_;
   MeshCache meshes_;
   PoseSearch search_;
+  WatchedRenderer renderer_;
   FilterTools tools_;
   FrameCache frame_cache_;
 };

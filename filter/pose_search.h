@@ -5,7 +5,7 @@
 //   PoseSearch search(batch, pool);
 //   auto starts = disturbed_starts(X_CO, target.centre(), 0.029, 0.30, 32, stream);
 //   std::vector<PoseCandidate> found = search.run(terms, target, starts, options, stream);
-//   found.front().X_CO
+//   ... found.front().X_CO
 #pragma once
 
 #include <span>

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/sampling.h"
@@ -106,11 +109,13 @@ bool present(const ObjectBelief& object) {
   return object.existence >= 0.5 && object.state != belief::TrackState::kLost;
 }
 
-/// One particle that physics moves on.
+/// One particle that physics is to move on.
 struct Falling {
   std::size_t object;
   std::size_t particle;
   double duration;  ///< s
+  Pose X_WO;        ///< Where constant velocity takes it, ...
+  Twist V_WO;       ///< ... and how fast it is then.
 };
 
 /// The scene of one step: robot bodies go from where they were to where they are, absent objects are left out.
@@ -128,43 +133,104 @@ belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_W
   return scene;
 }
 
-/// Moves the falling particles by the simulator, each with the other objects where they most likely are.
-void simulate(belief::Belief& belief, std::span<const Falling> falling, std::span<const Pose> X_WG, double dt,
-              const SimulatorSource& simulators, const core::RandomStream& stream, core::ThreadPool& threads) {
-  std::vector<std::size_t> objects;
-  for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    if (present(belief.objects[i])) objects.push_back(i);
-  const belief::Scene scene = step_scene(belief, X_WG, dt, objects);
-  const std::unique_ptr<simulation::Simulator> simulator = simulators(scene);
-  if (!simulator) return;
+/// Constant velocity in place of physics.
+void go_on_without_physics(const Falling& falling, const std::string& why, belief::Belief& belief,
+                           PredictReport& report) {
+  Particle& particle = belief.objects[falling.object].particles[falling.particle];
+  particle.X_WO = falling.X_WO;
+  particle.V_WO = falling.V_WO;
+  if (report.not_simulated++ == 0) report.failure = why;
+}
+
+/// Why the end of a run is no prediction; nothing where it is one.
+std::optional<std::string> failure_of(const belief::Trajectory& run, std::size_t place) {
+  switch (run.end) {
+    case belief::TrajectoryEnd::kDuration:
+      break;
+    case belief::TrajectoryEnd::kDiverged:
+      return "diverged";
+    case belief::TrajectoryEnd::kLeftTheWorld:
+      return "left the simulated world";
+    case belief::TrajectoryEnd::kAtRest:
+    case belief::TrajectoryEnd::kCancelled:
+    case belief::TrajectoryEnd::kDecided:
+      return "ended before the step did";
+  }
+  if (run.states.empty() || place >= run.final().objects.size()) return "has no end";
+  const belief::ObjectState& end = run.final().objects[place];
+  const bool finite = end.X_WO.is_finite() && end.V_WO.linear.allFinite() && end.V_WO.angular.allFinite();
+  return finite ? std::nullopt : std::optional<std::string>("has no finite end");
+}
+
+/// Moves falling particles of one duration by the simulator, each with the other objects (`objects`, by index in the
+/// belief) where they most likely are.
+void simulate(belief::Belief& belief, std::span<const Falling> falling, const std::vector<std::size_t>& objects,
+              double dt, const simulation::Simulator& simulator, const core::RandomStream& stream,
+              core::ThreadPool& threads, PredictReport& report) {
   belief::WorldState common;
   for (const std::size_t i : objects) {
     const Particle& particle = belief::heaviest(belief.objects[i].particles);
     common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, particle.physical});
   }
+  const auto place_of = [&](const Falling& f) {
+    return static_cast<std::size_t>(std::find(objects.begin(), objects.end(), f.object) - objects.begin());
+  };
   std::vector<belief::WorldState> starts;
   for (const Falling& f : falling) {
     belief::WorldState start = common;
     start.time = dt - f.duration;
     const Particle& particle = belief.objects[f.object].particles[f.particle];
-    const auto place = static_cast<std::size_t>(std::find(objects.begin(), objects.end(), f.object) - objects.begin());
-    start.objects[place] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, particle.physical};
+    start.objects[place_of(f)] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, particle.physical};
     starts.push_back(std::move(start));
   }
   simulation::RunRequest request;
   request.stop.duration = falling.front().duration;
   request.stop.stop_at_rest = false;
+  // The world of a robot has no edge: what is far from its origin falls like everything else.
+  request.stop.world_radius = std::numeric_limits<double>::infinity();
   std::vector<belief::Trajectory> runs(starts.size());
-  simulator->run(starts, request, stream, 0, threads, runs);
+  simulator.run(starts, request, stream, 0, threads, runs);
   for (std::size_t i = 0; i < falling.size(); ++i) {
-    if (runs[i].end != belief::TrajectoryEnd::kDuration || runs[i].states.empty()) continue;
-    const auto place =
-        static_cast<std::size_t>(std::find(objects.begin(), objects.end(), falling[i].object) - objects.begin());
+    ObjectBelief& object = belief.objects[falling[i].object];
+    const std::size_t place = place_of(falling[i]);
+    if (const std::optional<std::string> failure = failure_of(runs[i], place)) {
+      go_on_without_physics(falling[i], "the simulated motion of '" + object.name + "' " + *failure, belief, report);
+      continue;
+    }
     const belief::ObjectState& end = runs[i].final().objects[place];
-    Particle& particle = belief.objects[falling[i].object].particles[falling[i].particle];
+    Particle& particle = object.particles[falling[i].particle];
     particle.X_WO = geometry::normalized(end.X_WO);
     particle.V_WO = end.V_WO;
+    ++report.simulated;
   }
+}
+
+/// Moves all falling particles on: by physics where that can be done.
+PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,
+                      const simulation::SimulatorFactory& simulators, const core::RandomStream& stream,
+                      core::ThreadPool& threads) {
+  PredictReport report;
+  if (falling.empty()) return report;
+  std::vector<std::size_t> objects;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    if (present(belief.objects[i])) objects.push_back(i);
+  const auto simulator = simulators(step_scene(belief, X_WG, dt, objects), 1.0);
+  if (!simulator) {
+    const std::string why = "no simulator could be made: " + simulator.status().message();
+    for (const Falling& f : falling) go_on_without_physics(f, why, belief, report);
+    return report;
+  }
+  PRESCENE_CHECK(*simulator != nullptr);
+  // Runs of one call share a duration.
+  std::stable_sort(falling.begin(), falling.end(),
+                   [](const auto& a, const auto& b) { return a.duration < b.duration; });
+  for (std::size_t begin = 0; begin < falling.size();) {
+    std::size_t end = begin;
+    while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
+    simulate(belief, std::span(falling).subspan(begin, end - begin), objects, dt, **simulator, stream, threads, report);
+    begin = end;
+  }
+  return report;
 }
 
 Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
@@ -226,9 +292,9 @@ void drift(Particle& particle, const Vector3d& p_OQ, double dt, double velocity_
   add_noise(noise, dt, particle.covariance);
 }
 
-void predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
-             const PredictOptions& options, const SimulatorSource& simulators, const core::RandomStream& stream,
-             core::ThreadPool& threads) {
+PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
+                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
+                      const core::RandomStream& stream, core::ThreadPool& threads) {
   PRESCENE_CHECK(belief.objects.size() == belief.scene->objects.size());
   PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
   PRESCENE_CHECK(dt > 0.0);
@@ -267,25 +333,18 @@ void predict(belief::Belief& belief, const belief::Control& control, std::span<c
         const Particle before = particle;
         drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep, options.moving);
         if (simulators && present(object) && physics_draw < physics_share) {
+          falling.push_back({i, k, left, particle.X_WO, particle.V_WO});
           particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike
           particle.V_WO = before.V_WO;
-          falling.push_back({i, k, left});
         }
       }
       limit_spread(options, particle.covariance);
     }
     if (released) set_holder(i, std::nullopt, belief);
   }
-  // Runs of one call share a duration.
-  std::stable_sort(falling.begin(), falling.end(),
-                   [](const auto& a, const auto& b) { return a.duration < b.duration; });
-  for (std::size_t begin = 0; begin < falling.size();) {
-    std::size_t end = begin;
-    while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
-    simulate(belief, std::span(falling).subspan(begin, end - begin), X_WG, dt, simulators, stream, threads);
-    begin = end;
-  }
+  PredictReport report = move_on(belief, std::move(falling), X_WG, dt, simulators, stream, threads);
   belief.robot.assign(X_WG.begin(), X_WG.end());
+  return report;
 }
 
 }  // namespace prescene::filter

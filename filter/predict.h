@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Operator 2, predict: what each particle does until the next frame. Resting stays, held moves with its hand, moving
 // goes on at constant velocity or falls by the laws of physics (a part of the particles each, the frame decides); some
-// particles change their mode.
+// particles change their mode. What physics cannot do goes on at constant velocity, and the report says so.
 //
-//   predict(belief, control, X_WG_now, dt, options, simulators, stream, pool);
+//   PredictReport report = predict(belief, control, X_WG_now, dt, options, simulators, stream, pool);
 #pragma once
 
-#include <functional>
-#include <memory>
+#include <optional>
 #include <span>
-#include <vector>
+#include <string>
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
@@ -19,10 +18,6 @@ namespace prescene::filter {
 
 using belief::Pose;
 using geometry::Vector3d;
-
-/// Makes a simulator of a scene (service knows which); empty = none, then everything that moves does so at constant
-/// velocity. Shapes should come from a cache: it is called once a step while something moves.
-using SimulatorSource = std::function<std::unique_ptr<simulation::Simulator>(const belief::Scene&)>;
 
 /// Standard deviations that are added within one second, as random walks: rates in m, rad per square root of a second.
 struct MotionNoise {
@@ -55,11 +50,24 @@ struct PredictOptions {
   double physics_after_release = 1.0;  ///< The same in the step in which an object was released.
 };
 
+/// What physics did in a step.
+struct PredictReport {
+  int simulated = 0;      ///< Particles that it moved.
+  int not_simulated = 0;  ///< Particles that it was to move and could not; they went on at constant velocity.
+  /// Why it could not move the first of these; "" = it moved all.
+  std::string failure;
+};
+
 /// Steps `belief` from its robot poses and stamp to `X_WG` and `dt` later (s, > 0). Actions of the control act at their
 /// times within the step. Weights do not change.
-void predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
-             const PredictOptions& options, const SimulatorSource& simulators, const core::RandomStream& stream,
-             core::ThreadPool& threads);
+///
+/// `simulators` is called at most once, with the scene of this step, and shapes should come from a cache; empty = none,
+/// then everything that moves does so at constant velocity. A particle whose simulator can't be made, or whose run does
+/// not last for the whole step or ends where nothing can be, goes on at constant velocity like those that are not meant
+/// for physics.
+PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
+                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
+                      const core::RandomStream& stream, core::ThreadPool& threads);
 
 /// One particle at constant velocity about the centre p_OQ for dt, its covariance grown by the noise.
 void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise);

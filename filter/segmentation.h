@@ -3,7 +3,7 @@
 //
 //   SampledDepth sampled = sample_depth(frame.depth, frame.camera, options);
 //   auto support = find_support_plane(sampled, options, stream);
-//   for (const Cluster& cluster : find_clusters(sampled, *support, {}, options)) ...
+//   for (const Cluster& cluster : find_clusters(sampled, support->region, {}, options)) ...
 #pragma once
 
 #include <optional>

@@ -3,7 +3,7 @@
 // by the Laplace evidence of the frame. A particle whose pose is hidden may stay hidden instead of moving onto what
 // hides it.
 //
-//   WeightReport report = weight(terms, target, X_WC, options, tools, stream, object.particles);
+//   WeightReport report = weight(terms, target, X_WC, dt, options, tools, stream, object.particles);
 #pragma once
 
 #include <span>
@@ -56,7 +56,7 @@ struct WeightReport {
   std::vector<ParticleWeight> particles;
   int heaviest = 0;
   double hidden_weight = 0.0;   ///< Of the particles that stayed hidden.
-  bool all_impossible = false;  ///< No particle had finite evidence: weights were left as they were.
+  bool all_impossible = false;  ///< No particle had a finite weight: the weights were made equal.
   /// Nats per visible pixel of the heaviest particle, worth less where the outline has no edge.
   double evidence_per_pixel = 0.0;
   double visible_share = 0.0;  ///< Of the pixels that it covers in view.

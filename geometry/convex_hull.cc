@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/cancellable.h"
 #include "prescene/geometry/triangle_mesh.h"
 
 namespace prescene::geometry {
@@ -52,21 +54,25 @@ struct Face {
   WideVector normal{};
   Wide tolerance = 0;                  // Height of a point that is just worth adding.
   std::vector<std::uint32_t> outside;  // Points above it that no earlier face took.
-  bool alive = true;
   bool visible = false;
+  std::uint32_t skipped = kNone;  // First of the skipped points that are above it, see Quickhull::next_skipped_.
 };
 
 // The hull of distinct points in lexicographic order, which do not lie in a plane.
 class Quickhull {
  public:
-  explicit Quickhull(const std::vector<GridPoint>& points) : points_(points), face_from_(points.size(), kNone) {}
+  explicit Quickhull(const std::vector<GridPoint>& points)
+      : points_(points), next_skipped_(points.size(), kNone), face_from_(points.size(), kNone) {}
 
-  // False when all points lie in (almost) one plane.
-  bool build() {
+  // False when all points lie in (almost) one plane, and where it was stopped.
+  bool build(const core::Cancellation* cancellation) {
     if (!make_simplex()) return false;
-    for (std::uint32_t f = 0; f < faces_.size();) {
-      for (; f < faces_.size(); ++f) {
-        while (faces_[f].alive && !faces_[f].outside.empty()) add_point(f, farthest(f));
+    for (std::uint32_t f = 0; f < slots_.size();) {
+      for (; f < slots_.size(); ++f) {
+        while (is_alive(f) && !face(f).outside.empty()) {
+          if (cancellation && cancellation->requested()) return false;
+          add_point(f, farthest(f));
+        }
       }
       // A point may be just above a face that is gone but clearly above one of those that stayed.
       f = reconsider_skipped();
@@ -77,10 +83,10 @@ class Quickhull {
   // Points in which at least three edges meet that are true edges; the others lie inside a side or an edge of the hull.
   std::vector<std::uint32_t> corners() const {
     std::vector<int> edges(points_.size(), 0);
-    for (const Face& face : faces_) {
-      if (!face.alive) continue;
+    for (std::uint32_t f = 0; f < slots_.size(); ++f) {
+      if (!is_alive(f)) continue;
       for (std::size_t k = 0; k < 3; ++k) {
-        if (height(face, opposite(face, k)) != 0) ++edges[face.corners[k]];
+        if (height(face(f), opposite(face(f), k)) != 0) ++edges[face(f).corners[k]];
       }
     }
     std::vector<std::uint32_t> result;
@@ -92,13 +98,17 @@ class Quickhull {
 
   std::vector<std::array<std::uint32_t, 3>> triangles() const {
     std::vector<std::array<std::uint32_t, 3>> result;
-    for (const Face& face : faces_) {
-      if (face.alive) result.push_back(face.corners);
+    for (std::uint32_t f = 0; f < slots_.size(); ++f) {
+      if (is_alive(f)) result.push_back(face(f).corners);
     }
     return result;
   }
 
  private:
+  bool is_alive(std::uint32_t f) const { return slots_[f] != kNone; }
+  Face& face(std::uint32_t f) { return faces_[slots_[f]]; }
+  const Face& face(std::uint32_t f) const { return faces_[slots_[f]]; }
+
   // Six times the signed volume of the tetrahedron of a face and a point; positive above the face.
   Wide height(const Face& face, std::uint32_t point) const {
     const GridPoint d = difference(points_[point], points_[face.corners[0]]);
@@ -106,10 +116,9 @@ class Quickhull {
   }
 
   // The corner of the neighbour across edge k that the face does not share.
-  std::uint32_t opposite(const Face& face, std::size_t k) const {
-    const Face& neighbour = faces_[face.neighbours[k]];
-    for (const std::uint32_t corner : neighbour.corners) {
-      if (corner != face.corners[k] && corner != face.corners[(k + 1) % 3]) return corner;
+  std::uint32_t opposite(const Face& of, std::size_t k) const {
+    for (const std::uint32_t corner : face(of.neighbours[k]).corners) {
+      if (corner != of.corners[k] && corner != of.corners[(k + 1) % 3]) return corner;
     }
     core::check_failed(__FILE__, __LINE__, "two faces of a hull share all corners", {});
   }
@@ -136,48 +145,102 @@ class Quickhull {
   }
 
   std::uint32_t farthest(std::uint32_t f) const {
-    const Face& face = faces_[f];
-    return pick(face.outside, face.corners[0], static_cast<double>(face.tolerance),
-                [&](std::uint32_t i) { return static_cast<double>(height(face, i)); });
+    const Face& from = face(f);
+    return pick(from.outside, from.corners[0], static_cast<double>(from.tolerance),
+                [&](std::uint32_t i) { return static_cast<double>(height(from, i)); });
   }
 
   std::uint32_t add_face(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    Face face;
-    face.corners = {a, b, c};
-    face.normal = cross(difference(points_[b], points_[a]), difference(points_[c], points_[a]));
-    face.tolerance = static_cast<Wide>(kTolerance * norm(face.normal));
-    faces_.push_back(std::move(face));
-    return static_cast<std::uint32_t>(faces_.size() - 1);
+    if (free_.empty()) {
+      free_.push_back(static_cast<std::uint32_t>(faces_.size()));
+      faces_.emplace_back();
+    }
+    slots_.push_back(free_.back());
+    free_.pop_back();
+    const auto made = static_cast<std::uint32_t>(slots_.size() - 1);
+    Face& face_made = face(made) = Face{};
+    face_made.corners = {a, b, c};
+    face_made.normal = cross(difference(points_[b], points_[a]), difference(points_[c], points_[a]));
+    face_made.tolerance = static_cast<Wide>(kTolerance * norm(face_made.normal));
+    return made;
   }
 
   // Gives each point to the first of the faces from `begin` that it lies clearly above; the others are inside, or
   // skipped.
   void assign(const std::vector<std::uint32_t>& candidates, std::uint32_t begin) {
     for (const std::uint32_t point : candidates) {
-      bool above = false;
+      std::uint32_t first_below = kNone;
       bool taken = false;
-      for (std::uint32_t f = begin; f < faces_.size() && !taken; ++f) {
-        const Wide h = height(faces_[f], point);
-        above = above || h > 0;
-        taken = h > faces_[f].tolerance;
-        if (taken) faces_[f].outside.push_back(point);
+      for (std::uint32_t f = begin; f < slots_.size() && !taken; ++f) {
+        const Wide h = height(face(f), point);
+        if (h > 0 && first_below == kNone) first_below = f;
+        taken = h > face(f).tolerance;
+        if (taken) face(f).outside.push_back(point);
       }
-      if (above && !taken) skipped_.push_back(point);
+      if (first_below == kNone || taken) continue;
+      skipped_.push_back(point);
+      keep_above(first_below, point);
     }
+  }
+
+  // Remembers for a skipped point one face that it is above.
+  void keep_above(std::uint32_t f, std::uint32_t point) {
+    next_skipped_[point] = std::exchange(face(f).skipped, point);
+  }
+
+  // The skipped points of a face that is gone are kept at one of the new faces from `begin`: a point above both a gone
+  // face and one that stayed is above the new face at some edge of the outline, because what it sees is connected.
+  // Who is above none of them has become a point inside.
+  void keep_above_new(std::uint32_t gone, std::uint32_t begin) {
+    for (std::uint32_t point = std::exchange(face(gone).skipped, kNone); point != kNone;) {
+      const std::uint32_t next = next_skipped_[point];
+      for (std::uint32_t f = begin; f < slots_.size(); ++f) {
+        if (height(face(f), point) <= 0) continue;
+        keep_above(f, point);
+        break;
+      }
+      point = next;
+    }
+  }
+
+  // Of the faces that a point sees, `seen` one of them, the first that it is more than twice the tolerance above.
+  std::uint32_t first_far_below(std::uint32_t seen, std::uint32_t point) {
+    std::uint32_t first = kNone;
+    std::vector<std::uint32_t> visible = {seen};
+    face(seen).visible = true;
+    for (std::size_t i = 0; i < visible.size(); ++i) {
+      const Face& seen_too = face(visible[i]);
+      if (height(seen_too, point) > 2 * seen_too.tolerance) first = std::min(first, visible[i]);
+      for (const std::uint32_t n : seen_too.neighbours) {
+        if (face(n).visible || height(face(n), point) <= 0) continue;
+        face(n).visible = true;
+        visible.push_back(n);
+      }
+    }
+    for (const std::uint32_t f : visible) face(f).visible = false;
+    return first;
   }
 
   // Gives skipped points to faces that they are more than twice the tolerance above; returns the first such face, or
   // the number of faces when there is none.
   std::uint32_t reconsider_skipped() {
-    auto first = static_cast<std::uint32_t>(faces_.size());
+    std::vector<std::uint32_t> witness(points_.size(), kNone);
+    for (std::uint32_t f = 0; f < slots_.size(); ++f) {
+      if (!is_alive(f)) continue;
+      for (std::uint32_t point = face(f).skipped; point != kNone; point = next_skipped_[point]) witness[point] = f;
+      face(f).skipped = kNone;
+    }
+    auto first = static_cast<std::uint32_t>(slots_.size());
     std::erase_if(skipped_, [&](std::uint32_t point) {
-      for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-        if (!faces_[f].alive || height(faces_[f], point) <= 2 * faces_[f].tolerance) continue;
-        faces_[f].outside.push_back(point);
-        first = std::min(first, f);
-        return true;
+      if (witness[point] == kNone) return true;  // Inside by now.
+      const std::uint32_t f = first_far_below(witness[point], point);
+      if (f == kNone) {
+        keep_above(witness[point], point);
+        return false;
       }
-      return false;
+      face(f).outside.push_back(point);
+      first = std::min(first, f);
+      return true;
     });
     return first;
   }
@@ -197,19 +260,20 @@ class Quickhull {
     const std::uint32_t third = pick(all, first, kTolerance, from_base);
     if (from_base(third) < kThin) return false;
 
-    const Face base_face = faces_[add_face(first, second, third)];
+    const Face base_face = face(add_face(first, second, third));
     const auto from_base_face = [&](std::uint32_t i) { return std::abs(static_cast<double>(height(base_face, i))); };
     const std::uint32_t fourth = pick(all, first, static_cast<double>(base_face.tolerance), from_base_face);
     if (from_base_face(fourth) < kThin * norm(base_face.normal)) return false;
 
+    slots_.clear();
     faces_.clear();
     std::array<std::uint32_t, 3> floor = {first, second, third};
     if (height(base_face, fourth) > 0) std::swap(floor[1], floor[2]);  // The floor faces away from the fourth point.
     add_face(floor[0], floor[1], floor[2]);
     for (std::size_t e = 0; e < 3; ++e) add_face(floor[(e + 1) % 3], floor[e], fourth);
     for (std::uint32_t e = 0; e < 3; ++e) {
-      faces_[0].neighbours[e] = 1 + e;
-      faces_[1 + e].neighbours = {0, 1 + (e + 2) % 3, 1 + (e + 1) % 3};
+      face(0).neighbours[e] = 1 + e;
+      face(1 + e).neighbours = {0, 1 + (e + 2) % 3, 1 + (e + 1) % 3};
     }
     assign(all, 0);
     return true;
@@ -218,50 +282,56 @@ class Quickhull {
   // Replaces the faces that a point sees by the cone from the point to their outline.
   void add_point(std::uint32_t seen_face, std::uint32_t eye) {
     std::vector<std::uint32_t> visible = {seen_face};
-    faces_[seen_face].visible = true;
+    face(seen_face).visible = true;
     for (std::size_t i = 0; i < visible.size(); ++i) {
-      for (const std::uint32_t n : faces_[visible[i]].neighbours) {
-        if (faces_[n].visible || height(faces_[n], eye) <= 0) continue;
-        faces_[n].visible = true;
+      for (const std::uint32_t n : face(visible[i]).neighbours) {
+        if (face(n).visible || height(face(n), eye) <= 0) continue;
+        face(n).visible = true;
         visible.push_back(n);
       }
     }
 
-    const auto first_new = static_cast<std::uint32_t>(faces_.size());
+    const auto first_new = static_cast<std::uint32_t>(slots_.size());
     for (const std::uint32_t f : visible) {
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t beyond = faces_[f].neighbours[k];
-        if (faces_[beyond].visible) continue;
-        const std::uint32_t from = faces_[f].corners[k];
-        const std::uint32_t to = faces_[f].corners[(k + 1) % 3];
+        const std::uint32_t beyond = face(f).neighbours[k];
+        if (face(beyond).visible) continue;
+        const std::uint32_t from = face(f).corners[k];
+        const std::uint32_t to = face(f).corners[(k + 1) % 3];
         const std::uint32_t made = add_face(from, to, eye);
-        faces_[made].neighbours[0] = beyond;
+        face(made).neighbours[0] = beyond;
         for (std::size_t m = 0; m < 3; ++m) {
-          if (faces_[beyond].corners[m] == to) faces_[beyond].neighbours[m] = made;
+          if (face(beyond).corners[m] == to) face(beyond).neighbours[m] = made;
         }
         PRESCENE_CHECK_MSG(face_from_[from] == kNone, "the outline of the visible faces is one loop");
         face_from_[from] = made;
       }
     }
-    for (std::uint32_t f = first_new; f < faces_.size(); ++f) {
-      const std::uint32_t next = face_from_[faces_[f].corners[1]];
+    for (std::uint32_t f = first_new; f < slots_.size(); ++f) {
+      const std::uint32_t next = face_from_[face(f).corners[1]];
       PRESCENE_CHECK(next != kNone);
-      faces_[f].neighbours[1] = next;
-      faces_[next].neighbours[2] = f;
+      face(f).neighbours[1] = next;
+      face(next).neighbours[2] = f;
     }
-    for (std::uint32_t f = first_new; f < faces_.size(); ++f) face_from_[faces_[f].corners[0]] = kNone;
+    for (std::uint32_t f = first_new; f < slots_.size(); ++f) face_from_[face(f).corners[0]] = kNone;
 
     for (const std::uint32_t f : visible) {
-      faces_[f].alive = faces_[f].visible = false;
-      const std::vector<std::uint32_t> orphans = std::exchange(faces_[f].outside, {});
+      const std::vector<std::uint32_t> orphans = std::exchange(face(f).outside, {});
       assign(orphans, first_new);
+      keep_above_new(f, first_new);
+      free_.push_back(std::exchange(slots_[f], kNone));
     }
   }
 
   const std::vector<GridPoint>& points_;
-  std::vector<Face> faces_;
-  std::vector<std::uint32_t> skipped_;    // Points above a face by less than the tolerance.
-  std::vector<std::uint32_t> face_from_;  // While a cone is made: its face whose outline edge starts at the vertex.
+  // Faces have numbers in the order in which they were made. Only those that are part of the hull are kept: of the
+  // others there are several times as many.
+  std::vector<std::uint32_t> slots_;  // For each face its place in faces_; kNone once it is gone.
+  std::deque<Face> faces_;
+  std::vector<std::uint32_t> free_;     // Places in faces_.
+  std::vector<std::uint32_t> skipped_;  // Points above a face by less than the tolerance, in the order of skipping.
+  std::vector<std::uint32_t> next_skipped_;  // For a skipped point the next one of the same face, see Face::skipped.
+  std::vector<std::uint32_t> face_from_;     // While a cone is made: its face whose outline edge starts at the vertex.
 };
 
 struct GridEntry {
@@ -302,7 +372,9 @@ std::vector<GridPoint> places_of(const std::vector<GridEntry>& entries) {
 
 }  // namespace
 
-core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) {
+core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) { return convex_hull(points, nullptr); }
+
+core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points, const core::Cancellation* cancellation) {
   for (const Vector3d& p : points) {
     if (!p.allFinite()) return core::invalid_input("a point for a convex hull is not finite: repair the mesh first");
   }
@@ -311,7 +383,8 @@ core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points) {
   while (true) {
     const std::vector<GridPoint> places = places_of(entries);
     Quickhull hull(places);
-    if (!hull.build()) {
+    if (!hull.build(cancellation)) {
+      if (cancellation && cancellation->requested()) return core::cancelled("the making of a convex hull was stopped");
       return core::invalid_input("a convex hull needs points that do not lie in one plane; these " +
                                  std::to_string(points.size()) + " do: give the body a thickness");
     }

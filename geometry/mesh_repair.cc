@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "mesh_edges.h"
+#include "prescene/geometry/cancellable.h"
 #include "prescene/geometry/triangle_mesh.h"
 
 namespace prescene::geometry {
@@ -62,6 +63,10 @@ bool edge_exists(const std::vector<EdgeUse>& uses, std::uint32_t a, std::uint32_
 // neighbour's edge, the sliver is gone and the surface stays as it was. Returns how many were flipped; each pass leaves
 // alone what it touched already.
 int flip_slivers(const std::vector<Vector3d>& vertices, std::vector<Triangle>& triangles) {
+  // Most meshes have none, and to find neighbours takes longer than to see that.
+  if (std::none_of(triangles.begin(), triangles.end(),
+                   [&](const Triangle& t) { return sliver_corner(vertices, t).has_value(); }))
+    return 0;
   const std::vector<EdgeUse> uses = edge_uses(triangles);
   std::vector<bool> touched(triangles.size(), false);
   int flips = 0;
@@ -93,9 +98,16 @@ int remove_slivers(const std::vector<Vector3d>& vertices, std::vector<Triangle>&
       std::erase_if(triangles, [&](const Triangle& t) { return sliver_corner(vertices, t).has_value(); }));
 }
 
+core::Status cancelled_repair() { return core::cancelled("the repair of a mesh was stopped"); }
+
 }  // namespace
 
 core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* report) {
+  return repair_mesh(std::move(mesh), report, nullptr);
+}
+
+core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* report,
+                                       const core::Cancellation* cancellation) {
   MeshRepairReport found;
   std::vector<Triangle>& triangles = mesh.triangles;
   const std::size_t count = mesh.vertices.size();
@@ -111,7 +123,10 @@ core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* repo
   // Welding closes the seams of files that repeat vertices (STL, or one vertex for each texture coordinate). A surface
   // that is closed by its own indices is only welded when it stays so: scans of thin walls touch themselves in single
   // points.
+  const auto stopped = [cancellation] { return cancellation && cancellation->requested(); };
+  if (stopped()) return cancelled_repair();
   const bool closed_before = edges_are_closed(triangles);
+  if (stopped()) return cancelled_repair();
   const std::vector<std::uint32_t> welded = welded_indices(mesh.vertices);
   std::vector<Triangle> candidate = triangles;
   for (Triangle& t : candidate) {
@@ -128,6 +143,7 @@ core::Result<TriangleMesh> repair_mesh(TriangleMesh mesh, MeshRepairReport* repo
   constexpr int kMaxPasses = 16;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     const int flips = flip_slivers(mesh.vertices, triangles);
+    if (stopped()) return cancelled_repair();
     if (flips == 0) break;
     found.flipped_edges += flips;
   }

@@ -9,6 +9,24 @@
 #include "prescene/geometry/triangle_mesh.h"
 
 namespace prescene::geometry {
+namespace {
+
+// Into the order of their lower vertices, one pass over them; false where the vertices' numbers are so much larger than
+// their count that a list over all of these would be out of proportion.
+bool order_by_low(std::vector<EdgeUse>& uses) {
+  std::size_t end = 0;
+  for (const EdgeUse& use : uses) end = std::max(end, std::size_t{use.low} + 1);
+  if (end > 4 * uses.size()) return false;
+  std::vector<std::uint32_t> place(end + 1, 0);
+  for (const EdgeUse& use : uses) ++place[use.low + 1];
+  std::partial_sum(place.begin(), place.end(), place.begin());
+  std::vector<EdgeUse> ordered(uses.size());
+  for (const EdgeUse& use : uses) ordered[place[use.low]++] = use;
+  uses = std::move(ordered);
+  return true;
+}
+
+}  // namespace
 
 std::vector<EdgeUse> edge_uses(const std::vector<Triangle>& triangles) {
   std::vector<EdgeUse> uses;
@@ -22,9 +40,18 @@ std::vector<EdgeUse> edge_uses(const std::vector<Triangle>& triangles) {
       uses.push_back({std::min(a, b), std::max(a, b), static_cast<std::uint32_t>(i), k, a < b});
     }
   }
-  std::sort(uses.begin(), uses.end(), [](const EdgeUse& x, const EdgeUse& y) {
+  const auto before = [](const EdgeUse& x, const EdgeUse& y) {
     return std::tie(x.low, x.high, x.triangle) < std::tie(y.low, y.high, y.triangle);
-  });
+  };
+  if (!order_by_low(uses)) {
+    std::sort(uses.begin(), uses.end(), before);
+    return uses;
+  }
+  for (auto begin = uses.begin(); begin != uses.end();) {
+    const auto end = std::find_if(begin, uses.end(), [&](const EdgeUse& use) { return use.low != begin->low; });
+    std::sort(begin, end, before);
+    begin = end;
+  }
   return uses;
 }
 

@@ -9,10 +9,14 @@
 #include <numeric>
 #include <utility>
 
+#include "mesh_edges.h"
+
 namespace prescene::geometry {
 namespace {
 
-using Edge = std::pair<std::uint32_t, std::uint32_t>;
+constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
+/// For each triangle those beyond its edges: of edge k from corner k to the next.
+using Neighbours = std::vector<std::array<std::uint32_t, 3>>;
 
 /// A face of the hull: coplanar triangles together.
 struct Face {
@@ -38,8 +42,7 @@ Vector3d area_normal(const TriangleMesh& hull, std::size_t triangle) {
 }
 
 /// The face number of each triangle.
-std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, std::size_t>& triangle_of_edge,
-                                double flatness) {
+std::vector<int> merge_coplanar(const TriangleMesh& hull, const Neighbours& neighbours, double flatness) {
   std::vector<int> face_of(hull.triangles.size(), -1);
   int faces = 0;
   for (std::size_t seed = 0; seed < hull.triangles.size(); ++seed) {
@@ -49,15 +52,13 @@ std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, s
     std::vector<std::size_t> open{seed};
     face_of[seed] = faces;
     while (!open.empty()) {
-      const auto corners = hull.triangles[open.back()];
+      const std::array<std::uint32_t, 3>& around = neighbours[open.back()];
       open.pop_back();
-      for (int k = 0; k < 3; ++k) {
-        const auto beyond = triangle_of_edge.find(
-            {corners[static_cast<std::size_t>((k + 1) % 3)], corners[static_cast<std::size_t>(k)]});
-        if (beyond == triangle_of_edge.end() || face_of[beyond->second] >= 0) continue;
-        if (area_normal(hull, beyond->second).normalized().dot(normal) < std::cos(flatness)) continue;
-        face_of[beyond->second] = faces;
-        open.push_back(beyond->second);
+      for (const std::uint32_t beyond : around) {
+        if (beyond == kNoTriangle || face_of[beyond] >= 0) continue;
+        if (area_normal(hull, beyond).normalized().dot(normal) < std::cos(flatness)) continue;
+        face_of[beyond] = faces;
+        open.push_back(beyond);
       }
     }
     ++faces;
@@ -65,18 +66,19 @@ std::vector<int> merge_coplanar(const TriangleMesh& hull, const std::map<Edge, s
   return face_of;
 }
 
-/// What lies beyond the edge of a triangle is found by the edge the other way round.
-std::map<Edge, std::size_t> triangles_by_edge(const TriangleMesh& hull) {
-  std::map<Edge, std::size_t> triangle_of_edge;
-  for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) triangle_of_edge[{hull.triangles[t][k], hull.triangles[t][(k + 1) % 3]}] = t;
-  }
-  return triangle_of_edge;
+Neighbours neighbours_of(const TriangleMesh& hull) {
+  Neighbours neighbours(hull.triangles.size(), {kNoTriangle, kNoTriangle, kNoTriangle});
+  for_each_edge(edge_uses(hull.triangles), [&](std::span<const EdgeUse> uses) {
+    if (uses.size() != 2) return;
+    neighbours[uses[0].triangle][uses[0].corner] = uses[1].triangle;
+    neighbours[uses[1].triangle][uses[1].corner] = uses[0].triangle;
+  });
+  return neighbours;
 }
 
 /// How a body whose centre of mass is the origin stands on each face, and where it rolls from those that don't carry
 /// it.
-std::vector<Face> measure_faces(const TriangleMesh& hull, const std::map<Edge, std::size_t>& triangle_of_edge,
+std::vector<Face> measure_faces(const TriangleMesh& hull, const Neighbours& neighbours,
                                 const std::vector<int>& face_of) {
   std::vector<Face> faces(static_cast<std::size_t>(*std::ranges::max_element(face_of)) + 1);
   for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
@@ -99,14 +101,14 @@ std::vector<Face> measure_faces(const TriangleMesh& hull, const std::map<Edge, s
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t from = hull.triangles[t][k];
         const std::uint32_t to = hull.triangles[t][(k + 1) % 3];
-        const auto beyond = triangle_of_edge.find({to, from});
-        if (beyond == triangle_of_edge.end() || face_of[beyond->second] == static_cast<int>(f)) continue;
+        const std::uint32_t beyond = neighbours[t][k];
+        if (beyond == kNoTriangle || face_of[beyond] == static_cast<int>(f)) continue;
         // How far inside of this edge the centre of mass stands.
         const Vector3d outward = (hull.vertices[to] - hull.vertices[from]).cross(face.normal).normalized();
         const double inside = outward.dot(hull.vertices[from]);
         if (inside < least) {
           least = inside;
-          face.rolls_to = face_of[beyond->second];
+          face.rolls_to = face_of[beyond];
         }
       }
     }
@@ -151,11 +153,16 @@ bool join_faces_that_roll_in_circles(const std::vector<Face>& faces, std::vector
 core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm,
                                                      double flatness) {
   PRESCENE_TRY(TriangleMesh hull, convex_hull(mesh.vertices));
+  return resting_poses_of_hull(std::move(hull), p_BoBcm, flatness);
+}
+
+core::Result<std::vector<RestingPose>> resting_poses_of_hull(TriangleMesh hull, const Vector3d& p_BoBcm,
+                                                             double flatness) {
   for (Vector3d& vertex : hull.vertices) vertex -= p_BoBcm;  // from here on about the centre of mass
-  const std::map<Edge, std::size_t> triangle_of_edge = triangles_by_edge(hull);
-  std::vector<int> face_of = merge_coplanar(hull, triangle_of_edge, flatness);
-  std::vector<Face> faces = measure_faces(hull, triangle_of_edge, face_of);
-  while (join_faces_that_roll_in_circles(faces, face_of)) faces = measure_faces(hull, triangle_of_edge, face_of);
+  const Neighbours neighbours = neighbours_of(hull);
+  std::vector<int> face_of = merge_coplanar(hull, neighbours, flatness);
+  std::vector<Face> faces = measure_faces(hull, neighbours, face_of);
+  while (join_faces_that_roll_in_circles(faces, face_of)) faces = measure_faces(hull, neighbours, face_of);
   if (std::ranges::any_of(faces, [](const Face& face) { return face.height <= 0.0; }))
     return core::invalid_input("the centre of mass is not inside of the convex hull: correct one of them");
 

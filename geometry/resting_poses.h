@@ -23,5 +23,8 @@ struct RestingPose {
 /// kInvalidInput when the vertices lie in a plane or the centre of mass is outside of the hull.
 core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, const Vector3d& p_BoBcm,
                                                      double flatness = 0.02);
+/// The same of a mesh's convex hull, where it is known already.
+core::Result<std::vector<RestingPose>> resting_poses_of_hull(TriangleMesh hull, const Vector3d& p_BoBcm,
+                                                             double flatness = 0.02);
 
 }  // namespace prescene::geometry

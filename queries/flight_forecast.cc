@@ -6,25 +6,22 @@
 
 namespace prescene::queries {
 
-std::optional<belief::FlightForecast> forecast_flight(const Foresight& foresight, const Prior& prior,
-                                                      const QueryContext& context) {
-  if (!context.shapes) return std::nullopt;
+core::Status forecast_flight(const Foresight& foresight, const Prior& prior, const QueryContext& context,
+                             belief::PredictAnswer& answer) {
+  if (!context.shapes) return core::ok_status();
   const belief::Scene& scene = *foresight.scene;
   const auto bodies = simulation::FlightBodies::make(scene, *context.shapes);
-  if (!bodies) return std::nullopt;
-  const auto make_simulator = [&](const belief::Scene& flown) {
-    return context.make_simulator(std::make_shared<const belief::Scene>(flown));
-  };
-  const auto flight = simulation::common_flight(scene, *bodies, prior.starts, foresight.request, make_simulator,
+  if (!bodies) return core::ok_status();
+  const auto flight = simulation::common_flight(scene, *bodies, prior.starts, foresight.request, context.make_simulator,
                                                 prior.stream, *context.pool, {}, context.cancellation);
-  if (!flight) return std::nullopt;
-  belief::FlightForecast forecast;
+  if (!flight) return flight.status().code() == core::StatusCode::kCancelled ? core::ok_status() : flight.status();
+  belief::FlightForecast& forecast = answer.flight.emplace();
   forecast.apart_until = flight->apart_until;
   forecast.end = flight->end;
   for (const simulation::FlightOpening& opening : flight->openings)
     forecast.may_touch.push_back({belief::body_name(scene, opening.first), belief::body_name(scene, opening.second),
                                   opening.probability, opening.probability_error});
-  return forecast;
+  return core::ok_status();
 }
 
 }  // namespace prescene::queries

@@ -39,13 +39,14 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   if (!context.make_simulator) return core::unavailable("no simulator: this service was set up without one");
 
   Foresight foresight;
-  PRESCENE_TRY(foresight.simulator, context.make_simulator(scene));
+  PRESCENE_TRY(foresight.simulator, context.make_simulator(*scene, 1.0));
   const double step = foresight.simulator->step_size();
   if (!(duration >= step && duration <= belief::kDurations.high))
     return core::invalid_input("a duration of " + core::rounded_text(duration) +
                                " s: give at least one step of the simulator, " + core::rounded_text(step) +
                                " s, and at most 3600 s");
   foresight.request.actions = scene->actions;
+  PRESCENE_RETURN_IF_ERROR(foresight.simulator->supports(foresight.request));
   foresight.request.stop.duration = duration;
   foresight.request.stop.stop_at_rest = scene->stop_at_rest;
   foresight.request.sample_interval = needs_states_along_the_way(*scene) ? kJudgingInterval : 0.0;

@@ -180,8 +180,6 @@ std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, cons
 
 core::Result<std::optional<belief::ModelError>> model_error(const Foresight& foresight, const Prior& prior,
                                                             double confidence, const QueryContext& context) {
-  if (!context.make_simulator_of_step)
-    return core::unavailable("no simulator of other steps: this service was set up without one");
   const std::size_t count = std::min(kRepeated, foresight.estimate.instances.size());
   const std::vector<belief::WorldState> starts =
       simulation::starts_of(prior.starts, foresight.estimate, count, prior.stream, *context.pool);
@@ -196,7 +194,7 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
   for (std::size_t n = 0; n < variants.size(); ++n) {
     const Variant& variant = variants[n];
     tell(context, static_cast<double>(n) / static_cast<double>(variants.size()), "the model's error: " + variant.what);
-    PRESCENE_TRY(const auto simulator, context.make_simulator_of_step(variant.scene, variant.step_factor));
+    PRESCENE_TRY(const auto simulator, context.make_simulator(*variant.scene, variant.step_factor));
     // No certificates: they know the scene's friction, not a variant's.
     const auto after = simulation::classes_from(*simulator, variant.starts, foresight.variables, foresight.request,
                                                 prior.stream, nullptr, *context.pool, context.cancellation);

@@ -141,6 +141,9 @@ void account(const Foresight& foresight, belief::PredictAnswer& answer) {
   answer.simulated_seconds = estimate.simulated_seconds;
   answer.flown_seconds = estimate.flown_seconds;
   answer.step = foresight.simulator->step_size();
+  const simulation::StepperUse stepper = foresight.simulator->stepper();
+  answer.stepper = stepper.name;
+  answer.not_lockstep = stepper.not_lockstep;
   answer.certificates = {foresight.certifier != nullptr, estimate.certificates.certified, estimate.certificates.audited,
                          estimate.certificates.mismatches, estimate.certificates.switched_off};
   for (const simulation::InstanceRecord& record : estimate.instances) {
@@ -250,8 +253,9 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   });
   work_out(tell.contacts, "contacts",
            [&] { return forecast_contacts(foresight, query.effort.confidence, context.abandoned, answer); });
+  core::Status flight;
   work_out(tell.contacts, "flight", [&] {
-    answer.flight = forecast_flight(foresight, prior, context);
+    flight = forecast_flight(foresight, prior, context, answer);
     return answer.flight || !stopped();
   });
   work_out(tell.paths > 0, "paths", [&] {
@@ -266,15 +270,20 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   core::Status model_status;
   work_out(tell.model_error, "model_error", [&] {
     auto error = model_error(foresight, prior, query.effort.confidence, context);
-    if (!error) model_status = error.status();
-    if (error) answer.model_error = *std::move(error);
-    return answer.model_error || !error || !stopped();
+    if (!error) {
+      model_status = error.status();
+      return true;
+    }
+    answer.model_error = *std::move(error);
+    return answer.model_error || !stopped();
   });
   PRESCENE_RETURN_IF_ERROR(model_status);
   if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.remarks = remarks_of(answer, query.effort);
   if (!missing.empty()) answer.remarks.push_back(missing_text(missing));
   remark_on_leaving(foresight.estimate, answer.remarks);
+  if (!flight.ok())
+    answer.remarks.push_back("For how long nothing can touch anything is not told: " + flight.message() + ".");
   if (foresight.estimate.certain)
     answer.remarks.push_back(
         "Nothing in the scene is uncertain: one instance tells what the simulator does, not how sure that is.");

@@ -29,10 +29,10 @@ std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, 
 bool forecast_contacts(const Foresight& foresight, double confidence, const core::Cancellation* abandoned,
                        belief::PredictAnswer& answer);
 
-/// For how long nothing can touch anything. Nothing when stopped, without a shape store, or where a shape can't be made
-/// of spheres.
-std::optional<belief::FlightForecast> forecast_flight(const Foresight& foresight, const Prior& prior,
-                                                      const QueryContext& context);
+/// For how long nothing can touch anything, into `flight`. Nothing is told when stopped, without a shape store, or
+/// where a shape can't be made of spheres. Fails when the objects can't be simulated each by itself.
+core::Status forecast_flight(const Foresight& foresight, const Prior& prior, const QueryContext& context,
+                             belief::PredictAnswer& answer);
 
 /// Runs some instances again from starts near by. Empty when stopped, or with fewer than 32 instances.
 std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, const Prior& prior, double confidence,

@@ -19,7 +19,7 @@ void put(core::Result<Value> result, belief::Answer& answer) {
   if (result)
     answer.what = *std::move(result);
   else
-    answer.error = core::to_string(result.status());
+    answer.error = result.status();
 }
 
 /// Calls `task` with a context that ends a little after the effort's time.

@@ -2,10 +2,10 @@
 // Answers questions about a belief, or about a scene of which nothing has been seen yet.
 //
 //   QueryContext context;
-//   context.make_simulator = [&](auto scene) { return simulation::make_bullet_simulator(scene, shapes, {}); };
+//   context.make_simulator = make_simulator;        // of a scene, by a backend: simulation/bullet or lockstep
 //   context.pool = &pool;
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
-//   if (!answer.error.empty()) ...
+//   if (!answer.error.ok()) ...
 //
 // Four questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
 // what will the camera see (observation anticipation). docs/queries.md says what the answers mean.
@@ -29,12 +29,9 @@ namespace prescene::queries {
 
 /// What answering takes; made by whoever chooses backends.
 struct QueryContext {
-  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where`.
-  std::function<core::Result<std::unique_ptr<simulation::Simulator>>(std::shared_ptr<const belief::Scene>)>
-      make_simulator;
-  /// The same with every step so many times as long; needed where PredictDetail::model_error is asked for.
-  std::function<core::Result<std::unique_ptr<simulation::Simulator>>(std::shared_ptr<const belief::Scene>, double)>
-      make_simulator_of_step;
+  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where`;
+  /// steps of another length only where PredictDetail::model_error is asked for.
+  simulation::SimulatorFactory make_simulator;
   /// MechanicsOptions::edge_rounding of those simulators, m.
   double edge_rounding = simulation::MechanicsOptions{}.edge_rounding;
   /// Where shapes are kept over queries; null: answers do not tell of flights (belief::FlightForecast).

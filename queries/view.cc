@@ -56,7 +56,7 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   effort.exact_instances = kViews;
   QueryContext foreseen = context;
   if (query.time == 0.0) {
-    foreseen.make_simulator = [](auto) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    foreseen.make_simulator = [](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
       return std::unique_ptr<simulation::Simulator>(std::make_unique<StandingStill>());
     };
   }

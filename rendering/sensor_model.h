@@ -5,8 +5,8 @@
 //
 //   SensorModel model;                                    // options with defaults
 //   PixelMixture m = model.mixture(material, {d, cosine, px});
-//   double log_r = model.log_ratio(m, z, log_absent, color_ratio);
-//   double z = model.sample(m, background, stream);       // 0 = no return
+//   double log_r = model.log_ratio(m, z, absent, color_ratio);
+//   double drawn = model.sample(m, absent, stream);       // 0 = no return
 #pragma once
 
 #include <array>

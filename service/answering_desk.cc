@@ -44,10 +44,10 @@ core::Status too_many_wait(std::size_t count) {
 
 }  // namespace
 
-std::string error_answer(const std::string& id, const std::string& text) {
+std::string error_answer(const std::string& id, const core::Status& error) {
   nlohmann::ordered_json answer = nlohmann::ordered_json::object();
   if (!id.empty()) answer["id"] = id;
-  answer["error"] = text;
+  answer.update(belief::error_to_json(error));
   return belief::json_text(answer);
 }
 
@@ -214,7 +214,7 @@ void AnsweringDesk::refuse(const std::string& id, const core::Status& reason) {
     const std::lock_guard lock(mutex_);
     ++counts_.refused;
   }
-  send(error_answer(id, core::to_string(reason)));
+  send(error_answer(id, reason));
 }
 
 void AnsweringDesk::send(const std::string& answer) {

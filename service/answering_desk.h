@@ -100,7 +100,7 @@ class AnsweringDesk {
   std::thread reader_, simulator_;  // last: they use all above
 };
 
-/// {"id": `id` unless it is empty, "error": text}.
-std::string error_answer(const std::string& id, const std::string& text);
+/// {"id": `id` unless it is empty, "error": why, "code": ...}, see belief::error_to_json.
+std::string error_answer(const std::string& id, const core::Status& error);
 
 }  // namespace prescene::service

@@ -2,6 +2,8 @@
 #include "prescene/service/backends.h"
 
 #include <algorithm>
+#include <functional>
+#include <mutex>
 #include <utility>
 
 #include "prescene/rendering/reference/reference_renderer.h"
@@ -17,19 +19,25 @@ simulation::LockstepOptions lockstep_options(const simulation::BulletOptions& bu
   return options;
 }
 
-/// Runs in lockstep what that supports; other actions, and single instances, go to Bullet.
+/// Runs in lockstep what that supports, and by Bullet's stepper what else it is given; single instances, which would
+/// leave the lanes empty, too.
 class EitherSimulator : public simulation::Simulator {
  public:
-  EitherSimulator(std::unique_ptr<simulation::Simulator> lockstep, std::unique_ptr<simulation::Simulator> bullet)
-      : lockstep_(std::move(lockstep)), bullet_(std::move(bullet)) {}
+  /// `on_bullet` is told why, once for each run that Bullet's stepper has to take over.
+  EitherSimulator(std::unique_ptr<simulation::Simulator> lockstep, std::unique_ptr<simulation::Simulator> bullet,
+                  std::function<void(const std::string&)> on_bullet)
+      : lockstep_(std::move(lockstep)), bullet_(std::move(bullet)), on_bullet_(std::move(on_bullet)) {}
 
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
            const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
            std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
-    const simulation::Simulator& simulator = simulation::lockstep_supports(request).ok() ? *lockstep_ : *bullet_;
+    const core::Status in_lockstep = lockstep_->supports(request);
+    if (!in_lockstep.ok()) on_bullet_(in_lockstep.message());
+    const simulation::Simulator& simulator = in_lockstep.ok() ? *lockstep_ : *bullet_;
     simulator.run(starts, request, stream, numbers, pool, trajectories, cancellation);
   }
 
+  simulation::StepperUse stepper() const override { return lockstep_->stepper(); }
   double step_size() const override { return bullet_->step_size(); }
 
   std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>& actions,
@@ -39,12 +47,64 @@ class EitherSimulator : public simulation::Simulator {
 
  private:
   std::unique_ptr<simulation::Simulator> lockstep_, bullet_;
+  std::function<void(const std::string&)> on_bullet_;
+};
+
+/// Bullet's simulator where lockstep was tried first.
+class InsteadOfLockstep : public simulation::Simulator {
+ public:
+  InsteadOfLockstep(std::unique_ptr<simulation::Simulator> bullet, std::string reason)
+      : bullet_(std::move(bullet)), reason_(std::move(reason)) {}
+
+  core::Status supports(const simulation::RunRequest& request) const override { return bullet_->supports(request); }
+  simulation::StepperUse stepper() const override { return {bullet_->stepper().name, reason_}; }
+  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
+           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
+           std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
+    bullet_->run(starts, request, stream, numbers, pool, trajectories, cancellation);
+  }
+  double step_size() const override { return bullet_->step_size(); }
+  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>& actions,
+                                                      const core::RandomStream& stream) const override {
+    return bullet_->make_instance(actions, stream);
+  }
+
+ private:
+  std::unique_ptr<simulation::Simulator> bullet_;
+  std::string reason_;
 };
 
 }  // namespace
 
+/// Shared with the simulators, which may outlive the backends.
+class Backends::StepperLog {
+ public:
+  void in_lockstep() {
+    const std::lock_guard lock(mutex_);
+    ++counts_.lockstep;
+  }
+  void by_bullet(const std::string& reason) {
+    const std::lock_guard lock(mutex_);
+    ++counts_.bullet_instead;
+    counts_.last_reason = reason;
+  }
+  StepperCounts counts() const {
+    const std::lock_guard lock(mutex_);
+    return counts_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  StepperCounts counts_;
+};
+
 Backends::Backends(core::ThreadPool& pool, const BackendSettings& settings)
-    : pool_(pool), settings_(settings), shapes_(simulation::hacd_decomposer()) {}
+    : pool_(pool),
+      settings_(settings),
+      stepper_log_(std::make_shared<StepperLog>()),
+      shapes_(simulation::hacd_decomposer()) {}
+
+StepperCounts Backends::stepper_counts() const { return stepper_log_->counts(); }
 
 core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(const belief::Scene& scene,
                                                                               double step_factor) {
@@ -52,17 +112,28 @@ core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(co
   options.step *= step_factor;
   if (settings_.stepper == Stepper::kBullet) return simulation::make_bullet_simulator(scene, shapes_, options);
   auto lockstep = simulation::make_lockstep_simulator(scene, shapes_, lockstep_options(options));
-  if (!lockstep) {
-    const bool other_stepper = settings_.stepper == Stepper::kAutomatic;
-    if (lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
-    if (!other_stepper)
+  if (settings_.stepper == Stepper::kLockstep) {
+    if (!lockstep && lockstep.status().code() == core::StatusCode::kUnsupported)
       return core::unsupported(lockstep.status().message() +
-                               "; '--stepper bullet' can, and 'automatic' chooses by itself");
-    return simulation::make_bullet_simulator(scene, shapes_, options);
+                               ": '--stepper bullet' can simulate it, and '--stepper automatic' chooses by itself");
+    if (lockstep) stepper_log_->in_lockstep();
+    return lockstep;
   }
+  if (!lockstep && lockstep.status().code() != core::StatusCode::kUnsupported) return lockstep.status();
   PRESCENE_TRY(auto bullet, simulation::make_bullet_simulator(scene, shapes_, options));
+  if (!lockstep) {
+    const std::string reason = lockstep.status().message();
+    stepper_log_->by_bullet(reason);
+    return std::unique_ptr<simulation::Simulator>(std::make_unique<InsteadOfLockstep>(std::move(bullet), reason));
+  }
+  stepper_log_->in_lockstep();
   return std::unique_ptr<simulation::Simulator>(
-      std::make_unique<EitherSimulator>(*std::move(lockstep), std::move(bullet)));
+      std::make_unique<EitherSimulator>(*std::move(lockstep), std::move(bullet),
+                                        [log = stepper_log_](const std::string& reason) { log->by_bullet(reason); }));
+}
+
+simulation::SimulatorFactory Backends::simulator_factory() {
+  return [this](const belief::Scene& scene, double step_factor) { return make_simulator(scene, step_factor); };
 }
 
 core::Result<std::unique_ptr<rendering::Renderer>> Backends::make_renderer() {
@@ -75,10 +146,7 @@ core::Result<std::unique_ptr<rendering::LikelihoodBatch>> Backends::make_likelih
 
 queries::QueryContext Backends::query_context(core::ThreadPool& pool) {
   queries::QueryContext context;
-  context.make_simulator = [this](const std::shared_ptr<const belief::Scene>& scene) { return make_simulator(*scene); };
-  context.make_simulator_of_step = [this](const std::shared_ptr<const belief::Scene>& scene, double factor) {
-    return make_simulator(*scene, factor);
-  };
+  context.make_simulator = simulator_factory();
   context.make_renderer = [this] { return make_renderer(); };
   context.edge_rounding = settings_.bullet.edge_rounding;
   context.shapes = &shapes_;

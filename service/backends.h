@@ -5,10 +5,12 @@
 //
 //   Backends backends(pool);
 //   auto simulator = backends.make_simulator(scene);
-//   belief::Answer answer = queries::answer(snapshot, query, backends.query_context());
+//   belief::Answer answer = queries::answer(snapshot, query, backends.query_context(pool));
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <string>
 
 #include "prescene/belief/scene.h"
 #include "prescene/core/parallel.h"
@@ -25,8 +27,15 @@ namespace prescene::service {
 /// Who simulates (docs/simulation.md).
 enum class Stepper {
   kBullet,
-  kAutomatic,  ///< In lockstep where scene and actions allow it, else Bullet.
-  kLockstep,   ///< As before, but a scene that it can't simulate is an error.
+  kAutomatic,  ///< In lockstep where scene and actions allow it, else Bullet, which is counted (StepperCounts).
+  kLockstep,   ///< In lockstep; scenes and actions that it can't simulate are refused with the reason.
+};
+
+/// Who simulated so far, where lockstep was to be taken if it can.
+struct StepperCounts {
+  std::uint64_t lockstep = 0;        ///< Simulators made that step in lockstep.
+  std::uint64_t bullet_instead = 0;  ///< Simulators, or runs of one, that Bullet's stepper had to take over.
+  std::string last_reason;           ///< Why it had to, the last time.
 };
 
 struct BackendSettings {
@@ -46,9 +55,13 @@ class Backends {
   core::ThreadPool& pool() { return pool_; }
   filter::MeshCache& meshes() { return meshes_; }
 
-  /// With steps so many times as long as the settings say.
+  /// With steps so many times as long as the settings say. Simulator::stepper() says who it is; with
+  /// Stepper::kLockstep kUnsupported names what of the scene can't be simulated in lockstep.
   core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene,
                                                                       double step_factor = 1.0);
+  /// The same as a function; the backends must outlive it.
+  simulation::SimulatorFactory simulator_factory();
+  StepperCounts stepper_counts() const;
   core::Result<std::unique_ptr<rendering::LikelihoodBatch>> make_likelihood();
   /// Deterministic bits: what is recorded, replayed or answered is drawn by it.
   core::Result<std::unique_ptr<rendering::Renderer>> make_renderer();
@@ -56,8 +69,11 @@ class Backends {
   queries::QueryContext query_context(core::ThreadPool& pool);
 
  private:
+  class StepperLog;
+
   core::ThreadPool& pool_;
   BackendSettings settings_;
+  std::shared_ptr<StepperLog> stepper_log_;
   simulation::ShapeStore shapes_;
   filter::MeshCache meshes_;
 };

@@ -163,7 +163,7 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   PRESCENE_RETURN_IF_ERROR(player.open());
 
   {  // Advertise everything first, so that the service has found it all before the first frame.
-    PRESCENE_TRY(const auto reader, RecordingReader::open(path));
+    PRESCENE_TRY(const auto reader, RecordingReader::open(path, options.read));
     for (;;) {
       PRESCENE_TRY(const auto entry, reader->next());
       if (!entry) break;
@@ -175,7 +175,9 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
                              std::to_string(options.dds.domain) + ", with topic names as in the recording");
   }
 
-  PRESCENE_TRY(const auto reader, RecordingReader::open(path));
+  RecordingReadOptions again = options.read;
+  again.check_data = false;  // It was, just now.
+  PRESCENE_TRY(const auto reader, RecordingReader::open(path, again));
   BusReplayResult result;
   const auto start = steady_clock::now();
   std::optional<core::TimeNs> first_ns;
@@ -208,7 +210,8 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   listener.wait_for_rest(last_stamp_ns, steady_clock::now() + seconds(options.wait_at_end));
   node->stop_receiving();
   listener.move_to(result);
-  result.loss = reader->loss().text();
+  result.loss = reader->loss_text();
+  result.unchecked = reader->unchecked_text();
   return result;
 }
 

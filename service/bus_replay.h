@@ -27,6 +27,7 @@ struct BusReplayOptions {
   double wait_for_service = 20.0;  ///< s to wait for a service to listen before the first message; 0 = don't.
   double wait_at_end = 2.0;        ///< s to wait for the last beliefs and answers.
   std::vector<TimedQuestion> questions;
+  RecordingReadOptions read;
 };
 
 struct BusReplayResult {
@@ -39,7 +40,8 @@ struct BusReplayResult {
     double seconds = 0.0;  ///< From question to answer.
   };
   std::vector<Answered> answers;
-  std::string loss;
+  std::string loss;       ///< As ReplaySummary.
+  std::string unchecked;  ///< The same.
 };
 
 /// `on_entry` sees each entry of the recording when its time has come. Fails with kUnavailable when no service listens

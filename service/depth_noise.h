@@ -3,7 +3,7 @@
 // over time, by depth, incidence and distance to edges, and the sensor model's settings that say the same.
 //
 //   DepthNoiseEstimator estimator;
-//   for (...) PRESCENE_RETURN_IF_ERROR(estimator.add(depth, camera));
+//   for (const geometry::DepthImage& depth : images) PRESCENE_RETURN_IF_ERROR(estimator.add(depth, camera));
 //   PRESCENE_TRY(DepthNoise noise, estimator.finish());
 #pragma once
 

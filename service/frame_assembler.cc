@@ -14,11 +14,21 @@ namespace {
 // Bounds of what waits: the newest frame wins, so more would never be used. 8 frames are 0.27 s at 30 Hz.
 constexpr std::size_t kMaxWaiting = 8;
 constexpr std::size_t kMaxColors = 8;
+// The same for large images, of all that wait: eight of 2048 x 2048, two of the largest. A depth takes 4 bytes.
+constexpr std::size_t kMaxWaitingPixels = std::size_t{1} << 25;
 constexpr std::size_t kMaxSkippedKept = 1000;
 // A stamp this much older than the last one taken means that the sender's clock was set back (a looped recording).
 constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
 
 core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llround(seconds * 1e9)); }
+
+/// Whether so many images wait that the oldest has to go.
+template <class Entries, class Image>
+bool too_many(const Entries& entries, std::size_t most, Image Entries::value_type::*image) {
+  std::size_t pixels = 0;
+  for (const auto& entry : entries) pixels += (entry.*image)->size();
+  return entries.size() > most || (entries.size() > 1 && pixels > kMaxWaitingPixels);
+}
 
 }  // namespace
 
@@ -52,7 +62,7 @@ core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, Messag
   const auto place = std::upper_bound(waiting_.begin(), waiting_.end(), stamp_ns,
                                       [](core::TimeNs t, const Waiting& other) { return t < other.stamp_ns; });
   waiting_.insert(place, std::move(entry));
-  if (waiting_.size() > kMaxWaiting) {
+  while (too_many(waiting_, kMaxWaiting, &Waiting::depth)) {
     skip(waiting_.front(), "too many frames wait");
     waiting_.pop_front();
   }
@@ -64,7 +74,7 @@ core::Status FrameAssembler::add_color(const interfaces::RosImage& image, Messag
   PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
   PRESCENE_TRY(geometry::ColorImage color, interfaces::to_color_image(image));
   colors_.push_back({index, stamp_ns, std::make_shared<geometry::ColorImage>(std::move(color))});
-  if (colors_.size() > kMaxColors) colors_.pop_front();
+  while (too_many(colors_, kMaxColors, &Color::image)) colors_.pop_front();
   return core::ok_status();
 }
 

@@ -7,6 +7,7 @@
 #include <exception>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "prescene/belief/json.h"
@@ -95,6 +96,7 @@ struct LiveService::Impl {
   core::TimeNs now();
   ServiceHealth health() const;
   void tell_what_changed(const ServiceHealth& health);
+  void say_once(const std::string& text);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -119,6 +121,10 @@ struct LiveService::Impl {
   double step_seconds = 0.0;
   std::vector<std::string> degraded;
   std::string last_refusal;
+  std::uint64_t not_simulated = 0;
+  std::string physics_failure;
+  std::set<std::string> said;  // by say_once
+  const Backends* backends = nullptr;
   std::optional<core::Stopwatch> since_frame;
   bool was_tracking = false;
   bool was_degraded = false;
@@ -148,6 +154,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
                                                                const core::LogSink& log) {
   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings.tracker, seed, backends));
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
+  impl->backends = &backends;
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
   Impl* raw = impl.get();
   const auto on_answer = [raw](const std::string& answer) {  // on two threads
@@ -274,6 +281,8 @@ void LiveService::Impl::look_after_frames() {
       since_frame.emplace();
       step_seconds = step->record.seconds;
       degraded = step->record.degraded;
+      not_simulated += static_cast<std::uint64_t>(step->counters.not_simulated);
+      if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
       publish(*step);
     }
   } catch (const std::exception& error) {
@@ -327,10 +336,24 @@ ServiceHealth LiveService::Impl::health() const {
   health.degraded = degraded;
   health.last_skip = tracker->last_skip();
   health.last_refusal = last_refusal;
+  health.not_simulated = not_simulated;
+  health.physics_failure = physics_failure;
+  health.steppers = backends->stepper_counts();
   return health;
 }
 
+void LiveService::Impl::say_once(const std::string& text) {
+  // Reasons name objects and counts of a scene, so they are few; more than these stand in /diagnostics only.
+  constexpr std::size_t kMostSaid = 32;
+  if (said.size() < kMostSaid && said.insert(text).second) core::log(log, core::LogLevel::kWarning, text);
+}
+
 void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
+  if (!health.physics_failure.empty())
+    say_once("physics failed, so what it was to move goes on at constant velocity: " + health.physics_failure);
+  if (!health.steppers.last_reason.empty())
+    say_once("simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
+             health.steppers.last_reason);
   const bool tracking = is_tracking(health);
   if (tracking && !was_tracking) {
     core::log(log, core::LogLevel::kInfo, "frames come: " + health_text(health));

@@ -3,8 +3,8 @@
 // while, with a count of what was left out, and a long text is shortened.
 //
 //   LogLimiter limiter(log, {});
-//   service.use(limiter.sink());
-//   diagnostics.unlogged = limiter.held_back();
+//   core::log(limiter.sink(), core::LogLevel::kWarning, "the same fault as a moment ago");
+//   ... limiter.held_back()
 #pragma once
 
 #include <cstdint>

@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
+#include "prescene/geometry/cancellable.h"
+#include "prescene/interfaces/scene_files/mesh_use.h"
 
 namespace prescene::service {
 namespace {
@@ -65,41 +67,91 @@ std::string symmetry_text(const geometry::SymmetryGroup& symmetry) {
   return std::to_string(symmetry.rotations.size() + 1) + " rotations about several axes";
 }
 
+namespace {
+
+/// Says which step is being done; the shares are those of an open sphere of a million triangles.
+class Steps {
+ public:
+  explicit Steps(const MeshInspectionOptions& options) : options_(options) {}
+
+  core::Status begin(double fraction, const char* what) const {
+    if (options_.progress) options_.progress({fraction, {}, what});
+    if (options_.read.cancellation && options_.read.cancellation->requested())
+      return core::cancelled("the inspection was stopped");
+    return core::ok_status();
+  }
+
+ private:
+  const MeshInspectionOptions& options_;
+};
+
+/// What becomes of hollows in a scene.
+std::optional<std::string> hollow_remark(const MeshInspection& found, const MeshInspectionOptions& options) {
+  const auto fills = [&] {
+    return options.use == belief::MeshUse::kConvexHull || options.use == belief::MeshUse::kConvexParts;
+  };
+  if (!found.mass && found.hull_mass && (!options.use || fills()))
+    return "in a scene it collides as its convex hull, because it is not closed: nothing gets into its hollows; close "
+           "it";
+  if (!found.hollow || *found.hollow <= interfaces::kLargestHiddenHollow) return std::nullopt;
+  const std::string share = core::fixed_text(100.0 * *found.hollow, 0) + " % of its convex hull is hollow";
+  if (fills())
+    return share + ", and with use: " + interfaces::word_of(*options.use) +
+           " nothing gets into that; leave --use out, or choose spheres or decompose";
+  if (options.use) return std::nullopt;
+  return share + ": in a scene it collides as spheres, which keep that, unless the key 'use' says otherwise";
+}
+
+}  // namespace
+
 core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, const MeshInspectionOptions& options) {
+  const Steps steps(options);
   MeshInspection found;
   found.path = path;
   found.density = options.density;
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.0, "reading and repairing"));
   PRESCENE_TRY(found.loaded, interfaces::read_mesh(path, options.read));
   const geometry::TriangleMesh& mesh = found.loaded.mesh;
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.3, "edges"));
   found.topology = geometry::mesh_topology(mesh);
   found.box = geometry::bounding_box(mesh);
+  found.doubtful_scale = interfaces::scale_hint(found.box);
   found.surface_area = geometry::surface_area(mesh);
   found.remarks = found.loaded.warnings;
 
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.35, "mass"));
   const auto closed = geometry::mass_properties(mesh, options.density);
   if (closed) {
     found.mass = *closed;
   } else {
     found.remarks.push_back("no volume of its own: " + closed.status().message());
   }
-  const auto hull = geometry::convex_hull(mesh.vertices);
-  if (hull && !closed) {
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.4, "convex hull"));
+  auto hull = geometry::convex_hull(mesh.vertices, options.read.cancellation);
+  if (!hull && hull.status().code() == core::StatusCode::kCancelled) return hull.status();
+  if (hull) {
     const auto hull_mass = geometry::mass_properties(*hull, options.density);
-    if (hull_mass) found.hull_mass = *hull_mass;
+    if (hull_mass && closed) found.hollow = std::max(0.0, 1.0 - closed->mass / hull_mass->mass);
+    if (hull_mass && !closed) found.hull_mass = *hull_mass;
+  } else {
+    found.remarks.push_back("flat: " + hull.status().message());
   }
-  if (!hull) found.remarks.push_back("flat: " + hull.status().message());
+  if (auto remark = hollow_remark(found, options)) found.remarks.push_back(*std::move(remark));
 
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.75, "symmetry"));
   const double radius = 0.5 * found.box.diagonal().norm();
   found.symmetry = geometry::suggest_symmetry(mesh, options.symmetry_tolerance * radius);
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.85, "resting poses"));
   const auto& mass = found.mass ? found.mass : found.hull_mass;
-  if (mass) {
-    const auto poses = geometry::resting_poses(mesh, mass->p_BoBcm);
+  if (mass && hull) {
+    const auto poses = geometry::resting_poses_of_hull(*std::move(hull), mass->p_BoBcm);
     if (poses) {
       found.resting_poses = *poses;
     } else {
       found.remarks.push_back("no resting poses: " + poses.status().message());
     }
   }
+  PRESCENE_RETURN_IF_ERROR(steps.begin(1.0, ""));
   return found;
 }
 
@@ -127,6 +179,7 @@ ordered_json to_json(const MeshInspection& found) {
   json["solid"] = found.mass ? mass_json(*found.mass) : ordered_json();
   json["hull"] = found.hull_mass ? mass_json(*found.hull_mass) : ordered_json();
   json["volume"] = found.mass ? ordered_json(found.mass->mass / found.density) : ordered_json();
+  json["hollow_share_of_hull"] = found.hollow ? ordered_json(*found.hollow) : ordered_json();
   json["symmetry"] = symmetry_text(found.symmetry);
   json["resting_poses"] = poses;
   json["remarks"] = found.remarks;
@@ -144,6 +197,7 @@ core::Result<interfaces::ModelFile> model_file(const MeshInspection& found, cons
   file.mesh_file = relative.empty() ? found.path.string() : relative.generic_string();
   file.scale = options.read.metres_per_unit;
   file.y_up = options.read.up_axis == interfaces::UpAxis::kY;
+  file.use = options.use;
   file.model.mass = belief::FixedScalar{mass->mass};
   file.model.center_of_mass = belief::Vector3Distribution::fixed(mass->p_BoBcm);
   file.model.unit_inertia = mass->I_BBcm_B / mass->mass;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/core/progress.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/resting_poses.h"
 #include "prescene/geometry/symmetry.h"
@@ -21,6 +22,9 @@ struct MeshInspectionOptions {
   interfaces::MeshReadOptions read;
   double density = 500.0;            ///< kg/m^3: about that of filled household packages.
   double symmetry_tolerance = 0.02;  ///< Of the surface, as a share of the mesh's radius.
+  /// What the mesh is to collide as in a model made of it; else a scene goes by its shape (docs/scene_files.md).
+  std::optional<belief::MeshUse> use;
+  core::ProgressSink progress;  ///< May be empty. `read.cancellation` stops all steps.
 };
 
 struct MeshInspection {
@@ -35,7 +39,10 @@ struct MeshInspection {
   double density = 0.0;
   geometry::SymmetryGroup symmetry;                  ///< A suggestion.
   std::vector<geometry::RestingPose> resting_poses;  ///< Likeliest first; empty for a flat mesh.
-  std::vector<std::string> remarks;                  ///< Sentences for a person: doubtful scale, holes, repairs.
+  /// Of a closed mesh the share of its convex hull that is hollow, see interfaces::hidden_hollow().
+  std::optional<double> hollow;
+  std::optional<std::string> doubtful_scale;  ///< A sentence for a person, see interfaces::scale_hint().
+  std::vector<std::string> remarks;           ///< Sentences for a person: hollows that get lost, holes, repairs.
 };
 
 core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, const MeshInspectionOptions& options);
@@ -43,7 +50,7 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
 nlohmann::ordered_json to_json(const MeshInspection& inspection);
 /// A model file that scene files can name (docs/scene_files.md): the mesh, mass properties and symmetry, with remarks
 /// as comments. `model_path` is where it will lie: the mesh is named relative to it. Fails with kInvalidInput for a
-/// flat mesh.
+/// flat mesh. The file says what the mesh collides as only where the options do.
 core::Result<interfaces::ModelFile> model_file(const MeshInspection& inspection, const MeshInspectionOptions& options,
                                                const std::filesystem::path& model_path);
 /// "none", "continuous about z, both ways round", "4 turns about z", ...

@@ -302,8 +302,7 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
   found.rotation_noise = motion.rotation_noise;
   motion.position_noise = std::max(motion.position_noise, kLeastPositionNoise);
   motion.rotation_noise = std::max(motion.rotation_noise, kLeastRotationNoise);
-  const auto make_simulator = [&](const belief::Scene& varied) { return backends.make_simulator(varied); };
-  PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, make_simulator,
+  PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, backends.simulator_factory(),
                                                core::RandomStream(options.seed, core::Purpose::kEvaluation),
                                                backends.pool(), motion, progress, cancellation));
   for (simulation::CalibratedParameter& p : found.motion.parameters) {

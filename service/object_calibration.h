@@ -3,7 +3,8 @@
 //
 //   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(folder, log));
 //   PRESCENE_TRY(const ObjectCalibration found, calibrate_object(dataset, backends, {}));
-//   write_file(path, calibrated_yaml(dataset, found, path.parent_path()));
+//   PRESCENE_TRY(const std::string yaml, calibrated_yaml(dataset, found, path.parent_path()));
+//   PRESCENE_RETURN_IF_ERROR(interfaces::write_file(path, yaml));
 #pragma once
 
 #include <cstdint>

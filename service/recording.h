@@ -18,7 +18,8 @@
 
 namespace prescene::service {
 
-/// What a recording says about itself, in its metadata record "prescene".
+/// What a recording says about itself, in its metadata record "prescene", with a checksum: in a recording that was cut
+/// there is no other.
 struct RecordingInfo {
   std::string scene_file;  ///< Where the scene came from, as given; "" = not known.
   std::string scene_text;  ///< Its YAML.
@@ -80,15 +81,26 @@ struct RecordedEntry {
   MessageIndex index = 0;  ///< Of a robot message, as when it was written.
 };
 
+struct RecordingReadOptions {
+  bool salvage = false;    ///< As interfaces::McapReaderOptions.
+  bool check_data = true;  ///< The same.
+};
+
 class RecordingReader {
  public:
-  static core::Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path);
+  /// Errors of McapReader::open; kDataLoss where the checksum of what it says about itself is wrong (with `salvage`,
+  /// that is left out).
+  static core::Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path,
+                                                             const RecordingReadOptions& options = {});
 
   /// From the recording's metadata; defaults where it has none (a recording made by other tools).
   const RecordingInfo& info() const { return info_; }
-  /// In the order of log times; empty at the end.
+  /// In the order of log times; empty at the end. Errors of McapReader::next; kResourceExhausted for JSON of more than
+  /// 8 MiB.
   core::Result<std::optional<RecordedEntry>> next();
-  const interfaces::McapLoss& loss() const { return reader_->loss(); }
+  /// What could not be read, and what could not be checked: a sentence each, empty = nothing. Complete at the end.
+  std::string loss_text() const;
+  std::string unchecked_text() const { return reader_->unchecked().text(); }
   std::optional<std::uint64_t> message_count() const { return reader_->message_count(); }
 
  private:
@@ -96,6 +108,7 @@ class RecordingReader {
 
   std::unique_ptr<interfaces::McapReader> reader_;
   RecordingInfo info_;
+  bool info_is_damaged_ = false;
   MessageIndex next_index_ = 0;
 };
 

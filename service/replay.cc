@@ -12,11 +12,14 @@ namespace {
 
 constexpr const char* kFolderCameraFrame = "camera";
 constexpr core::TimeNs kFolderLatencyNs = 1'000'000;
+constexpr std::size_t kMostDegraded = 100;  // different ones, as some name a number
 
 /// Whether Prescene wrote step records into this recording.
-core::Result<bool> has_step_records(const std::filesystem::path& path) {
+core::Result<bool> has_step_records(const std::filesystem::path& path, const RecordingReadOptions& options) {
   interfaces::McapReaderOptions only_steps;
   only_steps.topics = {kStepTopic};
+  only_steps.salvage = options.salvage;
+  only_steps.check_data = false;  // It was, just now.
   PRESCENE_TRY(const auto reader, interfaces::McapReader::open(path, only_steps));
   PRESCENE_TRY(const auto first, reader->next());
   return first.has_value();
@@ -74,7 +77,20 @@ class Replay {
 
   core::Status deliver(const TrackerStep& step) {
     ++summary_.steps;
+    count_degraded(step.record.degraded);
     return on_step_ ? on_step_(step, tracker_) : core::ok_status();
+  }
+
+  void count_degraded(const std::vector<std::string>& words) {
+    for (const std::string& word : words) {
+      const auto known = std::find_if(summary_.degraded.begin(), summary_.degraded.end(),
+                                      [&](const auto& entry) { return entry.first == word; });
+      if (known != summary_.degraded.end()) {
+        ++known->second;
+      } else if (summary_.degraded.size() < kMostDegraded) {
+        summary_.degraded.emplace_back(word, 1);
+      }
+    }
   }
 
   Tracker& tracker_;
@@ -84,11 +100,12 @@ class Replay {
 
 }  // namespace
 
-core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, Tracker& tracker,
-                                             const core::Cancellation& cancellation, const core::ProgressSink& progress,
-                                             const StepSink& on_step, const JsonSink& on_json) {
-  PRESCENE_TRY(const bool follow, has_step_records(path));
-  PRESCENE_TRY(const auto reader, RecordingReader::open(path));
+core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, const RecordingReadOptions& options,
+                                             Tracker& tracker, const core::Cancellation& cancellation,
+                                             const core::ProgressSink& progress, const StepSink& on_step,
+                                             const JsonSink& on_json) {
+  PRESCENE_TRY(const auto reader, RecordingReader::open(path, options));
+  PRESCENE_TRY(const bool follow, has_step_records(path, options));
   const double total = static_cast<double>(reader->message_count().value_or(0));
   Replay replay(tracker, on_step, follow);
   std::uint64_t entries = 0;
@@ -113,7 +130,8 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
     }
   }
   if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
-  replay.summary().loss = reader->loss().text();
+  replay.summary().loss = reader->loss_text();
+  replay.summary().unchecked = reader->unchecked_text();
   return replay.take_summary();
 }
 

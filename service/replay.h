@@ -8,6 +8,9 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/images/frame_folder.h"
@@ -33,12 +36,17 @@ struct ReplaySummary {
   std::optional<std::uint64_t> first_different_step;
   bool cancelled = false;  ///< Stopped on request before the end.
   std::string loss;        ///< What of the file could not be read; empty = all was read.
+  std::string unchecked;   ///< What of it has no checksum; empty = all was checked.
+  /// What was doubtful or second best in the steps (a distorting lens, ...), with the number of the steps that it was
+  /// so in, in the order of the first ones. Of more than a hundred, the first.
+  std::vector<std::pair<std::string, std::uint64_t>> degraded;
 };
 
 /// A stop on request ends it early, with what was done until then. Status of the sinks end the replay.
-core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, Tracker& tracker,
-                                             const core::Cancellation& cancellation, const core::ProgressSink& progress,
-                                             const StepSink& on_step, const JsonSink& on_json);
+core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, const RecordingReadOptions& options,
+                                             Tracker& tracker, const core::Cancellation& cancellation,
+                                             const core::ProgressSink& progress, const StepSink& on_step,
+                                             const JsonSink& on_json);
 
 /// Plays a folder of images with camera poses as if a robot had sent them.
 core::Result<ReplaySummary> replay_folder(const interfaces::FrameFolder& folder, Tracker& tracker,

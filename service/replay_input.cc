@@ -19,8 +19,10 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
     PRESCENE_TRY(input.folder_, interfaces::FrameFolder::open(options.path, folder_options));
     if (options.scene_file.empty()) input.scene_ = unknown_scene(options.path, input.folder_->frames().front().X_WC);
   } else {
-    PRESCENE_TRY(const auto reader, RecordingReader::open(options.path));
+    PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
     input.info_ = reader->info();
+    input.read_ = options.read;
+    input.read_.check_data = false;  // Once is enough; chunks are checked whenever they are read.
   }
   if (input.scene_) return input;
   if (!options.scene_file.empty()) {
@@ -44,7 +46,7 @@ core::Result<ReplaySummary> ReplayInput::replay(Tracker& tracker, const core::Ca
                                                 const core::ProgressSink& progress, const StepSink& on_step,
                                                 const JsonSink& on_json) const {
   if (folder_) return replay_folder(*folder_, tracker, cancellation, progress, on_step);
-  return replay_recording(path_, tracker, cancellation, progress, on_step, on_json);
+  return replay_recording(path_, read_, tracker, cancellation, progress, on_step, on_json);
 }
 
 core::Status check_steps(const ReplaySummary& summary, const InputTopics& topics) {

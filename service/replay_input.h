@@ -24,6 +24,7 @@ struct ReplayInputOptions {
   std::filesystem::path scene_file;
   double metres_per_unit = 0.001;   ///< Of a folder's depth images.
   double frames_per_second = 30.0;  ///< Of a folder without stamps.
+  RecordingReadOptions read = {};   ///< Of a recording.
 };
 
 class ReplayInput {
@@ -45,6 +46,7 @@ class ReplayInput {
 
  private:
   std::filesystem::path path_;
+  RecordingReadOptions read_;
   std::optional<interfaces::FrameFolder> folder_;  // else a recording
   RecordingInfo info_;
   std::shared_ptr<const belief::Scene> scene_;

@@ -79,7 +79,12 @@ interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const
       {"questions refused", std::to_string(health.questions.refused)},
       {"questions without an answer", std::to_string(health.questions.unanswered + health.unreadable_questions)},
       {"failures", std::to_string(health.failures + health.questions.failed)},
-      {"last failure", health.last_failure}};
+      {"last failure", health.last_failure},
+      {"particles without physics", std::to_string(health.not_simulated)},
+      {"last failure of physics", health.physics_failure},
+      {"simulators in lockstep", std::to_string(health.steppers.lockstep)},
+      {"simulators on Bullet instead", std::to_string(health.steppers.bullet_instead)},
+      {"last reason for Bullet", health.steppers.last_reason}};
   return status;
 }
 

@@ -10,6 +10,7 @@
 
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/answering_desk.h"
+#include "prescene/service/backends.h"
 
 namespace prescene::service {
 
@@ -34,6 +35,9 @@ struct ServiceHealth {
   std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
   double last_step_seconds = 0.0;
+  std::uint64_t not_simulated = 0;  ///< Particles that physics could not move and constant velocity did.
+  std::string physics_failure;      ///< Why, the last time; "" = it never failed.
+  StepperCounts steppers;
   std::vector<std::string> degraded;  ///< What the last step could not do fully.
   std::string last_skip;              ///< Why the last frame since the last step was skipped; "" = none was.
   std::string last_refusal;           ///< Why the last refused message was.

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/belief_overlay.h"
@@ -18,8 +19,9 @@ namespace {
 using core::fixed_text;
 using nlohmann::ordered_json;
 
-constexpr std::size_t kMaxObservations = 48;  // in memory
-constexpr std::size_t kPictures = 6;          // on the page
+constexpr std::size_t kMaxObservations = 48;              // in memory
+constexpr std::size_t kMaxPixels = std::size_t{1} << 24;  // of all of them: 54 of 640 x 480
+constexpr std::size_t kPictures = 6;                      // on the page
 
 AssemblerSettings assembler_settings(const belief::Scene& scene) {
   AssemblerSettings settings;
@@ -104,10 +106,10 @@ void SessionReport::add(const interfaces::ReceivedMessage& message) {
       taken = assembler_.add_color(*image, index, message.received_ns);
     }
   } else if (message.topic == topics_.camera_info) {
-    if (const auto info = interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr))
+    if (const auto info = interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage))
       taken = assembler_.add_camera_info(*info, index);
   } else if (message.topic == topics_.tf || message.topic == topics_.tf_static) {
-    if (const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr)) {
+    if (const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage)) {
       taken = assembler_.add_tf(*tf, index, message.topic == topics_.tf_static);
     }
   }
@@ -118,11 +120,17 @@ void SessionReport::add(const interfaces::ReceivedMessage& message) {
 void SessionReport::add(const belief::Observation& observation) {
   if (seen_++ % every_ != 0) return;
   observations_.push_back(observation);
-  if (observations_.size() <= kMaxObservations) return;
-  std::vector<belief::Observation> kept;
-  for (std::size_t i = 0; i < observations_.size(); i += 2) kept.push_back(std::move(observations_[i]));
-  observations_ = std::move(kept);
-  every_ *= 2;
+  const auto too_many = [&] {
+    std::size_t pixels = 0;
+    for (const belief::Observation& kept : observations_) pixels += kept.frame.depth ? kept.frame.depth->size() : 0;
+    return observations_.size() > kMaxObservations || (observations_.size() > 1 && pixels > kMaxPixels);
+  };
+  while (too_many()) {
+    std::vector<belief::Observation> kept;
+    for (std::size_t i = 0; i < observations_.size(); i += 2) kept.push_back(std::move(observations_[i]));
+    observations_ = std::move(kept);
+    every_ *= 2;
+  }
 }
 
 void SessionReport::add(const BeliefSummary& summary) { summaries_[summary.stamp_ns] = summary; }
@@ -196,6 +204,24 @@ void SessionReport::add_supports(interfaces::ReportContents& contents) const {
   contents.sections.push_back({"Supports", {std::move(table), std::move(height), std::move(tilt)}});
 }
 
+void SessionReport::add_foreseen(interfaces::ReportContents& contents) const {
+  if (comparisons_.empty()) return;
+  interfaces::ReportSection section{"Foreseen, and what came", {}};
+  for (const Comparison& comparison : comparisons_) {
+    section.blocks.push_back(interfaces::TextBlock{"Asked at " + fixed_text(comparison.at, 2) +
+                                                   " s: " + comparison.question + "\n\n" + comparison.note});
+    interfaces::TableBlock table{comparison.comparable ? "" : "Not to be compared: see above",
+                                 {"outcome", "group", "foreseen", "came to pass"},
+                                 {}};
+    for (const Comparison::Row& row : comparison.rows) {
+      if (is_worth_a_row(row)) table.rows.push_back({row.outcome, row.group, foreseen_text(row), came_text(row)});
+    }
+    section.blocks.push_back(std::move(table));
+  }
+  section.blocks.push_back(interfaces::TextBlock{came_is_truth_ ? kCameByTruth : kCameByTracking});
+  contents.sections.push_back(std::move(section));
+}
+
 void SessionReport::add_answers(interfaces::ReportContents& contents) const {
   for (const auto& [at, text] : answers_) {
     try {
@@ -214,8 +240,8 @@ void SessionReport::add_answer_section(double at, const ordered_json& answer,
     section.title = "Asked at " + fixed_text(at, 1) + " s";
     if (!answer.is_object()) {
       section.blocks.push_back(interfaces::TextBlock{"No answer came."});
-    } else if (const std::string error = answer.value("error", ""); !error.empty()) {
-      section.blocks.push_back(interfaces::TextBlock{error});
+    } else if (const core::Status error = belief::error_from_json(answer); !error.ok()) {
+      section.blocks.push_back(interfaces::TextBlock{core::to_string(error)});
     } else if (answer.contains("predict")) {
       section.title += ": what happens?";
       add_prediction(answer["predict"], *scene_, section);
@@ -241,6 +267,7 @@ core::Status SessionReport::write(const std::filesystem::path& path, const std::
                     {"supports", std::to_string(scene_->supports.size())}};
   interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures(backends)}};
   contents.sections.push_back(std::move(seen));
+  add_foreseen(contents);
   interfaces::ReportSection tracking{"Tracking", {}};
   if (!rows.empty()) {
     interfaces::TableBlock table{

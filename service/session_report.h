@@ -11,6 +11,7 @@
 #include "prescene/interfaces/reports/report.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/belief_summary.h"
+#include "prescene/service/foreseen.h"
 #include "prescene/service/frame_assembler.h"
 #include "prescene/service/support_score.h"
 #include "prescene/service/topics.h"
@@ -34,6 +35,12 @@ class SessionReport {
   /// An answer as JSON, and when it was asked for (s into the session).
   void add_answer(double at, const std::string& json) { answers_.emplace_back(at, json); }
 
+  /// What was foreseen beside what came.
+  void set_foreseen(const ForeseenAndCame& foreseen) {
+    comparisons_ = foreseen.comparisons();
+    came_is_truth_ = foreseen.knows_truth();
+  }
+
   core::Status write(const std::filesystem::path& path, const std::vector<ObjectTrackingScore>& rows,
                      Backends& backends) const;
 
@@ -41,6 +48,7 @@ class SessionReport {
   interfaces::PictureBlock pictures(Backends& backends) const;
   std::vector<interfaces::ReportBlock> curves() const;
   void add_supports(interfaces::ReportContents& contents) const;
+  void add_foreseen(interfaces::ReportContents& contents) const;
   void add_answers(interfaces::ReportContents& contents) const;
   void add_answer_section(double at, const nlohmann::ordered_json& answer, interfaces::ReportContents& contents) const;
 
@@ -54,6 +62,8 @@ class SessionReport {
   std::map<core::TimeNs, BeliefSummary> summaries_;
   SupportScore supports_;
   std::vector<std::pair<double, std::string>> answers_;
+  std::vector<Comparison> comparisons_;
+  bool came_is_truth_ = false;
 };
 
 }  // namespace prescene::service

@@ -11,6 +11,7 @@
 #include "prescene/filter/frame.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/foreseen.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
@@ -90,6 +91,13 @@ class Player {
                                    interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
     return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(state, view, images))),
                                  stamp_ns + ns_of(options_.latency));
+  }
+
+  core::Status write_outcomes(const belief::Trajectory& trajectory) {
+    if (scene_.outcomes.empty() && scene_.exclusive_outcomes.empty()) return core::ok_status();
+    return recording_.write_json(kOutcomeTopic,
+                                 belief::json_text(to_json(outcomes_of(scene_, trajectory, options_.start_ns))),
+                                 stamp(trajectory.final().time) + ns_of(options_.latency));
   }
 
  private:
@@ -189,7 +197,7 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     PRESCENE_RETURN_IF_ERROR(due[i].write());
     if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(due.size()), {}, ""});
   }
-  return core::ok_status();
+  return player.write_outcomes(trajectory);
 }
 
 ordered_json to_json(const TruthRecord& record) {

@@ -33,7 +33,8 @@ inline constexpr const char* kDiagnosticsTopic = "/diagnostics";         ///< ou
 std::string pose_topic(const std::string& object);
 
 // In recordings only, as JSON.
-inline constexpr const char* kTruthTopic = "/prescene/truth";  ///< Simulated truth of each frame.
-inline constexpr const char* kStepTopic = "/prescene/step";    ///< One step record a belief step.
+inline constexpr const char* kTruthTopic = "/prescene/truth";      ///< Simulated truth of each frame.
+inline constexpr const char* kOutcomeTopic = "/prescene/outcome";  ///< What the simulation came to.
+inline constexpr const char* kStepTopic = "/prescene/step";        ///< One step record a belief step.
 
 }  // namespace prescene::service

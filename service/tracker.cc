@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 #include <utility>
 
 #include "prescene/belief/json.h"
@@ -37,7 +38,8 @@ core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const 
     return core::invalid_input("carries " + message.type + ", expected " + type +
                                ": correct the topic's name in the settings");
   }
-  return interfaces::decode_cdr<Message>(message.cdr);
+  const bool large = std::is_same_v<Message, interfaces::RosImage>;
+  return interfaces::decode_cdr<Message>(message.cdr, large ? interfaces::CdrLimits{} : interfaces::kSmallMessage);
 }
 
 /// Frames do not wait for the colour of a topic that nobody named.
@@ -50,6 +52,8 @@ std::vector<std::string> degraded_words(const filter::StepResult& result) {
   std::vector<std::string> words;
   if (result.degraded != 0) words.push_back(filter::degraded_text(result.degraded));
   if (!result.frame_status.ok()) words.push_back(result.frame_status.message());
+  if (!result.physics_failure.empty()) words.push_back(result.physics_failure);
+  if (!result.rendering_failure.ok()) words.push_back(result.rendering_failure.message());
   return words;
 }
 
@@ -71,11 +75,7 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
     : settings_(settled(settings)),
       renderer_(std::move(renderer)),
       likelihood_(std::move(likelihood)),
-      filter_(*likelihood_, *renderer_, backends.pool(), settings.filter,
-              [&backends](const belief::Scene& simulated) {
-                auto simulator = backends.make_simulator(simulated);
-                return simulator ? *std::move(simulator) : nullptr;
-              }),
+      filter_(*likelihood_, *renderer_, backends.pool(), settings.filter, backends.simulator_factory()),
       assembler_(settings_.assembler, robot_names(*scene), settings.tf),
       scene_(std::move(scene)),
       belief_(std::make_shared<belief::Belief>(filter_.start(scene_, seed))) {}
@@ -177,6 +177,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.record.step = result.belief.step;
   step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
   step.counters = result.counters;
+  step.physics_failure = std::move(result.physics_failure);
   step.trace = std::move(result.trace);
   step.supports = std::move(result.supports);
   step.observation = std::move(frame->observation);

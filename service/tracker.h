@@ -2,13 +2,14 @@
 // One scene, tracked: messages go in, beliefs come out. The live service and the replay of a recording both drive it;
 // it reads no clock and owns no thread, so that both come to the same bits.
 //
-//   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings, seed, backends, log));
-//   tracker->take_in(message, index);
-//   while (auto step = tracker->step(now_ns)) publish(*step, *tracker->belief());
+//   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings, seed, backends));
+//   PRESCENE_RETURN_IF_ERROR(tracker->take_in(message, index));
+//   while (auto step = tracker->step(now_ns)) ... *step, *tracker->belief()
 #pragma once
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "prescene/belief/belief.h"
@@ -24,6 +25,7 @@ namespace prescene::service {
 struct TrackerStep {
   StepRecord record;
   filter::StepCounters counters;
+  std::string physics_failure;  ///< As in filter::StepResult.
   filter::HashTrace trace;
   std::vector<filter::SupportMeasurement> supports;
   belief::Observation observation;

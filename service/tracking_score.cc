@@ -23,6 +23,16 @@ double quantile(std::vector<double> values, double share) {
 
 }  // namespace
 
+void TrackingScore::add(const TruthRecord& truth) {
+  TruthRecord& kept = truths_[truth.stamp_ns];
+  kept = {truth.stamp_ns, {}};
+  for (const TruthRecord::Object& object : truth.objects) {
+    const bool twice = std::any_of(kept.objects.begin(), kept.objects.end(),
+                                   [&](const TruthRecord::Object& other) { return other.name == object.name; });
+    if (!twice && belief::find_object(*scene_, object.name)) kept.objects.push_back(object);
+  }
+}
+
 std::optional<FrameError> TrackingScore::error_at(core::TimeNs stamp_ns, const std::string& name) const {
   const auto truth = truths_.find(stamp_ns);
   const auto summary = summaries_.find(stamp_ns);

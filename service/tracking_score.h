@@ -38,7 +38,8 @@ class TrackingScore {
  public:
   explicit TrackingScore(std::shared_ptr<const belief::Scene> scene) : scene_(std::move(scene)) {}
   void add(const BeliefSummary& summary) { summaries_[summary.stamp_ns] = summary; }
-  void add(const TruthRecord& truth) { truths_[truth.stamp_ns] = truth; }
+  /// Objects that the scene does not have are left out: nothing estimates them.
+  void add(const TruthRecord& truth);
   /// One row an object of the truth, in its order; empty without truth.
   std::vector<ObjectTrackingScore> rows() const;
   /// Empty where the frame has no truth, or no estimate, of this object.

@@ -10,9 +10,9 @@
 namespace prescene::simulation {
 
 /// A step of free rotation is four turns, each by a rotation vector that is these rates times the angular momentum L:
-///
-///   about_least, about_most, about_least: in the body's principal axes, each with L as seen from the axes turned so
-///   far, about_momentum: in the world's axes.
+///   - about_least, about_most, about_least: in the body's principal axes, each with L as seen from the axes turned so
+///     far;
+///   - about_momentum: in the world's axes.
 ///
 /// L is to be carried in the body's axes: what the world's lose by rounding is much of a slender body's spin.
 ///

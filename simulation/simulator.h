@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The contract of a forward simulator: many independent instances of one scene, each from its own world state.
 //
-//   auto simulator = simulation::make_bullet_simulator(scene, shapes, options);     // prescene/simulation/bullet/...
+//   PRESCENE_TRY(auto simulator, make_simulator(scene));     // of a backend: prescene/simulation/bullet/...
 //   std::vector<belief::Trajectory> runs(starts.size());
-//   simulator->run(starts, request, stream, pool, runs);
+//   simulator->run(starts, request, stream, 0, pool, runs);
 //
 // The same scene, starts, request and stream give the same bits, for any number of threads and any split into calls.
 #pragma once
@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "prescene/belief/scene.h"
@@ -97,9 +98,20 @@ class InstanceNumbers {
   std::span<const std::uint32_t> numbers_;
 };
 
+/// Which of our steppers a simulator runs on, for those who are told.
+struct StepperUse {
+  std::string name;          ///< "lockstep" or "bullet"; "" = another, which has no name.
+  std::string not_lockstep;  ///< Why it is not "lockstep", where that was asked for first; else "".
+};
+
 class Simulator {
  public:
   virtual ~Simulator() = default;
+
+  /// Whether it can run `request`: kUnsupported names what of it can't be run. A simulator can run its scene's own
+  /// actions in any case; a request that it does not support must not be given to run() or make_instance() (checked).
+  virtual core::Status supports(const RunRequest& /*request*/) const { return core::ok_status(); }
+  virtual StepperUse stepper() const { return {}; }
 
   /// Runs starts.size() instances; trajectories.size() == starts.size(). Instance i uses stream.at(0, numbers[i]) for
   /// what is random in its actions. A cancelled run ends its instances with TrajectoryEnd::kCancelled.
@@ -114,6 +126,9 @@ class Simulator {
                                                   const core::RandomStream& stream) const = 0;
 };
 
-using SimulatorFactory = std::function<core::Result<std::unique_ptr<Simulator>>(const belief::Scene& scene)>;
+/// Makes a simulator of a scene, with steps `step_factor` times as long as the factory's own (1 = its own). Whoever
+/// needs simulators without knowing which takes one of these; service makes it. The scene need not outlive the call.
+using SimulatorFactory =
+    std::function<core::Result<std::unique_ptr<Simulator>>(const belief::Scene& scene, double step_factor)>;
 
 }  // namespace prescene::simulation

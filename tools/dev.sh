@@ -7,7 +7,7 @@ usage() {
   cat << 'END'
 usage: ./dev VERB
 
-  setup [run|develop]...       install the missing Debian packages (default: run)
+  setup [run|develop|MODULE]... install the missing Debian packages (default: run), or those that a module needs
   build [PRESET] [TARGET]...   build (default preset: release)
   test [--preset P] [FILTER]... build, then run all tests, or those whose name matches a FILTER (regular expressions)
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
@@ -43,14 +43,6 @@ timed() {
 
 installed() { [ "$(dpkg-query -W -f='${db:Status-Abbrev}' "$1" 2> /dev/null)" = "ii " ]; }
 
-packages_missing() {
-  local set package
-  while read -r set package _; do
-    case $set in '' | '#'*) continue ;; esac
-    case " $* " in *" $set "*) installed "$package" || echo "$package" ;; esac
-  done < tools/packages.txt
-}
-
 as_root() {
   if [ "$(id -u)" = 0 ]; then
     "$@"
@@ -80,8 +72,9 @@ apt_estimate() {
 
 verb_setup() {
   [ $# -gt 0 ] || set -- run
-  local missing estimate
-  mapfile -t missing < <(packages_missing "$@")
+  local wanted package missing=() estimate
+  wanted=$(tools/packages "$@") || exit 1
+  for package in $wanted; do installed "$package" || missing+=("$package"); done
   [ ${#missing[@]} -gt 0 ] || return 0
   command -v apt-get > /dev/null || fail "this is not Debian; install by your system's means: ${missing[*]}"
   if ! estimate=$(apt_estimate "${missing[@]}"); then

@@ -5,7 +5,7 @@
 // Body B's DOP lies, in A's frame, in the polytope of B's turned planes. How far that reaches against A's direction d
 // is bounded by the corner of the three planes between whose normals the turned d lies: a sum of three stored planes
 // with weights that depend on the rotation only. So two bodies' volumes are disjoint if for some direction p
-//   A's plane p  <  constant[p] - sum of weights[p][n] * B's plane planes[p][n], n = 0, 1, 2.
+// A's plane p is less than constant[p] minus the sum of weights[p][n] * B's plane planes[p][n] over n = 0, 1, 2.
 #pragma once
 
 #include <array>

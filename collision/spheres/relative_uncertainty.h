@@ -4,7 +4,7 @@
 //   PRESCENE_TRY(const RelativeUncertainty between, RelativeUncertainty::make({X_WA, C_A}, {X_WB, C_B}));
 //
 // Everything is seen from A. To first order in both errors, the point of B whose mean place is p moves by
-//   d(p) = tau + phi x p,   phi = R_AB phi_B - phi_A,   tau = R_WA^T (tau_B - tau_A) + p_AB x R_AB phi_B,
+// d(p) = tau + phi x p, with phi = R_AB phi_B - phi_A and tau = R_WA^T (tau_B - tau_A) + p_AB x R_AB phi_B,
 // so that all pairs of points move with one Gaussian error (phi, tau) of six dimensions. What the first order misses is
 // bounded: see remainder().
 #pragma once

@@ -5,7 +5,7 @@
 // of the surface has a sphere of its own, which knows how the surface goes on about the place where it touches.
 //
 //   PRESCENE_TRY(const SurfaceSpheres cup, cover_surface(mesh, {.count = 3000, .edge_fidelity = 0.001}, pool));
-//   cup.tree, cup.patches[cup.tree->order()[place]]
+//   ... cup.tree, cup.patches[cup.tree->order()[place]]
 //
 // Faces are sampled by throwing darts, closer where they bend [Cook 1986]; the sphere at a sample is the largest that
 // touches the surface there and does not leave the body (the shrinking ball of [Ma, Bae and Choi 2012]). Facets that

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // RGB-D frames in a folder of PNGs (colour may be JPEG), in one of three layouts:
 //
-//   camera_poses.csv       with a header line naming the columns frame, color, depth, m00 ... m33 (camera-to-world,
-//                          row-major, metres, optical axes) and optionally stamp_ns; file names relative to the folder
-//   frames/*.color.png     (or beside) with the matching *.depth.png and no poses: the camera stands still at
-//                          X_WC = identity
-//   color.png, depth.png   a single frame
+//   - camera_poses.csv, with a header line naming the columns frame, color, depth, m00 ... m33 (camera-to-world,
+//     row-major, metres, optical axes) and optionally stamp_ns; file names relative to the folder;
+//   - frames/*.color.png (or beside) with the matching *.depth.png and no poses: the camera stands still at
+//     X_WC = identity;
+//   - color.png and depth.png, a single frame.
 //
 // The camera comes from intrinsics.K.txt (3x3) in the folder, else from the options. Images are read when asked for.
 #pragma once

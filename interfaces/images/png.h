@@ -2,7 +2,7 @@
 // PNG files: colour, depth in 16-bit grey with a scale, and labels in 8- or 16-bit grey or a palette. Sizes are checked
 // against limits, and against what the bytes could hold at best, before memory is taken; broken bytes are a status.
 //
-//   PRESCENE_TRY(DepthImage depth, read_png_depth(path, 0.001));
+//   PRESCENE_TRY(geometry::DepthImage depth, read_png_depth(path, 0.001));
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ using ColorView = geometry::ImageView<const geometry::Rgb>;
 /// What an image file may make us allocate.
 struct ImageLimits {
   int max_side = 16384;                             ///< Pixels.
-  std::int64_t max_pixels = std::int64_t{1} << 26;  ///< 67 million.
+  std::int64_t max_pixels = std::int64_t{1} << 24;  ///< 4096 x 4096, as of images in messages.
   std::size_t max_file_bytes = std::size_t{256} << 20;
 };
 

@@ -16,65 +16,85 @@ namespace {
 // would.
 constexpr int kZstdLevel = 1;
 constexpr std::size_t kMinCompressedBytes = 1024;
-constexpr std::size_t kOutputStep = std::size_t{1} << 20;
+constexpr std::size_t kInputStep = std::size_t{256} << 10;
 
-/// Room for the next step of output; false when all of `size` is there.
-bool grow(std::vector<std::uint8_t>* out, std::size_t used, std::uint64_t size) {
-  if (used == size) return false;
-  if (used == out->size())
-    out->resize(static_cast<std::size_t>(std::min<std::uint64_t>(size, used + std::max(used, kOutputStep))));
-  return true;
+/// The stored bytes, a piece at a time.
+class Input {
+ public:
+  Input(const StoredBytes& stored, std::uint64_t size) : stored_(stored), left_(size) {}
+
+  /// What was not consumed yet; the next piece when all was. Empty at the end.
+  core::Result<std::span<const std::uint8_t>> rest() {
+    if (consumed_ == piece_.size() && left_ > 0) {
+      piece_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(left_, kInputStep)));
+      left_ -= piece_.size();
+      consumed_ = 0;
+      PRESCENE_RETURN_IF_ERROR(stored_(piece_));
+    }
+    return std::span<const std::uint8_t>(piece_).subspan(consumed_);
+  }
+  void consume(std::size_t count) { consumed_ += count; }
+  bool at_end() const { return left_ == 0 && consumed_ == piece_.size(); }
+
+ private:
+  const StoredBytes& stored_;
+  std::uint64_t left_;
+  std::vector<std::uint8_t> piece_;
+  std::size_t consumed_ = 0;
+};
+
+/// Where the output goes. Left uninitialised: pages that nothing is written to take no memory.
+Decompressed empty_output(std::size_t claimed) {
+  return {std::make_unique_for_overwrite<std::uint8_t[]>(claimed), 0, false};
 }
 
-Decompressed decompress_zstd(std::span<const std::uint8_t> bytes, std::uint64_t size) {
+core::Result<Decompressed> decompress_zstd(Input* input, std::size_t claimed) {
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   PRESCENE_CHECK(context != nullptr);
-  Decompressed result;
-  ZSTD_inBuffer in{bytes.data(), bytes.size(), 0};
-  std::size_t used = 0;
+  Decompressed result = empty_output(claimed);
+  ZSTD_outBuffer out{result.data.get(), claimed, 0};
   std::size_t expected = 1;  // 0 when a frame is finished.
-  while (grow(&result.bytes, used, size)) {
-    ZSTD_outBuffer out{result.bytes.data(), result.bytes.size(), used};
-    const std::size_t before = in.pos;
+  // When all bytes are out, the frame's end (its checksum) may be still to be read.
+  while (out.pos < claimed || expected != 0) {
+    PRESCENE_TRY(const std::span<const std::uint8_t> piece, input->rest());
+    ZSTD_inBuffer in{piece.data(), piece.size(), 0};
+    const std::size_t before = out.pos;
     expected = ZSTD_decompressStream(context.get(), &out, &in);
-    const bool stuck = in.pos == before && out.pos == used;
-    used = out.pos;
-    if (ZSTD_isError(expected) != 0 || stuck) break;
+    input->consume(in.pos);
+    if (ZSTD_isError(expected) != 0 || (in.pos == 0 && out.pos == before)) break;
   }
-  result.bytes.resize(used);
-  if (used == size && ZSTD_isError(expected) == 0 && expected != 0) {
-    // All bytes are out, the frame's end (its checksum) may be still to be read.
-    std::uint8_t nothing = 0;
-    ZSTD_outBuffer out{&nothing, 0, 0};
-    expected = ZSTD_decompressStream(context.get(), &out, &in);
-  }
-  result.complete = used == size && (size == 0 || expected == 0) && in.pos == in.size;
+  result.size = out.pos;
+  result.complete = result.size == claimed && (claimed == 0 || expected == 0) && input->at_end();
   return result;
 }
 
-Decompressed decompress_lz4(std::span<const std::uint8_t> bytes, std::uint64_t size) {
+core::Result<Decompressed> decompress_lz4(Input* input, std::size_t claimed) {
   LZ4F_dctx* raw_context = nullptr;
   PRESCENE_CHECK(LZ4F_isError(LZ4F_createDecompressionContext(&raw_context, LZ4F_VERSION)) == 0U);
   const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(raw_context,
                                                                                      &LZ4F_freeDecompressionContext);
-  Decompressed result;
-  std::size_t used = 0;
-  std::size_t consumed = 0;
+  Decompressed result = empty_output(claimed);
   std::size_t hint = 1;  // 0 when the frame is finished.
-  for (;;) {
-    const bool room = grow(&result.bytes, used, size);
-    std::size_t out_bytes = room ? result.bytes.size() - used : 0;
-    std::size_t in_bytes = bytes.size() - consumed;
-    std::uint8_t nothing = 0;
-    hint = LZ4F_decompress(context.get(), room ? result.bytes.data() + used : &nothing, &out_bytes,
-                           bytes.data() + consumed, &in_bytes, nullptr);
+  while (hint != 0) {
+    PRESCENE_TRY(const std::span<const std::uint8_t> piece, input->rest());
+    std::size_t out_bytes = claimed - result.size;
+    std::size_t in_bytes = piece.size();
+    hint =
+        LZ4F_decompress(context.get(), result.data.get() + result.size, &out_bytes, piece.data(), &in_bytes, nullptr);
     if (LZ4F_isError(hint) != 0U) break;
-    used += out_bytes;
-    consumed += in_bytes;
-    if (hint == 0 || (out_bytes == 0 && in_bytes == 0)) break;
+    result.size += out_bytes;
+    input->consume(in_bytes);
+    if (out_bytes == 0 && in_bytes == 0) break;
   }
-  result.bytes.resize(used);
-  result.complete = used == size && hint == 0 && consumed == bytes.size();
+  result.complete = result.size == claimed && hint == 0 && input->at_end();
+  return result;
+}
+
+core::Result<Decompressed> copied(const StoredBytes& stored, std::uint64_t stored_size, std::size_t claimed) {
+  Decompressed result = empty_output(claimed);
+  result.size = static_cast<std::size_t>(std::min<std::uint64_t>(claimed, stored_size));
+  result.complete = result.size == claimed && result.size == stored_size;
+  PRESCENE_RETURN_IF_ERROR(stored({result.data.get(), result.size}));
   return result;
 }
 
@@ -117,17 +137,18 @@ std::optional<std::vector<std::uint8_t>> compress(McapCompression compression, s
   return out;
 }
 
-Decompressed decompress(McapCompression compression, std::span<const std::uint8_t> bytes, std::uint64_t size) {
+core::Result<Decompressed> decompress(McapCompression compression, const StoredBytes& stored, std::uint64_t stored_size,
+                                      std::size_t claimed) {
+  Input input(stored, stored_size);
   switch (compression) {
     case McapCompression::kZstd:
-      return decompress_zstd(bytes, size);
+      return decompress_zstd(&input, claimed);
     case McapCompression::kLz4:
-      return decompress_lz4(bytes, size);
+      return decompress_lz4(&input, claimed);
     case McapCompression::kNone:
       break;
   }
-  const std::size_t kept = static_cast<std::size_t>(std::min<std::uint64_t>(size, bytes.size()));
-  return {{bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(kept)}, size == bytes.size()};
+  return copied(stored, stored_size, claimed);
 }
 
 }  // namespace prescene::interfaces

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "prescene/core/status.h"
 #include "prescene/interfaces/mcap/mcap.h"
 
 namespace prescene::interfaces {
@@ -21,10 +24,17 @@ std::optional<McapCompression> find_compression(std::string_view name);
 std::optional<std::vector<std::uint8_t>> compress(McapCompression compression, std::span<const std::uint8_t> bytes);
 
 struct Decompressed {
-  std::vector<std::uint8_t> bytes;  ///< As many as could be had.
-  bool complete = false;            ///< All `size` bytes, and the input ended where it should.
+  std::unique_ptr<std::uint8_t[]> data;
+  std::size_t size = 0;   ///< As many bytes as could be had.
+  bool complete = false;  ///< All that were claimed, and the input ended where it should.
+  std::span<const std::uint8_t> bytes() const { return {data.get(), size}; }
 };
-/// At most `size` bytes; memory grows with what really comes out, not with `size`.
-Decompressed decompress(McapCompression compression, std::span<const std::uint8_t> bytes, std::uint64_t size);
+/// Fills the span with the stored bytes that come next.
+using StoredBytes = std::function<core::Status(std::span<std::uint8_t>)>;
+/// At most `claimed` bytes out of `stored_size`, which are asked for piece by piece. `claimed` bytes of address space
+/// are reserved (the caller bounds them); only what really comes out is touched, and up to 128 MiB for zstd's window.
+/// Errors are those of `stored`.
+core::Result<Decompressed> decompress(McapCompression compression, const StoredBytes& stored, std::uint64_t stored_size,
+                                      std::size_t claimed);
 
 }  // namespace prescene::interfaces

@@ -2,6 +2,7 @@
 #include "mcap_layout.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <map>
 
@@ -21,22 +22,34 @@ constexpr std::size_t kMagicBytes = records::kMagic.size();
 constexpr std::size_t kFooterBytes = records::kFrameBytes + records::Footer::kContentBytes;
 constexpr std::uint64_t kMaxRunBytes = std::uint64_t{4} << 20;
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
-constexpr std::uint64_t kMaxMetadataBytes = std::uint64_t{64} << 20;
+constexpr std::size_t kMaxIds = 65535;  // of schemas and of channels: they have 16 bits
+constexpr std::uint64_t kDataEndBytes = records::kFrameBytes + sizeof(std::uint32_t);
+constexpr std::size_t kCheckStep = std::size_t{1} << 20;
 
 struct Frame {
   Op op{};
   std::uint64_t length = 0;
 };
 
+/// What the summary says of a chunk.
+struct KnownChunk {
+  std::uint64_t length = 0;  ///< With the frame.
+  std::uint64_t message_index_length = 0;
+  std::vector<std::uint16_t> channel_ids;
+};
+
 class LayoutFinder {
  public:
-  explicit LayoutFinder(McapSource* source) : source_(*source), limit_(source->size()) {}
+  LayoutFinder(McapSource* source, bool salvage, bool check_data)
+      : source_(*source), salvage_(salvage), check_data_(check_data), limit_(source->size()) {}
 
   Result<McapLayout> find() {
     PRESCENE_RETURN_IF_ERROR(check_magic());
     PRESCENE_RETURN_IF_ERROR(read_header());
     PRESCENE_RETURN_IF_ERROR(read_summary());
     PRESCENE_RETURN_IF_ERROR(walk());
+    PRESCENE_RETURN_IF_ERROR(check_data_section());
+    PRESCENE_RETURN_IF_ERROR(refuse_damage());
     out_.indexed = !out_.channels.empty();
     return std::move(out_);
   }
@@ -91,25 +104,32 @@ class LayoutFinder {
     limit_ = footer_at;
     records::Footer footer;
     parse(std::span(tail).subspan(records::kFrameBytes, records::Footer::kContentBytes), &footer);
-    if (footer.summary_start == 0) return core::ok_status();
+    out_.unchecked.index = footer.summary_start != 0 && footer.summary_crc == 0;
 
-    bool good = footer.summary_start >= position_ && footer.summary_start <= footer_at;
-    if (good) {
-      std::vector<std::uint8_t> summary(static_cast<std::size_t>(footer_at - footer.summary_start));
-      PRESCENE_RETURN_IF_ERROR(source_.read(footer.summary_start, summary));
-      const std::span<const std::uint8_t> covered_footer(tail.data(), kFooterBytes - sizeof footer.summary_crc);
-      good = footer.summary_crc == 0 || footer.summary_crc == crc32(covered_footer, crc32(summary));
-      good = good && parse_summary(summary, footer.summary_start);
+    // Without a summary the checksum, where there is one, is that of the footer alone.
+    const std::uint64_t summary_start = footer.summary_start == 0 ? footer_at : footer.summary_start;
+    bool good = summary_start >= position_ && summary_start <= footer_at;
+    if (good && footer_at - summary_start > kMaxSummaryBytes) {
+      return core::resource_exhausted(source_.name() + ": its index has " +
+                                      size_text(static_cast<std::size_t>(footer_at - summary_start)) + "; up to " +
+                                      size_text(kMaxSummaryBytes) + " are read");
     }
     if (good) {
-      limit_ = footer.summary_start;
+      std::vector<std::uint8_t> summary(static_cast<std::size_t>(footer_at - summary_start));
+      PRESCENE_RETURN_IF_ERROR(source_.read(summary_start, summary));
+      const std::span<const std::uint8_t> covered_footer(tail.data(), kFooterBytes - sizeof footer.summary_crc);
+      good = footer.summary_crc == 0 || footer.summary_crc == crc32(covered_footer, crc32(summary));
+      good = good && parse_summary(summary, summary_start);
+    }
+    if (good) {
+      limit_ = summary_start;
       return core::ok_status();
     }
     out_.loss.bad_index = true;
     out_.schemas.clear();
     out_.channels.clear();
     out_.statistics.reset();
-    chunk_indexes_.clear();
+    known_chunks_.clear();
     return core::ok_status();
   }
 
@@ -118,9 +138,11 @@ class LayoutFinder {
     while (walk.next()) {
       bool good = true;
       if (walk.op() == Op::kSchema) {
-        good = parse(walk.content(), &out_.schemas.emplace_back());
+        good = walk.content().size() <= kMaxDefinitionBytes && out_.schemas.size() < kMaxIds &&
+               parse(walk.content(), &out_.schemas.emplace_back());
       } else if (walk.op() == Op::kChannel) {
-        good = parse(walk.content(), &out_.channels.emplace_back());
+        good = walk.content().size() <= kMaxDefinitionBytes && out_.channels.size() < kMaxIds &&
+               parse(walk.content(), &out_.channels.emplace_back());
       } else if (walk.op() == Op::kStatistics) {
         good = parse(walk.content(), &out_.statistics.emplace());
       } else if (walk.op() == Op::kChunkIndex) {
@@ -128,7 +150,10 @@ class LayoutFinder {
         good = parse(walk.content(), &index) && index.chunk_offset < data_end &&
                index.chunk_length <= data_end - index.chunk_offset &&
                index.message_index_length <= data_end - index.chunk_offset - index.chunk_length;
-        chunk_indexes_[index.chunk_offset] = std::move(index);
+        KnownChunk& known = known_chunks_[index.chunk_offset];
+        known = {index.chunk_length, index.message_index_length, {}};
+        known.channel_ids.reserve(index.message_index_offsets.size());
+        for (const auto& [id, offset] : index.message_index_offsets) known.channel_ids.push_back(id);
       }
       if (!good) return false;
     }
@@ -140,7 +165,12 @@ class LayoutFinder {
   Status walk() {
     while (position_ < limit_) {
       const std::optional<Frame> frame = frame_at(position_);
+      if (frame && frame->op == Op::kDataEnd) data_end_ = position_;
       if (frame && (frame->op == Op::kDataEnd || frame->op == Op::kFooter)) return core::ok_status();
+      if (out_.segments.size() > kMaxSegments) {
+        return core::resource_exhausted(source_.name() + ": has more than " + std::to_string(kMaxSegments) +
+                                        " chunks; split it");
+      }
       const bool fits = frame && frame->length <= limit_ - position_ - records::kFrameBytes;
       if (frame && frame->op == Op::kChunk) {
         PRESCENE_TRY(const bool good, add_chunk(*frame));
@@ -171,8 +201,8 @@ class LayoutFinder {
   }
 
   std::uint64_t next_known_chunk() const {
-    const auto next = chunk_indexes_.upper_bound(position_);
-    return next == chunk_indexes_.end() ? limit_ : next->first;
+    const auto next = known_chunks_.upper_bound(position_);
+    return next == known_chunks_.end() ? limit_ : next->first;
   }
 
   void skip_damage() {
@@ -189,20 +219,24 @@ class LayoutFinder {
     const auto head_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(
         content_end - content_begin, records::ChunkHead::kBytesBeforeName + records::ChunkHead::kMaxNameBytes + 8));
     PRESCENE_TRY(const std::span<const std::uint8_t> head, source_.peek(content_begin, head_bytes));
+    records::ChunkHead parsed;
+    if (!parse(head, &parsed)) return false;
     McapSegment segment;
     segment.chunk = true;
-    if (!parse(head, &segment.head)) return false;
-    segment.offset = content_begin + segment.head.bytes();
+    segment.crc = parsed.uncompressed_crc;
+    segment.offset = content_begin + parsed.bytes();
     const std::uint64_t available = content_end - segment.offset;
-    segment.cut = segment.head.records_size > available;
-    segment.length = std::min(segment.head.records_size, available);
-    segment.start_time = segment.head.start_time;
-    segment.end_time = segment.head.end_time;
-    const auto index = chunk_indexes_.find(position_);
+    segment.cut = parsed.records_size > available;
+    segment.length = std::min(parsed.records_size, available);
+    segment.unpacked_length = parsed.uncompressed_size;
+    segment.start_time = parsed.start_time;
+    segment.end_time = parsed.end_time;
+    segment.compression = std::move(parsed.compression);
+    const auto known = known_chunks_.find(position_);
     position_ = content_end;
-    if (index != chunk_indexes_.end() && fits && index->second.chunk_length == records::kFrameBytes + frame.length) {
-      for (const auto& [id, offset] : index->second.message_index_offsets) segment.channel_ids.insert(id);
-      position_ += index->second.message_index_length;
+    if (known != known_chunks_.end() && fits && known->second.length == records::kFrameBytes + frame.length) {
+      segment.channel_ids = known->second.channel_ids;
+      position_ += known->second.message_index_length;
     }
     out_.segments.push_back(std::move(segment));
     return true;
@@ -221,16 +255,19 @@ class LayoutFinder {
         McapSegment& run = run_for(bytes);
         run.start_time = std::min(run.start_time, head.log_time);
         run.end_time = std::max(run.end_time, head.log_time);
-        run.length += bytes;
+        extend(&run, bytes);
         break;
       }
       case Op::kSchema:
       case Op::kChannel:
-        run_for(bytes).length += bytes;
+        extend(&run_for(bytes), bytes);
         break;
       case Op::kMetadata: {
         metadata_bytes_ += frame.length;
-        if (metadata_bytes_ > kMaxMetadataBytes) break;
+        if (metadata_bytes_ > kMaxMetadataBytes) {
+          return core::resource_exhausted(source_.name() + ": its metadata has more than " +
+                                          size_text(kMaxMetadataBytes) + ", which is the limit");
+        }
         PRESCENE_TRY(const std::vector<std::uint8_t> content, content_at(position_, frame));
         if (!records::parse(content, &out_.metadata.emplace_back())) {
           out_.metadata.pop_back();
@@ -243,6 +280,11 @@ class LayoutFinder {
     }
     position_ += bytes;
     return true;
+  }
+
+  static void extend(McapSegment* run, std::uint64_t bytes) {
+    run->length += bytes;
+    run->unpacked_length += bytes;
   }
 
   /// The run of loose records that ends at the position, or a new one.
@@ -258,16 +300,67 @@ class LayoutFinder {
     return out_.segments.back();
   }
 
+  /// Compares the checksum in the record that ends the data section with the bytes before that record. A recording
+  /// that was closed has it at the end of the section; in one that was cut the walk may have come to it.
+  Status check_data_section() {
+    const bool closed = !out_.loss.truncated;
+    if (closed && !out_.loss.bad_index && limit_ >= kMagicBytes + kDataEndBytes) {
+      data_end_ = limit_ - kDataEndBytes;
+    }
+    out_.unchecked.data = closed;
+    if (!data_end_ || source_.size() - *data_end_ < kDataEndBytes) return core::ok_status();
+    std::array<std::uint8_t, kDataEndBytes> record{};
+    PRESCENE_RETURN_IF_ERROR(source_.read(*data_end_, record));
+    ByteReader in(record);
+    const auto op = static_cast<Op>(in.read<std::uint8_t>());
+    const auto length = in.read<std::uint64_t>();
+    const auto expected = in.read<std::uint32_t>();
+    if (op != Op::kDataEnd || length != sizeof expected) return core::ok_status();
+    out_.unchecked.data = expected == 0;
+    if (expected == 0 || !check_data_) return core::ok_status();
+    std::uint32_t found = 0;
+    std::vector<std::uint8_t> bytes;
+    for (std::uint64_t offset = 0; offset < *data_end_; offset += bytes.size()) {
+      bytes.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kCheckStep, *data_end_ - offset)));
+      PRESCENE_RETURN_IF_ERROR(source_.read(offset, bytes));
+      found = crc32(bytes, found);
+    }
+    out_.loss.damaged_data = found != expected;
+    return core::ok_status();
+  }
+
+  /// A recording that was cut is whole up to the cut; one that was closed has no reason to have lost anything.
+  Status refuse_damage() const {
+    if (salvage_) return core::ok_status();
+    const bool closed = !out_.loss.truncated;
+    std::string what;
+    if (out_.loss.bad_index) {
+      what = "its index is";
+    } else if (out_.loss.damaged_data) {
+      what = "its data section is";
+    } else if (closed && out_.loss.lost_bytes > 0) {
+      what = size_text(static_cast<std::size_t>(out_.loss.lost_bytes)) + " of it are";
+    } else {
+      return core::ok_status();
+    }
+    return core::data_loss(source_.name() + ": " + what + " damaged" + kDamageRemedy);
+  }
+
   McapSource& source_;
+  bool salvage_;
+  bool check_data_;
   std::uint64_t limit_;  ///< Where the data section must have ended.
   std::uint64_t position_ = 0;
-  std::map<std::uint64_t, records::ChunkIndex> chunk_indexes_;
+  std::optional<std::uint64_t> data_end_;  ///< Where the record that ends the data section begins.
+  std::map<std::uint64_t, KnownChunk> known_chunks_;
   std::uint64_t metadata_bytes_ = 0;
   McapLayout out_;
 };
 
 }  // namespace
 
-Result<McapLayout> find_layout(McapSource* source) { return LayoutFinder(source).find(); }
+Result<McapLayout> find_layout(McapSource* source, bool salvage, bool check_data) {
+  return LayoutFinder(source, salvage, check_data).find();
+}
 
 }  // namespace prescene::interfaces

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads MCAP recordings: by their index when they have one, front to back when they were cut. Damage costs what is
-// damaged and is told, never the rest; hostile lengths take no memory.
+// Reads MCAP recordings: by their index when they have one, front to back when they were cut. A recording is compared
+// with every checksum that it holds, and refused where one is wrong or a record makes no sense; on request, what is
+// sound of it is read, and what was left out is counted. A recording that was cut is read to its last whole record.
+// Lengths that a file claims are bounded before memory is taken.
 //
 //   PRESCENE_TRY(auto reader, McapReader::open("run.mcap"));
 //   while (true) {
 //     PRESCENE_TRY(auto message, reader->next());
 //     if (!message) break;
-//     use(reader->channels()[message->channel].topic, *message);
+//     ... reader->channels()[message->channel].topic, *message
 //   }
 #pragma once
 
@@ -24,13 +26,21 @@ struct McapReaderOptions {
   std::set<std::string> topics = {};          ///< Empty: all.
   std::optional<std::int64_t> begin_ns = {};  ///< Log times in [begin_ns, end_ns).
   std::optional<std::int64_t> end_ns = {};
-  std::size_t max_chunk_bytes = std::size_t{1} << 30;  ///< Larger (uncompressed) chunks are refused.
+  /// Larger (uncompressed) chunks are refused. Recorders make chunks of 1 to 4 MiB; a message that is larger, such as
+  /// an image, is a chunk of its own.
+  std::size_t max_chunk_bytes = std::size_t{128} << 20;
+  /// Read what is sound of a damaged recording instead of refusing it.
+  bool salvage = false;
+  /// Compare the checksum of the data section, which reads the whole file once. Without it, damage outside of chunks
+  /// (to metadata, for instance) is not noticed: only for a file that was checked a moment ago.
+  bool check_data = true;
 };
 
 /// What could not be read.
 struct McapLoss {
   bool truncated = false;            ///< No footer: the file was cut or is still being written.
   bool bad_index = false;            ///< There is an index, but it is wrong; read front to back instead.
+  bool damaged_data = false;         ///< The checksum of the data section is wrong.
   std::uint64_t lost_bytes = 0;      ///< After the last whole record; of a cut chunk those of its unpacked content.
   std::uint64_t damaged_chunks = 0;  ///< Left out for a wrong checksum, or read to their last sound record.
   std::uint64_t refused_chunks = 0;  ///< Left out as larger than max_chunk_bytes.
@@ -42,11 +52,25 @@ struct McapLoss {
   friend bool operator==(const McapLoss&, const McapLoss&) = default;
 };
 
+/// What carries no checksum, so that damage to it can't be noticed. (A recording that was cut has lost the checksum of
+/// its data section with its end, see McapLoss::truncated.)
+struct McapUnchecked {
+  bool data = false;         ///< The data section: what is outside of chunks, as metadata.
+  bool index = false;        ///< The summary.
+  std::uint64_t chunks = 0;  ///< Of those that were read.
+  bool nothing() const { return *this == McapUnchecked{}; }
+  /// One sentence for a person; empty when all has its checksum.
+  std::string text() const;
+  friend bool operator==(const McapUnchecked&, const McapUnchecked&) = default;
+};
+
 /// Not thread-safe. Memory is bounded by the chunks that overlap in time, together at most max_chunk_bytes (then the
-/// order of time is given up before memory is), not by the file.
+/// order of time is given up before memory is), and what is kept of each chunk (at most 2^20, some 150 bytes each),
+/// schemas, channels and metadata (at most 64 MiB, 64 MiB and 20 MiB as stored); not by the file.
 class McapReader {
  public:
-  /// Fails with kNotFound (no such file), kInvalidInput (not an MCAP file), kDataLoss (nothing readable).
+  /// Fails with kNotFound (no such file), kInvalidInput (not an MCAP file), kDataLoss (nothing readable, or damaged),
+  /// kResourceExhausted (it would take too much memory).
   static core::Result<std::unique_ptr<McapReader>> open(const std::filesystem::path& path,
                                                         const McapReaderOptions& options = {});
   /// The same from memory.
@@ -64,10 +88,13 @@ class McapReader {
   std::optional<std::uint64_t> message_count() const;
 
   /// The next message in the order of log time (of position in the file among equals, or throughout a file without
-  /// index); empty at the end. Damage is passed over and counted. Times beyond 2^63 ns read as 2^63 - 1.
+  /// index); empty at the end. Fails with kDataLoss at a damaged chunk, with kUnsupported at one of an unknown
+  /// compression and with kResourceExhausted at one that is too large; these are left out and counted with `salvage`.
+  /// Times beyond 2^63 ns read as 2^63 - 1.
   core::Result<std::optional<McapMessage>> next();
   /// Complete once next() has returned the end.
   const McapLoss& loss() const;
+  const McapUnchecked& unchecked() const;
 
  private:
   struct Impl;

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/core/text.h"
+#include "prescene/geometry/cancellable.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "raw_mesh.h"
@@ -34,6 +36,14 @@ constexpr std::array<Extension, 6> kExtensions = {{{".ply", MeshFormat::kPly},
                                                    {".gltf", MeshFormat::kGltf},
                                                    {".glb", MeshFormat::kGltf},
                                                    {".dae", MeshFormat::kCollada}}};
+
+/// "96.1 x 82 x 110.4 m".
+std::string extent_text(const Vector3d& size) {
+  const auto text = [](double length) {
+    return core::rounded_text(length > 1.0 ? std::round(10.0 * length) / 10.0 : length);
+  };
+  return text(size.x()) + " x " + text(size.y()) + " x " + text(size.z()) + " m";
+}
 
 Vector3d turned_up(const Vector3d& p, UpAxis up) {
   if (up == UpAxis::kX) return {-p.z(), p.y(), p.x()};
@@ -76,20 +86,20 @@ Result<LoadedMesh> finish(RawMesh raw, const MeshReadOptions& options) {
   LoadedMesh out;
   std::vector<Vector3d> before;
   if (!raw.colors.empty()) before = raw.mesh.vertices;
-  Result<TriangleMesh> repaired = geometry::repair_mesh(std::move(raw.mesh), &out.repair);
+  Result<TriangleMesh> repaired = geometry::repair_mesh(std::move(raw.mesh), &out.repair, options.cancellation);
   if (!repaired) {
     if (raw.first_non_finite.empty()) return repaired.status();
     return repaired.status().at(raw.first_non_finite + " is the first that is not finite");
   }
   out.mesh = *std::move(repaired);
   out.colors = colors_after_repair(before, raw.colors, out.mesh.vertices);
-  out.warnings = std::move(raw.warnings);
+  if (const auto hint = scale_hint(geometry::bounding_box(out.mesh))) out.warnings.push_back(*hint);
+  out.warnings.insert(out.warnings.end(), raw.warnings.begin(), raw.warnings.end());
   if (!raw.first_non_finite.empty()) {
     out.warnings.push_back(raw.first_non_finite +
                            " is the first that is not finite; triangles with such were left out");
   }
   if (out.repair.changed()) out.warnings.push_back(out.repair.text());
-  if (const auto hint = scale_hint(geometry::bounding_box(out.mesh))) out.warnings.push_back(*hint);
   return out;
 }
 
@@ -123,9 +133,13 @@ Result<RawMesh> parse(MeshFormat format, std::span<const std::uint8_t> bytes, co
 
 Result<RawMesh> read_raw(const std::filesystem::path& path, MeshFormat format, const MeshReadOptions& options) {
   if (format == MeshFormat::kGltf || format == MeshFormat::kCollada) {
-    // assimp reads the file again; this is for the errors and the cap.
-    PRESCENE_RETURN_IF_ERROR(read_file(path, options.max_assimp_file_bytes).status());
-    Result<RawMesh> raw = import_with_assimp(path, options);
+    // The importer opens the file again; this is for the errors and the cap.
+    PRESCENE_TRY(const InputFile file, InputFile::open(path));
+    if (file.size() > options.max_assimp_file_bytes) {
+      return core::resource_exhausted(path.string() + ": " + size_text(file.size()) + " are more than the limit of " +
+                                      size_text(options.max_assimp_file_bytes) + "; use a smaller file");
+    }
+    Result<RawMesh> raw = import_with_assimp(path, format, options);
     if (!raw) return raw.status().at(path.string());
     return raw;
   }
@@ -167,18 +181,16 @@ Result<LoadedMesh> decode_mesh(MeshFormat format, std::span<const std::uint8_t> 
 
 std::optional<std::string> scale_hint(const geometry::Box& box) {
   if (box.isEmpty()) return std::nullopt;
-  const double length = box.sizes().maxCoeff();
-  if (length > kLargestObject) {
-    return "the object is " + number_text(std::round(length * 10.0) / 10.0) +
-           " m long: is the file in millimetres? Then set its scale to 0.001";
-  }
-  if (length < kSmallestObject) {
-    return "the object is " + number_text(length) + " m long: was the scale applied twice? Then set it to 1";
-  }
+  const geometry::Vector3d size = box.sizes();
+  if (size.maxCoeff() > kLargestObject)
+    return "the bounding box is " + extent_text(size) + ": the mesh is probably in millimetres; set its scale to 0.001";
+  if (size.maxCoeff() < kSmallestObject)
+    return "the bounding box is " + extent_text(size) + ": the scale was probably applied twice; set it to 1";
   return std::nullopt;
 }
 
 Status check_triangle_count(std::size_t count, const MeshReadOptions& options) {
+  if (options.cancellation && options.cancellation->requested()) return core::cancelled("reading was stopped");
   if (count <= options.max_triangles) return core::ok_status();
   return core::resource_exhausted("has more than the limit of " + std::to_string(options.max_triangles) +
                                   " triangles or vertices; simplify it");

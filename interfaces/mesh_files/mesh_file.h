@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Triangle meshes from and to files: PLY, OBJ and STL by small readers of our own that expect hostile bytes; glTF and
-// COLLADA through assimp, behind a size cap, for files that you trust. Whatever is read is repaired, with a report.
+// COLLADA through assimp in a child process with limits of memory and time, which may open regular files of the model's
+// folder only. Whatever is read is repaired, with a report.
 //
 //   PRESCENE_TRY(LoadedMesh cup, read_mesh("cup.stl", {.metres_per_unit = 0.001}));
-//   for (const std::string& warning : cup.warnings) log(sink, LogLevel::kWarning, warning);
+//   for (const std::string& warning : cup.warnings) core::log(sink, core::LogLevel::kWarning, warning);
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -15,6 +17,7 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/core/progress.h"
 #include "prescene/core/status.h"
 #include "prescene/geometry/image.h"
 #include "prescene/geometry/triangle_mesh.h"
@@ -36,14 +39,18 @@ struct MeshReadOptions {
   UpAxis up_axis = UpAxis::kDeclared;
   std::size_t max_file_bytes = std::size_t{256} << 20;
   std::size_t max_assimp_file_bytes = std::size_t{64} << 20;  ///< For glTF and COLLADA.
-  std::size_t max_triangles = 20'000'000;                     ///< Also of vertices.
+  /// Also of vertices. Reading and repairing as many takes less than 1 GB.
+  std::size_t max_triangles = 4'000'000;
+  std::size_t max_importer_memory = std::size_t{800} << 20;  ///< For glTF and COLLADA: address space.
+  std::chrono::milliseconds max_importer_time{8000};         ///< For glTF and COLLADA: by the wall clock.
+  const core::Cancellation* cancellation = nullptr;          ///< May be null; else outlives the reading.
 };
 
 struct LoadedMesh {
   geometry::TriangleMesh mesh;        ///< Metres, z up, repaired.
   std::vector<geometry::Rgb> colors;  ///< One a vertex, or empty: PLY and OBJ may have them.
   geometry::MeshRepairReport repair;
-  std::vector<std::string> warnings;  ///< Sentences for a person: what was repaired, a doubtful unit.
+  std::vector<std::string> warnings;  ///< Sentences for a person: a doubtful unit first, what was repaired.
 };
 
 /// By the extension, in either case; nothing for an unknown one.
@@ -51,14 +58,17 @@ std::optional<MeshFormat> mesh_format(const std::filesystem::path& path);
 
 /// The format goes by the extension: .ply .obj .stl .gltf .glb .dae. Errors of read_file(); kUnsupported for another
 /// extension; kDataLoss for a file that is cut; kInvalidInput for wrong content, no triangles, and a scale that is not
-/// positive; kResourceExhausted above a limit. The text names the path, the line or byte, and the remedy.
+/// positive, and where the importer of glTF and COLLADA crashes; kResourceExhausted above a limit, of which its memory
+/// and time are two; kCancelled. The text names the path, the line or byte, and the remedy.
+///
+/// glTF and COLLADA: starts a process by fork(). May be called by any thread, also of several at once.
 core::Result<LoadedMesh> read_mesh(const std::filesystem::path& path, const MeshReadOptions& options = {});
 /// The same for PLY, OBJ and STL in memory (other formats are bugs of the caller: they need a path).
 core::Result<LoadedMesh> decode_mesh(MeshFormat format, std::span<const std::uint8_t> bytes,
                                      const MeshReadOptions& options = {});
 
-/// A sentence when an object of this size (m) is hardly meant in metres: above 10 m "millimetres?", below 1 mm "scaled
-/// twice?"; nothing otherwise.
+/// A sentence when an object of this size (m) is hardly meant in metres: above 10 m that the file is probably in
+/// millimetres, below 1 mm that it was probably scaled twice; nothing otherwise.
 std::optional<std::string> scale_hint(const geometry::Box& box);
 
 enum class MeshEncoding { kBinary, kText };

@@ -24,7 +24,10 @@ class ObjParser {
     for (;;) {
       const std::size_t number = lines_.line();
       if (!lines_.next_line(&line)) break;
-      if (line.ends_with('\\')) line = join_continued(line, &joined);
+      if (line.ends_with('\\')) {
+        PRESCENE_RETURN_IF_ERROR(join_continued(line, &joined));
+        line = joined;
+      }
       const Status status = parse_line(line, number);
       if (!status.ok()) return status.at("line " + std::to_string(number));
     }
@@ -41,16 +44,23 @@ class ObjParser {
   }
 
  private:
-  std::string_view join_continued(std::string_view line, std::string* joined) {
+  Status join_continued(std::string_view line, std::string* joined) {
+    // A face of a million corners is shorter, and what is joined is a copy.
+    constexpr std::size_t kLongest = std::size_t{16} << 20;
+    const std::size_t number = lines_.line();
     joined->assign(line.substr(0, line.size() - 1));
     std::string_view next;
     while (lines_.next_line(&next)) {
+      if (joined->size() + next.size() > kLongest) {
+        return core::resource_exhausted("line " + std::to_string(number) + ": is continued over more than " +
+                                        size_text(kLongest) + "; cut its polygon into triangles");
+      }
       *joined += ' ';
       const bool goes_on = next.ends_with('\\');
       *joined += goes_on ? next.substr(0, next.size() - 1) : next;
       if (!goes_on) break;
     }
-    return *joined;
+    return core::ok_status();
   }
 
   Status parse_line(std::string_view line, std::size_t number) {
@@ -105,6 +115,7 @@ class ObjParser {
         largest_index_line_ = number;
       }
       corners_.push_back(static_cast<std::uint32_t>(index - 1));
+      if (corners_.size() > options_.max_triangles) return check_triangle_count(SIZE_MAX, options_);
     }
     if (corners_.size() < 3) ++small_faces_;
     append_fan(corners_, &out_.mesh);

@@ -16,6 +16,9 @@ namespace {
 using core::Result;
 using core::Status;
 
+// Headers in use have some dozens; each element and property is kept.
+constexpr std::size_t kMaxHeaderLines = 10'000;
+
 enum class Type { kI8, kU8, kI16, kU16, kI32, kU32, kF32, kF64 };
 
 struct TypeName {
@@ -140,6 +143,10 @@ Result<Header> parse_header(std::string_view text) {
   Header header;
   for (bool done = false; !done;) {
     const std::size_t number = lines.line();
+    if (number > kMaxHeaderLines) {
+      return core::resource_exhausted("line " + std::to_string(number) + ": the header has more than " +
+                                      std::to_string(kMaxHeaderLines) + " lines; leave out comments and properties");
+    }
     if (!lines.next_line(&line)) return core::data_loss("line " + std::to_string(number) + ": ends before end_header");
     const Status status = parse_header_line(line, &header, &done);
     if (!status.ok()) return status.at("line " + std::to_string(number));
@@ -353,6 +360,7 @@ class Body {
     std::uint64_t count = 0;
     PRESCENE_RETURN_IF_ERROR(read_length(property, &count));
     corners_.clear();
+    PRESCENE_RETURN_IF_ERROR(check_triangle_count(count, options_));
     for (std::uint64_t i = 0; i < count; ++i) {
       double index = 0.0;
       if (!in_.number(property.type, &index)) return in_.error();

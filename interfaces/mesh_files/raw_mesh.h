@@ -27,9 +27,10 @@ core::Result<RawMesh> parse_ply(std::span<const std::uint8_t> bytes, const MeshR
 core::Result<RawMesh> parse_obj(std::string_view text, const MeshReadOptions& options);
 core::Result<RawMesh> parse_stl(std::span<const std::uint8_t> bytes, const MeshReadOptions& options);
 /// glTF and COLLADA.
-core::Result<RawMesh> import_with_assimp(const std::filesystem::path& path, const MeshReadOptions& options);
+core::Result<RawMesh> import_with_assimp(const std::filesystem::path& path, MeshFormat format,
+                                         const MeshReadOptions& options);
 
-/// kResourceExhausted when there are more than the options allow.
+/// kResourceExhausted when there are more than the options allow, kCancelled once that is requested.
 core::Status check_triangle_count(std::size_t count, const MeshReadOptions& options);
 /// Remembers the place of the first vertex that is not finite.
 void note_vertex(const geometry::Vector3d& vertex, const std::string& place_kind, std::size_t place, std::size_t index,

@@ -41,6 +41,8 @@ Result<RawMesh> parse_binary(std::span<const std::uint8_t> bytes, const MeshRead
   }
   PRESCENE_RETURN_IF_ERROR(check_triangle_count(count, options));
   RawMesh out;
+  out.mesh.vertices.reserve(std::size_t{3} * count);
+  out.mesh.triangles.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     in.take(3 * sizeof(float));
     for (int corner = 0; corner < 3; ++corner) {

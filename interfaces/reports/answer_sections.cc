@@ -125,7 +125,7 @@ std::vector<HeatMapBlock::Outline> support_outlines(const belief::Scene& scene) 
 }
 
 std::vector<ReportSection> answer_sections(const belief::Answer& answer, const belief::Scene& scene) {
-  if (!answer.error.empty()) return {{"No answer", {TextBlock{answer.error}}}};
+  if (!answer.error.ok()) return {{"No answer", {TextBlock{core::to_string(answer.error)}}}};
   return std::visit([&](const auto& what) { return sections_of(what, scene); }, answer.what);
 }
 

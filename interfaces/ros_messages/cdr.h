@@ -22,6 +22,9 @@ struct CdrLimits {
   std::size_t max_string_bytes = std::size_t{64} << 20;
 };
 
+/// For messages that are not images: transforms, camera infos and texts are small, and may take ten times their bytes.
+inline constexpr CdrLimits kSmallMessage{std::size_t{4} << 20, std::size_t{4} << 20};
+
 /// Little endian, header 00 01 00 00.
 template <class Message>
 std::vector<std::uint8_t> encode_cdr(const Message& message);

@@ -72,6 +72,7 @@ RosTransformStamped to_ros_transform(const FrameTransform& transform);
 
 struct ImageRules {
   std::uint32_t max_side = 16384;        ///< Pixels.
+  std::uint32_t max_pixels = 1U << 24;   ///< 4096 x 4096; several images are held at once, and worked on.
   double metres_per_unit_16uc1 = 0.001;  ///< REP 118: millimetres.
   double metres_per_unit_32fc1 = 1.0;    ///< REP 118: metres.
   bool mono16_is_depth = false;          ///< Some drivers send depth as mono16.

@@ -47,6 +47,11 @@ Status check_layout(const RosImage& image, std::uint32_t bytes_per_pixel, const 
                                     std::to_string(image.height) + " exceeds the limit of " +
                                     std::to_string(rules.max_side) + " pixels a side; send a smaller image");
   }
+  if (std::uint64_t{image.width} * image.height > rules.max_pixels) {
+    return core::resource_exhausted("width x height: " + std::to_string(image.width) + " x " +
+                                    std::to_string(image.height) + " exceeds the limit of " +
+                                    std::to_string(rules.max_pixels) + " pixels; send a smaller image");
+  }
   const std::uint64_t row_bytes = std::uint64_t{image.width} * bytes_per_pixel;
   if (image.step < row_bytes) {
     return core::invalid_input("step: " + std::to_string(image.step) + " is less than a row of " +

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "prescene/core/spelling.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -255,9 +256,9 @@ void Binder::finish() {
   for (std::size_t i = 0; i < value_.keys.size(); ++i) {
     const std::string& key = value_.keys[i].name;
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-    const std::vector<std::string> meant = nearest_words(key, absent);
+    const std::vector<std::string> meant = core::nearest_words(key, absent);
     explained.insert(explained.end(), meant.begin(), meant.end());
-    const bool near_present = meant.empty() && !nearest_words(key, present).empty();
+    const bool near_present = meant.empty() && !core::nearest_words(key, present).empty();
     std::string remedy = suggestion(key, meant.empty() ? (near_present ? present : known_) : absent);
     problems_.add(value_.keys[i].place, value_.items[i].path, "unknown key",
                   remedy.empty() ? "remove it" : std::move(remedy));

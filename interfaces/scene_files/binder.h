@@ -3,7 +3,7 @@
 //
 //   Problems problems;
 //   Binder binder(document, problems);
-//   binder.read("frames_unseen_max", settings.frames_unseen_max, {1, 1000, "give a number of frames"});
+//   binder.read("frames_unseen_max", settings.frames_unseen_max, 1, 1000, "give a number of frames");
 //   binder.read("camera_topic", settings.camera_topic);
 //   if (const LocatedValue* filter = binder.find("filter")) bind(*filter, problems, settings.filter);
 //   binder.finish();                           // keys that nobody asked for are errors, with the nearest that was

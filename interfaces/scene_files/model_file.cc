@@ -8,6 +8,7 @@
 
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/scene_files/mesh_use.h"
 #include "read_scene_parts.h"
 
 namespace prescene::interfaces {
@@ -69,22 +70,6 @@ std::string text_of(const geometry::SymmetryGroup& group) {
   for (const geometry::Quaterniond& rotation : group.rotations)
     rotations.append(rotations.empty() ? "" : ", ").append(text_of(rotation));
   return "{rotations: [" + rotations + "]" + center + "}";
-}
-
-const char* word_of(belief::MeshUse use) {
-  switch (use) {
-    case belief::MeshUse::kConvexHull:
-      return "convex_hull";
-    case belief::MeshUse::kConvexParts:
-      return "convex_parts";
-    case belief::MeshUse::kDecompose:
-      return "decompose";
-    case belief::MeshUse::kSurface:
-      return "surface";
-    case belief::MeshUse::kSpheres:
-      return "spheres";
-  }
-  return "convex_hull";
 }
 
 // In double quotes, with what YAML takes as something else escaped.
@@ -184,7 +169,7 @@ std::string model_yaml(const ModelFile& file) {
   text += "model:\n";
   const auto line = [&](const char* key, const std::string& value) { text += key_line(key, value); };
   line("mesh", "{file: " + quoted_yaml(file.mesh_file) + ", scale: " + number_text(file.scale) +
-                   ", up: " + (file.y_up ? "y" : "z") + ", use: " + word_of(file.use) + "}");
+                   ", up: " + (file.y_up ? "y" : "z") + (file.use ? ", use: " + word_of(*file.use) : "") + "}");
   line("mass", text_of(model.mass) + "  # kg");
   text += fitted_lines(model);
   line("symmetry", text_of(model.symmetry));
@@ -223,11 +208,13 @@ core::Status write_model(const std::filesystem::path& path, const ModelFile& fil
   return write_file(path, std::string_view(model_yaml(file)));
 }
 
-core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
-                                             const SceneFileOptions& options, FileReport* report) {
-  const core::Result<LocatedValue> document = read_yaml(path, options.limits);
+namespace {
+
+core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& document, const std::string& file,
+                                           const std::string& name, const SceneFileOptions& options,
+                                           FileReport* report) {
   if (!document) {
-    if (report) report->errors.push_back({path.string(), 0, 0, "", document.status().message(), ""});
+    if (report) report->errors.push_back({file, 0, 0, "", document.status().message(), ""});
     return document.status();
   }
   Problems problems;
@@ -245,6 +232,18 @@ core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, 
   if (report) *report = {problems.errors(), problems.warnings()};
   if (!problems.empty()) return problems.status();
   return model;
+}
+
+}  // namespace
+
+core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
+                                             const SceneFileOptions& options, FileReport* report) {
+  return model_of(read_yaml(path, options.limits), path.string(), name, options, report);
+}
+
+core::Result<belief::ObjectModel> parse_model(std::string_view text, const std::string& file, const std::string& name,
+                                              const SceneFileOptions& options, FileReport* report) {
+  return model_of(parse_yaml(text, file, options.limits), file, name, options, report);
 }
 
 }  // namespace prescene::interfaces

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "prescene/belief/object_model.h"
@@ -18,7 +20,8 @@ struct ModelFile {
   std::string mesh_file;  ///< As it is to stand in the file: relative to the model file's folder.
   double scale = 1.0;     ///< Metres per unit of the mesh file.
   bool y_up = false;
-  belief::MeshUse use = belief::MeshUse::kConvexHull;
+  /// What the mesh collides as, where somebody chose it; else whoever reads the file goes by the mesh.
+  std::optional<belief::MeshUse> use;
   belief::ObjectModel model;         ///< Its name, collision and visual are not written: the mesh stands for them.
   std::vector<std::string> remarks;  ///< Written as comments at the top.
 };
@@ -39,5 +42,8 @@ core::Result<std::string> fitted_model_yaml(const std::filesystem::path& scene, 
 /// Reads a model file on its own and gives the model a name.
 core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
                                              const SceneFileOptions& options = {}, FileReport* report = nullptr);
+/// The same from text; `file` is its name in messages and where relative paths start.
+core::Result<belief::ObjectModel> parse_model(std::string_view text, const std::string& file, const std::string& name,
+                                              const SceneFileOptions& options = {}, FileReport* report = nullptr);
 
 }  // namespace prescene::interfaces

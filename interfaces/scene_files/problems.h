@@ -49,11 +49,8 @@ class Problems {
   std::size_t left_off_ = 0;
 };
 
-/// "did you mean 'mass'?", or "one of a, b, c" when nothing known is near to `word`; empty without candidates. Distance
-/// is the number of letters to add, drop, change or swap with a neighbour [Damerau 1964, optimal string alignment].
+/// "did you mean 'mass'?" (core::nearest_words), or "one of a, b, c" when nothing known is near to `word`; empty
+/// without candidates.
 std::string suggestion(std::string_view word, const std::vector<std::string>& known);
-/// Those of `known` nearest to `word` (several on a tie), none when all are too far to be a slip.
-std::vector<std::string> nearest_words(std::string_view word, const std::vector<std::string>& known);
-int edit_distance(std::string_view a, std::string_view b);
 
 }  // namespace prescene::interfaces

@@ -5,6 +5,7 @@
 #include "prescene/core/text.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/scene_files/mesh_use.h"
 #include "read_scene_parts.h"
 
 namespace prescene::interfaces {
@@ -23,11 +24,6 @@ const std::vector<std::string> kShapeKeys{"box",   "sphere",       "cylinder", "
 constexpr const char* kShapeRemedy =
     "give one shape: box, sphere, cylinder, capsule, cone, mesh, lathe, gable_carton, open_bin, ground or parts";
 
-const std::vector<std::pair<std::string, MeshUse>> kMeshUses{{"convex_hull", MeshUse::kConvexHull},
-                                                             {"convex_parts", MeshUse::kConvexParts},
-                                                             {"decompose", MeshUse::kDecompose},
-                                                             {"surface", MeshUse::kSurface},
-                                                             {"spheres", MeshUse::kSpheres}};
 // An object whose mesh fills less of its hull than this collides as spheres where its file does not say how.
 constexpr double kNearlyConvex = 0.95;
 
@@ -91,7 +87,7 @@ class ShapeReader {
   };
   Use read_use(Binder& binder) {
     Use use;
-    binder.read_enum("use", use.use, kMeshUses);
+    binder.read_enum("use", use.use, mesh_uses());
     use.at = binder.find("use");
     if (use.use == MeshUse::kSurface && may_move_)
       problems_.add(use.at->place, use.at->path, "a surface of triangles can't move",
@@ -112,6 +108,7 @@ class ShapeReader {
   MeshShape with_use(const MeshPtr& mesh, const Use& use, const LocatedValue& place) {
     MeshShape shape{mesh, Pose{}, use.use, use.spheres};
     if (!use.at && use.use == MeshUse::kConvexHull && may_move_ && is_hollow(*mesh)) shape.use = MeshUse::kSpheres;
+    warn_of_hidden_hollow(shape, use.at ? *use.at : place);
     if (shape.use != MeshUse::kSpheres) return shape;
     if (const auto solid = geometry::mass_properties(*mesh, 1.0); !solid)
       problems_.add(place.place, place.path, "spheres can't stand for this mesh: " + solid.status().message(),
@@ -120,6 +117,16 @@ class ShapeReader {
       problems_.add(place.place, place.path, "edge_fidelity is more than a tenth of the mesh's diagonal",
                     "give metres: 0.001");
     return shape;
+  }
+
+  void warn_of_hidden_hollow(const MeshShape& shape, const LocatedValue& place) {
+    const std::optional<double> hollow = hidden_hollow(shape);
+    if (!hollow || *hollow <= kLargestHiddenHollow) return;
+    problems_.warn(place.place, place.path,
+                   core::fixed_text(100.0 * *hollow, 0) + " % of its convex hull" +
+                       (shape.use == MeshUse::kConvexParts ? "s are" : " is") +
+                       " hollow in the mesh, and nothing can get into that",
+                   may_move_ ? "remove 'use', or write 'use: spheres' or 'use: decompose'" : "write 'use: surface'");
   }
 
   static bool is_hollow(const geometry::TriangleMesh& mesh) {
@@ -171,10 +178,13 @@ class ShapeReader {
 
  private:
   void check_extent(const LocatedValue& value, const geometry::TriangleMesh& mesh) {
-    const double extent = geometry::bounding_box(mesh).sizes().maxCoeff();
+    const Vector3d size = geometry::bounding_box(mesh).sizes();
+    const double extent = size.maxCoeff();
     if (extent > size_.high)
-      problems_.add(value.place, value.path, "the mesh is " + core::rounded_text(extent) + " m large",
-                    "millimetres? then give scale: 0.001");
+      problems_.add(value.place, value.path,
+                    "the mesh's bounding box is " + core::rounded_text(size.x()) + " x " +
+                        core::rounded_text(size.y()) + " x " + core::rounded_text(size.z()) + " m",
+                    "the mesh is probably in millimetres: give scale: 0.001");
     else if (extent < 1e-4)
       problems_.add(value.place, value.path, "the mesh is only " + core::rounded_text(extent) + " m large",
                     "give the scale in metres per unit of the file");

@@ -3,9 +3,9 @@
 // them.
 //
 //   SceneFileOptions options;
-//   options.read_mesh = ...;                              // how meshes are read; see MeshReader
+//   options.read_mesh = read_mesh;                        // how meshes are read; see MeshReader
 //   auto scene = read_scene("scenarios/milk_on_bin.yaml", options);
-//   if (!scene) show(scene.status());                     // every mistake: file, line, key, reason, remedy
+//   if (!scene) ... scene.status()                        // every mistake: file, line, key, reason, remedy
 #pragma once
 
 #include <filesystem>

@@ -52,9 +52,7 @@ core::Status run(const Options& options, VerbContext& context) {
                client->ask(belief::json_text(question), options.timeout, context.cancellation()));
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
-  if (const auto error = answer.find("error"); error != answer.end()) {
-    return status_of_error("", error->is_string() ? error->get<std::string>() : belief::json_text(*error));
-  }
+  PRESCENE_RETURN_IF_ERROR(belief::error_from_json(answer));
   context.print(answer, answer_text(answer));
   return core::ok_status();
 }

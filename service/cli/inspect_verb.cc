@@ -7,6 +7,7 @@
 
 #include "inspect_recording.h"
 #include "prescene/core/text.h"
+#include "prescene/interfaces/scene_files/mesh_use.h"
 #include "prescene/service/depth_noise.h"
 #include "prescene/service/mesh_inspection.h"
 #include "prescene/service/prediction_report.h"
@@ -20,6 +21,7 @@ using core::fixed_text;
 struct Options {
   std::string file;
   std::string model;
+  std::string use;
   std::string report;
   bool y_up = false;
   MeshInspectionOptions inspection;
@@ -29,7 +31,7 @@ struct Options {
   const CLI::App* verb = nullptr;
 };
 
-constexpr const char* kMeshOptions[] = {"--output", "--density", "--scale", "--y-up", "--report"};
+constexpr const char* kMeshOptions[] = {"--output", "--use", "--density", "--scale", "--y-up", "--report"};
 constexpr const char* kRecordingOptions[] = {"--frame",          "--scene",       "--overlay",
                                              "--likelihood-map", "--depth-scale", "--depth-noise"};
 
@@ -50,9 +52,11 @@ core::Status check_options(const Options& options, bool recording) {
 
 std::string text_of(const MeshInspection& found) {
   const auto size = found.box.sizes();
-  std::string text = found.path.string() + ": " + std::to_string(found.loaded.mesh.triangles.size()) + " triangles, " +
-                     fixed_text(size.x(), 4) + " x " + fixed_text(size.y(), 4) + " x " + fixed_text(size.z(), 4) +
-                     " m, " + (found.topology.watertight() ? "closed" : "not closed") + "\n";
+  // All that follows is of no use where the unit is wrong.
+  std::string text = found.doubtful_scale ? "warning: " + *found.doubtful_scale + " (--scale)\n" : "";
+  text += found.path.string() + ": " + std::to_string(found.loaded.mesh.triangles.size()) + " triangles, " +
+          fixed_text(size.x(), 4) + " x " + fixed_text(size.y(), 4) + " x " + fixed_text(size.z(), 4) + " m, " +
+          (found.topology.watertight() ? "closed" : "not closed") + "\n";
   const auto& mass = found.mass ? found.mass : found.hull_mass;
   if (mass) {
     const geometry::Vector3d& com = mass->p_BoBcm;
@@ -80,7 +84,8 @@ std::string text_of(const MeshInspection& found) {
       text += "and " + std::to_string(found.resting_poses.size() + 1 - rows.size()) + " more, together " +
               fixed_text(rest, 3) + "\n";
   }
-  for (const std::string& remark : found.remarks) text += "remark: " + remark + "\n";
+  for (const std::string& remark : found.remarks)
+    if (remark != found.doubtful_scale) text += "remark: " + remark + "\n";
   return text;
 }
 
@@ -123,7 +128,19 @@ core::Status inspect_mesh(Options& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_apart("-o", options.model, "--report", options.report));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.file}));
   if (options.y_up) options.inspection.read.up_axis = interfaces::UpAxis::kY;
-  PRESCENE_TRY(const MeshInspection found, service::inspect_mesh(options.file, options.inspection));
+  if (!options.use.empty()) {
+    for (const auto& [word, use] : interfaces::mesh_uses())
+      if (word == options.use) options.inspection.use = use;
+  }
+  options.inspection.read.cancellation = &context.cancellation();
+  // Of smaller meshes all is told before anybody could read how far it is.
+  constexpr std::uintmax_t kTakesSeconds = std::uintmax_t{4} << 20;
+  std::error_code ignored;
+  if (const auto bytes = std::filesystem::file_size(options.file, ignored); !ignored && bytes > kTakesSeconds)
+    options.inspection.progress = context.progress("inspecting");
+  const core::Result<MeshInspection> inspected = service::inspect_mesh(options.file, options.inspection);
+  context.end_progress();
+  PRESCENE_TRY(const MeshInspection found, inspected);
   if (!options.model.empty()) {
     PRESCENE_TRY(const interfaces::ModelFile model, model_file(found, options.inspection, options.model));
     PRESCENE_RETURN_IF_ERROR(interfaces::write_model(options.model, model));
@@ -164,6 +181,9 @@ Verb add_inspect_verb(CLI::App& app) {
                    "Mesh (PLY, OBJ, STL, glTF, COLLADA), or recording (.mcap, or a folder of images)")
       ->required();
   verb->add_option("-o,--output", options->model, "Write a model file that scene files can name")->check(file_name());
+  verb->add_option("--use", options->use,
+                   "With -o: what the mesh collides as; default: by its shape, hollow objects as spheres")
+      ->check(CLI::IsMember({"convex_hull", "convex_parts", "decompose", "spheres"}));
   verb->add_option("--density", options->inspection.density, "kg/m^3")
       ->check(number_between(0.1, 25000.0))
       ->capture_default_str();

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/core/spelling.h"
 #include "prescene/interfaces/scene_files/problems.h"
 #include "verb.h"
 
@@ -48,6 +49,35 @@ void check_verb(const CLI::App& app, const std::string& word) {
   }
   throw CLI::ExtrasError("there is no verb '" + word + "': " + prescene::interfaces::suggestion(word, verbs),
                          CLI::ExitCodes::ExtrasError);
+}
+
+/// Where an option of the command line is none of the verb's (or of the program's, before a verb): its name, and the
+/// one that is nearest. CLI11 names it only if nothing else is wrong, and never says what was meant. To be asked only
+/// where parsing failed, as it takes what follows an option for its value.
+std::string unknown_option(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* verb = &app;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--") break;
+    if (verb == &app) {
+      for (const CLI::App* known : app.get_subcommands([](const CLI::App*) { return true; }))
+        if (known->get_name() == word) verb = known;
+    }
+    if (!word.starts_with("--")) continue;
+    const std::string name = word.substr(0, word.find('='));
+    std::vector<std::string> names;
+    const auto add_names = [&names](const CLI::App& of) {
+      for (const CLI::Option* option : of.get_options())
+        for (const std::string& long_name : option->get_lnames()) names.push_back("--" + long_name);
+    };
+    add_names(*verb);
+    for (const CLI::App* group : verb->get_subcommands([](const CLI::App* of) { return of->get_name().empty(); }))
+      add_names(*group);
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    const bool near = !prescene::core::nearest_words(name, names).empty();
+    return "there is no option '" + name + "'" + (near ? ": " + prescene::interfaces::suggestion(name, names) : "");
+  }
+  return "";
 }
 
 void add_common_options(CLI::App& verb, prescene::service::CommonOptions& options) {
@@ -99,9 +129,15 @@ int main(int argc, char** argv) {
     const int code = app.exit(success);
     return std::cout.flush() ? code : static_cast<int>(service::ExitCode::kFailed);
   } catch (const CLI::ParseError& error) {
-    app.exit(error);
+    const std::string unknown = unknown_option(app, argc, argv);
+    const std::string what = unknown.empty() ? error.what() : unknown;
+    if (unknown.empty()) {
+      app.exit(error);
+    } else {
+      app.exit(CLI::ExtrasError(unknown, CLI::ExitCodes::ExtrasError));
+    }
     const bool json = std::any_of(argv + 1, argv + argc, [](const char* arg) { return std::string(arg) == "--json"; });
-    if (json) std::fputs(service::error_document(error.what()).c_str(), stdout);
+    if (json) std::fputs(service::error_document(core::invalid_input(what)).c_str(), stdout);
     return static_cast<int>(service::ExitCode::kBadInput);
   }
 

@@ -2,15 +2,17 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "final_states.h"
 #include "prescene/core/text.h"
 #include "prescene/service/bus_replay.h"
+#include "prescene/service/foreseen.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/replay_input.h"
 #include "prescene/service/session_report.h"
 #include "prescene/service/support_score.h"
 #include "prescene/service/tracking_score.h"
+#include "replay_text.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -26,6 +28,7 @@ struct Options {
   std::string report;
   bool over_dds = false;
   BusReplayOptions bus;
+  RecordingReadOptions read;
   std::vector<std::string> questions;
   double depth_scale = 0.001;
   double frame_rate = 30.0;
@@ -45,68 +48,7 @@ core::Result<TimedQuestion> timed_question(const std::string& text) {
 }
 
 ReplayInputOptions input_of(const Options& options) {
-  return {options.input, options.scene, options.depth_scale, options.frame_rate};
-}
-
-ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows) {
-  ordered_json json = ordered_json::array();
-  for (const ObjectTrackingScore& row : rows) json.push_back(to_json(row));
-  return json;
-}
-
-/// Each object's error in each frame, where the recording holds the truth.
-void add_errors(const TrackingScore& score, ordered_json& steps) {
-  for (ordered_json& step : steps) {
-    for (ordered_json& object : step["objects"]) {
-      const auto error = score.error_at(step["stamp_ns"].get<core::TimeNs>(), object["name"].get<std::string>());
-      if (!error) continue;
-      object["truth"] = {{"position_error_m", error->position_error},
-                         {"turn_error_rad", error->turn_error},
-                         {"visible_share", error->visible_share}};
-    }
-  }
-}
-
-std::string tracking_text(const std::vector<ObjectTrackingScore>& rows) {
-  if (rows.empty()) return "";
-  std::vector<std::vector<std::string>> cells = {
-      {"object", "frames", "visible", "median error, mm", "90 %, mm", "median turn, deg", "tracked", "wrong"}};
-  for (const ObjectTrackingScore& row : rows) {
-    cells.push_back({row.object, std::to_string(row.frames), std::to_string(row.visible_frames),
-                     fixed_text(1e3 * row.median_position_error, 1), fixed_text(1e3 * row.p90_position_error, 1),
-                     fixed_text(row.median_turn_error * 180.0 / std::numbers::pi, 1),
-                     fixed_text(100.0 * row.share_tracked, 0) + " %",
-                     fixed_text(100.0 * row.share_confidently_wrong, 0) + " %"});
-  }
-  return "\nTracking against the simulated truth\n" + table(cells);
-}
-
-std::string supports_text(const std::vector<SupportRow>& rows) {
-  if (rows.empty()) return "";
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
-  std::vector<std::vector<std::string>> cells = {{"support", "frames", "measured", "median tilt, deg", "largest",
-                                                  "median height, mm", "largest", "points off it, mm"}};
-  for (const SupportRow& row : rows) {
-    cells.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
-                     fixed_text(row.median_tilt * kDegrees, 2), fixed_text(row.largest_tilt * kDegrees, 2),
-                     fixed_text(1e3 * row.median_height, 1), fixed_text(1e3 * row.largest_height, 1),
-                     fixed_text(1e3 * row.median_rms, 1)});
-  }
-  return "\nSupports, each frame's plane against the first one's\n" + table(cells);
-}
-
-std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) {
-  std::string text;
-  for (const BusReplayResult::Answered& answered : answers) {
-    text += "\nAsked at " + fixed_text(answered.at, 1) + " s: " + answered.question + "\n";
-    if (answered.answer.empty()) {
-      text += "no answer came\n";
-      continue;
-    }
-    const ordered_json answer = parse_or_discard(answered.answer);
-    text += "answered after " + fixed_text(answered.seconds, 2) + " s\n" + answer_text(answer);
-  }
-  return text;
+  return {options.input, options.scene, options.depth_scale, options.frame_rate, options.read};
 }
 
 /// What the recording was made with, but for what the command line says otherwise.
@@ -114,6 +56,10 @@ core::Result<TrackerSettings> settings_of(const Options& options, const ReplayIn
   if (!input.has_settings()) return options.tracker;
   PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
   return with_given(*options.verb, std::move(recorded), options.tracker);
+}
+
+void tell_unchecked(const Options& options, const std::string& unchecked, VerbContext& context) {
+  if (!unchecked.empty()) core::log(context.log(), core::LogLevel::kInfo, options.input + ": " + unchecked);
 }
 
 core::Status run_over_dds(Options& options, VerbContext& context) {
@@ -125,12 +71,17 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   }
   std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
                    [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
+  options.bus.read = options.read;
+  options.bus.read.check_data = false;  // It was when the input was opened.
   TrackingScore score(input.scene());
   SessionReport report(input.scene(), settings.topics);
+  ForeseenAndCame foreseen(input.scene());
+  FinalStates states;
   PRESCENE_TRY(BusReplayResult result,
                replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
                                context.log(), [&](const RecordedEntry& entry) {
                                  if (!options.report.empty()) report.add(entry.message);
+                                 foreseen.add(entry);
                                  if (!entry.is_json || entry.message.topic != kTruthTopic) return;
                                  const std::string json(entry.message.cdr.begin(), entry.message.cdr.end());
                                  if (const auto truth = truth_from_json(json)) score.add(*truth);
@@ -138,6 +89,8 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   for (const BeliefSummary& summary : result.beliefs) {
     score.add(summary);
     report.add(summary);
+    foreseen.add(summary);
+    states.add(summary);
   }
   ordered_json answers = ordered_json::array();
   for (const BusReplayResult::Answered& answered : result.answers) {
@@ -146,7 +99,9 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
                        {"seconds", answered.seconds},
                        {"answer", answer.is_discarded() ? ordered_json() : answer}});
     report.add_answer(answered.at, answered.answer);
+    foreseen.add(answered.at, answered.question, answered.answer);
   }
+  report.set_foreseen(foreseen);
   const std::vector<ObjectTrackingScore> rows = score.rows();
   if (!options.report.empty()) {
     Backends backends(context.pool());
@@ -154,14 +109,19 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   if (!result.loss.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + result.loss);
+  tell_unchecked(options, result.unchecked, context);
   context.print({{"recording", options.input},
                  {"messages", result.messages},
                  {"beliefs", result.beliefs.size()},
+                 {"objects", states.json()},
                  {"tracking", tracking_json(rows)},
                  {"answers", answers},
-                 {"loss", result.loss}},
+                 {"foreseen", foreseen_json(foreseen)},
+                 {"loss", result.loss},
+                 {"unchecked", result.unchecked}},
                 std::to_string(result.messages) + " messages played, " + std::to_string(result.beliefs.size()) +
-                    " beliefs came back\n" + answers_text(result.answers) + tracking_text(rows));
+                    " beliefs came back\n" + answers_text(result.answers) + foreseen_text_of(foreseen) + states.text() +
+                    tracking_text(rows));
   const bool unanswered =
       std::any_of(result.answers.begin(), result.answers.end(), [](const auto& a) { return a.answer.empty(); });
   if (unanswered) return core::unavailable("not every question was answered");
@@ -178,24 +138,27 @@ core::Status run_here(Options& options, VerbContext& context) {
   PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
   TrackingScore score(input.scene());
   SupportScore supports;
+  FinalStates states;
   SessionReport report(input.scene(), settings.topics);
   ordered_json steps = ordered_json::array();
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
     const BeliefSummary summary = summary_of(*at.belief());
     score.add(summary);
+    states.add(summary);
     if (!options.report.empty()) {
       report.add(step.observation);
       report.add(summary);
       report.set_scene(at.belief()->scene);
     }
+    const std::vector<SupportFrame> support_frames = supports.add(summary.stamp_ns, step.supports);
+    if (!context.options().json) return core::ok_status();  // Long recordings have many steps.
     ordered_json record = to_json(step.record);
     record.erase("seconds");
     ordered_json objects = to_json(summary)["objects"];
     for (ordered_json& object : objects) object.erase("covariance");
     record["objects"] = objects;
     record["supports"] = ordered_json::array();
-    for (const SupportFrame& frame : supports.add(summary.stamp_ns, step.supports))
-      record["supports"].push_back(to_json(frame));
+    for (const SupportFrame& frame : support_frames) record["supports"].push_back(to_json(frame));
     steps.push_back(std::move(record));
     return core::ok_status();
   };
@@ -217,9 +180,12 @@ core::Status run_here(Options& options, VerbContext& context) {
     PRESCENE_RETURN_IF_ERROR(report.write(options.report, rows, backends));
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
-  for (const std::string& problem : {summary->loss, summary->first_refusal}) {
-    if (!problem.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + problem);
+  if (context.options().json) {  // The text has them itself.
+    for (const std::string& problem : {summary->loss, summary->first_refusal}) {
+      if (!problem.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + problem);
+    }
   }
+  tell_unchecked(options, summary->unchecked, context);
   context.print(
       {{"recording", options.input},
        {"seed", seed},
@@ -230,6 +196,9 @@ core::Status run_here(Options& options, VerbContext& context) {
        {"compared_steps", summary->compared},
        {"different_steps", summary->different},
        {"loss", summary->loss},
+       {"unchecked", summary->unchecked},
+       {"degraded", degraded_json(*summary)},
+       {"objects", states.json()},
        {"tracking", tracking_json(rows)},
        {"supports", support_rows},
        {"steps", steps}},
@@ -238,7 +207,7 @@ core::Status run_here(Options& options, VerbContext& context) {
           (summary->followed_step_records ? std::to_string(summary->compared - summary->different) + " of " +
                                                 std::to_string(summary->compared) + " steps have the recorded bits\n"
                                           : "") +
-          tracking_text(rows) + supports_text(supports.rows()));
+          states.text() + tracking_text(rows) + supports_text(supports.rows()) + warnings_text(*summary));
   if (summary->cancelled) return core::cancelled("stopped on request; what was done is printed");
   if (summary->different > 0) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
@@ -274,6 +243,8 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
       ->check(positive_number())
       ->capture_default_str();
+  verb->add_flag("--salvage", options->read.salvage,
+                 "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
       ->check(file_name());
   add_bus_options(*verb, options->bus.dds, options->tracker.topics);

@@ -14,12 +14,33 @@ struct Checked {
   std::string text;
 };
 
+/// Keeps the warnings about a file, besides saying them.
+class Warnings {
+ public:
+  explicit Warnings(core::LogSink log) : log_(std::move(log)) {}
+
+  core::LogSink sink() {
+    return [this](core::LogLevel level, const std::string& text) {
+      if (level >= core::LogLevel::kWarning) texts_.push_back(text);
+      core::log(log_, level, text);
+    };
+  }
+  const std::vector<std::string>& texts() const { return texts_; }
+  /// Appended to the line that says that the file is valid.
+  std::string count() const { return texts_.empty() ? "" : ", " + counted(texts_.size(), "warning"); }
+
+ private:
+  core::LogSink log_;
+  std::vector<std::string> texts_;
+};
+
 Checked bad(const std::string& file, const core::Status& status) {
   return {status, {{"file", file}, {"valid", false}, {"errors", status.message()}}, status.message()};
 }
 
 Checked check_scene(const std::string& file, VerbContext& context) {
-  const auto scene = load_scene(file, context.log());
+  Warnings warnings(context.log());
+  const auto scene = load_scene(file, warnings.sink());
   if (!scene) return bad(file, scene.status());
   const int dimensions = start_dimensions(**scene);
   return {{},
@@ -29,15 +50,19 @@ Checked check_scene(const std::string& file, VerbContext& context) {
            {"models", (*scene)->models.size()},
            {"objects", (*scene)->objects.size()},
            {"actions", (*scene)->actions.size()},
-           {"uncertain_dimensions", dimensions}},
+           {"uncertain_dimensions", dimensions},
+           {"warnings", warnings.texts()}},
           file + ": valid: " + counted((*scene)->objects.size(), "object") + ", " +
-              counted(static_cast<std::size_t>(dimensions), "uncertain dimension")};
+              counted(static_cast<std::size_t>(dimensions), "uncertain dimension") + warnings.count()};
 }
 
 Checked check_model(const std::string& file, VerbContext& context) {
-  const auto model = load_model(file, context.log());
+  Warnings warnings(context.log());
+  const auto model = load_model(file, warnings.sink());
   if (!model) return bad(file, model.status());
-  return {{}, {{"file", file}, {"valid", true}, {"model", model->name}}, file + ": valid: a model file"};
+  return {{},
+          {{"file", file}, {"valid", true}, {"model", model->name}, {"warnings", warnings.texts()}},
+          file + ": valid: a model file" + warnings.count()};
 }
 
 }  // namespace

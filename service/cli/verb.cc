@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
@@ -58,6 +59,25 @@ std::optional<double> finite_number(const std::string& text) {
   return value;
 }
 
+/// How wide the terminal on stderr is; 80 where it does not say, or is none.
+std::size_t terminal_columns() {
+  winsize size{};
+  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : 80;
+}
+
+/// The line, cut where it is too wide. Each character of UTF-8 counts as one column.
+std::string fitted(const std::string& line, std::size_t columns) {
+  const auto begins_character = [](char byte) { return (static_cast<unsigned char>(byte) & 0xc0U) != 0x80U; };
+  const auto width = static_cast<std::size_t>(std::count_if(line.begin(), line.end(), begins_character));
+  if (width <= columns) return line;
+  const std::string dots = columns > 10 ? "..." : "";
+  std::size_t left = columns - dots.size();
+  std::size_t end = 0;
+  while (end < line.size() && (left > 0 || !begins_character(line[end]))) left -= begins_character(line[end++]) ? 1 : 0;
+  return line.substr(0, end) + dots;
+}
+
 std::string duration_text(double seconds) {
   if (seconds < 90.0) return fixed_text(seconds, 0) + " s";
   return fixed_text(seconds / 60.0, 1) + " min";
@@ -103,14 +123,21 @@ core::ProgressSink VerbContext::progress(const std::string& what) {
     std::string left = progress.seconds_left ? ", about " + duration_text(*progress.seconds_left) + " left" : "";
     if (!progress.text.empty()) left += ", " + progress.text;
     const std::string percent = fixed_text(100.0 * fraction, 0) + " %";
+    // The last column stays free: some terminals begin a new line behind it, which the bar could not take back.
+    const std::size_t columns = terminal_columns() - 1;
     if (!terminal) {
-      std::fprintf(stderr, "%s: %s%s\n", what.c_str(), percent.c_str(), left.c_str());
+      std::fprintf(stderr, "%s\n", fitted(what + ": " + percent + left, columns).c_str());
       return;
     }
-    constexpr int kBarWidth = 30;
-    const auto filled = static_cast<std::size_t>(std::lround(fraction * kBarWidth));
-    const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
-    std::fprintf(stderr, "\r\033[K%s [%s] %s%s", what.c_str(), bar.c_str(), percent.c_str(), left.c_str());
+    // The bar gives way to the words.
+    const std::size_t words = what.size() + percent.size() + left.size() + 4;
+    const std::size_t bar_width = std::min<std::size_t>(30, columns - std::min(columns, words));
+    std::string bar;
+    if (bar_width >= 10) {
+      const auto filled = static_cast<std::size_t>(std::lround(fraction * static_cast<double>(bar_width)));
+      bar = "[" + std::string(filled, '#') + std::string(bar_width - filled, '.') + "] ";
+    }
+    std::fprintf(stderr, "\r\033[K%s", fitted(what + " " + bar + percent + left, columns).c_str());
     std::fflush(stderr);
     bar_open_ = true;
   };
@@ -135,7 +162,7 @@ void VerbContext::write_out(const std::string& out) {
 
 ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
   end_progress();
-  if (!status.ok() && options_.json && !printed_) write_out(error_document(to_string(status)));
+  if (!status.ok() && options_.json && !printed_) write_out(error_document(status));
   if (print_failed_) {
     const std::string text = "standard output can't be written: is the disk full, or was the pipe closed?";
     if (status.ok())
@@ -147,17 +174,8 @@ ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
   return exit_code_of(status);
 }
 
-std::string error_document(const std::string& text) { return belief::json_text({{"error", text}}, 2) + "\n"; }
-
-core::Status status_of_error(const std::string& place, const std::string& error) {
-  using core::StatusCode;
-  for (const StatusCode code :
-       {StatusCode::kInvalidInput, StatusCode::kNotFound, StatusCode::kDataLoss, StatusCode::kUnsupported,
-        StatusCode::kCancelled, StatusCode::kUnavailable, StatusCode::kResourceExhausted}) {
-    const std::string prefix = std::string(core::to_string(code)) + ": ";
-    if (error.starts_with(prefix)) return {code, place + error.substr(prefix.size())};
-  }
-  return core::invalid_input(place + error);
+std::string error_document(const core::Status& status) {
+  return belief::json_text(belief::error_to_json(status), 2) + "\n";
 }
 
 CLI::Validator positive_number() {

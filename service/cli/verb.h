@@ -31,8 +31,8 @@ namespace prescene::service {
 /// (a file that is not there, can't be opened or read as what it should be, or is larger than a limit).
 enum class ExitCode { kDone = 0, kFailed = 1, kBadInput = 2 };
 ExitCode exit_code_of(const core::Status& status);
-/// {"error": text} and a line's end.
-std::string error_document(const std::string& text);
+/// {"error": text, "code": ...} and a line's end, see belief::error_to_json. `status` is not ok.
+std::string error_document(const core::Status& status);
 
 /// Options that every verb takes.
 struct CommonOptions {
@@ -62,8 +62,8 @@ class VerbContext {
 
   /// One JSON document to stdout with --json, the text otherwise.
   void print(const nlohmann::ordered_json& document, const std::string& text);
-  /// The verb's end: what went wrong to stderr, and with --json as {"error": text} to stdout where nothing was printed.
-  /// Output that could not be written (a full disk, a closed pipe) is a failure too.
+  /// The verb's end: what went wrong to stderr, and with --json as error_document() to stdout where nothing was
+  /// printed. Output that could not be written (a full disk, a closed pipe) is a failure too.
   ExitCode finish(const std::string& verb, core::Status status);
 
  private:
@@ -105,10 +105,6 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
 void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice);
 /// `settings` (of a recording) with those of the options above that were on the command line.
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given);
-
-/// An answer's error as a status: what begins with "cancelled: " or "unavailable: " could not be done, everything else
-/// is a bad question. `place` goes in front of the text.
-core::Status status_of_error(const std::string& place, const std::string& error);
 
 /// An answer as JSON, for a person; what has no short form stays JSON.
 std::string answer_text(const nlohmann::ordered_json& answer);

@@ -2,7 +2,7 @@
 // How well real tosses of a cube are forecast: which face ends up, and where.
 //
 //   PRESCENE_TRY(CubeReport report, evaluate_cube_tosses(dir, CubeSplit::kReport, seed, threads, progress));
-//   report.right_face_share
+//   ... report.right_face_share
 #pragma once
 
 #include <Eigen/Core>

@@ -3,7 +3,7 @@
 // ones.
 //
 //   PRESCENE_TRY(YcbReport report, evaluate_ycb_video(dir, seed, threads, sink));
-//   report.disturbed.share_adds_below_2cm
+//   ... report.disturbed.share_adds_below_2cm
 #pragma once
 
 #include <cstdint>

@@ -89,6 +89,8 @@ class BulletSimulator : public Simulator {
  public:
   explicit BulletSimulator(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)) {}
 
+  StepperUse stepper() const override { return {"bullet", ""}; }
+
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
            InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {

@@ -3,9 +3,9 @@
 // wobbles about the parabola that the centre flies on), how its moments of inertia compare (how its spin wanders), and
 // gravity in the tracker's units, which tells the scale of its lengths and the tilt of its ground.
 //
-//   std::vector<std::span<const TimedPose>> flights = ...;          // frames before the first contact of each toss
+//   std::vector<std::span<const TimedPose>> flights;                // of each toss the frames before it first touches
 //   PRESCENE_TRY(const FlightCalibration found, calibrate_flights(flights, prior));
-//   found.center_of_mass, found.standard_error(FlightParameter::kCenterOfMassX)
+//   ... found.center_of_mass, found.standard_error(FlightParameter::kCenterOfMassX)
 #pragma once
 
 #include <Eigen/Core>

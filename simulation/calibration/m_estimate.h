@@ -4,7 +4,7 @@
 // the estimate is uncertain.
 //
 //   PRESCENE_TRY(const Estimate found, m_estimate(parameters, observations, simulate, stream));
-//   found.value[0], found.standard_error(0)
+//   ... found.value[0], found.standard_error(0)
 #pragma once
 
 #include <Eigen/Core>

@@ -6,7 +6,7 @@
 //   MotionPrior prior = motion_prior(scene.model_of(scene.objects[0]));
 //   PRESCENE_TRY(const MotionCalibration found,
 //                calibrate_motions(motions, scene, prior, make_simulator, stream, pool));
-//   found.parameters[0].value, found.parameters[0].standard_error
+//   ... found.parameters[0].value, found.parameters[0].standard_error
 #pragma once
 
 #include <array>

@@ -150,7 +150,7 @@ core::Result<Eigen::MatrixXd> MotionJudge::simulated(const MotionHypothesis& hyp
   belief::ObjectModel& model = scene.models[model_];
   model.unit_inertia *= std::exp(hypothesis[MotionParameter::kInertiaSize]);
   model.contact.edge_radius = hypothesis[MotionParameter::kEdgeRadius];
-  PRESCENE_TRY(const std::unique_ptr<Simulator> simulator, make_simulator_(scene));
+  PRESCENE_TRY(const std::unique_ptr<Simulator> simulator, make_simulator_(scene, 1.0));
   std::vector<belief::WorldState> starts;
   for (std::size_t i = 0; i < cases_.size(); ++i) PRESCENE_RETURN_IF_ERROR(add_starts(i, hypothesis, &starts));
   RunRequest request;

@@ -177,11 +177,11 @@ core::Status validate(const LockstepOptions& options) {
   return core::ok_status();
 }
 
-core::Status lockstep_supports(const RunRequest& request) {
-  const std::size_t pushers = pusher_radii(request.actions).size();
+core::Status check_pushers(const std::vector<belief::Action>& actions) {
+  const std::size_t pushers = pusher_radii(actions).size();
   if (pushers <= kMostPushers) return core::ok_status();
   return core::unsupported(std::to_string(pushers) + " push actions are more than the " + std::to_string(kMostPushers) +
-                           " that are simulated in lockstep; use the Bullet stepper");
+                           " that are simulated in lockstep");
 }
 
 std::vector<double> pusher_radii(const std::vector<belief::Action>& actions) {
@@ -220,9 +220,7 @@ core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const bel
     return core::unsupported("lockstep simulates one to " + std::to_string(kMaxObjects) +
                              " objects, and the scene has " + std::to_string(scene.objects.size()));
   }
-  RunRequest request;
-  request.actions = scene.actions;
-  PRESCENE_RETURN_IF_ERROR(lockstep_supports(request));
+  PRESCENE_RETURN_IF_ERROR(check_pushers(scene.actions));
   auto compiled = std::make_shared<CompiledLockstep>();
   compiled->scene = scene;
   compiled->options = options;

@@ -198,11 +198,14 @@ class LockstepSimulator : public Simulator {
  public:
   explicit LockstepSimulator(std::shared_ptr<const CompiledLockstep> scene) : scene_(std::move(scene)) {}
 
+  core::Status supports(const RunRequest& request) const override { return check_pushers(request.actions); }
+  StepperUse stepper() const override { return {"lockstep", ""}; }
+
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
            InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
     PRESCENE_CHECK(starts.size() == trajectories.size());
-    PRESCENE_CHECK(lockstep_supports(request).ok());
+    PRESCENE_CHECK(supports(request).ok());
     if (starts.empty()) return;
     LaneQueue queue;
     queue.starts = starts;
@@ -225,9 +228,7 @@ class LockstepSimulator : public Simulator {
   double step_size() const override { return scene_->options.step; }
   std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                           const core::RandomStream& stream) const override {
-    RunRequest request;
-    request.actions = actions;
-    PRESCENE_CHECK(lockstep_supports(request).ok());
+    PRESCENE_CHECK(check_pushers(actions).ok());
     return std::make_unique<LockstepInstance>(scene_for(actions), actions, stream);
   }
 

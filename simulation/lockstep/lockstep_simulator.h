@@ -30,17 +30,13 @@ struct LockstepOptions : MechanicsOptions {
 /// Ranges of the options: the message names the field.
 core::Status validate(const LockstepOptions& options);
 
-/// Whether instances can be run as `request` says: no more than 16 push actions. kUnsupported says what it is
-/// otherwise. run() and make_instance() check it.
-core::Status lockstep_supports(const RunRequest& request);
-
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
 ///   - one to four objects of boxes, spheres, cylinders, cones, capsules and hulls (convex_hull, convex_parts,
-///   decompose) of at
-///     most 64 vertices, sides of at most 16, and at most 16 parts each;
+///     decompose) of at most 64 vertices, sides of at most 16, and at most 16 parts each;
 ///   - supports of the same shapes, at most 256 parts together;
-///   - robot bodies of the same shapes, at most 16 parts each and 32 bodies with a shape.
+///   - robot bodies of the same shapes, at most 16 parts each and 32 bodies with a shape;
+///   - at most 16 push actions. Simulator::supports() says the same of a request's actions.
 core::Result<std::unique_ptr<Simulator>> make_lockstep_simulator(const belief::Scene& scene, ShapeStore& shapes,
                                                                  const LockstepOptions& options = {});
 

@@ -172,7 +172,7 @@ class Flyer {
                                const core::Cancellation* cancellation) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
       if (cancellation && cancellation->requested()) return core::cancelled("the flight was not followed to its end");
-      PRESCENE_TRY(auto simulator, make(alone(scene, i)));
+      PRESCENE_TRY(auto simulator, make(alone(scene, i), 1.0));
       simulators_.push_back(std::move(simulator));
     }
     return core::ok_status();

@@ -3,8 +3,9 @@
 // flight tell all about it. What then may touch opens it into instances.
 //
 //   PRESCENE_TRY(const FlightBodies bodies, FlightBodies::make(scene, shapes));
-//   PRESCENE_TRY(const CommonFlight flight, common_flight(scene, bodies, starts, request, make_simulator, stream,
-//   pool)); flight.apart_until, flight.openings[0].probability
+//   PRESCENE_TRY(const CommonFlight flight,
+//                common_flight(scene, bodies, starts, request, make_simulator, stream, pool));
+//   ... flight.apart_until, flight.openings[0].probability
 #pragma once
 
 #include <memory>

@@ -3,8 +3,8 @@
 // instances that there are [Saltelli et al. 2008, section 1.2.8; Plischke 2010].
 //
 //   InputEffect effect = first_order_effect(friction, classes, 3, weights);
-//   effect.share                       // of the variance of the classes, in [0, 1]
-//   effect.low_fifth[0]                // probability of class 0 where the friction is in its lowest fifth
+//   ... effect.share                   // of the variance of the classes, in [0, 1]
+//   ... effect.low_fifth[0]            // probability of class 0 where the friction is in its lowest fifth
 #pragma once
 
 #include <span>

@@ -5,10 +5,10 @@
 // grown in steps (64, 96, 128, 192, 256, 384, ...) until every interval is narrow enough. Aligned consecutive blocks of
 // the net serve as pseudo-replicates, so that the whole net's accuracy is kept and still has an error estimate.
 //
-//   StartDistribution starts = start_of(*scene);
+//   StartDistribution starts = start_of(scene);
 //   std::vector<Variable> variables = variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
 //   OutcomeEstimate estimate = estimate_outcomes(simulator, starts, variables, request, stream, options, pool);
-//   estimate.variables[0].classes[0].probability
+//   ... estimate.variables[0].classes[0].probability
 #pragma once
 
 #include <functional>

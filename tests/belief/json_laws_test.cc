@@ -121,6 +121,11 @@ TEST(QueryFromJson, NamesThePathOfWhatIsWrong) {
       message(
           R"({"where": {"object": "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["}, "a": 1})"),
       HasSubstr("unknown key"));
+  EXPECT_THAT(
+      message(R"({"stability": {"object": "cup", "max_mvoe": 1}})"),
+      HasSubstr("stability.max_mvoe: unknown key; did you mean 'max_move'? The keys here are object, max_move"));
+  EXPECT_THAT(message(R"({"stability": {"object": "cup", "weather": 1}})"),
+              HasSubstr("stability.weather: unknown key; the keys here are object, max_move"));
 }
 
 TEST(QueryFromJson, FillsInWhatIsNotSaid) {
@@ -141,7 +146,7 @@ TEST(AnswerToJson, HasTheKeysThatTheCommandLinePromises) {
   predict.instances = 512;
   predict.simulated_seconds = 3.5;
   predict.wall_seconds = 0.1;
-  const Json json = to_json(Answer{"7", 3, "", predict});
+  const Json json = to_json(Answer{"7", 3, {}, predict});
   EXPECT_EQ(json["id"], "7");
   EXPECT_EQ(json["predict"]["outcomes"][0]["name"], "in");
   EXPECT_EQ(json["predict"]["outcomes"][0]["group"], "where");
@@ -150,14 +155,52 @@ TEST(AnswerToJson, HasTheKeysThatTheCommandLinePromises) {
   EXPECT_FALSE(json["predict"]["outcomes"][1].contains("group"));
   EXPECT_EQ(json["predict"]["instances"], 512);
   EXPECT_FALSE(json.contains("error"));
-  EXPECT_EQ(to_json(Answer{"8", 0, "no such object", {}})["error"], "no such object");
+}
+
+TEST(JsonLaws, ErrorsOfAnswersKeepTheirCodeAndText) {
+  using core::StatusCode;
+  for (const StatusCode code :
+       {StatusCode::kInvalidInput, StatusCode::kNotFound, StatusCode::kDataLoss, StatusCode::kUnsupported,
+        StatusCode::kUnavailable, StatusCode::kResourceExhausted, StatusCode::kCancelled}) {
+    // Texts that look like another code, and one that JSON has to escape.
+    for (const std::string text : {"there is no object 'mug'", "unavailable: later", "a \"quote\"\n\xc3\xa9", ""}) {
+      Answer answer;
+      answer.id = "8";
+      answer.error = core::Status(code, text);
+      const Json json = Json::parse(to_json(answer).dump());
+      EXPECT_EQ(json["error"], text);
+      EXPECT_TRUE(json["code"].is_string());
+      EXPECT_EQ(error_from_json(json), answer.error) << json;
+    }
+  }
+  EXPECT_TRUE(error_from_json(to_json(Answer{"8", 0, {}, WhereAnswer{}})).ok());
+}
+
+TEST(ErrorFromJson, TakesErrorsOfOthersForBadInput) {
+  EXPECT_EQ(error_from_json(Json::parse(R"({"error": "no"})")), core::invalid_input("no"));
+  EXPECT_EQ(error_from_json(Json::parse(R"({"error": "no", "code": "tired"})")), core::invalid_input("no"));
+  EXPECT_EQ(error_from_json(Json::parse(R"({"error": "no", "code": 3})")), core::invalid_input("no"));
+  EXPECT_EQ(error_from_json(Json::parse(R"({"error": {"why": 1}})")), core::invalid_input(R"({"why":1})"));
+  EXPECT_TRUE(error_from_json(Json::parse(R"({"code": "not_found"})")).ok());
+  EXPECT_TRUE(error_from_json(Json::parse("[1]")).ok());
+}
+
+TEST(AnswerToJson, TellsWhoSimulatedAndWhyNotInLockstep) {
+  PredictAnswer predict;
+  EXPECT_FALSE(to_json(Answer{"", 0, {}, predict})["predict"].contains("stepper"));
+  predict.stepper = "lockstep";
+  EXPECT_EQ(to_json(Answer{"", 0, {}, predict})["predict"]["stepper"], Json::parse(R"({"name": "lockstep"})"));
+  predict.stepper = "bullet";
+  predict.not_lockstep = "five objects";
+  EXPECT_EQ(to_json(Answer{"", 0, {}, predict})["predict"]["stepper"],
+            Json::parse(R"({"name": "bullet", "not_lockstep": "five objects"})"));
 }
 
 TEST(AnswerToJson, WritesImagesInBase64) {
   ViewAnswer view;
   view.depth = geometry::DepthImage(2, 1, 1.0F);  // 00 00 80 3f twice
   view.labels = geometry::LabelImage(1, 1, std::uint16_t{0x0102});
-  const Json json = to_json(Answer{"", 0, "", view})["view"];
+  const Json json = to_json(Answer{"", 0, {}, view})["view"];
   EXPECT_EQ(json["depth"]["base64"], "AACAPwAAgD8=");
   EXPECT_EQ(json["labels"]["base64"], "AgE=");
   EXPECT_EQ(json["depth"]["encoding"], "32FC1");

@@ -14,7 +14,6 @@
 #include "prescene/tests/peers/mesh_collision.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
-#include "prescene/tests/support/paths.h"
 
 namespace prescene::collision {
 namespace {
@@ -68,7 +67,7 @@ class DistancesOfRecordedPairs : public testing::TestWithParam<Files> {};
 TEST_P(DistancesOfRecordedPairs, AreThoseOfFcl) {
   const std::shared_ptr<const Mesh> a = tests::read_collision_mesh(GetParam().a);
   const std::shared_ptr<const Mesh> b = tests::read_collision_mesh(GetParam().b);
-  if (a == nullptr || b == nullptr) GTEST_SKIP() << tests::missing_data_message("meshes");
+  if (a == nullptr || b == nullptr) GTEST_SKIP() << tests::missing_meshes_message();
   expect_same_distances(a, b);
 }
 

@@ -19,7 +19,6 @@
 #include "prescene/tests/support/brute_force.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
-#include "prescene/tests/support/paths.h"
 
 namespace prescene::collision {
 namespace {
@@ -96,7 +95,7 @@ class RecordedDistances : public testing::TestWithParam<Files> {};
 TEST_P(RecordedDistances, AreLeast) {
   const std::shared_ptr<const Mesh> a = tests::read_collision_mesh(GetParam().a);
   const std::shared_ptr<const Mesh> b = tests::read_collision_mesh(GetParam().b);
-  if (a == nullptr || b == nullptr) GTEST_SKIP() << tests::missing_data_message("meshes");
+  if (a == nullptr || b == nullptr) GTEST_SKIP() << tests::missing_meshes_message();
   expect_least_distances(a, b);
 }
 

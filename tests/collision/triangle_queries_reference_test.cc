@@ -26,7 +26,6 @@
 #include "prescene/tests/support/brute_force.h"
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
-#include "prescene/tests/support/paths.h"
 #include "prescene/tests/support/target_test.h"
 
 namespace prescene::collision {
@@ -186,7 +185,7 @@ class RecordedPairs : public testing::TestWithParam<Files> {};
 TEST_P(RecordedPairs, AnswerAsBruteForceAndFcl) {
   const std::shared_ptr<const Mesh> a = tests::read_collision_mesh(GetParam().a),
                                     b = tests::read_collision_mesh(GetParam().b);
-  if (a == nullptr || b == nullptr) GTEST_SKIP() << tests::missing_data_message("meshes");
+  if (a == nullptr || b == nullptr) GTEST_SKIP() << tests::missing_meshes_message();
   expect_same_answers(a, b);
 }
 

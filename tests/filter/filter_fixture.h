@@ -28,7 +28,7 @@ struct Backends {
   PoseSearch search;
   FilterTools tools;
 
-  ParticleFilter make_filter(FilterSettings settings = {}, SimulatorSource simulators = {}) {
+  ParticleFilter make_filter(FilterSettings settings = {}, simulation::SimulatorFactory simulators = {}) {
     return ParticleFilter(*likelihood, *renderer, threads, std::move(settings), std::move(simulators));
   }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "filter_fixture.h"
 #include "prescene/geometry/pose_error.h"
@@ -198,7 +199,7 @@ class BadFrames : public ::testing::Test {
         belief_(filter_.step(filter_.start(sequence_.scene, 7), sequence_.observe(0, *backends_.renderer), {}).belief) {
   }
 
-  void expect_rejected(belief::Observation observation, const std::string& word) {
+  void expect_rejected(const belief::Observation& observation, const std::string& word) {
     const StepResult result = filter_.step(belief_, observation, {});
     EXPECT_TRUE(result.degraded & kFrameRejected);
     EXPECT_NE(result.frame_status.message().find(word), std::string::npos) << result.frame_status.message();
@@ -247,9 +248,76 @@ TEST_F(BadFrames, OlderThanTheBeliefChangeNothing) {
   EXPECT_EQ(result.belief, belief_);
 }
 
+TEST(ParticleFilter, SaysThatPhysicsFailedAndTracksOnWithoutIt) {
+  Backends backends;
+  const SimulatedSequence sequence = carried_carton(0.22, 1.44, 103);
+  FilterSettings settings;
+  settings.predict.physics_share = 0.5;
+  ParticleFilter with_none = backends.make_filter(settings);
+  ParticleFilter filter = backends.make_filter(
+      settings, [](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+        return core::unsupported("carton: a surface can't move");
+      });
+  Belief belief = filter.start(sequence.scene, 7);
+  int failed = 0;
+  for (int frame = 0; frame < 6; ++frame) {
+    const belief::Observation observation = sequence.observe(frame, *backends.renderer);
+    const StepResult without = with_none.step(belief, observation, {});
+    StepResult result = filter.step(belief, observation, {});
+    EXPECT_EQ(result.belief, without.belief) << frame;
+    EXPECT_EQ((result.degraded & kPhysicsFailed) != 0, result.counters.not_simulated > 0) << frame;
+    EXPECT_EQ(result.physics_failure.find("a surface can't move") != std::string::npos,
+              result.counters.not_simulated > 0)
+        << result.physics_failure;
+    EXPECT_EQ(result.counters.simulated, 0);
+    failed += result.counters.not_simulated;
+    belief = std::move(result.belief);
+  }
+  EXPECT_GT(failed, 0);
+}
+
+/// A renderer whose device is lost after some calls.
+class LosingRenderer final : public rendering::Renderer {
+ public:
+  explicit LosingRenderer(rendering::Renderer& renderer) : renderer_(renderer) {}
+  rendering::RendererInfo info() const override { return renderer_.info(); }
+  core::Status render(std::span<const rendering::RenderJob> jobs, const rendering::RenderOptions& options,
+                      std::span<rendering::RenderedView> views) override {
+    if (lost) return core::unavailable("the graphics device was lost");
+    return renderer_.render(jobs, options, views);
+  }
+  bool lost = false;
+
+ private:
+  rendering::Renderer& renderer_;
+};
+
+TEST(ParticleFilter, SaysThatPicturesCouldNotBeDrawn) {
+  Backends backends;
+  const SimulatedSequence sequence =
+      still_sequence({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.0, 0.0, 0.09})});
+  LosingRenderer losing(*backends.renderer);
+  ParticleFilter filter(*backends.likelihood, losing, backends.threads, {});
+  Belief belief = filter.start(sequence.scene, 7);
+  for (int frame = 0; frame < 3; ++frame) {
+    losing.lost = frame == 1;
+    StepResult result = filter.step(belief, sequence.observe(frame, *backends.renderer), {});
+    EXPECT_EQ((result.degraded & kRenderingFailed) != 0, losing.lost) << frame;
+    EXPECT_EQ(result.counters.not_drawn > 0, losing.lost) << frame;
+    EXPECT_EQ(result.rendering_failure,
+              losing.lost ? core::unavailable("the graphics device was lost") : core::ok_status());
+    belief = std::move(result.belief);
+  }
+}
+
 TEST(DegradedText, NamesEveryBit) {
   EXPECT_EQ(degraded_text(0), "");
   EXPECT_EQ(degraded_text(kFrameRejected | kLongGap), "frame rejected, long gap");
+  EXPECT_EQ(degraded_text(kPhysicsFailed), "physics failed");
+  std::set<std::string> names;
+  for (std::uint32_t bit = kFrameRejected; bit <= kRenderingFailed; bit <<= 1) names.insert(degraded_text(bit));
+  EXPECT_EQ(names.size(), 9u);
+  EXPECT_FALSE(names.contains(""));
 }
 
 TEST(NumberIslands, JoinsWhatTouches) {

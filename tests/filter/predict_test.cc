@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
+#include <mutex>
+#include <set>
 
 #include "filter_fixture.h"
 #include "prescene/geometry/sampling.h"
@@ -52,12 +55,16 @@ PredictOptions without_mode_changes() {
   return options;
 }
 
+core::Result<std::unique_ptr<simulation::Simulator>> by_formula(tests::FakeSimulator::Formula formula) {
+  return std::unique_ptr<simulation::Simulator>(std::make_unique<tests::FakeSimulator>(std::move(formula)));
+}
+
 class Predict : public ::testing::Test {
  protected:
-  void run(belief::Belief& belief, const Pose& X_WG, double dt, const PredictOptions& options,
-           const belief::Control& control = {}, const SimulatorSource& simulators = {}) {
+  PredictReport run(belief::Belief& belief, const Pose& X_WG, double dt, const PredictOptions& options,
+                    const belief::Control& control = {}, const simulation::SimulatorFactory& simulators = {}) {
     const Pose poses[] = {X_WG};
-    predict(belief, control, poses, dt, options, simulators, {3, core::Purpose::kProcessNoise}, threads_);
+    return predict(belief, control, poses, dt, options, simulators, {3, core::Purpose::kProcessNoise}, threads_);
   }
   core::ThreadPool threads_{2};
 };
@@ -142,22 +149,22 @@ TEST_F(Predict, AHandThatHasNotLetGoCarriesOnWhatSeemedToSlip) {
 TEST_F(Predict, FallsByTheSimulatorWhereThereIsOne) {
   // Physics that moves everything down by a tenth of the duration and knows where the hand goes.
   int scenes = 0;
-  const SimulatorSource source = [&](const belief::Scene& scene) {
+  const simulation::SimulatorFactory source = [&](const belief::Scene& scene, double step_factor) {
     ++scenes;
+    EXPECT_EQ(step_factor, 1.0);
     EXPECT_EQ(scene.robot[0].timeline.size(), 2u);
     EXPECT_NEAR(scene.robot[0].timeline.back().X_WG.translation.z(), 0.45, 1e-12);
-    return std::make_unique<tests::FakeSimulator>(
-        [](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
-          belief::WorldState end = start;
-          end.objects[0].X_WO.translation.z() -= 0.1 * request.stop.duration;
-          end.objects[0].V_WO.linear.z() = -0.1;
-          return end;
-        });
+    return by_formula([](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
+      belief::WorldState end = start;
+      end.objects[0].X_WO.translation.z() -= 0.1 * request.stop.duration;
+      end.objects[0].V_WO.linear.z() = -0.1;
+      return end;
+    });
   };
   belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
   PredictOptions options = without_mode_changes();
   options.physics_share = 0.5;
-  run(belief, Pose::from_translation({0.1, 0.0, 0.45}), 0.1, options, {}, source);
+  const PredictReport report = run(belief, Pose::from_translation({0.1, 0.0, 0.45}), 0.1, options, {}, source);
   EXPECT_EQ(scenes, 1);
   int fell = 0;
   for (const Particle& particle : belief.objects[0].particles) {
@@ -167,6 +174,132 @@ TEST_F(Predict, FallsByTheSimulatorWhereThereIsOne) {
   }
   EXPECT_GT(fell, 2);
   EXPECT_LT(fell, 14);
+  EXPECT_EQ(report.simulated, fell);
+  EXPECT_EQ(report.not_simulated, 0);
+  EXPECT_EQ(report.failure, "");
+}
+
+/// A belief whose particles all fly, each at a speed of its own, and are all to be moved by physics.
+belief::Belief flying() {
+  belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
+  belief.objects[0].state = belief::TrackState::kTracked;
+  for (std::size_t i = 0; i < belief.objects[0].particles.size(); ++i) {
+    belief.objects[0].particles[i].V_WO.linear = Vector3d(0.3, 0.02 * static_cast<double>(i), 0.1);
+    belief.objects[0].particles[i].V_WO.angular = Vector3d(0.5, -0.2, 1.0);
+  }
+  return belief;
+}
+
+PredictOptions all_by_physics() {
+  PredictOptions options = without_mode_changes();
+  options.physics_share = 1.0;
+  return options;
+}
+
+TEST_F(Predict, WithoutASimulatorParticlesGoOnAtConstantVelocity) {
+  belief::Belief belief = flying(), without = flying();
+  const PredictReport report =
+      run(belief, belief.robot[0], 0.1, all_by_physics(), {},
+          [](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+            return core::unsupported("box: a surface can't move");
+          });
+  EXPECT_EQ(report.simulated, 0);
+  EXPECT_EQ(report.not_simulated, 16);
+  EXPECT_NE(report.failure.find("box: a surface can't move"), std::string::npos) << report.failure;
+  const PredictReport none = run(without, without.robot[0], 0.1, all_by_physics());
+  EXPECT_EQ(none.not_simulated, 0);
+  EXPECT_EQ(belief, without);
+  for (std::size_t i = 0; i < 16; ++i) {
+    const Vector3d expected = Vector3d(0.1, 0.0, 0.3) + 0.1 * Vector3d(0.3, 0.02 * static_cast<double>(i), 0.1);
+    EXPECT_THAT(belief.objects[0].particles[i].X_WO.translation, tests::is_near(expected, 1e-12)) << i;
+  }
+}
+
+/// Spoils every other run of a simulator that moves everything down by 5 cm.
+class SpoilingSimulator final : public simulation::Simulator {
+ public:
+  using Spoil = std::function<void(belief::Trajectory&)>;
+  explicit SpoilingSimulator(Spoil spoil) : spoil_(std::move(spoil)) {}
+  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
+           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
+           std::span<belief::Trajectory> runs, const core::Cancellation* cancellation) const override {
+    const tests::FakeSimulator down(
+        [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+          belief::WorldState end = start;
+          end.objects[0].X_WO.translation.z() -= 0.05;
+          return end;
+        });
+    down.run(starts, request, stream, numbers, pool, runs, cancellation);
+    for (std::size_t i = 1; i < runs.size(); i += 2) spoil_(runs[i]);
+  }
+  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>&,
+                                                      const core::RandomStream&) const override {
+    return nullptr;
+  }
+
+ private:
+  Spoil spoil_;
+};
+
+TEST_F(Predict, RunsThatDoNotLastLeaveTheirParticlesAtConstantVelocity) {
+  const auto ends_with = [](belief::TrajectoryEnd end) { return [end](belief::Trajectory& run) { run.end = end; }; };
+  const std::pair<SpoilingSimulator::Spoil, std::string> spoils[] = {
+      {ends_with(belief::TrajectoryEnd::kDiverged), "diverged"},
+      {ends_with(belief::TrajectoryEnd::kLeftTheWorld), "left"},
+      {ends_with(belief::TrajectoryEnd::kAtRest), "ended"},
+      {ends_with(belief::TrajectoryEnd::kCancelled), "ended"},
+      {ends_with(belief::TrajectoryEnd::kDecided), "ended"},
+      {[](belief::Trajectory& run) { run.states.clear(); }, "no end"},
+      {[](belief::Trajectory& run) { run.states.back().objects.clear(); }, "no end"},
+      {[](belief::Trajectory& run) { run.states.back().objects[0].X_WO.translation.y() = std::nan(""); }, "finite"},
+      {[](belief::Trajectory& run) { run.states.back().objects[0].V_WO.angular.x() = INFINITY; }, "finite"}};
+  belief::Belief without = flying();
+  run(without, without.robot[0], 0.1, all_by_physics());
+  for (const auto& [spoil, word] : spoils) {
+    SCOPED_TRACE(word);
+    belief::Belief belief = flying();
+    const PredictReport report =
+        run(belief, belief.robot[0], 0.1, all_by_physics(), {},
+            [&spoil = spoil](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+              return std::unique_ptr<simulation::Simulator>(std::make_unique<SpoilingSimulator>(spoil));
+            });
+    EXPECT_EQ(report.simulated, 8);
+    EXPECT_EQ(report.not_simulated, 8);
+    EXPECT_NE(report.failure.find("'box'"), std::string::npos) << report.failure;
+    EXPECT_NE(report.failure.find(word), std::string::npos) << report.failure;
+    for (std::size_t i = 0; i < 16; ++i) {
+      const Particle& particle = belief.objects[0].particles[i];
+      if (i % 2 == 1) {
+        EXPECT_EQ(particle, without.objects[0].particles[i]) << i;
+      } else {
+        EXPECT_NEAR(particle.X_WO.translation.z(), 0.25, 1e-12) << i;
+      }
+    }
+  }
+}
+
+TEST_F(Predict, ASimulatorIsMadeOnceThoughRunsDifferInLength) {
+  belief::Belief belief = hand_and_object(MotionMode::kMoving, true);
+  for (std::size_t i = 0; i < 8; ++i) belief.objects[0].particles[i].mode = MotionMode::kHeld;
+  PredictOptions options = all_by_physics();
+  options.regrasp_probability = 0.0;
+  belief::Control control;
+  control.actions.push_back({0.04, belief::Release{"box"}});
+  int made = 0;
+  std::mutex mutex;
+  std::multiset<int> milliseconds;
+  const PredictReport report = run(belief, belief.robot[0], 0.1, options, control, [&](const belief::Scene&, double) {
+    ++made;
+    return by_formula([&](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
+      const std::lock_guard lock(mutex);
+      milliseconds.insert(static_cast<int>(std::lround(1e3 * request.stop.duration)));
+      return start;
+    });
+  });
+  EXPECT_EQ(made, 1);
+  EXPECT_EQ(report.simulated, 16);
+  EXPECT_EQ(milliseconds.count(60), 8u);   // let go after 40 ms
+  EXPECT_EQ(milliseconds.count(100), 8u);  // had slipped before
 }
 
 TEST_F(Predict, SomeRestingParticlesWakeAndSlowOnesSettle) {

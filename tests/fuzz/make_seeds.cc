@@ -3,7 +3,9 @@
 // know.
 #include <cstdio>
 #include <filesystem>
+#include <initializer_list>
 #include <string>
+#include <utility>
 
 #include "prescene/collision/tree_file.h"
 #include "prescene/core/check.h"
@@ -12,6 +14,7 @@
 #include "prescene/interfaces/images/jpeg.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/mcap/mcap_writer.h"
+#include "prescene/interfaces/mesh_files/import_reply.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -80,6 +83,15 @@ void write_mesh_seeds() {
              std::string("# x\nv 0 0 0 1 0 0\nv 1 0 0 1\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1/1/1 2//2 -2 \\\n 4\n"));
   write_seed("stl", "binary", encode_stl(box));
   write_seed("stl", "text", encode_stl(box, MeshEncoding::kText));
+  for (const auto& [name, answer] : std::initializer_list<std::pair<const char*, core::Result<ImportedMesh>>>{
+           {"mesh", ImportedMesh{box, ""}},
+           {"not_finite", ImportedMesh{box, "vertex 7 (mesh 2)"}},
+           {"refusal", core::invalid_input("'GLTF: no such node'")},
+           {"too_large", core::resource_exhausted("has more than the limit")}}) {
+    const auto bytes = run_in_child([&answer = answer](ChildOutput& out) { send_reply(answer, out); }, {});
+    PRESCENE_CHECK(bytes.ok());
+    write_seed("import_reply", name, *bytes);
+  }
 }
 
 void write_tree_file_seeds() {
@@ -119,6 +131,33 @@ void write_recording_seed(const std::string& name, McapCompression compression, 
   }
   PRESCENE_CHECK((*writer)->close().ok());
   write_seed("mcap", name, *read_file(scratch.path() / "a", 1 << 20));
+}
+
+/// Programs for frames_fuzz.cc: a byte says what comes, and each of its values takes one or more.
+void write_frames_seeds() {
+  using Program = std::vector<std::uint8_t>;
+  const auto after = [](std::initializer_list<Program> parts) {
+    Program program;
+    for (const Program& part : parts) program.insert(program.end(), part.begin(), part.end());
+    return program;
+  };
+  const Program info = {3, 4, 4, 0, 0, 0, 0, 0};
+  const Program distorted = {3, 4, 4, 0, 5, 3, 3, 3, 3, 3, 0, 0, 0};
+  const auto tf = [](std::uint8_t time, std::uint8_t child, bool is_static) {
+    return Program{4, 1, time, 0, child, 0, 1, 3, 0, static_cast<std::uint8_t>(is_static ? 0 : 1)};
+  };
+  const auto depth = [](std::uint8_t time) { return Program{0, time, 1, 0, 4, 4, 0, 3, 200, 3, 210, 3}; };
+  const auto color = [](std::uint8_t time) { return Program{2, time, 1, 2, 4, 4, 0, 3, 10, 20, 30, 40}; };
+  const Program wait_100_ms = {5, 100, 0};
+  const Program back_an_hour = {5, 0, 0x80};
+  const Program skipped = {6};
+  write_seed("frames", "plain",
+             after({{1}, tf(0, 1, true), info, color(3), depth(3), wait_100_ms, depth(4), wait_100_ms}));
+  write_seed("frames", "moving",
+             after({{0}, info, tf(1, 1, false), tf(3, 1, false), tf(2, 3, false), depth(2), wait_100_ms, skipped}));
+  write_seed("frames", "clock_back",
+             after({{8}, distorted, depth(200), wait_100_ms, depth(1), back_an_hour, wait_100_ms, depth(2), skipped}));
+  write_seed("frames", "odd", after({{31}, info, depth(255), {0, 3, 1, 1, 4, 4, 1, 7, 3, 1, 2, 3}, wait_100_ms}));
 }
 
 template <class Message>
@@ -178,5 +217,6 @@ int main(int argc, char** argv) {
   write_message_seeds<RosMarkerArray>("markers");
   write_message_seeds<RosDiagnosticArray>("diagnostics");
   write_sound_messages();
+  write_frames_seeds();
   return 0;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "prescene/geometry/cancellable.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/tests/support/matchers.h"
@@ -208,6 +209,40 @@ TEST(Primitives, CartonHasARoofAndAFin) {
   // Base block, trapezoid roof of 4 cm, fin of 2 cm; the fin is 0.04 * 8 cm thick.
   const double profile = 0.08 * 0.2 + 0.5 * (0.08 + 0.0032) * 0.04 + 0.0032 * 0.02;
   EXPECT_NEAR(signed_volume(carton), 0.07 * profile, 1e-15);
+}
+
+// Points that crowd closer together than the hull's tolerance are passed over and looked at again in the end. That must
+// not cost a look at every face of the hull for each of them: it would be 10^10 looks here, and the time limit of a
+// test.
+TEST(ConvexHull, TakesCrowdsOfPointsOnASphere) {
+  constexpr int kSpread = 60'000;
+  constexpr int kCrowded = 40'000;
+  const double golden = M_PI * (3.0 - std::sqrt(5.0));
+  const auto on_sphere = [&](double z, int turn) {
+    const double r = std::sqrt(1.0 - z * z);
+    return Vector3d(r * std::cos(golden * turn), r * std::sin(golden * turn), z);
+  };
+  std::vector<Vector3d> points;
+  for (int i = 0; i < kSpread; ++i) points.push_back(on_sphere(1.0 - (2.0 * i + 1.0) / kSpread, i));
+  for (int i = 0; i < kCrowded; ++i) points.push_back(on_sphere(1.0 - 1e-10 * (i + 1.0) / kCrowded, i));
+  const auto hull = convex_hull(points);
+  ASSERT_TRUE(hull.ok()) << hull.status().message();
+  EXPECT_TRUE(mesh_topology(*hull).watertight());
+  EXPECT_GT(hull->vertices.size(), 0.99 * kSpread);
+  EXPECT_NEAR(signed_volume(*hull), 4.0 / 3.0 * M_PI, 1e-3);
+  const auto again = convex_hull(hull->vertices);
+  ASSERT_TRUE(again.ok());
+  EXPECT_TRUE(*again == *hull);
+}
+
+TEST(Cancellation, StopsARepairAndAHull) {
+  core::Cancellation cancellation;
+  const TriangleMesh ball = make_mesh(Sphere{1.0}, 48);
+  EXPECT_TRUE(*repair_mesh(ball, nullptr, &cancellation) == *repair_mesh(ball, nullptr));
+  EXPECT_TRUE(*convex_hull(ball.vertices, &cancellation) == *convex_hull(ball.vertices));
+  cancellation.request();
+  EXPECT_EQ(repair_mesh(ball, nullptr, &cancellation).status().code(), core::StatusCode::kCancelled);
+  EXPECT_EQ(convex_hull(ball.vertices, &cancellation).status().code(), core::StatusCode::kCancelled);
 }
 
 TEST(Primitives, LatheClosesItsProfileOnTheAxis) {

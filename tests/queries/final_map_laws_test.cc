@@ -39,19 +39,19 @@ std::shared_ptr<belief::Scene> ridge(double deviation) {
   return scene;
 }
 
-belief::FinalPoses final_poses(std::shared_ptr<const belief::Scene> scene, int instances, int* run = nullptr) {
+belief::FinalPoses final_poses(const std::shared_ptr<const belief::Scene>& scene, int instances, int* run = nullptr) {
   core::ThreadPool pool(2);
   simulation::ShapeStore shapes(nullptr);
   QueryContext context;
   context.pool = &pool;
-  context.make_simulator = [&](const std::shared_ptr<const belief::Scene>& asked) {
-    return simulation::make_bullet_simulator(*asked, shapes, {});
+  context.make_simulator = [&](const belief::Scene& asked, double) {
+    return simulation::make_bullet_simulator(asked, shapes, {});
   };
   belief::PredictQuery query;
   query.tell.typical_runs = false;
   query.effort.exact_instances = instances;
   const belief::Answer answer = queries::answer(scene, 1, {"", query}, context);
-  EXPECT_EQ(answer.error, "");
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
   const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
   if (run) *run = predicted.instances;
   return predicted.final_poses.at(0);

@@ -60,13 +60,13 @@ PredictAnswer predicted(std::shared_ptr<belief::Scene> scene, double tolerance,
   simulation::ShapeStore shapes(simulation::hacd_decomposer());
   QueryContext context;
   context.pool = &pool;
-  context.make_simulator = [&](std::shared_ptr<const belief::Scene> asked) {
-    return simulation::make_bullet_simulator(*asked, shapes, options);
+  context.make_simulator = [&](const belief::Scene& asked, double) {
+    return simulation::make_bullet_simulator(asked, shapes, options);
   };
   belief::PredictQuery query;
   query.effort.tolerance = tolerance;
   const belief::Answer answer = queries::answer(std::move(scene), 1, {"", query}, context);
-  EXPECT_EQ(answer.error, "");
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
   return std::get<PredictAnswer>(answer.what);
 }
 
@@ -178,13 +178,13 @@ TEST(Mechanics, TheMilkCartonsAnswerIsTheSameOnOneThreadAndOnThree) {
     core::ThreadPool pool(threads);
     QueryContext context;
     context.pool = &pool;
-    context.make_simulator = [&](std::shared_ptr<const belief::Scene> asked) {
-      return simulation::make_bullet_simulator(*asked, shapes);
+    context.make_simulator = [&](const belief::Scene& asked, double) {
+      return simulation::make_bullet_simulator(asked, shapes);
     };
     belief::PredictQuery query;
     query.effort.exact_instances = 48;
     belief::Answer answer = queries::answer(shared, 1, {"", query}, context);
-    EXPECT_EQ(answer.error, "");
+    EXPECT_TRUE(answer.error.ok()) << answer.error.message();
     return std::get<PredictAnswer>(std::move(answer.what));
   };
   const PredictAnswer one = ask(1), three = ask(3);

@@ -76,11 +76,11 @@ inline belief::WorldState slide(const belief::WorldState& start, const simulatio
   return end;
 }
 
-inline queries::QueryContext context_with(FakeSimulator::Formula formula, core::ThreadPool& pool) {
+inline queries::QueryContext context_with(const FakeSimulator::Formula& formula, core::ThreadPool& pool) {
   queries::QueryContext context;
   context.pool = &pool;
-  context.make_simulator =
-      [formula](std::shared_ptr<const belief::Scene>) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+  context.make_simulator = [formula](const belief::Scene&,
+                                     double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
     return std::unique_ptr<simulation::Simulator>(std::make_unique<FakeSimulator>(formula));
   };
   return context;

@@ -19,7 +19,7 @@ std::map<std::string, belief::OutcomeProbability> foreseen(const std::string& na
   const auto scene = scenario(name);
   if (scene == nullptr) return found;
   const belief::Answer answer = predict(scene, instances, 1, 2);
-  EXPECT_EQ(answer.error, "");
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
   const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
   EXPECT_EQ(predicted.failed_instances, 0);
   EXPECT_EQ(predicted.overlapping_share, 0.0);

@@ -38,8 +38,8 @@ void record(belief::Scene scene, double rate, double seconds, std::uint64_t seed
   ASSERT_TRUE(closed.ok()) << closed.message();
 }
 
-Replayed replay(const std::filesystem::path& path, std::shared_ptr<const belief::Scene> scene, std::uint64_t seed,
-                int threads) {
+Replayed replay(const std::filesystem::path& path, const std::shared_ptr<const belief::Scene>& scene,
+                std::uint64_t seed, int threads) {
   Replayed replayed;
   core::ThreadPool pool(threads);
   service::Backends backends(pool);
@@ -65,7 +65,7 @@ Replayed replay(const std::filesystem::path& path, std::shared_ptr<const belief:
     score.add(replayed.last_truth);
     return core::ok_status();
   };
-  const auto summary = service::replay_recording(path, **tracker, {}, {}, on_step, on_json);
+  const auto summary = service::replay_recording(path, {}, **tracker, {}, {}, on_step, on_json);
   if (!summary.ok()) {
     ADD_FAILURE() << summary.status().message();
     return replayed;
@@ -86,8 +86,12 @@ belief::Answer predict(std::shared_ptr<const belief::Scene> scene, int instances
 }
 
 std::uint64_t content_hash(belief::Answer answer) {
-  if (auto* predicted = std::get_if<belief::PredictAnswer>(&answer.what))
+  if (auto* predicted = std::get_if<belief::PredictAnswer>(&answer.what)) {
     predicted->wall_seconds = predicted->cpu_seconds = 0.0;
+    // Who simulated is told beside the numbers and is none of them.
+    predicted->stepper.clear();
+    predicted->not_lockstep.clear();
+  }
   return core::Hasher().text(belief::to_json(answer).dump()).digest();
 }
 

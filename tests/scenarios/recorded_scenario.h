@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene file, played, recorded, tracked from its recording, and asked about.
-//
-//   const auto scene = scenario("milk_on_bin");
-//   record(*scene, 10.0, 4.0, seed, path);
-//   const Replayed replayed = replay(path, scene, seed, threads);
-//
-// Failures of these steps are reported to GoogleTest.
+// A scene file (`scenario`), played and recorded (`record`), tracked from its recording (`replay`), and asked about
+// (`predict`). Failures of these steps are reported to GoogleTest.
 #pragma once
 
 #include <filesystem>
@@ -34,8 +29,8 @@ struct Replayed {
   service::BeliefSummary last_belief;
   service::TruthRecord last_truth;
 };
-Replayed replay(const std::filesystem::path& path, std::shared_ptr<const belief::Scene> scene, std::uint64_t seed,
-                int threads);
+Replayed replay(const std::filesystem::path& path, const std::shared_ptr<const belief::Scene>& scene,
+                std::uint64_t seed, int threads);
 
 /// Answers "what happens?" from the scene's priors with just so many instances.
 belief::Answer predict(std::shared_ptr<const belief::Scene> scene, int instances, std::uint64_t seed, int threads);

@@ -104,7 +104,7 @@ void Scenario::foresee() {
   ASSERT_NE(scene_, nullptr);
   const int instances = GetParam().instances;
   const belief::Answer answer = predict(scene_, instances, kSeed, 1);
-  ASSERT_EQ(answer.error, "");
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
   for (const int threads : {2, 3}) {
     EXPECT_EQ(content_hash(predict(scene_, instances, kSeed, threads)), content_hash(answer))
         << "with " << threads << " threads";

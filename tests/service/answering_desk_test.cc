@@ -88,11 +88,12 @@ TEST(AnsweringDesk, QuestionsThatFindNoRoomAreRefusedOrCounted) {
   for (std::uint64_t i = 1; i < kAsked; ++i)
     flood.push_back(R"({"id": ")" + std::to_string(i) + R"(", "stability": {"object": "box"}})");
   desk.ask_at_once(flood);
-  // One is simulated and two wait; every other is told or counted.
+  // One is simulated and two wait, or, where the flood came before the first one was taken, one more finds no room;
+  // every other is refused or counted.
   while (desk.counts().refused + desk.counts().unanswered < kAsked - 3) std::this_thread::yield();
   const DeskCounts counts = desk.counts();
   EXPECT_EQ(counts.answered, 0u);
-  EXPECT_EQ(counts.refused + counts.unanswered, kAsked - 3);
+  EXPECT_LE(counts.refused + counts.unanswered, kAsked - 2);
   EXPECT_GT(counts.refused, 0u);
   for (const std::string& answer : desk.answers(counts.refused)) {
     EXPECT_THAT(answer, HasSubstr(kQuestionsWait));

@@ -64,23 +64,89 @@ bool same(const std::vector<belief::Trajectory>& a, const std::vector<belief::Tr
   });
 }
 
+BackendSettings settings_of(Stepper stepper) {
+  BackendSettings settings;
+  settings.stepper = stepper;
+  return settings;
+}
+
+simulation::RunRequest request_of(const std::vector<belief::Action>& actions) {
+  simulation::RunRequest request;
+  request.actions = actions;
+  return request;
+}
+
+const std::vector<belief::Action> kPushes(17, {0.05, belief::Push{{-0.3, 0, 0.05}, {0.1, 0, 0.05}}});
+
 TEST(Backends, LockstepRunsWhatItCanAndBulletTheRest) {
   core::ThreadPool pool(1);
-  const auto simulator_of = [&](Stepper stepper, const belief::Scene& scene) {
-    BackendSettings settings;
-    settings.stepper = stepper;
-    return Backends(pool, settings).make_simulator(scene);
-  };
+  Backends bullets(pool, settings_of(Stepper::kBullet)), lanes(pool, settings_of(Stepper::kLockstep)),
+      either(pool, settings_of(Stepper::kAutomatic));
   const auto one = scene_of(kOneBox);
-  const auto bullet = simulator_of(Stepper::kBullet, *one);
-  const auto lockstep = simulator_of(Stepper::kLockstep, *one);
-  const auto automatic = simulator_of(Stepper::kAutomatic, *one);
+  const auto bullet = bullets.make_simulator(*one);
+  const auto lockstep = lanes.make_simulator(*one);
+  const auto automatic = either.make_simulator(*one);
   ASSERT_TRUE(bullet.ok() && lockstep.ok() && automatic.ok());
   EXPECT_FALSE(same(runs(**bullet, *one, {}), runs(**lockstep, *one, {})));
   EXPECT_TRUE(same(runs(**automatic, *one, {}), runs(**lockstep, *one, {})));
+  EXPECT_EQ((*bullet)->stepper().name, "bullet");
+  EXPECT_EQ((*lockstep)->stepper().name, "lockstep");
+  EXPECT_EQ((*automatic)->stepper().name, "lockstep");
+  EXPECT_EQ(either.stepper_counts().lockstep, 1u);
+  EXPECT_EQ(either.stepper_counts().bullet_instead, 0u);
 
-  const std::vector<belief::Action> pushed(17, {0.05, belief::Push{{-0.3, 0, 0.05}, {0.1, 0, 0.05}}});
-  EXPECT_TRUE(same(runs(**lockstep, *one, pushed), runs(**bullet, *one, pushed)));
+  // A request may ask for more than its scene does. Bullet's stepper takes such a run over, and that is counted.
+  EXPECT_TRUE((*automatic)->supports(request_of(kPushes)).ok());
+  EXPECT_TRUE(same(runs(**automatic, *one, kPushes), runs(**bullet, *one, kPushes)));
+  EXPECT_EQ(either.stepper_counts().bullet_instead, 1u);
+  EXPECT_THAT(either.stepper_counts().last_reason, HasSubstr("17 push actions"));
+  // Nobody is instead of anybody where one of them was asked for.
+  EXPECT_EQ(bullets.stepper_counts().bullet_instead, 0u);
+  EXPECT_EQ(lanes.stepper_counts().bullet_instead, 0u);
+}
+
+TEST(Backends, LockstepAloneRefusesWhatItCannotRun) {
+  core::ThreadPool pool(1);
+  Backends backends(pool, settings_of(Stepper::kLockstep));
+  const auto one = scene_of(kOneBox);
+  const auto lockstep = backends.make_simulator(*one);
+  ASSERT_TRUE(lockstep.ok());
+  EXPECT_TRUE((*lockstep)->supports(request_of({kPushes.begin(), kPushes.begin() + 16})).ok());
+  const core::Status refused = (*lockstep)->supports(request_of(kPushes));
+  EXPECT_EQ(refused.code(), core::StatusCode::kUnsupported);
+  EXPECT_THAT(refused.message(), HasSubstr("17 push actions"));
+
+  belief::Scene pushed = *one;
+  pushed.actions = kPushes;
+  const core::Status scene_refused = backends.make_simulator(pushed).status();
+  EXPECT_EQ(scene_refused.code(), core::StatusCode::kUnsupported);
+  EXPECT_THAT(scene_refused.message(), HasSubstr("17 push actions"));
+  EXPECT_THAT(scene_refused.message(), HasSubstr("--stepper bullet"));
+}
+
+TEST(Backends, AnswersTellWhoSimulatedAndWhyItWasNotLockstep) {
+  core::ThreadPool pool(1);
+  belief::PredictQuery query;
+  query.effort.exact_instances = 8;
+  query.duration = 0.1;
+  const auto asked = [&](Stepper stepper, const char* scene) {
+    Backends backends(pool, settings_of(stepper));
+    return queries::answer(scene_of(scene), 1, {"", query}, backends.query_context(pool));
+  };
+  const auto predicted = [&](Stepper stepper, const char* scene) {
+    const belief::Answer answer = asked(stepper, scene);
+    EXPECT_TRUE(answer.error.ok()) << answer.error.message();
+    return std::get<belief::PredictAnswer>(answer.what);
+  };
+  EXPECT_EQ(predicted(Stepper::kAutomatic, kOneBox).stepper, "lockstep");
+  EXPECT_EQ(predicted(Stepper::kAutomatic, kOneBox).not_lockstep, "");
+  EXPECT_EQ(predicted(Stepper::kBullet, kFiveBoxes).stepper, "bullet");
+  EXPECT_EQ(predicted(Stepper::kBullet, kFiveBoxes).not_lockstep, "");
+  EXPECT_EQ(predicted(Stepper::kAutomatic, kFiveBoxes).stepper, "bullet");
+  EXPECT_THAT(predicted(Stepper::kAutomatic, kFiveBoxes).not_lockstep, HasSubstr("the scene has 5"));
+  const belief::Answer refused = asked(Stepper::kLockstep, kFiveBoxes);
+  EXPECT_EQ(refused.error.code(), core::StatusCode::kUnsupported);
+  EXPECT_THAT(refused.error.message(), HasSubstr("the scene has 5"));
 }
 
 TEST(Backends, QueriesKnowHowTheirSimulatorsRoundEdges) {
@@ -92,16 +158,19 @@ TEST(Backends, QueriesKnowHowTheirSimulatorsRoundEdges) {
 
 TEST(Backends, AutomaticStepperIsBulletWhereLockstepRefusesTheScene) {
   core::ThreadPool pool(1);
-  BackendSettings settings;
   const auto five = scene_of(kFiveBoxes);
-  const auto bullet = Backends(pool, settings).make_simulator(*five);
-  settings.stepper = Stepper::kAutomatic;
-  const auto automatic = Backends(pool, settings).make_simulator(*five);
+  const auto bullet = Backends(pool, settings_of(Stepper::kBullet)).make_simulator(*five);
+  Backends either(pool, settings_of(Stepper::kAutomatic));
+  const auto automatic = either.make_simulator(*five);
   ASSERT_TRUE(bullet.ok() && automatic.ok());
   EXPECT_TRUE(same(runs(**automatic, *five, {}), runs(**bullet, *five, {})));
+  EXPECT_EQ((*automatic)->stepper().name, "bullet");
+  EXPECT_THAT((*automatic)->stepper().not_lockstep, HasSubstr("the scene has 5"));
+  EXPECT_EQ(either.stepper_counts().lockstep, 0u);
+  EXPECT_EQ(either.stepper_counts().bullet_instead, 1u);
+  EXPECT_THAT(either.stepper_counts().last_reason, HasSubstr("the scene has 5"));
 
-  settings.stepper = Stepper::kLockstep;
-  const auto refused = Backends(pool, settings).make_simulator(*five);
+  const auto refused = Backends(pool, settings_of(Stepper::kLockstep)).make_simulator(*five);
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.status().message(), HasSubstr("lockstep"));
 }

@@ -78,6 +78,56 @@ TEST(MeshInspection, AnOpenMeshGetsTheMassOfItsHullAndSaysSo) {
   ASSERT_TRUE(file.ok());
   EXPECT_NEAR(belief::mean(file->model.mass), 0.5, 1e-9);
   EXPECT_THAT(file->remarks.back(), testing::HasSubstr("convex hull"));
+  EXPECT_THAT(found->remarks, testing::Contains(testing::HasSubstr("nothing gets into its hollows")));
+}
+
+TEST(MeshInspection, HollowThingsKeepTheirHollowUnlessSomebodyChoosesOtherwise) {
+  const tests::ScratchDir folder;
+  const geometry::TriangleMesh mug =
+      geometry::make_lathe({{0.0, 0.0}, {0.04, 0.0}, {0.04, 0.1}, {0.036, 0.1}, {0.036, 0.006}, {0.0, 0.006}}, 48);
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "mug.ply", mug).ok());
+  const auto use_of = [&](std::optional<belief::MeshUse> use, std::string* remarks) {
+    MeshInspectionOptions options;
+    options.use = use;
+    const auto found = inspect_mesh(folder.path() / "mug.ply", options);
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    EXPECT_NEAR(*found->hollow, 0.036 * 0.036 * 0.094 / (0.04 * 0.04 * 0.1), 1e-9);
+    for (const std::string& remark : found->remarks) *remarks += remark + "\n";
+    const auto model = model_in_a_scene(*found, options, folder.path());
+    EXPECT_TRUE(model.ok()) << model.status().message();
+    return std::get<belief::MeshShape>(model->collision[0]).use;
+  };
+  std::string untold, chosen, spheres;
+  EXPECT_EQ(use_of({}, &untold), belief::MeshUse::kSpheres);
+  EXPECT_THAT(untold, testing::HasSubstr("76 % of its convex hull is hollow: in a scene it collides as spheres"));
+  EXPECT_EQ(use_of(belief::MeshUse::kConvexHull, &chosen), belief::MeshUse::kConvexHull);
+  EXPECT_THAT(chosen, testing::HasSubstr("with use: convex_hull nothing gets into that"));
+  EXPECT_EQ(use_of(belief::MeshUse::kSpheres, &spheres), belief::MeshUse::kSpheres);
+  EXPECT_EQ(spheres, "");
+}
+
+TEST(MeshInspection, CanBeStoppedAtEachStep) {
+  const tests::ScratchDir folder;
+  const geometry::TriangleMesh ball = geometry::make_mesh(geometry::Sphere{0.04}, 48);
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "ball.ply", ball).ok());
+  std::vector<std::string> steps;
+  MeshInspectionOptions options;
+  double last = 0.0;
+  options.progress = [&](const core::Progress& progress) {
+    steps.push_back(progress.text);
+    EXPECT_GE(progress.fraction, last);
+    last = progress.fraction;
+  };
+  ASSERT_TRUE(inspect_mesh(folder.path() / "ball.ply", options).ok());
+  ASSERT_EQ(last, 1.0);
+  for (const std::string& step : std::vector(steps)) {
+    core::Cancellation cancellation;
+    options.read.cancellation = &cancellation;
+    options.progress = [&](const core::Progress& progress) {
+      if (progress.text == step) cancellation.request();
+    };
+    EXPECT_EQ(inspect_mesh(folder.path() / "ball.ply", options).status().code(), core::StatusCode::kCancelled) << step;
+  }
 }
 
 TEST(MeshInspection, AFlatMeshMakesNoModel) {

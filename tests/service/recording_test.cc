@@ -111,7 +111,8 @@ TEST(Recording, KeepsMessagesInOrderWithTheirNumbers) {
   const auto end = (*reader)->next();
   ASSERT_TRUE(end.ok());
   EXPECT_FALSE(end->has_value());
-  EXPECT_EQ((*reader)->loss().text(), "");
+  EXPECT_EQ((*reader)->loss_text(), "");
+  EXPECT_EQ((*reader)->unchecked_text(), "");
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(Replay, StoppedOnRequestKeepsTheStepsThatWereMade) {
     if (++steps == 2) cancellation.request();
     return core::ok_status();
   };
-  const auto summary = replay_recording(path, **tracker, cancellation, {}, stop_after_two, {});
+  const auto summary = replay_recording(path, {}, **tracker, cancellation, {}, stop_after_two, {});
   ASSERT_TRUE(summary.ok()) << summary.status().message();
   EXPECT_TRUE(summary->cancelled);
   EXPECT_EQ(summary->steps, 2u);

@@ -49,6 +49,9 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.questions = {11, 13, 17, 19, 2, "no"};
   health.unreadable_questions = 1;
   health.failures = 4;
+  health.not_simulated = 111;
+  health.physics_failure = "no simulator could be made";
+  health.steppers = {13, 17, "the scene has 5"};
   const auto status = to_diagnostic(health, "here");
   EXPECT_EQ(status.hardware_id, "here");
   const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"},
@@ -57,7 +60,12 @@ TEST(ServiceHealth, CarriesItsCounts) {
                                                      {"questions answered", "11"},
                                                      {"questions refused", "13"},
                                                      {"questions without an answer", "18"},
-                                                     {"failures", "6"}};
+                                                     {"failures", "6"},
+                                                     {"particles without physics", "111"},
+                                                     {"last failure of physics", "no simulator could be made"},
+                                                     {"simulators in lockstep", "13"},
+                                                     {"simulators on Bullet instead", "17"},
+                                                     {"last reason for Bullet", "the scene has 5"}};
   for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
 }
 

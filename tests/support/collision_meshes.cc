@@ -5,12 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/interfaces/mesh_files/mesh_file.h"
-#include "prescene/tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {
@@ -107,15 +106,11 @@ std::shared_ptr<const collision::Mesh> collision_mesh(const TriangleMesh& mesh, 
 }
 
 std::shared_ptr<const collision::Mesh> read_collision_mesh(std::string_view file) {
-  const std::optional<std::filesystem::path> folder = data_dir("meshes");
-  if (!folder) return nullptr;
-  const core::Result<interfaces::LoadedMesh> loaded = interfaces::read_mesh(*folder / file);
-  PRESCENE_CHECK_MSG(loaded.ok(), loaded.status().message());
-  return collision_mesh(loaded->mesh, std::filesystem::path(file).stem().string());
+  const std::optional<TriangleMesh> mesh = read_recorded_mesh(file);
+  return mesh ? collision_mesh(*mesh, std::filesystem::path(file).stem().string()) : nullptr;
 }
 
 std::vector<MeshPair> recorded_mesh_pairs() {
-  if (!data_dir("meshes")) return {};
   static constexpr std::array<std::array<std::string_view, 2>, 14> kPairs = {{
       {"scans/stanford_bunny_closed.ply", "scans/stanford_bunny_closed.ply"},
       {"scans/stanford_dragon.ply", "scans/stanford_dragon.ply"},
@@ -135,6 +130,7 @@ std::vector<MeshPair> recorded_mesh_pairs() {
   std::vector<MeshPair> pairs;
   for (const auto& [file_a, file_b] : kPairs) {
     std::shared_ptr<const collision::Mesh> a = read_collision_mesh(file_a);
+    if (!a) return {};
     std::shared_ptr<const collision::Mesh> b = file_b == file_a ? a : read_collision_mesh(file_b);
     std::string name = a->name() + " / " + b->name();
     pairs.push_back({std::move(name), std::move(a), std::move(b)});

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,7 +23,11 @@ geometry::TriangleMesh make_wavy_sheet(double size, int triangles);
 
 /// Single precision; aborts on meshes that are not in order.
 std::shared_ptr<const collision::Mesh> collision_mesh(const geometry::TriangleMesh& mesh, std::string_view name);
-/// `file` ("scans/armadillo.ply") below the recorded meshes; null where the data is absent.
+/// `file` ("scans/armadillo.ply") below the recorded meshes; nothing where the data is absent, or where the build is of
+/// a part without a reader of mesh files. Tests then skip: `GTEST_SKIP() << missing_meshes_message()`.
+std::optional<geometry::TriangleMesh> read_recorded_mesh(std::string_view file);
+std::string missing_meshes_message();
+/// The same in single precision; null where there is none.
 std::shared_ptr<const collision::Mesh> read_collision_mesh(std::string_view file);
 
 struct MeshPair {
@@ -31,7 +36,7 @@ struct MeshPair {
   std::shared_ptr<const collision::Mesh> b;
 };
 
-/// 14 pairs of recorded meshes from 100 to 100,000 triangles; none where the data is absent.
+/// 14 pairs of recorded meshes from 100 to 100,000 triangles; none where there are none.
 std::vector<MeshPair> recorded_mesh_pairs();
 /// 4 pairs of shapes made here, 500 to 40,000 triangles.
 std::vector<MeshPair> made_mesh_pairs();

@@ -4,7 +4,7 @@
 //
 //   EXPECT_TRUE(rc::check([] {
 //     const Pose X_AB = *tests::poses();
-//     RC_ASSERT(...);
+//     RC_ASSERT(X_AB.inverse().inverse() == X_AB);
 //   }));
 #pragma once
 

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "prescene/geometry/primitives.h"
+#include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/tests/support/paths.h"
 #include "program.h"
 
@@ -61,6 +64,46 @@ TEST(CommandLine, AMistypedVerbIsNamedWithTheNearest) {
   const Finished finished = run_program({"inspec", "cup.ply"});
   EXPECT_EQ(finished.exit_code, 2);
   EXPECT_NE(finished.err.find("'inspec': did you mean 'inspect'?"), std::string::npos) << finished.err;
+}
+
+TEST(CommandLine, AMistypedOptionIsNamedWithTheNearest) {
+  for (const auto& [args, said] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"predict", scenario("milk_on_bin"), "--tolerence", "0.1"},
+            "there is no option '--tolerence': did you mean '--tolerance'?"},
+           {{"predict", scenario("milk_on_bin"), "--sed=3"}, "there is no option '--sed': did you mean '--seed'?"},
+           // Also where something else is missing because of it.
+           {{"record", "--outptu", "x.mcap"}, "there is no option '--outptu': did you mean '--output'?"},
+           {{"serve", "--scene", "x", "--depth-topics", "/d"}, "did you mean '--depth-topic'?"},
+           {{"--versoin"}, "did you mean '--version'?"},
+           {{"replay", "x.mcap", "--weather-forecast"}, "there is no option '--weather-forecast'\n"}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << args[0];
+    EXPECT_NE(finished.err.find(said), std::string::npos) << finished.err;
+    std::vector<std::string> with_json = args;
+    with_json.push_back("--json");
+    EXPECT_NE(run_program(with_json).out.find("there is no option"), std::string::npos) << args[0];
+  }
+}
+
+TEST(CommandLine, ProgressFitsTheTerminal) {
+  for (const int columns : {24, 60, 80, 200}) {
+    const std::string seen =
+        run_program_in_terminal({"predict", scenario("milk_on_bin"), "--max-instances", "600"}, columns);
+    EXPECT_NE(seen.find("%"), std::string::npos) << seen;
+    // Each line of progress begins anew at the left.
+    std::size_t begin = seen.find("\r\033[K");
+    ASSERT_NE(begin, std::string::npos) << seen;
+    while (begin != std::string::npos) {
+      begin += 4;
+      const std::size_t end = seen.find('\r', begin);
+      const std::string line = seen.substr(begin, end - begin);
+      EXPECT_LT(line.size(), static_cast<std::size_t>(columns)) << line;
+      begin = seen.find("\r\033[K", begin);
+    }
+  }
+  const Finished piped = run_program({"predict", scenario("milk_on_bin"), "--max-instances", "600"});
+  std::istringstream lines(piped.err);
+  for (std::string line; std::getline(lines, line);) EXPECT_LT(line.size(), 80U) << line;
 }
 
 TEST(CommandLine, MissingFilesAreNamed) {
@@ -183,6 +226,10 @@ TEST(CommandLine, PredictRefusesWhatMeansNothingAndSaysWhatWould) {
   refused({"--confidence", "0.9999999999999999"}, "between 0.5 and 0.9999");
   refused({"--duration", "3601"}, "up to 3600");
   EXPECT_EQ(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).exit_code, 2);
+  const std::vector<std::string> few = {"predict", scenario("mug_on_hook"), "--max-instances", "8"};
+  const Finished automatic = run_program(few);
+  EXPECT_EQ(automatic.exit_code, 0) << automatic.err;
+  EXPECT_NE(automatic.out.find("Simulated by Bullet's stepper"), std::string::npos) << automatic.out;
   EXPECT_NE(run_program({"predict", scenario("mug_on_hook"), "--stepper", "lockstep"}).err.find("--stepper bullet"),
             std::string::npos);
   EXPECT_NE(run_program({"validate", scene}).out.find("1 object, "), std::string::npos);
@@ -411,6 +458,102 @@ TEST(CommandLine, InspectMakesAModelThatASceneCanUse) {
       run_program({"predict", (folder.path() / "scene.yaml").string(), "--json", "--max-instances", "8"});
   ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
   EXPECT_EQ(parsed(predicted)["outcomes"][0]["probability"], 1.0);
+}
+
+// A mug of 8 cm by 10 cm with walls of 4 mm, as a scan gives it: a closed mesh.
+void write_mug(const std::filesystem::path& path) {
+  const geometry::TriangleMesh mug =
+      geometry::make_lathe({{0.0, 0.0}, {0.04, 0.0}, {0.04, 0.1}, {0.036, 0.1}, {0.036, 0.006}, {0.0, 0.006}}, 48);
+  ASSERT_TRUE(interfaces::write_ply(path, mug).ok());
+}
+
+TEST(CommandLine, WhatFallsIntoAnInspectedMugLandsInIt) {
+  const ScratchDir folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  write_mug(file("mug.ply"));
+  const Finished made = run_program({"inspect", file("mug.ply"), "-o", file("mug.yaml")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(read_file(file("mug.yaml")).find("use:"), std::string::npos) << "nobody chose one";
+  EXPECT_NE(made.out.find("% of its convex hull is hollow"), std::string::npos) << made.out;
+
+  const auto scene = [](const std::string& model) {
+    return "name: mug\nduration: 2\nmodels:\n  mug: {file: " + model +
+           "}\n  ball: {sphere: 0.012, mass: 0.01, restitution: 0.1}\n"
+           "supports:\n  floor: {ground: {size: 2}}\n"
+           "objects:\n  mug: {model: mug, pose: {position: [0, 0, 0.0005]}}\n"
+           "  ball: {model: ball, pose: {position: [{normal: [0, 0.001]}, {normal: [0, 0.001]}, 0.16]}}\n"
+           "outcomes:\n  in_mug: {object: ball, inside: {position: [0, 0, 0.05], size: [0.08, 0.08, 0.09]}}\n";
+  };
+  write_file(file("scene.yaml"), scene("mug.yaml"));
+  const Finished valid = run_program({"validate", file("scene.yaml"), "--json"});
+  ASSERT_EQ(valid.exit_code, 0) << valid.err;
+  EXPECT_TRUE(parsed(valid)["files"][0]["warnings"].empty()) << valid.out;
+  const Finished lands = run_program({"predict", file("scene.yaml"), "--json", "--max-instances", "32"});
+  ASSERT_EQ(lands.exit_code, 0) << lands.err;
+  EXPECT_GT(parsed(lands)["outcomes"][0]["probability"].get<double>(), 0.9) << lands.out;
+
+  // Who chooses the hull is told what that hides, by every verb that reads the model.
+  const Finished chosen =
+      run_program({"inspect", file("mug.ply"), "-o", file("solid.yaml"), "--use", "convex_hull", "--json"});
+  ASSERT_EQ(chosen.exit_code, 0) << chosen.err;
+  EXPECT_NE(read_file(file("solid.yaml")).find("use: convex_hull"), std::string::npos);
+  EXPECT_NEAR(parsed(chosen)["hollow_share_of_hull"].get<double>(),
+              1.0 - (0.04 * 0.04 * 0.1 - 0.036 * 0.036 * 0.094) / (0.04 * 0.04 * 0.1), 1e-9);
+  EXPECT_NE(parsed(chosen)["remarks"].dump().find("with use: convex_hull nothing gets into that"), std::string::npos);
+  write_file(file("solid_scene.yaml"), scene("solid.yaml"));
+  const Finished warned = run_program({"validate", file("solid_scene.yaml"), file("solid.yaml"), "--json"});
+  for (const auto& document : parsed(warned)["files"]) {
+    EXPECT_TRUE(document["valid"].get<bool>());
+    EXPECT_NE(document["warnings"].dump().find("76 % of its convex hull is hollow in the mesh"), std::string::npos)
+        << warned.out;
+  }
+  EXPECT_NE(run_program({"validate", file("solid.yaml")}).out.find("valid: a model file, 1 warning"),
+            std::string::npos);
+  const Finished misses = run_program({"predict", file("solid_scene.yaml"), "--json", "--max-instances", "32"});
+  EXPECT_LT(parsed(misses)["outcomes"][0]["probability"].get<double>(), 0.1) << misses.out;
+  EXPECT_NE(misses.err.find("76 % of its convex hull is hollow"), std::string::npos) << misses.err;
+}
+
+TEST(CommandLine, AMeshInMillimetresIsSaidFirst) {
+  const ScratchDir folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  geometry::TriangleMesh can = geometry::scaled(geometry::make_mesh(geometry::Cylinder{0.0048, 0.011}, 24), 1000.0);
+  ASSERT_TRUE(interfaces::write_ply(file("can.ply"), can).ok());
+  const std::string first = run_program({"inspect", file("can.ply")}).out;
+  EXPECT_EQ(first.rfind("warning: the bounding box is 9.6 x 9.6 x 11 m: the mesh is probably in millimetres", 0), 0u)
+      << first;
+  EXPECT_EQ(first.find("millimetres"), first.rfind("millimetres")) << "and once";
+  // As a model, and as a support, which may be as large.
+  write_file(file("model.yaml"), "model: {mesh: {file: can.ply}, mass: 0.3}\n");
+  write_file(file("scene.yaml"),
+             "name: can\nsupports:\n  can: {mesh: {file: can.ply}}\nmodels:\n  b: {sphere: 0.1, mass: 1}\n"
+             "objects:\n  b: {model: b, pose: {position: [0, 0, 8]}}\n");
+  for (const char* name : {"model.yaml", "scene.yaml"}) {
+    const Finished validated = run_program({"validate", file(name)});
+    EXPECT_NE(validated.err.find("the mesh is probably in millimetres"), std::string::npos) << validated.err;
+  }
+  const Finished predicted = run_program({"predict", file("scene.yaml"), "--max-instances", "2"});
+  EXPECT_NE(predicted.err.find("the mesh is probably in millimetres"), std::string::npos) << predicted.err;
+  can = geometry::scaled(can, 10.0);
+  ASSERT_TRUE(interfaces::write_ply(file("can.ply"), can).ok());
+  const Finished refused = run_program({"validate", file("model.yaml")});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.out.find("bounding box is 96 x 96 x 110 m: the mesh is probably in millimetres: give scale: 0.001"),
+            std::string::npos)
+      << refused.out;
+}
+
+TEST(CommandLine, InspectionOfALargeMeshSaysHowFarItIs) {
+  const ScratchDir folder;
+  const std::string path = (folder.path() / "ball.ply").string();
+  geometry::TriangleMesh ball = geometry::make_mesh(geometry::Sphere{0.1}, 480);
+  ball.triangles.resize(ball.triangles.size() - 9);  // open
+  ASSERT_TRUE(interfaces::write_ply(path, ball).ok());
+  ASSERT_GT(std::filesystem::file_size(path), 4u << 20);
+  const Finished done = run_program({"inspect", path});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_NE(done.err.find("inspecting: 40 %, convex hull"), std::string::npos) << done.err;
+  EXPECT_TRUE(run_program({"inspect", path, "-q"}).err.empty());
 }
 
 TEST(CommandLine, PredictWritesAReportWithTheStartAndAHeatMapOfEachObject) {

@@ -4,10 +4,13 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <spawn.h>
+#include <sys/ioctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -41,9 +44,11 @@ pid_t start(const std::string& program, const std::vector<std::string>& args,
   return failed == 0 ? pid : -1;
 }
 
-int wait_for_end(pid_t pid) {
+int wait_for_end(pid_t pid, std::int64_t* most_memory = nullptr) {
   int status = 0;
-  if (pid <= 0 || waitpid(pid, &status, 0) != pid) return -1;
+  rusage used{};
+  if (pid <= 0 || wait4(pid, &status, 0, &used) != pid) return -1;
+  if (most_memory != nullptr) *most_memory = std::int64_t{1024} * used.ru_maxrss;
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
@@ -53,7 +58,8 @@ Finished run_program(const std::vector<std::string>& args, const std::vector<std
   const ScratchDir folder;
   Finished finished;
   finished.exit_code = wait_for_end(
-      start(prescene(), args, environment, (folder.path() / "out").string(), (folder.path() / "err").string()));
+      start(prescene(), args, environment, (folder.path() / "out").string(), (folder.path() / "err").string()),
+      &finished.most_memory);
   finished.out = read_file(folder.path() / "out");
   finished.err = read_file(folder.path() / "err");
   return finished;
@@ -61,6 +67,24 @@ Finished run_program(const std::vector<std::string>& args, const std::vector<std
 
 int run_program_writing_to(const std::string& out, const std::vector<std::string>& args) {
   return wait_for_end(start(prescene(), args, {}, out, "/dev/null"));
+}
+
+std::string run_program_in_terminal(const std::vector<std::string>& args, int columns) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  EXPECT_TRUE(terminal >= 0 && grantpt(terminal) == 0 && unlockpt(terminal) == 0);
+  winsize size{};
+  size.ws_row = 24;
+  size.ws_col = static_cast<unsigned short>(columns);
+  EXPECT_EQ(ioctl(terminal, TIOCSWINSZ, &size), 0);
+  const pid_t pid = start(prescene(), args, {}, "/dev/null", ptsname(terminal));
+  std::string seen;
+  // Reading fails when the program has ended and nothing is left.
+  char bytes[4096];
+  for (ssize_t count = 0; (count = read(terminal, bytes, sizeof bytes)) > 0;)
+    seen.append(bytes, static_cast<std::size_t>(count));
+  EXPECT_EQ(wait_for_end(pid), 0) << seen;
+  close(terminal);
+  return seen;
 }
 
 BackgroundProgram::BackgroundProgram(const std::vector<std::string>& args, const std::vector<std::string>& environment)

@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@ struct Finished {
   int exit_code = -1;  ///< 128 + signal when it was killed by one.
   std::string out;
   std::string err;
+  std::int64_t most_memory = 0;  ///< Bytes that were in memory at once, at most.
 };
 
 /// Runs `prescene args...` to its end. `environment` is added to ours ("NAME=value").
@@ -21,6 +23,9 @@ Finished run_program(const std::vector<std::string>& args, const std::vector<std
 
 /// The exit code of a run whose standard output goes to that file.
 int run_program_writing_to(const std::string& out, const std::vector<std::string>& args);
+
+/// What a run writes to its standard error where that is a terminal of so many columns.
+std::string run_program_in_terminal(const std::vector<std::string>& args, int columns);
 
 /// A program that runs beside the test; killed with the object if it still runs.
 class BackgroundProgram {

@@ -10,9 +10,8 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/triangle_distance.h"
-#include "prescene/interfaces/mesh_files/mesh_file.h"
+#include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/paths.h"
 
 namespace prescene::collision {
 namespace {
@@ -129,29 +128,25 @@ TEST(PackSpheres, StopsAtTheSmallestRadius) {
 }
 
 TEST(PackSpheres, FillsHouseholdObjects) {
-  const auto data = tests::data_dir("meshes");
-  if (!data) GTEST_SKIP() << tests::missing_data_message("meshes");
   core::ThreadPool pool;
   for (const char* name : {"ycb_master_chef_can", "ycb_mustard_bottle", "ycb_cracker_box", "ycb_mug"}) {
-    const auto file = interfaces::read_mesh(*data / "household" / (std::string(name) + ".ply"));
-    ASSERT_TRUE(file.ok());
-    const auto packed = pack_spheres(**Mesh::make(file->mesh, name), {.max_spheres = 1000}, pool);
+    const auto mesh = tests::read_recorded_mesh("household/" + std::string(name) + ".ply");
+    if (!mesh) GTEST_SKIP() << tests::missing_meshes_message();
+    const auto packed = pack_spheres(**Mesh::make(*mesh, name), {.max_spheres = 1000}, pool);
     ASSERT_TRUE(packed.ok()) << packed.status().message();
-    EXPECT_NEAR(packed->report.body_volume, geometry::signed_volume(file->mesh), 1e-5 * packed->report.body_volume);
+    EXPECT_NEAR(packed->report.body_volume, geometry::signed_volume(*mesh), 1e-5 * packed->report.body_volume);
     EXPECT_GE(packed->report.share(), std::string_view(name) == "ycb_mug" ? 0.5 : 0.75) << name;
   }
 }
 
 TEST(PackSpheres, FillsConvexHouseholdObjectsByDefault) {
-  const auto data = tests::data_dir("meshes");
-  if (!data) GTEST_SKIP() << tests::missing_data_message("meshes");
   core::ThreadPool pool;
   // The brick is the worst of the household's boxes.
   for (const auto& [name, share] : {std::pair("ycb_tomato_soup_can", 0.85), std::pair("ycb_bleach_cleanser", 0.85),
                                     std::pair("ycb_foam_brick", 0.845)}) {
-    const auto file = interfaces::read_mesh(*data / "household" / (std::string(name) + ".ply"));
-    ASSERT_TRUE(file.ok());
-    const auto packed = pack_spheres(**Mesh::make(file->mesh, name), {}, pool);
+    const auto mesh = tests::read_recorded_mesh("household/" + std::string(name) + ".ply");
+    if (!mesh) GTEST_SKIP() << tests::missing_meshes_message();
+    const auto packed = pack_spheres(**Mesh::make(*mesh, name), {}, pool);
     ASSERT_TRUE(packed.ok()) << packed.status().message();
     EXPECT_EQ(packed->packing->size(), 5000U);
     EXPECT_GE(packed->report.share(), share) << name;

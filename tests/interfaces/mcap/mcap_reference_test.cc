@@ -115,15 +115,16 @@ TEST(McapReference, TheWriterWritesTheSameBytes) {
   EXPECT_EQ(*read_file(scratch.path() / "a.mcap", 10000), whole_file());
 }
 
-TEST(McapReference, AWrongIndexCostsNothing) {
+TEST(McapReference, AWrongIndexIsRefusedAndCostsNothingWhenSalvaged) {
   const Bytes good = whole_file();
   for (std::size_t i = good.size() - 36; i < good.size() - 8; ++i) {  // The footer.
     Bytes bytes = good;
     bytes[i] ^= 0x55;
-    auto reader = McapReader::open_bytes(bytes);
+    auto reader = McapReader::open_bytes(bytes, {.salvage = true});
     ASSERT_TRUE(reader.ok()) << i;
     EXPECT_EQ(read_all(reader->get()), std::vector<TopicMessage>{kMessage}) << i;
     EXPECT_TRUE((*reader)->loss().bad_index || (*reader)->loss().truncated) << i;
+    EXPECT_EQ(McapReader::open_bytes(bytes).ok(), (*reader)->loss().truncated) << i;
   }
 }
 
@@ -148,6 +149,7 @@ TEST(McapReference, FilesWithoutSummaryChunksOrDataEndAreReadInTheirOrder) {
   EXPECT_EQ((*reader)->channels().at(0).schema.name, "T");
   EXPECT_EQ((*reader)->channels().at(1).schema.name, "");
   EXPECT_TRUE((*reader)->loss().nothing()) << (*reader)->loss().text();
+  EXPECT_EQ((*reader)->unchecked(), (McapUnchecked{.data = true}));
 }
 
 }  // namespace

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <utility>
 
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/mesh_files/limited_child.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/tests/support/paths.h"
 
@@ -71,6 +75,121 @@ TEST_F(AssimpImport, SaysWhatIsWrong) {
   EXPECT_FALSE(read("a.glb", "glTF").ok());
   EXPECT_FALSE(read("a.dae", "<COLLADA>").ok());
   EXPECT_EQ(read("a.gltf", kGltf, {.max_assimp_file_bytes = 10}).status().code(), StatusCode::kResourceExhausted);
+}
+
+// What used to end this process, or to keep it for ever.
+TEST_F(AssimpImport, OutlivesFilesThatTheImporterDoesNot) {
+  const std::string text = kGltf;
+  const auto with = [&](std::string_view what, const std::string& by) {
+    std::string changed = text;
+    return changed.replace(changed.find(what), what.size(), by);
+  };
+  std::string nodes;
+  for (int i = 1; i <= 50'000; ++i) nodes += "{\"children\":[" + std::to_string(i) + "]},";
+  const std::string deep = with("{\"mesh\":0,\"translation\":[0,0,5]}", nodes + "{\"mesh\":0}");
+  const std::string brackets = std::string(2'000'000, '[') + std::string(2'000'000, ']');
+  std::string first = "<library_geometries>";
+  std::string collada_deep = collada("Z_UP");
+  collada_deep.replace(collada_deep.find("<node>"), 6, [] {
+    std::string nested;
+    for (int i = 0; i < 100'000; ++i) nested += "<node>";
+    for (int i = 0; i < 100'000; ++i) nested += "</node>";
+    return nested + "<node>";
+  }());
+  std::string collada_self = collada("Z_UP");
+  collada_self.replace(collada_self.find(first), first.size(),
+                       R"(<library_nodes><node id="n"><instance_node url="#n"/></node></library_nodes>)" + first);
+  collada_self.replace(collada_self.find(R"(<instance_geometry url="#g"/>)"), 29, R"(<instance_node url="#n"/>)");
+  std::string collada_stride = collada("Z_UP");
+  collada_stride.replace(collada_stride.find(R"(stride="3")"), 10, R"(stride="4000000000")");
+  const std::pair<const char*, std::string> files[] = {
+      {"a.gltf", deep},
+      {"a.gltf", with("\"scene\":0", "\"extras\":" + brackets + ",\"scene\":0")},
+      {"a.gltf", with("\"translation\":[0,0,5]", "\"children\":[0]")},
+      {"a.gltf", with("\"byteLength\":36", "\"byteLength\":36,\"byteStride\":2147483644")},
+      {"a.dae", collada_deep},
+      {"a.dae", collada_self},
+      {"a.dae", collada_stride}};
+  for (const auto& [name, bytes] : files) {
+    const auto mesh = read(name, bytes);
+    ASSERT_FALSE(mesh.ok()) << bytes.substr(0, 200);
+    EXPECT_EQ(mesh.status().code(), StatusCode::kInvalidInput) << mesh.status().message();
+    EXPECT_THAT(mesh.status().message(), HasSubstr("PLY, OBJ or STL")) << "the remedy";
+  }
+  const core::Status crash = read("a.gltf", deep).status();
+  if (child_memory_is_limited()) {
+    EXPECT_THAT(crash.message(),
+                HasSubstr("a.gltf: the importer crashed (signal 11); convert it to PLY, OBJ or STL, for instance"));
+  }
+}
+
+TEST_F(AssimpImport, HasLimitsOfMemoryAndTime) {
+  // 2^40 nodes by way of 41.
+  std::string nodes;
+  for (int i = 1; i <= 40; ++i) nodes += "{\"children\":[" + std::to_string(i) + "," + std::to_string(i) + "]},";
+  std::string graph = kGltf;
+  const std::string node = "{\"mesh\":0,\"translation\":[0,0,5]}";
+  graph.replace(graph.find(node), node.size(), nodes + "{\"mesh\":0}");
+  if (child_memory_is_limited()) {
+    const core::Status memory =
+        read("a.gltf", graph,
+             {.max_importer_memory = std::size_t{64} << 20, .max_importer_time = std::chrono::minutes(2)})
+            .status();
+    EXPECT_EQ(memory.code(), StatusCode::kResourceExhausted);
+    EXPECT_THAT(memory.message(), HasSubstr("a.gltf: the importer ran out of its 64.0 MiB of memory; convert it"));
+  }
+  const core::Status time = read("a.gltf", graph, {.max_importer_time = std::chrono::milliseconds(1)}).status();
+  EXPECT_EQ(time.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(time.message(), HasSubstr("a.gltf: the importer did not finish within 0.001 s; convert it"));
+  core::Cancellation cancellation;
+  cancellation.request();
+  EXPECT_EQ(read("a.gltf", kGltf, {.cancellation = &cancellation}).status().code(), StatusCode::kCancelled);
+}
+
+TEST_F(AssimpImport, OpensRegularFilesBelowTheModelsFolderOnly) {
+  const std::filesystem::path folder = scratch_.path() / "models";
+  ASSERT_TRUE(std::filesystem::create_directories(folder / "below"));
+  const std::string buffer =
+      std::string(14, '\0') + "\x80\x3f" + std::string(14, '\0') + "\x80\x3f" + std::string(4, '\0');
+  ASSERT_TRUE(write_file(scratch_.path() / "outside.bin", buffer).ok());
+  ASSERT_TRUE(write_file(folder / "below" / "b.bin", buffer).ok());
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink("../outside.bin", folder / "link.bin");
+  const std::string text = kGltf;
+  const std::size_t begin = text.find("data:");
+  const auto naming = [&](const std::string& file) {
+    std::string changed = text;
+    return read("models/a.gltf", changed.replace(begin, text.find('"', begin) - begin, file));
+  };
+  const auto found = naming("below/b.bin");
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_EQ(found->mesh.vertices[2], Vector3d(0, -5, 1));
+  EXPECT_THAT(naming("pipe").status().message(), HasSubstr("pipe: is no regular file"));
+  EXPECT_THAT(naming("below").status().message(), HasSubstr("is a folder"));
+  EXPECT_FALSE(naming("/etc/passwd").ok());
+  for (const char* outside : {"../outside.bin", "link.bin"})
+    EXPECT_THAT(naming(outside).status().message(), HasSubstr("is outside of the model's folder")) << outside;
+  // A model that is a link has its files beside what it names, as in folders made of links.
+  std::filesystem::create_directory(scratch_.path() / "links");
+  ASSERT_TRUE(naming("below/b.bin").ok());
+  std::filesystem::create_symlink("../models/a.gltf", scratch_.path() / "links" / "a.gltf");
+  std::filesystem::create_symlink("../models/below", scratch_.path() / "links" / "below");
+  const auto by_links = read_mesh(scratch_.path() / "links" / "a.gltf");
+  EXPECT_TRUE(by_links.ok()) << by_links.status().message();
+}
+
+TEST_F(AssimpImport, WhatIsNoRegularFileIsRefusedInEveryFormat) {
+  for (const char* extension : {".ply", ".obj", ".stl", ".gltf", ".glb", ".dae"}) {
+    const std::filesystem::path pipe = scratch_.path() / (std::string("pipe") + extension);
+    const std::filesystem::path folder = scratch_.path() / (std::string("folder") + extension);
+    const std::filesystem::path device = scratch_.path() / (std::string("device") + extension);
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    ASSERT_TRUE(std::filesystem::create_directory(folder));
+    std::filesystem::create_symlink("/dev/zero", device);
+    EXPECT_THAT(read_mesh(pipe).status().message(), HasSubstr("is no regular file"));
+    EXPECT_THAT(read_mesh(device).status().message(), HasSubstr("is no regular file"));
+    EXPECT_THAT(read_mesh(folder).status().message(), HasSubstr("is a folder"));
+  }
 }
 
 TEST_F(AssimpImport, KnowsTheExtensions) {

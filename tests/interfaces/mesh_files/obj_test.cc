@@ -74,13 +74,15 @@ TEST(ScaleHint, DoubtsUnlikelySizes) {
   const auto hint = [](double length) {
     return scale_hint(geometry::Box(Vector3d::Zero(), Vector3d(0.01 * length, length, 0.1 * length)));
   };
-  EXPECT_THAT(*hint(97.0), HasSubstr("the object is 97 m long: is the file in millimetres?"));
-  EXPECT_THAT(*hint(0.0002), HasSubstr("was the scale applied twice?"));
+  EXPECT_EQ(*hint(97.0),
+            "the bounding box is 0.97 x 97 x 9.7 m: the mesh is probably in millimetres; set its scale to 0.001");
+  EXPECT_EQ(*hint(0.0002),
+            "the bounding box is 2e-06 x 0.0002 x 2e-05 m: the scale was probably applied twice; set it to 1");
   EXPECT_FALSE(hint(0.2));
   EXPECT_FALSE(hint(9.0));
   EXPECT_FALSE(scale_hint(geometry::Box()));
   const auto cup = decode_text(MeshFormat::kObj, "v 0 0 0\nv 80 0 0\nv 0 97 0\nf 1 2 3\n");
-  EXPECT_THAT(cup->warnings.at(0), HasSubstr("millimetres?"));
+  EXPECT_THAT(cup->warnings.at(0), HasSubstr("probably in millimetres"));
 }
 
 }  // namespace

@@ -308,7 +308,7 @@ TEST(AnswerSections, ShowEveryKindOfAnswer) {
   answer.what = view;
   EXPECT_EQ(pictures_of(page_of(answer)).size(), 2u);
 
-  answer.error = "there is no object 'mug'";
+  answer.error = core::not_found("there is no object 'mug'");
   EXPECT_THAT(page_of(answer), HasSubstr("there is no object &#39;mug&#39;"));
 }
 

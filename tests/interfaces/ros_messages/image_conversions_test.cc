@@ -73,7 +73,10 @@ TEST(DepthImages, NameTheFieldAndTheRemedy) {
   EXPECT_THAT(message(odd), HasSubstr("is_bigendian: is 7"));
   const auto huge = image_of(16385, 1, "16UC1", four, 0xffffffff);
   EXPECT_EQ(to_depth_image(huge).status().code(), StatusCode::kResourceExhausted);
-  auto product = image_of(16384, 16384, "16UC1", four, 0xffffffff);  // step * height does not fit in 32 bits.
+  const auto many = to_depth_image(image_of(4097, 4096, "16UC1", four, 2 * 4097)).status();
+  EXPECT_EQ(many.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(many.message(), HasSubstr("4097 x 4096 exceeds the limit of 16777216 pixels"));
+  auto product = image_of(1024, 16384, "16UC1", four, 0xffffffff);  // step * height does not fit in 32 bits.
   EXPECT_THAT(message(product), HasSubstr("data: has 4 bytes"));
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "prescene/core/random.h"
+#include "prescene/core/spelling.h"
 #include "prescene/tests/support/laws.h"
 
 namespace prescene::interfaces {
@@ -152,14 +153,14 @@ TEST(EditDistanceLaws, IsSymmetricZeroForEqualsOnlyAndOneForEachSlip) {
   EXPECT_TRUE(rc::check([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const std::string a = random_word(stream), b = random_word(stream);
-    RC_ASSERT(edit_distance(a, b) == edit_distance(b, a));
-    RC_ASSERT((edit_distance(a, b) == 0) == (a == b));
-    RC_ASSERT(edit_distance(a, b) <= static_cast<int>(std::max(a.size(), b.size())));
-    RC_ASSERT(edit_distance(a, b) >= std::abs(static_cast<int>(a.size()) - static_cast<int>(b.size())));
+    RC_ASSERT(core::edit_distance(a, b) == core::edit_distance(b, a));
+    RC_ASSERT((core::edit_distance(a, b) == 0) == (a == b));
+    RC_ASSERT(core::edit_distance(a, b) <= static_cast<int>(std::max(a.size(), b.size())));
+    RC_ASSERT(core::edit_distance(a, b) >= std::abs(static_cast<int>(a.size()) - static_cast<int>(b.size())));
     std::string dropped = a + "x" + b;
-    RC_ASSERT(edit_distance(dropped, a + b) == 1);
-    RC_ASSERT(edit_distance(a + "xy" + b, a + "yx" + b) == 1);
-    RC_ASSERT(edit_distance(a + "x" + b, a + "y" + b) == 1);
+    RC_ASSERT(core::edit_distance(dropped, a + b) == 1);
+    RC_ASSERT(core::edit_distance(a + "xy" + b, a + "yx" + b) == 1);
+    RC_ASSERT(core::edit_distance(a + "x" + b, a + "y" + b) == 1);
   }));
 }
 

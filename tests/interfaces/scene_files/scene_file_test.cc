@@ -221,7 +221,7 @@ TEST(SceneFile, GuessesWrongUnits) {
               HasSubstr("lighter than air: check the sizes (metres"));
   EXPECT_THAT(
       error_of("models:\n  m: {mesh: {file: a.ply, scale: 1}, mass: 0.37}\nobjects:\n  o: {model: m, pose: {}}\n"),
-      HasSubstr("the mesh is 120 m large: millimetres? then give scale: 0.001"));
+      HasSubstr(" m: the mesh is probably in millimetres: give scale: 0.001"));
   EXPECT_THAT(error_of(small("", "", "    pose: {position: [0, 0, 5 cm]}\n")), HasSubstr("write 0.05 without a unit"));
   EXPECT_THAT(error_of(small("", "", "    pose: {rotation: {euler: [0, 0, 1]}}\n")),
               HasSubstr("did you mean 'euler_deg'?"));
@@ -364,6 +364,30 @@ TEST(SceneFile, HollowObjectsCollideAsSpheresWhereNothingElseIsSaid) {
   EXPECT_EQ(finer.use, belief::MeshUse::kSpheres);
   EXPECT_EQ(finer.spheres.count, 5000);
   EXPECT_EQ(finer.spheres.edge_fidelity, 0.001);
+}
+
+TEST(SceneFile, WarnsWhereAHullHidesAHollow) {
+  const auto warnings = [](const std::string& model_keys, const std::string& support_keys) {
+    // Of 0.1 m by 0.04 m, with walls and a floor of 3 mm: the hull is a cylinder, and 83 % of it are air.
+    const std::string cup = "profile: [[0, 0], [0.04, 0], [0.04, 0.1], [0.037, 0.1], [0.037, 0.003], [0, 0.003]]";
+    FileReport report;
+    const auto scene =
+        parse_scene("models:\n  m:\n    lathe: {" + cup + model_keys + "}\n    mass: 1\nsupports:\n  s: {lathe: {" +
+                        cup + support_keys + "}}\nobjects:\n  o: {model: m, pose: {position: [0, 0, 1]}}\n",
+                    "s.yaml", {}, &report);
+    EXPECT_TRUE(scene.ok()) << scene.status().message();
+    std::vector<std::string> texts;
+    for (const Problem& warning : report.warnings) texts.push_back(warning.text());
+    return texts;
+  };
+  EXPECT_THAT(warnings("", ", use: surface"), testing::IsEmpty()) << "the model collides as spheres, with its hollow";
+  EXPECT_THAT(
+      warnings(", use: convex_hull", ", use: surface"),
+      ElementsAre(AllOf(HasSubstr("s.yaml:3: models.m.lathe.use: 83 % of its convex hull is hollow in the mesh"),
+                        HasSubstr("remove 'use'"))));
+  EXPECT_THAT(warnings(", use: convex_parts", ", use: surface"),
+              ElementsAre(HasSubstr("83 % of its convex hulls are")));
+  EXPECT_THAT(warnings("", ""), ElementsAre(AllOf(HasSubstr("supports.s.lathe"), HasSubstr("write 'use: surface'"))));
 }
 
 TEST(SceneFile, WithoutAMeshReaderMeshesAreErrors) {

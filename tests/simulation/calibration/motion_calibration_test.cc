@@ -29,7 +29,7 @@ using ::testing::HasSubstr;
 class MotionCalibrationTest : public ::testing::Test {
  protected:
   MotionCalibrationTest() {
-    make_simulator_ = [this](const belief::Scene& scene) {
+    make_simulator_ = [this](const belief::Scene& scene, double) {
       return simulation::make_lockstep_simulator(scene, shapes_, {});
     };
     options_.samples = 8;
@@ -48,7 +48,7 @@ class MotionCalibrationTest : public ::testing::Test {
 
   core::Result<std::vector<RecordedMotion>> begun(const std::vector<SimulatedMotion>& motions) {
     const belief::Scene scene = box_scene({});
-    PRESCENE_TRY(const auto simulator, make_simulator_(scene));
+    PRESCENE_TRY(const auto simulator, make_simulator_(scene, 1.0));
     std::vector<RecordedMotion> result;
     for (const SimulatedMotion& motion : motions) {
       PRESCENE_TRY(RecordedMotion made, find_beginning("toss " + std::to_string(result.size()), frames_of(motion),
@@ -60,13 +60,13 @@ class MotionCalibrationTest : public ::testing::Test {
 
   std::vector<SimulatedMotion> tosses(const BoxTruth& truth, int count) {
     const belief::Scene scene = box_scene(truth);
-    return simulated_tosses(scene, **make_simulator_(scene), count, core::RandomStream(3, core::Purpose::kTest), pool_,
-                            noise_);
+    return simulated_tosses(scene, **make_simulator_(scene, 1.0), count, core::RandomStream(3, core::Purpose::kTest),
+                            pool_, noise_);
   }
   std::vector<SimulatedMotion> slides(const BoxTruth& truth, int count) {
     const belief::Scene scene = box_scene(truth);
-    return simulated_slides(scene, **make_simulator_(scene), count, core::RandomStream(3, core::Purpose::kTest), pool_,
-                            noise_);
+    return simulated_slides(scene, **make_simulator_(scene, 1.0), count, core::RandomStream(3, core::Purpose::kTest),
+                            pool_, noise_);
   }
 
   /// Of the frictions and restitution; everything else is as it was simulated.
@@ -166,7 +166,7 @@ TEST_F(MotionCalibrationTest, LeavesThePlateauWhereAllImpactsGrip) {
   belief::Scene scene = box_scene(truth);
   scene.models[0].collision = {belief::PrimitiveShape{geometry::Sphere{kRadius}, geometry::Pose{}}};
   scene.models[0].unit_inertia = 0.4 * kRadius * kRadius * geometry::Matrix3d::Identity();
-  const auto simulator = make_simulator_(scene);
+  const auto simulator = make_simulator_(scene, 1.0);
   ASSERT_TRUE(simulator.ok());
   std::vector<RecordedMotion> motions;
   for (const SimulatedMotion& motion :

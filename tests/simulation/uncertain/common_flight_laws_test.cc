@@ -27,7 +27,7 @@ Flown flown(const std::shared_ptr<const Scene>& scene, const simulation::StartDi
   simulation::ShapeStore shapes;
   core::ThreadPool pool(threads);
   const core::RandomStream stream(1, core::Purpose::kStartBelief);
-  const simulation::SimulatorFactory make = [&](const Scene& asked) {
+  const simulation::SimulatorFactory make = [&](const Scene& asked, double) {
     return simulation::make_bullet_simulator(asked, shapes, {});
   };
   simulation::RunRequest request;
@@ -44,7 +44,7 @@ Flown flown(const std::shared_ptr<const Scene>& scene, const simulation::StartDi
     for (std::uint32_t i = 0; i < 500; ++i) states.push_back(sampler.draw(i));
   request.stop.duration = std::min(scene->duration, found.flight.apart_until + 0.2);
   std::vector<belief::Trajectory> runs(states.size());
-  (*make(*scene))->run(states, request, stream, 0, pool, runs);
+  (*make(*scene, 1.0))->run(states, request, stream, 0, pool, runs);
   const auto robot = static_cast<int>(scene->objects.size() + scene->supports.size());
   for (const belief::Trajectory& run : runs)
     for (const belief::ContactInterval& contact : run.contacts)

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `replay` says: its tables as text, and its results as JSON.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "prescene/service/bus_replay.h"
+#include "prescene/service/foreseen.h"
+#include "prescene/service/replay.h"
+#include "prescene/service/support_score.h"
+#include "prescene/service/tracking_score.h"
+
+namespace prescene::service {
+
+nlohmann::ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows);
+/// Each object's error in each frame, where the recording holds the truth.
+void add_errors(const TrackingScore& score, nlohmann::ordered_json& steps);
+std::string tracking_text(const std::vector<ObjectTrackingScore>& rows);
+std::string supports_text(const std::vector<SupportRow>& rows);
+std::string answers_text(const std::vector<BusReplayResult::Answered>& answers);
+std::string foreseen_text_of(const ForeseenAndCame& foreseen);
+nlohmann::ordered_json foreseen_json(const ForeseenAndCame& foreseen);
+/// What was doubtful or second best on the way, and what is wrong with the file.
+std::string warnings_text(const ReplaySummary& summary);
+nlohmann::ordered_json degraded_json(const ReplaySummary& summary);
+
+}  // namespace prescene::service

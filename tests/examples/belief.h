@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of belief take for granted.
+#pragma once
+
+#include "prescene/belief/query_limits.h"
+
+namespace prescene::belief::given_belief::query_limits_h {
+extern const double value;
+extern const Query query;
+}  // namespace prescene::belief::given_belief::query_limits_h

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of queries take for granted.
+#pragma once
+
+#include <memory>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/query.h"
+#include "prescene/core/parallel.h"
+#include "prescene/queries/query_engine.h"
+
+namespace prescene::queries::given_queries {
+
+extern const decltype(QueryContext::make_simulator) make_simulator;
+extern core::ThreadPool pool;
+extern const std::shared_ptr<const belief::Belief> snapshot;
+extern const belief::Query query;
+
+}  // namespace prescene::queries::given_queries

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of simulation/calibration take for granted.
+#pragma once
+
+#include <vector>
+
+#include "prescene/belief/scene.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/random.h"
+#include "prescene/simulation/calibration/flight_calibration.h"
+#include "prescene/simulation/calibration/m_estimate.h"
+#include "prescene/simulation/calibration/motion_calibration.h"
+
+namespace prescene::simulation::given_simulation_calibration {
+
+extern const core::RandomStream stream;
+
+namespace flight_calibration_h {
+extern const FlightPrior prior;
+}
+
+namespace m_estimate_h {
+extern const std::vector<EstimatedParameter> parameters;
+extern const Observations observations;
+extern const SimulatedPoints simulate;
+}  // namespace m_estimate_h
+
+namespace motion_calibration_h {
+extern const std::vector<RecordedMotion> motions;
+extern const belief::Scene scene;
+extern const SimulatorFactory make_simulator;
+extern core::ThreadPool pool;
+}  // namespace motion_calibration_h
+
+}  // namespace prescene::simulation::given_simulation_calibration

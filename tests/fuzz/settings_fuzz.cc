@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any bytes as the settings that a recording holds: understood, or refused with a reason; what is understood can be
+// written down and read again.
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "prescene/core/check.h"
+#include "prescene/service/outside_json.h"
+#include "prescene/service/tracker_settings.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace prescene::service;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const auto settings = with_recorded({}, parse_or_discard(text));
+  if (!settings) {
+    PRESCENE_CHECK(!settings.status().message().empty());
+    return 0;
+  }
+  const auto again = with_recorded({}, to_json(*settings));
+  PRESCENE_CHECK_MSG(again.ok(), again.status().message());
+  PRESCENE_CHECK(again->topics == settings->topics && to_json(*again).size() == to_json(*settings).size());
+  return 0;
+}
