@@ -17,16 +17,10 @@ using geometry::Matrix3d;
 
 constexpr double kHereDistance = 0.02;  // m: what "is where the mean says" means in ObjectEstimate::confidence
 
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 // Inverse of the right Jacobian of the rotation exponential: log(exp(phi) exp(e)) = phi + J e for small e.
 Matrix3d inverse_right_jacobian(const Vector3d& phi) {
   const double angle = phi.norm();
-  const Matrix3d cross = cross_matrix(phi);
+  const Matrix3d cross = geometry::cross_matrix(phi);
   // The second is (1 + cos t) / (2 t sin t), written so that half a turn is no quotient of zeros; 1/12 for small t.
   const double c = angle < 1e-4 ? 1.0 / 12.0 : 1.0 / (angle * angle) - 1.0 / (2.0 * angle * std::tan(0.5 * angle));
   return Matrix3d::Identity() + 0.5 * cross + c * cross * cross;

@@ -9,8 +9,6 @@
 namespace prescene::belief {
 namespace {
 
-bool same_mesh(const MeshPtr& a, const MeshPtr& b) { return a == b || (a && b && *a == *b); }
-
 core::Result<geometry::MassProperties> solid_of(const MeshShape& shape, double density) {
   const geometry::TriangleMesh& mesh = *shape.mesh;
   switch (shape.use) {

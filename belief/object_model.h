@@ -18,6 +18,8 @@ namespace prescene::belief {
 
 /// Meshes are shared, never changed: two models of one file hold the same one.
 using MeshPtr = std::shared_ptr<const geometry::TriangleMesh>;
+/// Whether both are the same triangles, or both null.
+inline bool same_mesh(const MeshPtr& a, const MeshPtr& b) { return a == b || (a && b && *a == *b); }
 
 /// A shape in the object's frame O.
 struct PrimitiveShape {

@@ -15,8 +15,6 @@ std::optional<int> find_name(const std::vector<Named>& things, const std::string
   return static_cast<int>(found - things.begin());
 }
 
-bool same_mesh(const MeshPtr& a, const MeshPtr& b) { return a == b || (a && b && *a == *b); }
-
 }  // namespace
 
 bool operator==(const Support& a, const Support& b) {

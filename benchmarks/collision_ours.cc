@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/collision/triangle_tree.h"
+#include "prescene/core/clock.h"
 
 namespace prescene::benchmarks {
 namespace {
@@ -34,10 +34,6 @@ using collision::SimdopTree;
 using collision::Transform;
 using collision::TriangleTree;
 using collision::TriangleTreeOptions;
-
-double seconds_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 template <class Tree>
 std::size_t bytes_of(const Tree& tree) {
@@ -88,9 +84,9 @@ class TreeSolver : public PairSolver {
 
   static Tree build(const CollisionMesh& mesh, const Options& options, BuildCost* cost) {
     core::ThreadPool one(1);
-    const double start = seconds_now();
+    const core::Stopwatch watch;
     Tree tree = Tree::build(mesh, options, one);
-    cost->seconds = seconds_now() - start;
+    cost->seconds = watch.seconds();
     cost->bytes = static_cast<double>(bytes_of(tree));
     return tree;
   }

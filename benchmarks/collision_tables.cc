@@ -15,7 +15,7 @@
 namespace prescene::benchmarks {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kEmptyCell = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> measured(const std::vector<double>& values) {
   std::vector<double> kept;
@@ -25,7 +25,7 @@ std::vector<double> measured(const std::vector<double>& values) {
 }
 
 double mean_of(const std::vector<WorkCounts>& counts, double WorkCounts::*member) {
-  if (counts.empty()) return kNone;
+  if (counts.empty()) return kEmptyCell;
   double sum = 0.0;
   for (const WorkCounts& count : counts) sum += count.*member;
   return sum / static_cast<double>(counts.size());
@@ -97,7 +97,7 @@ Table ratio_table(const Measurements& measurements) {
       std::vector<Figure> row = {pair, algorithm};
       for (const double share : shares) {
         const std::optional<Ratio> ratio = speed_ratio(of_pair, algorithm, kFcl, Query::kCollide, std::span(&share, 1));
-        row.emplace_back(ratio ? ratio->value : kNone);
+        row.emplace_back(ratio ? ratio->value : kEmptyCell);
       }
       table.rows.push_back(std::move(row));
     }
@@ -112,7 +112,7 @@ double typical_microseconds(const Measurements& measurements, std::size_t algori
     const std::vector<double> seconds = measured(cell.timings[algorithm].*seconds_of(query));
     if (!seconds.empty()) each.push_back(1e6 * median(seconds));
   }
-  return each.empty() ? kNone : geometric_mean(each);
+  return each.empty() ? kEmptyCell : geometric_mean(each);
 }
 
 Table summary_table(const Measurements& measurements) {
@@ -158,7 +158,7 @@ Table cost_table(const Measurements& measurements) {
   Table table{"costs", {"mesh", "triangles", "algorithm", "build_ms", "bytes_a_triangle"}, {}};
   for (const MeshCost& cost : measurements.costs) {
     table.rows.push_back({cost.mesh, static_cast<std::int64_t>(cost.triangles), cost.algorithm, 1e3 * cost.cost.seconds,
-                          cost.cost.bytes ? *cost.cost.bytes / cost.triangles : kNone});
+                          cost.cost.bytes ? *cost.cost.bytes / cost.triangles : kEmptyCell});
   }
   return table;
 }

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/benchmarks/processor_time.h"
 #include "prescene/benchmarks/report.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
@@ -21,12 +22,6 @@
 
 namespace prescene::benchmarks {
 namespace {
-
-double cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 std::vector<belief::WorldState> drawn_starts(const belief::Scene& scene, int count) {
   std::vector<belief::WorldState> starts;
@@ -49,13 +44,13 @@ double measure(const simulation::Simulator& simulator, const belief::Scene& scen
   request.stop.stop_at_rest = scene.stop_at_rest;
   request.actions = scene.actions;
   runs.resize(starts.size());
-  const double begun = cpu_seconds();
+  const double begun = processor_seconds();
   for (std::size_t begin = 0; begin < starts.size(); begin += together) {
     const std::size_t count = std::min(together, starts.size() - begin);
     simulator.run({starts.data() + begin, count}, request, core::RandomStream(1, core::Purpose::kEvaluation),
                   static_cast<std::uint32_t>(begin), pool, {runs.data() + begin, count});
   }
-  return (cpu_seconds() - begun) / static_cast<double>(starts.size());
+  return (processor_seconds() - begun) / static_cast<double>(starts.size());
 }
 
 /// HWY_DYNAMIC_DISPATCH goes to this instruction set as long as it lives; 0: to the best.

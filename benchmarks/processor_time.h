@@ -2,19 +2,17 @@
 // What a piece of work costs one thread.
 #pragma once
 
-#include <sys/resource.h>
-
 #include <algorithm>
+#include <ctime>
 #include <functional>
 
 namespace prescene::benchmarks {
 
 /// Processor seconds of this thread.
 inline double processor_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_THREAD, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// Processor time of a call, s: the least of several rounds of at least a fifth of a second.

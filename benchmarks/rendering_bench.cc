@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/benchmarks/processor_time.h"
 #include "prescene/benchmarks/report.h"
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
@@ -27,7 +28,6 @@
 #include "prescene/rendering/simulated_camera.h"
 #include "prescene/tests/peers/ray_packets.h"
 #include "prescene/tests/support/target_test.h"
-#include "processor_time.h"
 #include "rendering_tracking.h"
 
 namespace prescene::benchmarks {

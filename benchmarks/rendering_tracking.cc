@@ -8,13 +8,13 @@
 #include <numbers>
 #include <vector>
 
+#include "prescene/benchmarks/processor_time.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/levels_of_detail.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/simulated_camera.h"
-#include "processor_time.h"
 
 namespace prescene::benchmarks {
 namespace {
@@ -24,7 +24,7 @@ using geometry::Vector3d;
 using namespace rendering;
 
 constexpr int kObjects = 5;
-constexpr int kHypotheses = 200;
+constexpr int kTrackedHypotheses = 200;
 constexpr double kDistance = 1.1;  // m
 
 /// Turned on a lathe, standing on z = 0: 10,200 triangles.
@@ -62,14 +62,14 @@ class Tracking {
     core::RandomStream stream(2, core::Purpose::kTest);
     for (const Pose& X_CO : X_CO_) {
       std::vector<PoseHypothesis> mine;
-      for (int k = 0; k < kHypotheses; ++k) {
+      for (int k = 0; k < kTrackedHypotheses; ++k) {
         geometry::Vector6d d;
         d << 0.1 * geometry::normal_vector(stream), 0.01 * geometry::normal_vector(stream);
         mine.push_back({nullptr, geometry::box_plus(X_CO, d), &material_});
       }
       hypotheses_.push_back(std::move(mine));
     }
-    evidences_.resize(kHypotheses);
+    evidences_.resize(kTrackedHypotheses);
     terms_of_.resize(kObjects);
     make_terms();
     choose(true);
@@ -116,13 +116,13 @@ class Tracking {
   TrackingCosts costs(int rounds) {
     TrackingCosts costs;
     costs.objects = kObjects;
-    costs.hypotheses = kHypotheses;
+    costs.hypotheses = kTrackedHypotheses;
     for (std::size_t i = 0; i < kObjects; ++i) {
       costs.triangles += static_cast<double>(levels_[i].levels().front().mesh->triangles.size()) / kObjects;
       costs.drawn += static_cast<double>(chosen_[i]->triangles.size()) / kObjects;
       batch_.evaluate(terms_of_[i], hypotheses_[i], *workspace_, evidences_);
       for (const PoseEvidence& evidence : evidences_)
-        costs.pixels += static_cast<double>(evidence.in_view) / (kObjects * kHypotheses);
+        costs.pixels += static_cast<double>(evidence.in_view) / (kObjects * kTrackedHypotheses);
     }
     costs.terms = cost_of([&] { make_terms(); }, rounds);
     costs.layers = cost_of([&] { draw_layers(); }, rounds);

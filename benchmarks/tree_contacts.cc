@@ -2,11 +2,11 @@
 #include "prescene/benchmarks/tree_contacts.h"
 
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "prescene/benchmarks/processor_time.h"
 #include "prescene/benchmarks/statistics.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
@@ -24,12 +24,6 @@ using geometry::Vector3d;
 
 constexpr double kStep = 1.0 / 240.0;
 constexpr int kSteps = 480;
-
-double cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 Quaterniond about(const Vector3d& axis, double angle) {
   return Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()));
@@ -91,19 +85,19 @@ belief::Scene scene_of(const Drop& drop, belief::MeshUse use) {
 double our_step(const Drop& drop, belief::MeshUse use, int repeats, double* build) {
   const belief::Scene scene = scene_of(drop, use);
   simulation::ShapeStore shapes(simulation::hacd_decomposer());
-  const double begun = cpu_seconds();
+  const double begun = processor_seconds();
   const auto simulator = simulation::make_bullet_simulator(scene, shapes);
   PRESCENE_CHECK(simulator.ok());
-  *build = cpu_seconds() - begun;
+  *build = processor_seconds() - begun;
   const auto instance = (*simulator)->make_instance({}, core::RandomStream(1, core::Purpose::kEvaluation));
   belief::WorldState start = belief::mean_start(scene);
   for (std::size_t i = 0; i < drop.bodies.size(); ++i) start.objects[i].X_WO = drop.bodies[i].start;
   std::vector<double> times;
   for (int r = 0; r < repeats; ++r) {
     instance->set_state(start);
-    const double from = cpu_seconds();
+    const double from = processor_seconds();
     for (int i = 0; i < kSteps; ++i) instance->step();
-    times.push_back(1e6 * (cpu_seconds() - from) / kSteps);
+    times.push_back(1e6 * (processor_seconds() - from) / kSteps);
   }
   return median(times);
 }
@@ -132,9 +126,9 @@ double bullet_step(const Drop& drop, bool gimpact, int repeats) {
   std::vector<double> times;
   for (int r = 0; r < repeats; ++r) {
     world.reset();
-    const double from = cpu_seconds();
+    const double from = processor_seconds();
     for (int i = 0; i < kSteps; ++i) world.step(kStep);
-    times.push_back(1e6 * (cpu_seconds() - from) / kSteps);
+    times.push_back(1e6 * (processor_seconds() - from) / kSteps);
   }
   return median(times);
 }

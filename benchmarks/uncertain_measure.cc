@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
@@ -16,9 +15,6 @@ namespace {
 using simulation::BulletOptions;
 using simulation::EstimatorOptions;
 using simulation::OutcomeEstimate;
-
-/// s of processor time of this process.
-double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 std::unique_ptr<simulation::Simulator> bullet_of(const belief::Scene& scene, bool skip_flight) {
   BulletOptions options;
@@ -51,9 +47,9 @@ UncertainProblem::UncertainProblem(const tests::NamedScene& named, Stepping step
   starts = simulation::start_of(scene);
   variables = simulation::variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
   request.stop.duration = scene->duration;
-  const double begin = cpu_seconds();
+  const double begin = core::process_cpu_seconds();
   certifier = simulation::make_certifier(scene, variables, request);
-  certifier_cpu = cpu_seconds() - begin;
+  certifier_cpu = core::process_cpu_seconds() - begin;
   PRESCENE_CHECK(certifier);
 }
 
@@ -70,9 +66,9 @@ Bank make_bank(const UncertainProblem& problem, int count) {
   core::ThreadPool pool(1);
   std::vector<belief::Trajectory> runs(starts.size());
   Bank bank;
-  double begin = cpu_seconds();
+  double begin = core::process_cpu_seconds();
   problem.stepper->run(starts, problem.request, actions, 0, pool, runs);
-  bank.cpu = (cpu_seconds() - begin) / count;
+  bank.cpu = (core::process_cpu_seconds() - begin) / count;
   for (const belief::Trajectory& run : runs) {
     bank.classes.push_back(problem.variables[0].classify(run));
     bank.seconds.push_back(run.simulated_seconds);
@@ -85,9 +81,9 @@ Bank make_bank(const UncertainProblem& problem, int count) {
 
   simulation::RunRequest request = problem.request;
   request.end_rule = problem.certifier.get();
-  begin = cpu_seconds();
+  begin = core::process_cpu_seconds();
   problem.simulator->run(starts, request, actions, 0, pool, runs);
-  bank.certified_cpu = (cpu_seconds() - begin) / count;
+  bank.certified_cpu = (core::process_cpu_seconds() - begin) / count;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     bank.certified_seconds += runs[i].simulated_seconds / count;
     bank.flown_seconds += runs[i].flown_seconds / count;
@@ -133,7 +129,7 @@ Estimates run_estimates(const UncertainProblem& problem, double tolerance, doubl
   options.confidence = confidence;
   options.max_instances = 8192;
   options.certifier = problem.certifier.get();
-  const double begin = cpu_seconds();
+  const double begin = core::process_cpu_seconds();
   for (int seed = 0; seed < seeds; ++seed) {
     OutcomeEstimate one = estimate(problem, options, static_cast<std::uint64_t>(seed), pool);
     estimates.instances.push_back(static_cast<double>(one.instances.size()));
@@ -147,7 +143,7 @@ Estimates run_estimates(const UncertainProblem& problem, double tolerance, doubl
     one.instances.clear();
     estimates.all.push_back(std::move(one));
   }
-  estimates.mean.cpu = (cpu_seconds() - begin) / seeds + problem.certifier_cpu;
+  estimates.mean.cpu = (core::process_cpu_seconds() - begin) / seeds + problem.certifier_cpu;
   return estimates;
 }
 

@@ -9,7 +9,7 @@
 namespace prescene::collision {
 namespace {
 
-struct Part {
+struct AxisPart {
   std::uint32_t begin = 0;
   std::uint32_t end = 0;
   std::size_t level = 0;  // Cuts made so far; the first three go along the node's axes, longest first.
@@ -33,7 +33,7 @@ class AxisSplitter final : public Splitter {
   }
 
  private:
-  CentreBox box(const Part& part) const { return box_of(std::span(centres_).subspan(part.begin, part.size())); }
+  CentreBox box(const AxisPart& part) const { return box_of(std::span(centres_).subspan(part.begin, part.size())); }
 
   Cuts slice(std::uint32_t begin, std::uint32_t end) {
     const Cuts cuts = equal_cuts(begin, end, std::min(branching_, (end - begin + leaf_items_ - 1) / leaf_items_));
@@ -45,7 +45,7 @@ class AxisSplitter final : public Splitter {
   }
 
   // Of those that do not fit a leaf the least often cut part, the largest of them.
-  std::uint32_t next(std::span<const Part> parts) const {
+  std::uint32_t next(std::span<const AxisPart> parts) const {
     std::uint32_t best = 0;
     for (std::uint32_t i = 1; i < parts.size(); ++i) {
       const bool best_splits = parts[best].size() > leaf_items_;
@@ -63,12 +63,12 @@ class AxisSplitter final : public Splitter {
 
   Cuts cut_again_and_again(std::uint32_t begin, std::uint32_t end) {
     const CentreBox node = box({begin, end});
-    std::array<Part, kMostChildren> parts;
+    std::array<AxisPart, kMostChildren> parts;
     parts[0] = {begin, end};
     std::uint32_t count = 1;
     while (count < branching_) {
       const std::uint32_t i = next(std::span(parts).first(count));
-      Part& part = parts[i];
+      AxisPart& part = parts[i];
       if (part.size() <= leaf_items_) break;
       const std::uint32_t middle = cut(part, node);
       ++part.level;
@@ -86,7 +86,7 @@ class AxisSplitter final : public Splitter {
   }
 
   // The end of the part's lower side. Only the first three cuts, in the middle of the node, may leave a side empty.
-  std::uint32_t cut(const Part& part, const CentreBox& node) {
+  std::uint32_t cut(const AxisPart& part, const CentreBox& node) {
     const bool of_node = part.level < 3 && builder_ != Builder::kExtendedLongestAxis;
     const CentreBox own = of_node ? node : box(part);
     const std::size_t axis = own.axes_by_length()[of_node ? part.level : 0];

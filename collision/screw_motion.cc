@@ -69,4 +69,9 @@ Vector3d ScrewMotion::place(const Vector3d& p_start, double t) const {
   return p_start + t * mean_turned(t * spin_, velocity(p_start));
 }
 
+int chord_pieces(double bend, double deviation) {
+  constexpr double kMostPieces = 256.0;
+  return static_cast<int>(std::clamp(std::ceil(std::sqrt(0.125 * bend / deviation)), 1.0, kMostPieces));
+}
+
 }  // namespace prescene::collision

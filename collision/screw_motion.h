@@ -45,4 +45,11 @@ class ScrewMotion {
   Eigen::Vector3d drift_ = Eigen::Vector3d::Zero();
 };
 
+/// Motions are cut so that spheres leave their chords by at most this share of the smaller body's radius: less cuts
+/// more often and prunes better.
+inline constexpr double kChordDeviation = 0.02;
+/// Into how many equal pieces, at most 256, a path over [0, 1] whose second derivative is at most `bend` is cut so that
+/// it leaves its chords by at most `deviation`, of the same unit.
+int chord_pieces(double bend, double deviation);
+
 }  // namespace prescene::collision

@@ -8,18 +8,20 @@
 namespace prescene::collision {
 namespace {
 
-using Vector = std::array<float, 3>;
-using ThreeCorners = std::array<Vector, 3>;
+using FloatVector = std::array<float, 3>;
+using ThreeCorners = std::array<FloatVector, 3>;
 
-Vector difference(const Vector& to, const Vector& from) { return {to[0] - from[0], to[1] - from[1], to[2] - from[2]}; }
+FloatVector difference(const FloatVector& to, const FloatVector& from) {
+  return {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+}
 
-Vector cross(const Vector& u, const Vector& v) {
+FloatVector cross(const FloatVector& u, const FloatVector& v) {
   return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
 }
 
-float dot(const Vector& u, const Vector& v) { return (u[0] * v[0] + u[1] * v[1]) + u[2] * v[2]; }
+float dot(const FloatVector& u, const FloatVector& v) { return (u[0] * v[0] + u[1] * v[1]) + u[2] * v[2]; }
 
-float largest(const Vector& u) { return std::max({std::abs(u[0]), std::abs(u[1]), std::abs(u[2])}); }
+float largest(const FloatVector& u) { return std::max({std::abs(u[0]), std::abs(u[1]), std::abs(u[2])}); }
 
 float determinant_error(float uv, float w) { return (kDeterminantError * uv + kUnderflowError) * w + kUnderflowError; }
 
@@ -34,13 +36,13 @@ struct Heights {
 };
 
 Heights heights(const ThreeCorners& plane, const ThreeCorners& points) {
-  const Vector u = difference(plane[1], plane[0]);
-  const Vector v = difference(plane[2], plane[0]);
-  const Vector normal = cross(u, v);
+  const FloatVector u = difference(plane[1], plane[0]);
+  const FloatVector v = difference(plane[2], plane[0]);
+  const FloatVector normal = cross(u, v);
   Heights h{};
   float reach = 0.0F;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Vector w = difference(points[i], plane[0]);
+    const FloatVector w = difference(points[i], plane[0]);
     h.value[i] = dot(normal, w);
     reach = std::max(reach, largest(w));
   }
@@ -65,7 +67,7 @@ std::size_t lone(const Heights& h) {
 }
 
 ThreeCorners corners(const TriangleCoordinates& t) {
-  return {Vector{t[0], t[1], t[2]}, Vector{t[3], t[4], t[5]}, Vector{t[6], t[7], t[8]}};
+  return {FloatVector{t[0], t[1], t[2]}, FloatVector{t[3], t[4], t[5]}, FloatVector{t[6], t[7], t[8]}};
 }
 
 }  // namespace
@@ -85,11 +87,11 @@ PairVerdict test_triangle_pair(const TriangleCoordinates& a_coordinates, const T
   const ThreeCorners p = {a[i], a[(i + 1) % 3], a[(i + 2) % 3]};
   ThreeCorners q = {b[k], b[(k + 1) % 3], b[(k + 2) % 3]};
   if (p_up != q_up) std::swap(q[1], q[2]);
-  const Vector w = q_up ? difference(q[0], p[0]) : difference(p[0], q[0]);
-  const Vector u1 = difference(p[1], p[0]);
-  const Vector u2 = difference(p[2], p[0]);
-  const Vector v1 = difference(q[1], q[0]);
-  const Vector v2 = difference(q[2], q[0]);
+  const FloatVector w = q_up ? difference(q[0], p[0]) : difference(p[0], q[0]);
+  const FloatVector u1 = difference(p[1], p[0]);
+  const FloatVector u2 = difference(p[2], p[0]);
+  const FloatVector v1 = difference(q[1], q[0]);
+  const FloatVector v2 = difference(q[2], q[0]);
   const float smaller = std::min(dot(cross(u1, v1), w), -dot(cross(u2, v2), w));
   const float error =
       determinant_error(std::max(largest(u1), largest(u2)) * std::max(largest(v1), largest(v2)), largest(w));

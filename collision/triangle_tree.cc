@@ -33,8 +33,8 @@ struct Bounds {
   }
 };
 
-/// Corners of the triangles in the order of the leaves: three a triangle.
-using Corners = std::vector<Vector3f>;
+/// CornerIndices of the triangles in the order of the leaves: three a triangle.
+using CornerIndices = std::vector<Vector3f>;
 
 struct ChildRange {
   std::uint32_t begin = 0;
@@ -42,7 +42,7 @@ struct ChildRange {
 };
 
 /// Rows are the axes, so that R_NM * p is in the frame N.
-Bounds bounds_in(const Matrix3f& R_NM, const Vector3f& origin, const Corners& corners, ChildRange range) {
+Bounds bounds_in(const Matrix3f& R_NM, const Vector3f& origin, const CornerIndices& corners, ChildRange range) {
   Bounds bounds;
   for (std::size_t i = std::size_t{3} * range.begin; i < std::size_t{3} * range.end; ++i)
     bounds.add(R_NM * (corners[i] - origin));
@@ -54,13 +54,13 @@ float area(const Bounds& bounds) {
   return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
 
-bool principal_axes(const Corners& corners, ChildRange range, Matrix3f* R_NM) {
+bool principal_axes(const CornerIndices& corners, ChildRange range, Matrix3f* R_NM) {
   PointMoments moments(corners[std::size_t{3} * range.begin]);
   for (std::size_t i = std::size_t{3} * range.begin; i < std::size_t{3} * range.end; ++i) moments.add(corners[i]);
   return moments.principal_axes(R_NM);
 }
 
-float cost_of(const Matrix3f& R_NM, const Vector3f& origin, const Corners& corners,
+float cost_of(const Matrix3f& R_NM, const Vector3f& origin, const CornerIndices& corners,
               std::span<const ChildRange> children) {
   float cost = 0.0F;
   for (const ChildRange& child : children) cost += area(bounds_in(R_NM, origin, corners, child));
@@ -68,7 +68,8 @@ float cost_of(const Matrix3f& R_NM, const Vector3f& origin, const Corners& corne
 }
 
 /// Sets the frame and the children's boxes.
-void fit(const Matrix3f& R_NM, const Corners& corners, std::span<const ChildRange> children, TriangleTreeNode* node) {
+void fit(const Matrix3f& R_NM, const CornerIndices& corners, std::span<const ChildRange> children,
+         TriangleTreeNode* node) {
   // The low corner is rounded when it is put into the mesh's frame, so boxes are measured from what it became.
   const Vector3f& reference = corners[std::size_t{3} * children[0].begin];
   Bounds all;
@@ -109,7 +110,7 @@ void fit(const Matrix3f& R_NM, const Corners& corners, std::span<const ChildRang
   node->diagonal = diagonal.stableNorm();  // Squares of tiny lengths vanish.
 }
 
-TriangleTreeNode make_node(const Corners& corners, std::span<const ChildRange> children, bool rotated_frames) {
+TriangleTreeNode make_node(const CornerIndices& corners, std::span<const ChildRange> children, bool rotated_frames) {
   TriangleTreeNode node{};
   Matrix3f R_NM = Matrix3f::Identity();
   Matrix3f principal;
@@ -122,7 +123,7 @@ TriangleTreeNode make_node(const Corners& corners, std::span<const ChildRange> c
   return node;
 }
 
-TriangleBlock make_block(const Corners& corners, ChildRange leaf) {
+TriangleBlock make_block(const CornerIndices& corners, ChildRange leaf) {
   TriangleBlock block;
   for (std::uint32_t lane = 0; lane < 4; ++lane) {
     const std::uint32_t triangle = std::min(leaf.begin + lane, leaf.end - 1);
@@ -150,7 +151,8 @@ std::vector<std::uint32_t> ranks(const Hierarchy& shape) {
 
 /// A node of the hierarchy with children, and where its children are among their own kinds.
 TriangleTreeNode make_inner_node(const Hierarchy& shape, const Hierarchy::Node& from,
-                                 const std::vector<std::uint32_t>& rank, const Corners& corners, bool rotated_frames) {
+                                 const std::vector<std::uint32_t>& rank, const CornerIndices& corners,
+                                 bool rotated_frames) {
   std::array<ChildRange, kBranching> children;
   std::uint32_t leaf_mask = 0;
   std::array<std::uint32_t, 2> first = {0, 0};
@@ -168,17 +170,18 @@ TriangleTreeNode make_inner_node(const Hierarchy& shape, const Hierarchy::Node& 
 }
 
 /// What a tree consists of.
-struct Parts {
+struct MeshParts {
   std::vector<TriangleTreeNode> nodes;
   std::vector<TriangleBlock> blocks;
   std::vector<TriangleReferences> references;
 };
 
-Parts make_parts(const Hierarchy& shape, const Corners& corners, bool rotated_frames, core::ThreadPool& pool) {
+MeshParts make_parts(const Hierarchy& shape, const CornerIndices& corners, bool rotated_frames,
+                     core::ThreadPool& pool) {
   const std::vector<std::uint32_t> rank = ranks(shape);
   const auto leaves = static_cast<std::size_t>(
       std::count_if(shape.nodes.begin(), shape.nodes.end(), [](auto& n) { return n.is_leaf(); }));
-  Parts parts;
+  MeshParts parts;
   parts.nodes.resize(shape.nodes.size() - leaves);
   parts.blocks.resize(leaves);
   parts.references.resize(leaves);
@@ -222,7 +225,7 @@ TriangleTree TriangleTree::build(std::shared_ptr<const Mesh> mesh, const Triangl
   ensure_root(&shape);
 
   constexpr std::size_t kTrianglesAtOnce = 4096;
-  Corners corners(3 * shape.order.size());
+  CornerIndices corners(3 * shape.order.size());
   pool.for_blocks(shape.order.size(), kTrianglesAtOnce, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const TriangleIndices& t = mesh->triangles()[shape.order[i]];
@@ -230,7 +233,7 @@ TriangleTree TriangleTree::build(std::shared_ptr<const Mesh> mesh, const Triangl
     }
   });
 
-  Parts parts = make_parts(shape, corners, options.rotated_frames, pool);
+  MeshParts parts = make_parts(shape, corners, options.rotated_frames, pool);
   TriangleTree tree;
   tree.radius_ = radius_of(*mesh);
   tree.mesh_ = std::move(mesh);

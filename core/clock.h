@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 
 namespace prescene::core {
@@ -11,6 +12,7 @@ namespace prescene::core {
 using TimeNs = std::int64_t;
 
 inline double seconds_of(TimeNs ns) { return static_cast<double>(ns) * 1e-9; }
+inline TimeNs ns_of(double seconds) { return static_cast<TimeNs>(std::llround(seconds * 1e9)); }
 
 /// Wall time now. It jumps when the system's clock is set: good for stamps, never for deadlines.
 TimeNs wall_now_ns();

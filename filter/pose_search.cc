@@ -14,12 +14,6 @@ namespace {
 constexpr std::size_t kStartsInBlock = 4;  // enough for a batch to share work, few enough to balance threads
 constexpr int kMinPixels = 6;              // fewer residuals than unknowns say nothing
 
-geometry::Matrix3d cross_matrix(const Vector3d& v) {
-  geometry::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 double gate_at(const RefineOptions& options, int step) {
   // The last quarter of the steps works at the final gate.
   const double shrinking = std::max(1.0, 0.75 * options.steps - 1.0);
@@ -73,7 +67,7 @@ rendering::PoseHypothesis hypothesis(const SearchTarget& target, const Pose& X_C
 
 Matrix6d from_point_coordinates(const geometry::Quaterniond& R_PO, const Vector3d& p_OQ) {
   Matrix6d A = Matrix6d::Identity();
-  A.bottomLeftCorner<3, 3>() = R_PO.toRotationMatrix() * cross_matrix(p_OQ);
+  A.bottomLeftCorner<3, 3>() = R_PO.toRotationMatrix() * geometry::cross_matrix(p_OQ);
   return A;
 }
 

@@ -70,6 +70,12 @@ class Image {
   std::vector<Pixel> pixels_;
 };
 
+/// Gives an image that size; its pixels are kept only where it has it already.
+template <class Pixel>
+void resize(Image<Pixel>* image, int width, int height) {
+  if (image->width() != width || image->height() != height) *image = Image<Pixel>(width, height);
+}
+
 using Rgb = std::array<std::uint8_t, 3>;
 using DepthImage = Image<float>;  ///< z in the camera frame, metres; 0 = no measurement or nothing there.
 using ColorImage = Image<Rgb>;

@@ -34,6 +34,12 @@ Pose Pose::inverse() const {
   return {back, -(back * translation)};
 }
 
+Matrix3d cross_matrix(const Vector3d& v) {
+  Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
 bool Pose::is_finite() const { return rotation.coeffs().allFinite() && translation.allFinite(); }
 
 Pose operator*(const Pose& X_AB, const Pose& X_BC) {

@@ -49,6 +49,9 @@ Quaterniond exp_rotation(const Vector3d& rotation_vector);
 /// Rotation vector (radians, norm <= pi) of a unit quaternion.
 Vector3d log_rotation(const Quaterniond& rotation);
 
+/// The matrix [v]x with [v]x u = v x u.
+Matrix3d cross_matrix(const Vector3d& v);
+
 /// Error coordinates of a pose about a mean, order (rotation, translation): rotation in the body frame,
 /// R = R_mean * exp(d.head<3>()), translation in the parent frame, p = p_mean + d.tail<3>().
 /// Covariances of poses (Matrix6d) are in these coordinates everywhere.

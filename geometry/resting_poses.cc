@@ -19,7 +19,7 @@ constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
 using Neighbours = std::vector<std::array<std::uint32_t, 3>>;
 
 /// A face of the hull: coplanar triangles together.
-struct Face {
+struct RestingFace {
   Vector3d normal = Vector3d::Zero();  // outward, area-weighted while it is summed up
   std::vector<std::size_t> triangles;
   double solid_angle = 0.0;
@@ -78,18 +78,18 @@ Neighbours neighbours_of(const TriangleMesh& hull) {
 
 /// How a body whose centre of mass is the origin stands on each face, and where it rolls from those that don't carry
 /// it.
-std::vector<Face> measure_faces(const TriangleMesh& hull, const Neighbours& neighbours,
-                                const std::vector<int>& face_of) {
-  std::vector<Face> faces(static_cast<std::size_t>(*std::ranges::max_element(face_of)) + 1);
+std::vector<RestingFace> measure_faces(const TriangleMesh& hull, const Neighbours& neighbours,
+                                       const std::vector<int>& face_of) {
+  std::vector<RestingFace> faces(static_cast<std::size_t>(*std::ranges::max_element(face_of)) + 1);
   for (std::size_t t = 0; t < hull.triangles.size(); ++t) {
-    Face& face = faces[static_cast<std::size_t>(face_of[t])];
+    RestingFace& face = faces[static_cast<std::size_t>(face_of[t])];
     const auto& [a, b, c] = hull.triangles[t];
     face.triangles.push_back(t);
     face.normal += area_normal(hull, t);
     face.solid_angle += solid_angle(hull.vertices[a], hull.vertices[b], hull.vertices[c]);
   }
   for (std::size_t f = 0; f < faces.size(); ++f) {
-    Face& face = faces[f];
+    RestingFace& face = faces[f];
     face.normal.normalize();
     face.height = std::numeric_limits<double>::lowest();
     for (const std::size_t t : face.triangles) {
@@ -119,7 +119,7 @@ std::vector<Face> measure_faces(const TriangleMesh& hull, const Neighbours& neig
 
 /// Rolling lowers the centre of mass, so it ends; but not among faces that were made of nearly coplanar triangles: of
 /// two such each may send the body to the other. Those carry it together. True if any were joined.
-bool join_faces_that_roll_in_circles(const std::vector<Face>& faces, std::vector<int>& face_of) {
+bool join_faces_that_roll_in_circles(const std::vector<RestingFace>& faces, std::vector<int>& face_of) {
   constexpr int kOpen = -1, kDone = -2;
   std::vector<int> reached_from(faces.size(), kOpen);  // the start of the walk that came here
   std::vector<int> joined(faces.size());
@@ -161,14 +161,14 @@ core::Result<std::vector<RestingPose>> resting_poses_of_hull(TriangleMesh hull, 
   for (Vector3d& vertex : hull.vertices) vertex -= p_BoBcm;  // from here on about the centre of mass
   const Neighbours neighbours = neighbours_of(hull);
   std::vector<int> face_of = merge_coplanar(hull, neighbours, flatness);
-  std::vector<Face> faces = measure_faces(hull, neighbours, face_of);
+  std::vector<RestingFace> faces = measure_faces(hull, neighbours, face_of);
   while (join_faces_that_roll_in_circles(faces, face_of)) faces = measure_faces(hull, neighbours, face_of);
-  if (std::ranges::any_of(faces, [](const Face& face) { return face.height <= 0.0; }))
+  if (std::ranges::any_of(faces, [](const RestingFace& face) { return face.height <= 0.0; }))
     return core::invalid_input("the centre of mass is not inside of the convex hull: correct one of them");
 
   std::vector<double> share(faces.size(), 0.0);
-  for (const Face& face : faces) {
-    const Face* at = &face;
+  for (const RestingFace& face : faces) {
+    const RestingFace* at = &face;
     while (at->tip_angle < 0.0) at = &faces[static_cast<std::size_t>(at->rolls_to)];
     share[static_cast<std::size_t>(at - faces.data())] += face.solid_angle / (4.0 * std::numbers::pi);
   }

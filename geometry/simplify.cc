@@ -242,10 +242,10 @@ class Simplifier {
         const Vector3d after = (p[1] - p[0]).cross(p[2] - p[0]);
         // Turned by more than 75 degrees, or squeezed to a sliver.
         constexpr double kCosine = 0.25;
-        constexpr double kSliver = 1e-3;
+        constexpr double kThinSliver = 1e-3;
         const double longest =
             std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(), (p[0] - p[2]).squaredNorm()});
-        if (after.norm() < kSliver * longest) return false;
+        if (after.norm() < kThinSliver * longest) return false;
         if (before.dot(after) < kCosine * before.norm() * after.norm()) return false;
       }
     }

@@ -16,9 +16,9 @@ namespace {
 using belief::Vector3d;
 
 constexpr std::size_t kFewestInstances = 128;
-constexpr std::size_t kMostLookedAt = 65536;  // shares of a prefix of the net are those of the whole
-constexpr std::size_t kFewestForRest = 512;   // below, first_order_effect() cuts inputs into 4 intervals only
-constexpr double kLargestTurn = 2.0;          // rad: beyond it a rotation is no longer told by a turn from its mean
+constexpr std::size_t kMostRolloutsLookedAt = 65536;  // shares of a prefix of the net are those of the whole
+constexpr std::size_t kFewestForRest = 512;           // below, first_order_effect() cuts inputs into 4 intervals only
+constexpr double kLargestTurn = 2.0;  // rad: beyond it a rotation is no longer told by a turn from its mean
 const char* const kAxes[] = {"x", "y", "z"};
 
 bool varies(const std::vector<double>& values) {
@@ -95,7 +95,7 @@ void add_actions(const Foresight& foresight, const Prior& prior, Columns& column
   const std::vector<belief::Action>& actions = foresight.request.actions;
   if (actions.empty()) return;
   std::vector<std::vector<simulation::DrawnAction>> drawn;
-  for (std::size_t i = 0; i < std::min(kMostLookedAt, foresight.estimate.instances.size()); ++i)
+  for (std::size_t i = 0; i < std::min(kMostRolloutsLookedAt, foresight.estimate.instances.size()); ++i)
     drawn.push_back(simulation::draw_actions(actions, prior.stream.at(0, static_cast<std::uint32_t>(i))));
   for (std::size_t a = 0; a < actions.size(); ++a) {
     const auto of = [&](std::size_t i) -> const simulation::DrawnAction& { return drawn[i][a]; };
@@ -123,7 +123,7 @@ void add_actions(const Foresight& foresight, const Prior& prior, Columns& column
 
 std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const Prior& prior,
                                              const QueryContext& context) {
-  const std::size_t count = std::min(kMostLookedAt, foresight.estimate.instances.size());
+  const std::size_t count = std::min(kMostRolloutsLookedAt, foresight.estimate.instances.size());
   const std::vector<belief::WorldState> starts =
       simulation::starts_of(prior.starts, foresight.estimate, count, prior.stream, *context.pool);
   Columns columns(count);
@@ -136,8 +136,8 @@ std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const P
 
 std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, const Prior& prior,
                                                     const QueryContext& context) {
-  const std::span instances =
-      std::span(foresight.estimate.instances).first(std::min(kMostLookedAt, foresight.estimate.instances.size()));
+  const std::span instances = std::span(foresight.estimate.instances)
+                                  .first(std::min(kMostRolloutsLookedAt, foresight.estimate.instances.size()));
   const auto stopped = [&] { return context.abandoned && context.abandoned->requested(); };
   std::vector<belief::DecidingInputs> all;
   if (instances.size() < kFewestInstances) return all;

@@ -15,7 +15,7 @@ using Classes = std::vector<std::vector<int>>;
 
 constexpr double kDisplacement = 0.1;  // standard deviations
 constexpr double kChaotic = 0.1;       // share of pairs that end otherwise
-constexpr std::size_t kFewestPairs = 32, kMostPairs = 128;
+constexpr std::size_t kFewestComparedPairs = 32, kMostComparedPairs = 128;
 constexpr std::size_t kRepeated = 256;
 constexpr double kLowEnd = 0.05, kHighEnd = 0.95;  // of priors
 constexpr double kPathInterval = 1.0 / 30.0;
@@ -148,8 +148,8 @@ std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, con
 std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, const Prior& prior, double confidence,
                                                 const QueryContext& context) {
   const std::size_t instances = foresight.estimate.instances.size();
-  if (instances < kFewestPairs || foresight.variables.empty()) return {};
-  const std::size_t pairs = std::clamp(instances / 8, kFewestPairs, kMostPairs);
+  if (instances < kFewestComparedPairs || foresight.variables.empty()) return {};
+  const std::size_t pairs = std::clamp(instances / 8, kFewestComparedPairs, kMostComparedPairs);
   tell(context, 0.0, "looking whether small differences decide");
   const std::vector<belief::WorldState> starts =
       simulation::starts_nearby(prior.starts, foresight.estimate, pairs, kDisplacement, prior.stream, *context.pool);

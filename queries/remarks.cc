@@ -75,16 +75,16 @@ std::string beyond_intervals(const belief::PredictAnswer& answer, belief::ModelE
 }
 
 void remark_on_model(const belief::PredictAnswer& answer, double confidence, std::vector<std::string>& remarks) {
-  using Kind = belief::ModelError::Kind;
+  using ErrorKind = belief::ModelError::Kind;
   const belief::ModelError& error = *answer.model_error;
   const double wider = widening(error, answer.outcomes.size(), confidence);
-  const std::string steps = beyond_intervals(answer, Kind::kStep, wider);
+  const std::string steps = beyond_intervals(answer, ErrorKind::kStep, wider);
   if (!steps.empty())
     remarks.push_back(
         "The model's step: the intervals tell what more instances would change, and are narrower than what the "
         "simulator itself is wrong by: " +
         steps + ".");
-  const std::string priors = beyond_intervals(answer, Kind::kPrior, wider);
+  const std::string priors = beyond_intervals(answer, ErrorKind::kPrior, wider);
   if (!priors.empty())
     remarks.push_back(
         "What the scene says is not known: the probabilities are taken over all of its values; with one of them known "
@@ -92,7 +92,7 @@ void remark_on_model(const belief::PredictAnswer& answer, double confidence, std
         priors + ".");
   const bool any_prior =
       std::any_of(error.variants.begin(), error.variants.end(),
-                  [](const belief::ModelError::Variant& variant) { return variant.kind == Kind::kPrior; });
+                  [](const belief::ModelError::Variant& variant) { return variant.kind == ErrorKind::kPrior; });
   std::string small = steps.empty() ? "neither half nor double step" : "";
   if (any_prior && priors.empty())
     small += (small.empty() ? "no" : " and no") + std::string(" end of what the scene says is not known");

@@ -15,11 +15,6 @@ namespace {
 using geometry::Vector3d;
 
 template <class Pixel>
-void resize(geometry::Image<Pixel>* image, int width, int height) {
-  if (image->width() != width || image->height() != height) *image = geometry::Image<Pixel>(width, height);
-}
-
-template <class Pixel>
 bool fits(const geometry::ImageView<Pixel>& image, const geometry::PinholeCamera& camera) {
   return image.width() == camera.width && image.height() == camera.height;
 }

@@ -7,7 +7,6 @@ namespace prescene::rendering {
 namespace {
 
 PixelClass class_of(const SensorModel& model, const SurfaceMaterial& material, const PixelGeometry& pixel) {
-  constexpr double kInverseSqrt2Pi = 0.3989422804014327;
   const PixelMixture m = model.mixture(material, pixel);
   PixelClass c;
   c.hit = static_cast<float>(m.hit * kInverseSqrt2Pi);

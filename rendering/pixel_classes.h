@@ -14,6 +14,8 @@ namespace prescene::rendering {
 inline constexpr float kMatchSigmas = 3.0f;
 /// So many standard deviations off, the hit is nothing beside the outliers.
 inline constexpr float kHitSigmas = 10.0f;
+/// The standard normal density at 0.
+inline constexpr double kInverseSqrt2Pi = 0.3989422804014327;
 /// exp(-t^2/2) = 2^(this t^2).
 inline constexpr float kNormalExponent = -0.72134752f;
 /// No pixel counts more against a pose than this, even when a material is said to have no outliers.

@@ -5,12 +5,11 @@
 #include <cmath>
 #include <string>
 
+#include "prescene/rendering/pixel_classes.h"
 #include "prescene/rendering/portable_math.h"
 
 namespace prescene::rendering {
 namespace {
-
-constexpr double kInverseSqrt2Pi = 0.3989422804014327;
 
 double normal_density(double x, double mean, double sigma) {
   const double t = (x - mean) / sigma;

@@ -14,11 +14,6 @@ namespace {
 /// What a stream's particle number is used for, so that no two draws share numbers.
 enum Channel : std::uint32_t { kFixedPattern, kCorrelated, kMissing, kPart, kPixels, kColors };
 
-template <class Pixel>
-void resize(geometry::Image<Pixel>* image, int width, int height) {
-  if (image->width() != width || image->height() != height) *image = geometry::Image<Pixel>(width, height);
-}
-
 /// Standard normal at each pixel, correlated over about one cell: a grid of normals, interpolated and scaled back to
 /// unit variance.
 class SmoothField {

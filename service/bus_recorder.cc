@@ -8,7 +8,7 @@
 namespace prescene::service {
 namespace {
 
-constexpr std::chrono::milliseconds kPollInterval(100);
+constexpr std::chrono::milliseconds kWriteInterval(100);
 // What may wait for the disk: two seconds of images of 640 x 480 at 30 Hz.
 constexpr InboxLimit kWaitingImages{.messages = 60, .bytes = std::size_t{64} << 20};
 constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t{16} << 20};
@@ -41,7 +41,7 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
   std::uint64_t messages = 0;
   core::TimeNs last_ns = 0;
   while (!cancellation.requested()) {
-    for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kPollInterval)) {
+    for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kWriteInterval)) {
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
       PRESCENE_RETURN_IF_ERROR(recording.write(message).status());

@@ -20,8 +20,6 @@ constexpr std::size_t kMaxSkippedKept = 1000;
 // A stamp this much older than the last one taken means that the sender's clock was set back (a looped recording).
 constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
 
-core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llround(seconds * 1e9)); }
-
 /// Whether so many images wait that the oldest has to go.
 template <class Entries, class Image>
 bool too_many(const Entries& entries, std::size_t most, Image Entries::value_type::*image) {
@@ -31,6 +29,12 @@ bool too_many(const Entries& entries, std::size_t most, Image Entries::value_typ
 }
 
 }  // namespace
+
+std::vector<std::string> robot_names(const belief::Scene& scene) {
+  std::vector<std::string> names;
+  for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
+  return names;
+}
 
 FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies,
                                TfBufferSettings tf_settings)
@@ -105,8 +109,8 @@ const FrameAssembler::Color* FrameAssembler::color_of(const Waiting& waiting) co
     if (!best || std::abs(color.stamp_ns - waiting.stamp_ns) < std::abs(best->stamp_ns - waiting.stamp_ns))
       best = &color;
   }
-  return best && std::abs(best->stamp_ns - waiting.stamp_ns) <= ns_of(settings_.max_stamp_difference_s) ? best
-                                                                                                        : nullptr;
+  return best && std::abs(best->stamp_ns - waiting.stamp_ns) <= core::ns_of(settings_.max_stamp_difference_s) ? best
+                                                                                                              : nullptr;
 }
 
 FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool out_of_time) const {
@@ -159,7 +163,7 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
 std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
   for (std::size_t newest = waiting_.size(); newest > 0; --newest) {
     const Waiting& waiting = waiting_[newest - 1];
-    const bool out_of_time = now_ns - waiting.received_ns >= ns_of(settings_.max_wait_s);
+    const bool out_of_time = now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
     Attempt attempt = assemble(waiting, out_of_time);
     if (attempt.frame) {
       last_taken_ns_ = waiting.stamp_ns;
@@ -178,7 +182,7 @@ std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
 std::optional<core::TimeNs> FrameAssembler::next_deadline() const {
   std::optional<core::TimeNs> deadline;
   for (const Waiting& waiting : waiting_) {
-    const core::TimeNs mine = waiting.received_ns + ns_of(settings_.max_wait_s);
+    const core::TimeNs mine = waiting.received_ns + core::ns_of(settings_.max_wait_s);
     deadline = deadline ? std::min(*deadline, mine) : mine;
   }
   return deadline;

@@ -14,10 +14,14 @@
 #include <vector>
 
 #include "prescene/belief/observation.h"
+#include "prescene/belief/scene.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/tf_buffer.h"
 
 namespace prescene::service {
+
+/// Of the bodies whose poses tf tells.
+std::vector<std::string> robot_names(const belief::Scene& scene);
 
 struct AssemblerSettings {
   std::string world_frame = "world";

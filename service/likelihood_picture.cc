@@ -19,8 +19,8 @@ using core::fixed_text;
 using geometry::ColorImage;
 using geometry::Rgb;
 
-constexpr Rgb kInk = {30, 32, 35};
-constexpr Rgb kSoft = {95, 100, 105};
+constexpr Rgb kTextColor = {30, 32, 35};
+constexpr Rgb kNoteColor = {95, 100, 105};
 constexpr int kLeastWidth = 640;
 // The scale ends where this share of the pixels has its log ratio.
 constexpr double kWithinScale = 0.95;
@@ -76,7 +76,7 @@ void draw_scale(double end, double x, double y, double width, ColorImage& canvas
     const double value = 0.5 * k * end;
     const std::string sign = k > 0 ? "+" : "";
     const std::string number = k == 0 ? "0" : sign + core::rounded_text(value);
-    interfaces::draw_text(number, {x + (0.5 + 0.25 * k) * (width - 1.0), y + 36.0}, 10.5, kSoft, canvas,
+    interfaces::draw_text(number, {x + (0.5 + 0.25 * k) * (width - 1.0), y + 36.0}, 10.5, kNoteColor, canvas,
                           k == -2  ? interfaces::TextAlign::kLeft
                           : k == 2 ? interfaces::TextAlign::kRight
                                    : interfaces::TextAlign::kCenter);
@@ -157,15 +157,15 @@ ColorImage likelihood_picture(const belief::Observation& observation, const std:
     for (int x = 0; x < picture.width(); ++x) canvas(left + x, y) = picture(x, y);
   double y = picture.height() + 24.0;
   interfaces::draw_text("What each pixel says, nats: log of p(measured | object there) / p(measured | not there)",
-                        {12.0, y}, 11.0, kInk, canvas);
+                        {12.0, y}, 11.0, kTextColor, canvas);
   draw_scale(end, 12.0, y + 8.0, 380.0, canvas);
-  interfaces::draw_text("blue: against the pose, orange: for", {408.0, y + 22.0}, 10.5, kSoft, canvas);
+  interfaces::draw_text("blue: against the pose, orange: for", {408.0, y + 22.0}, 10.5, kNoteColor, canvas);
   y += 68.0;
   for (const ObjectEvidence& object : objects) {
-    interfaces::draw_text(text_of(object), {12.0, y}, 11.0, kInk, canvas);
+    interfaces::draw_text(text_of(object), {12.0, y}, 11.0, kTextColor, canvas);
     y += kLine;
   }
-  if (objects.empty()) interfaces::draw_text("No object is believed to be there.", {12.0, y}, 11.0, kInk, canvas);
+  if (objects.empty()) interfaces::draw_text("No object is believed to be there.", {12.0, y}, 11.0, kTextColor, canvas);
   return canvas;
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/geometry/cancellable.h"
 #include "prescene/interfaces/scene_files/mesh_use.h"
 
@@ -14,8 +15,6 @@ namespace prescene::service {
 namespace {
 
 using nlohmann::ordered_json;
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 ordered_json vector_json(const geometry::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -161,7 +160,7 @@ ordered_json to_json(const MeshInspection& found) {
     const geometry::Quaterniond& R = pose.R_WB;
     poses.push_back({{"rotation", {R.w(), R.x(), R.y(), R.z()}},
                      {"height", pose.height},
-                     {"tip_angle_deg", pose.tip_angle * kDegrees},
+                     {"tip_angle_deg", pose.tip_angle * geometry::kDegreesPerRadian},
                      {"probability", pose.probability}});
   }
   ordered_json json = {{"file", found.path.string()},

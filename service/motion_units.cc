@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
 
 namespace prescene::service {
@@ -43,12 +44,6 @@ std::optional<Movement> beginning_of(const std::vector<simulation::TimedPose>& f
   return Movement{fit.row(1).norm(), 2.0 * fit.row(2).norm()};
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 }  // namespace
 
 double frame_rate(const std::vector<MotionRecording>& recordings) {
@@ -58,7 +53,7 @@ double frame_rate(const std::vector<MotionRecording>& recordings) {
     if (frames.size() > 1)
       rates.push_back(static_cast<double>(frames.size() - 1) / (frames.back().time - frames.front().time));
   }
-  return rates.empty() ? 0.0 : median(std::move(rates));
+  return rates.empty() ? 0.0 : core::upper_median(std::move(rates));
 }
 
 core::Status check_units(const std::vector<MotionRecording>& recordings, double gravity) {
@@ -77,8 +72,8 @@ core::Status check_units(const std::vector<MotionRecording>& recordings, double 
     accelerations.push_back(movement->acceleration);
   }
   if (speeds.empty()) return core::ok_status();
-  const double speed = median(std::move(speeds));
-  const double acceleration = median(std::move(accelerations));
+  const double speed = core::upper_median(std::move(speeds));
+  const double acceleration = core::upper_median(std::move(accelerations));
   if (speed < kFastest && acceleration < kMostAcceleration * gravity) return core::ok_status();
   return core::invalid_input("the typical recording begins with " + core::rounded_text(speed) + " m/s, changing by " +
                              core::rounded_text(acceleration) +

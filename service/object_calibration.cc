@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "prescene/core/order_statistics.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/scene_files/model_file.h"
@@ -65,12 +66,6 @@ const char* what_tells(MotionParameter parameter) {
     default:
       return "record tosses that spin about several axes";
   }
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 std::string words(MotionParameter parameter) {
@@ -166,11 +161,12 @@ core::Status check_gravity(const MotionDataset& dataset, const std::vector<Recor
     variance += fall.error * fall.error;
   }
   const auto n = static_cast<double>(falls.size());
-  const double fall = median(falls);
+  const double fall = core::upper_median(falls);
   std::vector<double> deviations;
   for (const double each : falls) deviations.push_back(std::abs(each - fall));
   // Of a median of normal numbers.
-  const double error = 1.2533 * std::max(std::sqrt(variance / n), 1.4826 * median(deviations)) / std::sqrt(n);
+  const double error =
+      1.2533 * std::max(std::sqrt(variance / n), 1.4826 * core::upper_median(deviations)) / std::sqrt(n);
   const double given = scene.gravity_W.norm();
   if (std::abs(fall - given) <= std::max(kScaleRefused * given, kScaleErrors * error)) return core::ok_status();
   return core::invalid_input(dataset.table_file().string() + ": flights fall with " + core::rounded_text(fall) +
@@ -194,8 +190,8 @@ core::Status measure_noise(const std::vector<RecordedMotion>& motions, simulatio
     rotations.push_back(fit->state.rotation_rms * std::sqrt(freedom));
   }
   if (positions.empty()) return core::ok_status();
-  options->position_noise = median(std::move(positions));
-  options->rotation_noise = median(std::move(rotations));
+  options->position_noise = core::upper_median(std::move(positions));
+  options->rotation_noise = core::upper_median(std::move(rotations));
   return core::ok_status();
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kPollInterval(20);
+constexpr std::chrono::milliseconds kAskInterval(20);
 // A service that was killed took the question with it: it is asked again after this time.
 constexpr std::chrono::seconds kAskAgain(2);
 
@@ -91,7 +91,7 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
       ask_at = steady_clock::now() + kAskAgain;
     }
     std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, kPollInterval, [&] { return answers_.contains(id); })) continue;
+    if (!changed_.wait_for(lock, kAskInterval, [&] { return answers_.contains(id); })) continue;
     const std::string answer = std::exchange(answers_[id], {});
     answers_.clear();
     if (!says_ask_again(answer)) return answer;

@@ -29,12 +29,6 @@ AssemblerSettings assembler_settings(const belief::Scene& scene) {
   return settings;
 }
 
-std::vector<std::string> robot_names(const belief::Scene& scene) {
-  std::vector<std::string> names;
-  for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
-  return names;
-}
-
 belief::Timeline timeline_from(const ordered_json& json) {
   belief::Timeline timeline;
   constexpr belief::Relation kRelations[] = {

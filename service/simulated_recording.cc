@@ -19,8 +19,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llround(seconds * 1e9)); }
-
 /// A message that is due; the recording is written in the order of these times.
 struct Due {
   core::TimeNs time_ns;
@@ -90,23 +88,23 @@ class Player {
     PRESCENE_RETURN_IF_ERROR(write(options_.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
                                    interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
     return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(state, view, images))),
-                                 stamp_ns + ns_of(options_.latency));
+                                 stamp_ns + core::ns_of(options_.latency));
   }
 
   core::Status write_outcomes(const belief::Trajectory& trajectory) {
     if (scene_.outcomes.empty() && scene_.exclusive_outcomes.empty()) return core::ok_status();
     return recording_.write_json(kOutcomeTopic,
                                  belief::json_text(to_json(outcomes_of(scene_, trajectory, options_.start_ns))),
-                                 stamp(trajectory.final().time) + ns_of(options_.latency));
+                                 stamp(trajectory.final().time) + core::ns_of(options_.latency));
   }
 
  private:
-  core::TimeNs stamp(double time) const { return options_.start_ns + ns_of(time); }
+  core::TimeNs stamp(double time) const { return options_.start_ns + core::ns_of(time); }
 
   core::Status write(const std::string& topic, const std::string& type, core::TimeNs stamp_ns,
                      std::vector<std::uint8_t> cdr) {
     const auto written = recording_.write(
-        interfaces::ReceivedMessage{topic, type, std::move(cdr), stamp_ns, stamp_ns + ns_of(options_.latency)});
+        interfaces::ReceivedMessage{topic, type, std::move(cdr), stamp_ns, stamp_ns + core::ns_of(options_.latency)});
     return written.status();
   }
 
@@ -176,18 +174,18 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
   std::vector<Due> due;
   for (std::size_t i = 0; i < trajectory.states.size(); ++i) {
     const belief::WorldState& state = trajectory.states[i];
-    due.push_back({ns_of(state.time), [&player, &state, i] { return player.write_frame(i, state); }});
+    due.push_back({core::ns_of(state.time), [&player, &state, i] { return player.write_frame(i, state); }});
   }
   const double end = trajectory.final().time;
   if (!scene.robot.empty()) {
     for (int i = 0; i / options.tf_rate <= end; ++i) {
       const double time = i / options.tf_rate;
-      due.push_back({ns_of(time), [&player, time] { return player.write_robot(time); }});
+      due.push_back({core::ns_of(time), [&player, time] { return player.write_robot(time); }});
     }
   }
   for (const belief::Action& action : scene.actions) {
     if (action.time <= end)
-      due.push_back({ns_of(action.time), [&player, &action] { return player.write_control(action); }});
+      due.push_back({core::ns_of(action.time), [&player, &action] { return player.write_control(action); }});
   }
   std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) { return a.time_ns < b.time_ns; });
 

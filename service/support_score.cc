@@ -5,18 +5,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include "prescene/core/order_statistics.h"
+#include "prescene/geometry/angles.h"
 
 namespace prescene::service {
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 SupportFrame compared(core::TimeNs stamp_ns, const filter::SupportMeasurement& measured,
                       const filter::SupportMeasurement& first) {
@@ -66,10 +59,10 @@ std::vector<SupportRow> SupportScore::rows() const {
     row.largest_tilt = *std::max_element(tilts.begin(), tilts.end());
     row.largest_height = *std::max_element(heights.begin(), heights.end());
     // The first measurement is the reference: it says nothing of itself.
-    row.median_tilt = median({tilts.begin() + 1, tilts.end()});
-    row.median_height = median({heights.begin() + 1, heights.end()});
-    row.median_rms = median(residuals);
-    row.median_share = median(shares);
+    row.median_tilt = core::upper_median({tilts.begin() + 1, tilts.end()});
+    row.median_height = core::upper_median({heights.begin() + 1, heights.end()});
+    row.median_rms = core::upper_median(residuals);
+    row.median_share = core::upper_median(shares);
     rows.push_back(row);
   }
   return rows;
@@ -77,8 +70,12 @@ std::vector<SupportRow> SupportScore::rows() const {
 
 nlohmann::ordered_json to_json(const SupportFrame& frame) {
   const geometry::Vector3d& n = frame.measured.plane_W.normal;
-  return {{"name", frame.measured.support},    {"normal", {n.x(), n.y(), n.z()}}, {"tilt_deg", frame.tilt * kDegrees},
-          {"height_mm", 1e3 * frame.height},   {"pixels", frame.measured.pixels}, {"share", frame.measured.share},
+  return {{"name", frame.measured.support},
+          {"normal", {n.x(), n.y(), n.z()}},
+          {"tilt_deg", frame.tilt * geometry::kDegreesPerRadian},
+          {"height_mm", 1e3 * frame.height},
+          {"pixels", frame.measured.pixels},
+          {"share", frame.measured.share},
           {"rms_mm", 1e3 * frame.measured.rms}};
 }
 
@@ -86,8 +83,8 @@ nlohmann::ordered_json to_json(const SupportRow& row) {
   return {{"name", row.support},
           {"frames", row.frames},
           {"measured", row.measured},
-          {"median_tilt_deg", row.median_tilt * kDegrees},
-          {"largest_tilt_deg", row.largest_tilt * kDegrees},
+          {"median_tilt_deg", row.median_tilt * geometry::kDegreesPerRadian},
+          {"largest_tilt_deg", row.largest_tilt * geometry::kDegreesPerRadian},
           {"median_height_mm", 1e3 * row.median_height},
           {"largest_height_mm", 1e3 * row.largest_height},
           {"median_rms_mm", 1e3 * row.median_rms},

@@ -19,8 +19,6 @@ std::string without_slash(const std::string& name) {
   return !name.empty() && name.front() == '/' ? name.substr(1) : name;
 }
 
-core::TimeNs ns_of(double seconds) { return static_cast<core::TimeNs>(std::llround(seconds * 1e9)); }
-
 }  // namespace
 
 bool TfBuffer::knows(const std::string& frame) const {
@@ -43,7 +41,7 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
   if (!is_known) PRESCENE_RETURN_IF_ERROR(check_acyclic(parent, child));
   if (found != edges_.end() && !is_known) {
     const bool expired =
-        !found->second.is_static && found->second.samples.back().first + ns_of(settings_.history_s) < stamp_ns;
+        !found->second.is_static && found->second.samples.back().first + core::ns_of(settings_.history_s) < stamp_ns;
     if (!expired) {
       return core::invalid_input("frame '" + child + "' has the parent '" + found->second.parent + "' and now also '" +
                                  parent + "': stop one of the two publishers");
@@ -66,7 +64,7 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
     edge.samples.assign(1, {stamp_ns, X_PC});
     return core::ok_status();
   }
-  if (!edge.samples.empty() && stamp_ns + ns_of(settings_.history_s) < edge.samples.back().first) {
+  if (!edge.samples.empty() && stamp_ns + core::ns_of(settings_.history_s) < edge.samples.back().first) {
     if (++edge.too_old_in_a_row < kTooOldToBeWrong) return core::ok_status();
     sample_count_ -= edge.samples.size();
     edge.samples.clear();
@@ -100,7 +98,7 @@ void TfBuffer::forget_beyond_limits(Edge& edge) {
     samples.pop_front();
     --sample_count_;
   };
-  while (samples.front().first + ns_of(settings_.history_s) < samples.back().first) forget_oldest();
+  while (samples.front().first + core::ns_of(settings_.history_s) < samples.back().first) forget_oldest();
   const std::size_t share =
       std::max(kLeastSamplesOfAnEdge, static_cast<std::size_t>(settings_.max_samples) / edges_.size());
   while (samples.size() > share) {
@@ -133,7 +131,7 @@ core::Result<geometry::Pose> TfBuffer::edge_pose(const std::string& child, const
                              " s after the asked time");
   }
   if (stamp_ns > samples.back().first) {
-    if (stamp_ns - samples.back().first > ns_of(settings_.max_extrapolation_s)) {
+    if (stamp_ns - samples.back().first > core::ns_of(settings_.max_extrapolation_s)) {
       return core::unavailable("transform " + edge.parent + " -> " + child + " is " +
                                core::rounded_text(core::seconds_of(stamp_ns - samples.back().first)) +
                                " s older than the asked time");

@@ -24,13 +24,7 @@ constexpr std::size_t kMaxControls = 1000;
 constexpr core::TimeNs kSameClockNs = 2'000'000'000;
 
 // The end of ROS's 32 bit seconds.
-constexpr core::TimeNs kLatestNs = (core::TimeNs{1} << 31) * 1'000'000'000;
-
-std::vector<std::string> robot_names(const belief::Scene& scene) {
-  std::vector<std::string> names;
-  for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
-  return names;
-}
+constexpr core::TimeNs kLatestStamp = (core::TimeNs{1} << 31) * 1'000'000'000;
 
 template <class Message>
 core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const char* type) {
@@ -201,7 +195,7 @@ core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control
     if (!json["stamp_ns"].is_number_integer())
       return core::invalid_input("stamp_ns: not a whole number of nanoseconds");
     begin_ns = json["stamp_ns"].get<core::TimeNs>();
-    if (begin_ns < 0 || begin_ns > kLatestNs)
+    if (begin_ns < 0 || begin_ns > kLatestStamp)
       return core::invalid_input("stamp_ns: a time from 1970 to 2038 is needed, as in ROS headers");
   }
   std::vector<std::pair<core::TimeNs, belief::Action>> actions;

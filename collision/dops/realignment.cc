@@ -21,12 +21,12 @@ double to_double(float x) { return static_cast<double>(x); }
 
 float constant_of(double bound) { return bound > -kHuge ? static_cast<float>(std::min(bound, kHuge)) : -kInfinity; }
 
-using Planes = std::array<double, 2 * kMostDopAxes>;
+using ExactPlanes = std::array<double, 2 * kMostDopAxes>;
 
-Planes planes_around(const DopDirections& directions, const DopSpace& space, const Mesh& mesh,
-                     std::span<const std::uint32_t> triangles) {
+ExactPlanes planes_around(const DopDirections& directions, const DopSpace& space, const Mesh& mesh,
+                          std::span<const std::uint32_t> triangles) {
   const std::span<const DopAxis> axes = directions.axes();
-  Planes planes;
+  ExactPlanes planes;
   std::fill(planes.begin(), planes.end(), -std::numeric_limits<double>::infinity());
   for (const std::uint32_t triangle : triangles) {
     for (const Vector3f& corner : mesh.corners(triangle)) {
@@ -77,7 +77,7 @@ std::vector<float> fit_planes(const DopDirections& directions, const DopSpace& s
       const Hierarchy::Node& node = shape.nodes[i];
       if (!node.is_leaf()) continue;
       const auto triangles = std::span(shape.order).subspan(node.begin, node.end - node.begin);
-      const Planes exact = planes_around(directions, space, mesh, triangles);
+      const ExactPlanes exact = planes_around(directions, space, mesh, triangles);
       for (std::size_t p = 0; p < k; ++p) planes[i * k + p] = round_up(exact[p]);
     }
   });
@@ -142,7 +142,7 @@ Realignment::Realignment(const DopDirections& dop_directions, const DopSpace& sp
     double weight = 0.0;
     for (std::size_t n = 0; n < 3; ++n) weight += cone.weights[n] * ratio;
     const double slack =
-        scale_a * placing + 32.0 * kUnit * (1.0 + std::abs(constant) + weight);  // Planes are at most 1.
+        scale_a * placing + 32.0 * kUnit * (1.0 + std::abs(constant) + weight);  // ExactPlanes are at most 1.
     Direction& upper = directions[i];
     Direction& lower = directions[axes.size() + i];
     // Where sizes differ so much that single precision overflows, the opposite direction decides, or none.

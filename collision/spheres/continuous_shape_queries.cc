@@ -200,15 +200,10 @@ bool is_finite(const Transform& X) {
          std::all_of(X.translation.begin(), X.translation.end(), finite);
 }
 
-// The motion is cut so that spheres leave their chords by at most this share of the body's radius: less cuts more often
-// and prunes better.
-constexpr double kMostOff = 0.02;
-constexpr double kMostPieces = 256.0;
-
 int pieces_of(const SphereTree& a, const ScrewMotion& motion) {
   const auto radius = static_cast<double>(a.root().radius);
   const double bend = motion.bend(a.root().centre.cast<double>()) + motion.spin().squaredNorm() * radius;
-  return static_cast<int>(std::clamp(std::ceil(std::sqrt(0.125 * bend / (kMostOff * radius))), 1.0, kMostPieces));
+  return chord_pieces(bend, kChordDeviation * radius);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ Vector3d placed(const Transform& X_AB, const Vector3d& c) {
 }
 
 /// The pair that meets first so far.
-struct Earliest {
+struct EarliestPair {
   double time;
   bool found = false;
   std::uint32_t place_a = 0;
@@ -38,7 +38,7 @@ class Pairs {
   const PackedSphere& a(std::uint32_t place) const { return a_.packing().spheres()[a_.order()[place]]; }
   const PackedSphere& b(std::uint32_t place) const { return b_.packing().spheres()[b_.order()[place]]; }
 
-  Impact impact(const Earliest& earliest, const Vector3d& centre_b) const {
+  Impact impact(const EarliestPair& earliest, const Vector3d& centre_b) const {
     Impact impact;
     impact.time = earliest.time;
     impact.sphere_a = a_.order()[earliest.place_a];
@@ -75,7 +75,7 @@ class StraightPairs final : public SweptPairs {
     return earliest.time;
   }
 
-  Earliest earliest{1.0};
+  EarliestPair earliest{1.0};
 
  private:
   const Pairs& pairs_;
@@ -136,7 +136,7 @@ class TurningPairs final : public SweptPairs {
     return (earliest.time - begin_) / (end_ - begin_);
   }
 
-  Earliest earliest{1.0};
+  EarliestPair earliest{1.0};
 
  private:
   const Pairs& pairs_;
@@ -146,17 +146,11 @@ class TurningPairs final : public SweptPairs {
   double end_ = 1.0;
 };
 
-// The motion is cut so that spheres leave their chords by at most this share of the smaller body's radius: less cuts
-// more often and prunes better.
-constexpr double kMostOff = 0.02;
-constexpr double kMostPieces = 256.0;
-
 int pieces_of(const SphereTree& a, const SphereTree& b, const ScrewMotion& motion) {
   const auto radius = static_cast<double>(b.root().radius);
   const double bend =
       motion.bend(motion.start() * b.root().centre.cast<double>()) + motion.spin().squaredNorm() * radius;
-  const double allowed = kMostOff * std::min(radius, static_cast<double>(a.root().radius));
-  return static_cast<int>(std::clamp(std::ceil(std::sqrt(0.125 * bend / allowed)), 1.0, kMostPieces));
+  return chord_pieces(bend, kChordDeviation * std::min(radius, static_cast<double>(a.root().radius)));
 }
 
 Transform rounded(const geometry::Pose& X) {

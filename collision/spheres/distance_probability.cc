@@ -22,7 +22,7 @@ constexpr double kSpacing = 1.1;
 constexpr double kBend = 3.0;
 // Deviations below this share of the radius are raised to it: the probability changes by less than 1e-6 unless the
 // mean's distance is that close to the radius, and the saddle point stays finite.
-constexpr double kLeastDeviation = 1e-7;
+constexpr double kLeastSpread = 1e-7;
 
 /// |x|^2 / radius^2 = sum of (m_i + s_i z_i)^2: the squares of both.
 struct Quadratic {
@@ -166,7 +166,7 @@ double distance_probability(const Eigen::Vector3d& mean, const Eigen::Matrix3d& 
   Quadratic q{};
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    q.variance[k] = std::max(variance[i] * scale, kLeastDeviation * kLeastDeviation);
+    q.variance[k] = std::max(variance[i] * scale, kLeastSpread * kLeastSpread);
     q.mean[k] = along[i] * along[i] * scale;
   }
   return contour_integral(q);

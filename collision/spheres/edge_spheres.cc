@@ -17,8 +17,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kSqrt3 = std::numbers::sqrt3;
-
 // The room for a sphere about a centre that a float holds. Not inlined: where g++ 12 sees both conversions of a vector,
 // from double to float and back, its vectorizer drops them.
 [[gnu::noinline]] double room_at(const SurfaceSearch& surface, const std::vector<PackedSphere>& nearby,
@@ -53,10 +51,10 @@ PackedSphere largest_near(const SurfaceSearch& surface, const std::vector<Packed
       best_room = room;
       best.centre = rounded;
     }
-    if (room + kSqrt3 * half > 0.0) queue.push({room + kSqrt3 * half, count, centre, half});
+    if (room + std::numbers::sqrt3 * half > 0.0) queue.push({room + std::numbers::sqrt3 * half, count, centre, half});
     ++count;
   };
-  look(corner, reach / kSqrt3);
+  look(corner, reach / std::numbers::sqrt3);
   while (!queue.empty() && count < kMostCells && best_room < kEnough * queue.top().bound) {
     const Cell cell = queue.top();
     queue.pop();

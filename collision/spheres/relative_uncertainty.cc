@@ -31,12 +31,6 @@ constexpr double kSizeFails = RelativeUncertainty::kRemainderFails / 4;
 // Twice the rounding of a centre's transform and of a distance, relative to the coordinates: a dozen operations.
 constexpr double kFloatRounding = 2e-6;
 
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 double largest_eigenvalue(const Matrix3d& m) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
   solver.computeDirect(m, Eigen::EigenvaluesOnly);
@@ -109,7 +103,7 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
   from_a.bottomRightCorner<3, 3>() = -R_AW;
   Matrix6d from_b = Matrix6d::Zero();
   from_b.topLeftCorner<3, 3>() = R_AB;
-  from_b.bottomLeftCorner<3, 3>() = cross_matrix(p_AB) * R_AB;
+  from_b.bottomLeftCorner<3, 3>() = geometry::cross_matrix(p_AB) * R_AB;
   from_b.bottomRightCorner<3, 3>() = R_AW;
   const Matrix6d sum = from_a * a.covariance * from_a.transpose() + from_b * b.covariance * from_b.transpose();
   result.covariance_ = 0.5 * (sum + sum.transpose());
@@ -119,7 +113,7 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
     joined.leftCols<6>() = -result.factor_a_;
     joined.topRightCorner<3, 6>() = R_AB * result.factor_b_.topRows<3>();
     joined.bottomRightCorner<3, 6>() =
-        cross_matrix(p_AB) * joined.topRightCorner<3, 6>() + result.factor_b_.bottomRows<3>();
+        geometry::cross_matrix(p_AB) * joined.topRightCorner<3, 6>() + result.factor_b_.bottomRows<3>();
     const Eigen::HouseholderQR<Eigen::Matrix<double, 12, 6>> triangle(joined.transpose());
     result.factor_ = triangle.matrixQR().topRows<6>().triangularView<Eigen::Upper>().transpose();
     result.covariance_ = result.factor_ * result.factor_.transpose();
@@ -140,7 +134,7 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
     // Solved for the offset from B's origin: the components that don't matter stay there.
     pivot_ += M.ldlt().solve(-v - M * p_AB);
   }
-  const Matrix3d mixed_at_pivot = mixed - cross_matrix(pivot_) * rotation;
+  const Matrix3d mixed_at_pivot = mixed - geometry::cross_matrix(pivot_) * rotation;
   const Matrix3d least = covariance_at(pivot_);
   least_trace_ = least.trace();
   at_pivot_ = largest_eigenvalue(least);
@@ -243,7 +237,7 @@ double RelativeUncertainty::reversed_displacement(const Vector3d& p) const {
 }
 
 Eigen::Matrix<double, 3, 6> RelativeUncertainty::displacement_at(const Vector3d& p) const {
-  return factor_.bottomRows<3>() - cross_matrix(p) * factor_.topRows<3>();
+  return factor_.bottomRows<3>() - geometry::cross_matrix(p) * factor_.topRows<3>();
 }
 
 Matrix3d RelativeUncertainty::covariance_at(const Vector3d& p) const {

@@ -20,12 +20,6 @@ using geometry::Vector6d;
 // Spheres further apart touch with 0.13 % and push with 4e-4 of a deviation on average.
 constexpr double kReach = 3.0;
 
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 /// Half the depth, x = max(0, -(gap + sigma z)) / 2, with z standard normal.
 struct HalfDepth {
   double mean = 0.0;
@@ -130,7 +124,7 @@ class ShapeWrench {
   /// (phi, tau), whose first part turns.
   void add_turning(double slope, const Vector6d& m, const Vector3d& n, const Vector3d& c) {
     Eigen::Matrix<double, 6, 3> turning;  // of (torque, force)
-    turning << -cross_matrix(c) * cross_matrix(n), -cross_matrix(n);
+    turning << -geometry::cross_matrix(c) * geometry::cross_matrix(n), -geometry::cross_matrix(n);
     for (std::size_t i = 0; i < 6; ++i) {
       const Eigen::Matrix<double, 6, 3> both = -slope * m * turning.row(static_cast<Eigen::Index>(i));
       sums_.bending[i].leftCols<3>() += both;

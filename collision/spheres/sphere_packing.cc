@@ -14,27 +14,28 @@ namespace {
 constexpr std::size_t kMostSpheres = std::size_t{1} << 30U;
 constexpr float kUnitTolerance = 1e-3F;
 
-core::Status refuse(std::string_view name, const std::string& what) {
+core::Status refuse_packing(std::string_view name, const std::string& what) {
   return core::invalid_input("sphere packing '" + std::string(name) + "': " + what);
 }
 
 core::Status check(const Array<PackedSphere>& spheres, const Array<SurfaceAnchor>& anchors, std::string_view name) {
-  if (spheres.empty()) return refuse(name, "it has no spheres; give at least one");
+  if (spheres.empty()) return refuse_packing(name, "it has no spheres; give at least one");
   if (spheres.size() > kMostSpheres)
-    return refuse(name, "it has " + std::to_string(spheres.size()) + " spheres; at most 2^30 are allowed");
+    return refuse_packing(name, "it has " + std::to_string(spheres.size()) + " spheres; at most 2^30 are allowed");
   if (anchors.size() != spheres.size()) {
-    return refuse(name, std::to_string(anchors.size()) + " anchors for " + std::to_string(spheres.size()) +
-                            " spheres; give one each");
+    return refuse_packing(name, std::to_string(anchors.size()) + " anchors for " + std::to_string(spheres.size()) +
+                                    " spheres; give one each");
   }
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     const auto& [centre, radius] = spheres[i];
     const std::string place = "sphere " + std::to_string(i);
-    if (!centre.allFinite() || !std::isfinite(radius)) return refuse(name, place + " is not finite; drop it");
+    if (!centre.allFinite() || !std::isfinite(radius)) return refuse_packing(name, place + " is not finite; drop it");
     if (centre.cwiseAbs().maxCoeff() > kLargestCoordinate || radius > kLargestCoordinate)
-      return refuse(name, place + " lies beyond the limit of 1e9 m: check the unit");
-    if (!(radius > 0.0F)) return refuse(name, place + " has a radius that is not positive; drop it");
+      return refuse_packing(name, place + " lies beyond the limit of 1e9 m: check the unit");
+    if (!(radius > 0.0F)) return refuse_packing(name, place + " has a radius that is not positive; drop it");
     if (!anchors[i].point.allFinite() || !(std::abs(anchors[i].normal.norm() - 1.0F) <= kUnitTolerance))
-      return refuse(name, "the anchor of " + place + " is not finite or its normal not of unit length; mend it");
+      return refuse_packing(name,
+                            "the anchor of " + place + " is not finite or its normal not of unit length; mend it");
   }
   return core::ok_status();
 }

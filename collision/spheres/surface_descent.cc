@@ -92,14 +92,14 @@ void look_below(const TriangleTree& tree, std::uint32_t index, const SweptSphere
   }
 }
 
-struct Reach {
+struct DescentReach {
   const Vector3d& direction;
   const Vector3d& centre;
   double radius;
   double most = -std::numeric_limits<double>::infinity();
 };
 
-void look_below(const TriangleTree& tree, std::uint32_t index, Reach* reach) {
+void look_below(const TriangleTree& tree, std::uint32_t index, DescentReach* reach) {
   const TriangleTreeNode& node = tree.nodes()[index];
   const NodeFrame frame(node);
   const Vector3d centre = frame.place(reach->centre);
@@ -229,7 +229,7 @@ double first_contact(const TriangleTree& tree, const SweptSphere& sphere) {
 }
 
 double reach_along(const TriangleTree& tree, const Vector3d& direction, const Vector3d& centre, double radius) {
-  Reach reach{direction, centre, radius};
+  DescentReach reach{direction, centre, radius};
   look_below(tree, 0, &reach);
   return reach.most;
 }

@@ -25,7 +25,6 @@ constexpr double kImpatience = 0.04;  // A round.
 constexpr double kFinestCell = 0.05;
 constexpr double kClimbShare = 1.0;         // A prototype sets out where the cell's half diagonal is below this share.
 constexpr std::size_t kMostObstacles = 12;  // That a climbing prototype keeps in mind.
-constexpr double kSqrt3 = std::numbers::sqrt3;
 
 double distance_to(const PackedSphere& sphere, const Vector3d& x) {
   return (sphere.centre.cast<double>() - x).norm() - static_cast<double>(sphere.radius);
@@ -93,7 +92,7 @@ VoidSearch::VoidSearch(const SurfaceSearch& surface, double smallest, const Vect
 }
 
 void VoidSearch::measure(Cell& cell, std::span<const std::uint32_t> nearby) const {
-  const double half_diagonal = kSqrt3 * cell.half;
+  const double half_diagonal = std::numbers::sqrt3 * cell.half;
   double beside = std::numeric_limits<double>::infinity();
   for (const std::uint32_t i : nearby) beside = std::min(beside, distance_to(spheres_[i], cell.centre));
   if (beside > cell.surface_low) {
@@ -116,7 +115,7 @@ VoidSearch::Cell VoidSearch::make_child(const Cell& parent, int octant) const {
   child.half = 0.5 * parent.half;
   const Vector3d sign((octant & 1) != 0 ? 1.0 : -1.0, (octant & 2) != 0 ? 1.0 : -1.0, (octant & 4) != 0 ? 1.0 : -1.0);
   child.centre = parent.centre + child.half * sign;
-  const double shift = kSqrt3 * child.half * (1.0 + 1e-9);
+  const double shift = std::numbers::sqrt3 * child.half * (1.0 + 1e-9);
   child.surface_low = parent.surface_low - shift;
   child.surface_high = parent.surface_high + shift;
   measure(child, parent.nearby);
@@ -254,11 +253,11 @@ VoidSearch::Outcome VoidSearch::work_on(const Entry& entry) const {
     return outcome;
   }
   const Cell& cell = cells_[entry.cell];
-  if (!cell.climbed && kSqrt3 * cell.half <= kClimbShare * cell.room) {
+  if (!cell.climbed && std::numbers::sqrt3 * cell.half <= kClimbShare * cell.room) {
     outcome.candidate = climb(cell.centre);
     return outcome;
   }
-  if (kSqrt3 * cell.half < kFinestCell * smallest_) {
+  if (std::numbers::sqrt3 * cell.half < kFinestCell * smallest_) {
     outcome.given_up = true;
     return outcome;
   }
@@ -338,7 +337,7 @@ void VoidSearch::insert(const PackedSphere& sphere) {
 
 double VoidSearch::update(std::uint32_t index, std::uint32_t sphere) {
   Cell& cell = cells_[index];
-  const double half_diagonal = kSqrt3 * cell.half;
+  const double half_diagonal = std::numbers::sqrt3 * cell.half;
   const double distance = distance_to(spheres_[sphere], cell.centre);
   if (!is_live(cell) || distance - half_diagonal > cell.bound) return cell.bound;
   if (cell.first_child == kNone) {

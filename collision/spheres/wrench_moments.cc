@@ -13,12 +13,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using geometry::Matrix6d;
 
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 /// A tensor that is symmetric in all of its three indices, from its entries i <= j <= k.
 template <int N>
 std::array<Eigen::Matrix<double, N, N>, std::size_t{N}> symmetric_tensor(const double* entries) {
@@ -48,8 +42,8 @@ Matrix6d wrench_gradient(const WrenchSums& sums) {
   gradient.topRows<3>() = -normal.bottomRows<3>();
   gradient.bottomRows<3>() = -normal.topRows<3>();
   const double* s = sums.sums.data() + WrenchSums::kSideways;
-  const Matrix3d of_p = cross_matrix(Vector3d(s[1], s[2], s[3]));
-  const Matrix3d of_a = cross_matrix(Vector3d(s[4], s[5], s[6]));
+  const Matrix3d of_p = geometry::cross_matrix(Vector3d(s[1], s[2], s[3]));
+  const Matrix3d of_a = geometry::cross_matrix(Vector3d(s[4], s[5], s[6]));
   Matrix3d outer;  // sum of w a p^T
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) outer(i, j) = s[7 + 3 * i + j];
@@ -80,7 +74,7 @@ void add_bending(const LocalSums& local, SymmetricTensor* bending) {
   }
   // m = lever * n at the mean place.
   Eigen::Matrix<double, 6, 3> lever;
-  lever << cross_matrix(Eigen::Map<const Vector3d>(sums + LocalSums::kPlace) / weight), Matrix3d::Identity();
+  lever << geometry::cross_matrix(Eigen::Map<const Vector3d>(sums + LocalSums::kPlace) / weight), Matrix3d::Identity();
   for (std::size_t j = 0; j < 3; ++j) {
     const Matrix6d spread = lever * H[j] * lever.transpose();
     for (std::size_t i = 0; i < 6; ++i)

@@ -27,24 +27,24 @@ constexpr std::uint64_t kMaxPixelsPerByte = 512;
 // Each scan of a progressive image walks all of it again. Real encoders use about ten.
 constexpr int kMaxScans = 100;
 constexpr long kMaxLibraryMemory = 512L << 20;
-constexpr int kMaxSide = 65500;
+constexpr int kMaxJpegSide = 65500;
 
 /// libjpeg leaves its functions by longjmp, so that the members which call it hold no object with a destructor.
-class Decoder {
+class JpegDecoder {
  public:
-  explicit Decoder(std::span<const std::uint8_t> bytes) {
+  explicit JpegDecoder(std::span<const std::uint8_t> bytes) {
     decompress_.err = jpeg_std_error(&error_manager_);
     decompress_.client_data = this;
-    error_manager_.error_exit = &Decoder::on_error;
-    error_manager_.emit_message = &Decoder::on_message;
-    progress_.progress_monitor = &Decoder::on_progress;
+    error_manager_.error_exit = &JpegDecoder::on_error;
+    error_manager_.emit_message = &JpegDecoder::on_message;
+    progress_.progress_monitor = &JpegDecoder::on_progress;
     created_ = create(bytes.data(), bytes.size());
   }
-  ~Decoder() {
+  ~JpegDecoder() {
     if (created_) jpeg_destroy_decompress(&decompress_);
   }
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
 
   bool read_header(ImageSize* size) {
     if (!created_ || setjmp(escape_) != 0) return false;
@@ -85,7 +85,7 @@ class Decoder {
   }
 
   [[noreturn]] static void on_error(j_common_ptr common) {
-    auto* self = static_cast<Decoder*>(common->client_data);
+    auto* self = static_cast<JpegDecoder*>(common->client_data);
     self->error_code_ = common->err->msg_code;
     common->err->format_message(common, self->message_.data());
     std::longjmp(self->escape_, 1);
@@ -135,7 +135,7 @@ Result<ColorImage> decode_file(const std::filesystem::path& path, const ImageLim
 
 Result<ColorImage> decode_jpeg(std::span<const std::uint8_t> bytes, const ImageLimits& limits) {
   if (bytes.empty()) return core::data_loss("is empty; write the JPEG again");
-  Decoder decoder(bytes);
+  JpegDecoder decoder(bytes);
   ImageSize size;
   if (!decoder.read_header(&size)) return decoder.error();
   const std::string size_words = std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
@@ -155,7 +155,8 @@ Result<ColorImage> decode_jpeg(std::span<const std::uint8_t> bytes, const ImageL
 }
 
 std::vector<std::uint8_t> encode_jpeg(ColorView image, int quality) {
-  PRESCENE_CHECK(image.width() > 0 && image.width() <= kMaxSide && image.height() > 0 && image.height() <= kMaxSide);
+  PRESCENE_CHECK(image.width() > 0 && image.width() <= kMaxJpegSide && image.height() > 0 &&
+                 image.height() <= kMaxJpegSide);
   PRESCENE_CHECK(quality >= 1 && quality <= 100);
   jpeg_error_mgr error_manager{};
   jpeg_compress_struct compress{};

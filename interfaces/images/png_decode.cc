@@ -85,24 +85,24 @@ Result<PngHeader> parse_header(std::span<const std::uint8_t> bytes, const ImageL
 
 /// libpng's reader over bytes in memory. libpng leaves its functions by longjmp, so that the members which call it
 /// hold no object with a destructor.
-class Decoder {
+class PngDecoder {
  public:
-  explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
-    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &Decoder::on_error, &Decoder::on_warning);
+  explicit PngDecoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &PngDecoder::on_error, &PngDecoder::on_warning);
     PRESCENE_CHECK_MSG(png_ != nullptr, "libpng of another version, or no memory");
     info_ = png_create_info_struct(png_);
     PRESCENE_CHECK(info_ != nullptr);
   }
-  ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
+  ~PngDecoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngDecoder(const PngDecoder&) = delete;
+  PngDecoder& operator=(const PngDecoder&) = delete;
 
   enum class Output { kRgb8, kGrey };
 
   /// Sets up the conversion; `bytes_per_row` of what read_rows() will write. False: see error().
   bool start(Output output, std::size_t* bytes_per_row) {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
-    png_set_read_fn(png_, this, &Decoder::on_read);
+    png_set_read_fn(png_, this, &PngDecoder::on_read);
     png_set_chunk_malloc_max(png_, kMaxMetadataChunkBytes);
     png_set_chunk_cache_max(png_, kMaxMetadataChunks);
     png_set_user_limits(png_, 0x7fffffff, 0x7fffffff);  // Checked before, against our own limits.
@@ -138,7 +138,7 @@ class Decoder {
 
  private:
   static void on_read(png_structp png, png_bytep out, std::size_t count) {
-    auto* self = static_cast<Decoder*>(png_get_io_ptr(png));
+    auto* self = static_cast<PngDecoder*>(png_get_io_ptr(png));
     if (count > self->bytes_.size() - self->position_) {
       self->cut_ = true;
       png_error(png, "cut");
@@ -147,7 +147,7 @@ class Decoder {
     self->position_ += count;
   }
   [[noreturn]] static void on_error(png_structp png, png_const_charp message) {
-    auto* self = static_cast<Decoder*>(png_get_error_ptr(png));
+    auto* self = static_cast<PngDecoder*>(png_get_error_ptr(png));
     std::snprintf(self->message_.data(), self->message_.size(), "%s", message);
     png_longjmp(png, 1);
   }
@@ -163,8 +163,8 @@ class Decoder {
 
 template <class Pixel>
 Result<geometry::Image<Pixel>> decode(std::span<const std::uint8_t> bytes, const PngHeader& header,
-                                      Decoder::Output output) {
-  Decoder decoder(bytes);
+                                      PngDecoder::Output output) {
+  PngDecoder decoder(bytes);
   std::size_t bytes_per_row = 0;
   if (!decoder.start(output, &bytes_per_row)) return decoder.error();
   PRESCENE_CHECK(bytes_per_row == static_cast<std::size_t>(header.size.width) * sizeof(Pixel));
@@ -204,7 +204,7 @@ Result<ImageSize> decode_png_size(std::span<const std::uint8_t> bytes, const Ima
 
 Result<ColorImage> decode_png_color(std::span<const std::uint8_t> bytes, const ImageLimits& limits) {
   PRESCENE_TRY(const PngHeader header, parse_header(bytes, limits));
-  return decode<geometry::Rgb>(bytes, header, Decoder::Output::kRgb8);
+  return decode<geometry::Rgb>(bytes, header, PngDecoder::Output::kRgb8);
 }
 
 Result<DepthImage> decode_png_depth(std::span<const std::uint8_t> bytes, double metres_per_unit,
@@ -215,7 +215,7 @@ Result<DepthImage> decode_png_depth(std::span<const std::uint8_t> bytes, double 
     return core::invalid_input("is " + kind_text(header) + ", but depth needs 16-bit grey; is it the colour image?");
   }
   PRESCENE_TRY(const geometry::Image<std::uint16_t> units,
-               decode<std::uint16_t>(bytes, header, Decoder::Output::kGrey));
+               decode<std::uint16_t>(bytes, header, PngDecoder::Output::kGrey));
   DepthImage depth(units.width(), units.height());
   for (std::size_t i = 0; i < units.size(); ++i) {
     const std::uint16_t value = units.data()[i];
@@ -230,8 +230,9 @@ Result<LabelImage> decode_png_label(std::span<const std::uint8_t> bytes, const I
   if (!is_grey(header) && header.color_type != PNG_COLOR_TYPE_PALETTE) {
     return core::invalid_input("is " + kind_text(header) + ", but labels need grey or a palette");
   }
-  if (header.bit_depth == 16) return decode<std::uint16_t>(bytes, header, Decoder::Output::kGrey);
-  PRESCENE_TRY(const geometry::Image<std::uint8_t> small, decode<std::uint8_t>(bytes, header, Decoder::Output::kGrey));
+  if (header.bit_depth == 16) return decode<std::uint16_t>(bytes, header, PngDecoder::Output::kGrey);
+  PRESCENE_TRY(const geometry::Image<std::uint8_t> small,
+               decode<std::uint8_t>(bytes, header, PngDecoder::Output::kGrey));
   LabelImage labels(small.width(), small.height());
   for (std::size_t i = 0; i < small.size(); ++i) labels.data()[i] = small.data()[i];
   return labels;

@@ -12,7 +12,7 @@
 namespace prescene::interfaces {
 namespace {
 
-constexpr int kMaxSide = 1 << 24;
+constexpr int kMaxPngSide = 1 << 24;
 
 void append(png_structp png, png_bytep data, std::size_t count) {
   auto* out = static_cast<std::vector<std::uint8_t>*>(png_get_io_ptr(png));
@@ -28,14 +28,15 @@ void on_warning(png_structp /*png*/, png_const_charp /*message*/) {}
 
 template <class Pixel>
 std::vector<std::uint8_t> encode(geometry::ImageView<const Pixel> image, int color_type, int bit_depth) {
-  PRESCENE_CHECK(image.width() > 0 && image.width() <= kMaxSide && image.height() > 0 && image.height() <= kMaxSide);
+  PRESCENE_CHECK(image.width() > 0 && image.width() <= kMaxPngSide && image.height() > 0 &&
+                 image.height() <= kMaxPngSide);
   std::vector<std::uint8_t> out;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
   PRESCENE_CHECK(png != nullptr);
   png_infop info = png_create_info_struct(png);
   PRESCENE_CHECK(info != nullptr);
   png_set_write_fn(png, &out, append, nullptr);
-  png_set_user_limits(png, kMaxSide, kMaxSide);
+  png_set_user_limits(png, kMaxPngSide, kMaxPngSide);
   png_set_IHDR(png, info, static_cast<png_uint_32>(image.width()), static_cast<png_uint_32>(image.height()), bit_depth,
                color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);

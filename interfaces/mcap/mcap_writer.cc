@@ -20,7 +20,7 @@ using core::Result;
 using core::Status;
 namespace records = mcap_records;
 
-constexpr std::size_t kMaxIds = 65535;
+constexpr std::size_t kMostIds = 65535;
 
 void add_time(std::uint64_t time, std::uint64_t count_before, std::uint64_t* start, std::uint64_t* end) {
   *start = count_before == 0 ? time : std::min(*start, time);
@@ -169,7 +169,7 @@ Result<int> McapWriter::add_channel(const McapChannel& channel) {
   PRESCENE_CHECK(!impl.closed);
   const auto known = std::find(impl.channels.begin(), impl.channels.end(), channel);
   if (known != impl.channels.end()) return static_cast<int>(known - impl.channels.begin());
-  if (impl.channels.size() == kMaxIds) {
+  if (impl.channels.size() == kMostIds) {
     return core::resource_exhausted(impl.file.path().string() + ": a recording has at most 65535 channels");
   }
   records::Channel record{static_cast<std::uint16_t>(impl.channels.size() + 1), 0, channel.topic,

@@ -21,10 +21,10 @@ constexpr std::uint32_t kRefusal = 2;   // The importer says that the file is wr
 constexpr std::uint32_t kTooLarge = 3;  // More than the options allow.
 constexpr std::size_t kMaxText = 400;
 constexpr std::size_t kVertexBytes = 3 * sizeof(double);
-constexpr std::size_t kTriangleBytes = 3 * sizeof(std::uint32_t);
+constexpr std::size_t kCornersBytes = 3 * sizeof(std::uint32_t);
 
 static_assert(sizeof(geometry::Vector3d) == kVertexBytes);
-static_assert(sizeof(std::array<std::uint32_t, 3>) == kTriangleBytes);
+static_assert(sizeof(std::array<std::uint32_t, 3>) == kCornersBytes);
 
 // Both ends are one program on one machine, so numbers keep its byte order.
 template <class T>
@@ -56,7 +56,7 @@ Result<ImportedMesh> read_mesh_reply(ByteReader in, const MeshReadOptions& optio
   const auto triangles = in.read<std::uint64_t>();
   if (!in.ok()) return garbled();
   PRESCENE_RETURN_IF_ERROR(check_triangle_count(std::max(vertices, triangles), options));
-  if (in.remaining() != vertices * kVertexBytes + triangles * kTriangleBytes) return garbled();
+  if (in.remaining() != vertices * kVertexBytes + triangles * kCornersBytes) return garbled();
   out.mesh.vertices.resize(vertices);
   for (geometry::Vector3d& vertex : out.mesh.vertices) {
     for (double& x : vertex) x = in.read<double>();
@@ -86,7 +86,7 @@ void send_reply(const Result<ImportedMesh>& imported, ChildOutput& out) {
   send(std::uint64_t{mesh.vertices.size()}, out);
   send(std::uint64_t{mesh.triangles.size()}, out);
   out.write({reinterpret_cast<const std::uint8_t*>(mesh.vertices.data()), mesh.vertices.size() * kVertexBytes});
-  out.write({reinterpret_cast<const std::uint8_t*>(mesh.triangles.data()), mesh.triangles.size() * kTriangleBytes});
+  out.write({reinterpret_cast<const std::uint8_t*>(mesh.triangles.data()), mesh.triangles.size() * kCornersBytes});
 }
 
 Result<ImportedMesh> decode_reply(std::span<const std::uint8_t> bytes, const MeshReadOptions& options) {
@@ -103,7 +103,7 @@ Result<ImportedMesh> decode_reply(std::span<const std::uint8_t> bytes, const Mes
 }
 
 std::size_t largest_reply(const MeshReadOptions& options) {
-  return (kVertexBytes + kTriangleBytes) * options.max_triangles + 2 * kMaxText;
+  return (kVertexBytes + kCornersBytes) * options.max_triangles + 2 * kMaxText;
 }
 
 }  // namespace prescene::interfaces

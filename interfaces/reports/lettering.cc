@@ -16,11 +16,6 @@ using Eigen::Vector2d;
 using geometry::ColorImage;
 using geometry::Rgb;
 
-void mix(Rgb& pixel, const Rgb& color, double share) {
-  for (std::size_t c = 0; c < 3; ++c)
-    pixel[c] = static_cast<std::uint8_t>(std::lround((1.0 - share) * pixel[c] + share * color[c]));
-}
-
 /// How much of each pixel a shape covers; the union of what is added.
 class Coverage {
  public:
@@ -258,6 +253,11 @@ Vector2d left_end(std::string_view text, const Vector2d& at, double height, Text
 }
 
 }  // namespace
+
+void mix(Rgb& pixel, const Rgb& color, double share) {
+  for (std::size_t c = 0; c < 3; ++c)
+    pixel[c] = static_cast<std::uint8_t>(std::lround((1.0 - share) * pixel[c] + share * color[c]));
+}
 
 void draw_line(std::span<const Vector2d> points, double width, const Rgb& color, double opacity, ColorImage& picture) {
   Vector2d low(1e9, 1e9), high(-1e9, -1e9);

@@ -15,6 +15,8 @@
 
 namespace prescene::interfaces {
 
+/// `share` of `color` over the pixel, 0 to 1.
+void mix(geometry::Rgb& pixel, const geometry::Rgb& color, double share);
 /// A line through points (pixels; x right, y down; pixel centres at integers) with round joints and ends, `width`
 /// pixels wide. What lies outside of the picture is left out; points that are not finite break the line.
 void draw_line(std::span<const Eigen::Vector2d> points, double width, const geometry::Rgb& color, double opacity,

@@ -6,17 +6,13 @@
 #include <cmath>
 
 #include "prescene/core/check.h"
+#include "prescene/interfaces/reports/lettering.h"
 
 namespace prescene::interfaces {
 namespace {
 
 using geometry::ColorImage;
 using geometry::Rgb;
-
-void mix(Rgb& pixel, const Rgb& color, double share) {
-  for (std::size_t c = 0; c < 3; ++c)
-    pixel[c] = static_cast<std::uint8_t>(std::lround((1.0 - share) * pixel[c] + share * color[c]));
-}
 
 /// Samples an image of the same view and any size at the picture's pixels.
 template <class Pixel>

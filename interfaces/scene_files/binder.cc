@@ -8,6 +8,7 @@
 
 #include "prescene/core/spelling.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -18,7 +19,6 @@ struct Unit {
   std::string_view base;
   double factor;
 };
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::array kUnits{Unit{"mm", "m", 1e-3},
                             Unit{"cm", "m", 1e-2},
                             Unit{"m", "m", 1.0},
@@ -28,12 +28,12 @@ constexpr std::array kUnits{Unit{"mm", "m", 1e-3},
                             Unit{"ms", "s", 1e-3},
                             Unit{"s", "s", 1.0},
                             Unit{"min", "s", 60.0},
-                            Unit{"deg", "rad", kDegree},
+                            Unit{"deg", "rad", geometry::kDegree},
                             Unit{"rad", "rad", 1.0},
                             Unit{"deg", "deg", 1.0},
-                            Unit{"rad", "deg", 1.0 / kDegree},
+                            Unit{"rad", "deg", 1.0 / geometry::kDegree},
                             Unit{"°", "deg", 1.0},
-                            Unit{"°", "rad", kDegree}};
+                            Unit{"°", "rad", geometry::kDegree}};
 
 // "5 cm" where metres are needed: "write 0.05".
 std::optional<std::string> converted(std::string_view text, std::string_view base) {
@@ -56,7 +56,7 @@ std::string unit_guess(double number, const NumberRange& range) {
     double factor;
   };
   static constexpr std::array kGuesses{Guess{"m", "millimetres", 1e-3}, Guess{"kg", "grams", 1e-3},
-                                       Guess{"s", "milliseconds", 1e-3}, Guess{"rad", "degrees", kDegree}};
+                                       Guess{"s", "milliseconds", 1e-3}, Guess{"rad", "degrees", geometry::kDegree}};
   for (const Guess& guess : kGuesses) {
     const double meant = number * guess.factor;
     if (guess.base == range.unit && std::abs(number) > std::abs(meant) && meant >= range.low && meant <= range.high)

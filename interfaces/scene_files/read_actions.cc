@@ -2,6 +2,7 @@
 #include <numbers>
 #include <set>
 
+#include "prescene/geometry/angles.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "read_scene_parts.h"
 
@@ -9,8 +10,6 @@ namespace prescene::interfaces {
 namespace {
 
 using geometry::Vector3d;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 class ActionReader {
  public:
@@ -113,7 +112,7 @@ class ActionReader {
     if (const LocatedValue* at = fields.require("angle_deg", "give by how many degrees it is turned"))
       angle_deg =
           read_number(*at, problems_, {-360.0, 360.0, "give degrees between -360 and 360", "deg"}).value_or(0.0);
-    pour.angle = kDegree * angle_deg;
+    pour.angle = geometry::kDegree * angle_deg;
     fields.read("duration", pour.duration, kDuration);
     return pour;
   }

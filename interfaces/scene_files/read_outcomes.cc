@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "prescene/belief/validation.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "read_scene_parts.h"
 
@@ -13,7 +14,6 @@ using belief::Condition;
 using belief::When;
 using geometry::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr NumberRange kTurn{0.0, 180.0, "give degrees between 0 and 180", "deg"};
 constexpr NumberRange kDistance{0.0, 1000.0, "give metres between 0 and 1000", "m"};
 
@@ -94,7 +94,7 @@ class ConditionReader {
     if (key == "moved_more_than")
       return {belief::MovedMoreThan{read_number(value, problems_, kDistance).value_or(0.0)}};
     if (key == "turned_more_than_deg")
-      return {belief::TurnedMoreThan{kDegree * read_number(value, problems_, kTurn).value_or(0.0)}};
+      return {belief::TurnedMoreThan{geometry::kDegree * read_number(value, problems_, kTurn).value_or(0.0)}};
     if (key == "touched") return {belief::Touched{read_thing(value)}};
     Condition moving{belief::StillMoving{}};
     moving.negated = !read_bool(value, problems_).value_or(true);
@@ -147,7 +147,7 @@ class ConditionReader {
     belief::UprightWithin upright;
     Binder binder(value, problems_);
     if (const LocatedValue* at = binder.require("within_deg", "give the largest angle to the vertical in degrees"))
-      upright.max_angle = kDegree * read_number(*at, problems_, kTurn).value_or(15.0);
+      upright.max_angle = geometry::kDegree * read_number(*at, problems_, kTurn).value_or(15.0);
     if (const LocatedValue* at = binder.find("axis")) upright.axis_O = read_axis(*at, problems_);
     return upright;
   }

@@ -8,6 +8,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -24,7 +25,6 @@ using geometry::Quaterniond;
 using geometry::Vector3d;
 using geometry::Vector6d;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::size_t kMostSamples = 100'000;
 
 constexpr const char* kScalarForms =
@@ -154,7 +154,8 @@ belief::PoseDistribution read_normal_pose(const LocatedValue& value, Problems& p
                  "give 'position' (m), 'rotation_deg' or 'covariance'");
   Vector6d deviations = Vector6d::Zero();
   if (rotation)
-    deviations.head<3>() = kDegree * read_deviations(*rotation, problems, {-180.0, 180.0, "give degrees", "deg"});
+    deviations.head<3>() =
+        geometry::kDegree * read_deviations(*rotation, problems, {-180.0, 180.0, "give degrees", "deg"});
   if (position) deviations.tail<3>() = read_deviations(*position, problems, kPosition);
   normal.covariance = deviations.cwiseAbs2().asDiagonal();
   return normal;
@@ -252,7 +253,7 @@ Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
   if (!form) return Quaterniond::Identity();
   if (which == "quaternion") return read_quaternion(*form, problems);
   if (which == "euler_deg") {
-    const Vector3d angles = kDegree * read_vector(*form, problems, kAngleDeg);
+    const Vector3d angles = geometry::kDegree * read_vector(*form, problems, kAngleDeg);
     return Quaterniond(Eigen::AngleAxisd(angles.z(), Vector3d::UnitZ()) *
                        Eigen::AngleAxisd(angles.y(), Vector3d::UnitY()) *
                        Eigen::AngleAxisd(angles.x(), Vector3d::UnitX()));
@@ -264,7 +265,7 @@ Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
     problems.add(form->place, form->path, "the axis has no direction", "give an axis of some length");
     return Quaterniond::Identity();
   }
-  return Quaterniond(Eigen::AngleAxisd(kDegree * (*numbers)[3], axis.normalized()));
+  return Quaterniond(Eigen::AngleAxisd(geometry::kDegree * (*numbers)[3], axis.normalized()));
 }
 
 Pose read_pose_keys(Binder& binder) {

@@ -11,7 +11,7 @@
 namespace prescene::service {
 namespace {
 
-struct Options {
+struct AskOptions {
   std::string kind;
   std::string object;
   std::string json;
@@ -19,7 +19,7 @@ struct Options {
   interfaces::DdsOptions dds;
 };
 
-core::Result<nlohmann::ordered_json> question_of(const Options& options) {
+core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
   if (!options.json.empty()) {
     const auto question = parse_or_discard(options.json);
     if (!question.is_object()) return core::invalid_input("--question: not a JSON object (docs/queries.md)");
@@ -45,7 +45,7 @@ core::Result<nlohmann::ordered_json> question_of(const Options& options) {
   return core::invalid_input("ask where | stability OBJECT | release OBJECT, or --question JSON");
 }
 
-core::Status run(const Options& options, VerbContext& context) {
+core::Status run(const AskOptions& options, VerbContext& context) {
   PRESCENE_TRY(const auto question, question_of(options));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
   PRESCENE_TRY(const std::string text,
@@ -61,7 +61,7 @@ core::Status run(const Options& options, VerbContext& context) {
 
 Verb add_ask_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("ask", "Ask a running `serve`: where | stability OBJECT | release OBJECT");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<AskOptions>();
   verb->add_option("KIND", options->kind,
                    "where: poses and confidence; stability: does it stay; release: what if it is let go")
       ->check(utf8_text());

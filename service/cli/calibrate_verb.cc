@@ -16,7 +16,7 @@ namespace {
 
 using core::fixed_text;
 
-struct Options {
+struct CalibrateOptions {
   std::string name;
   std::string data;
   std::string output;
@@ -56,7 +56,7 @@ std::string text_of(const nlohmann::ordered_json& start, const nlohmann::ordered
 }
 
 /// cube_tosses: the model that evaluate forecasts with.
-core::Status run_cube(const Options& options, VerbContext& context) {
+core::Status run_cube(const CalibrateOptions& options, VerbContext& context) {
   const std::map<std::string, CubeModel> starts = {
       {"measured", measured_cube_model()}, {"described", described_cube_model()}, {"shipped", shipped_cube_model()}};
   if (!options.output.empty() || !options.keep.empty())
@@ -130,7 +130,7 @@ std::string text_of(const ObjectCalibration& found) {
 }
 
 /// A folder with recordings of somebody's own object.
-core::Status run_folder(const Options& options, VerbContext& context) {
+core::Status run_folder(const CalibrateOptions& options, VerbContext& context) {
   if (options.output.empty()) return core::invalid_input("-o is missing: name the model file to write");
   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(options.name, context.log()));
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, dataset.inputs));
@@ -154,7 +154,7 @@ core::Status run_folder(const Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
-core::Status run(const Options& options, VerbContext& context) {
+core::Status run(const CalibrateOptions& options, VerbContext& context) {
   if (options.name == "cube_tosses" && !options.data.empty()) return run_cube(options, context);
   if (!options.data.empty()) return core::invalid_input("--data goes with cube_tosses only; give the folder itself");
   if (options.name == "cube_tosses" && !std::filesystem::exists(options.name))
@@ -168,7 +168,7 @@ core::Status run(const Options& options, VerbContext& context) {
 
 Verb add_calibrate_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("calibrate", "Fits an object's model to recorded motion of it (docs/calibration.md)");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   verb->add_option("DATASET", options->name, "Folder with scene.yaml and tosses.csv; or cube_tosses, with --data")
       ->required();
   verb->add_option("-o,--output", options->output,

@@ -17,7 +17,7 @@ namespace {
 
 using core::fixed_text;
 
-struct Options {
+struct EvaluateOptions {
   std::string name;
   std::string data;
   std::string split = "report";
@@ -89,7 +89,7 @@ std::string text_of(const CredibleRegionReport& report) {
   return table(rows);
 }
 
-core::Status run(const Options& options, VerbContext& context) {
+core::Status run(const EvaluateOptions& options, VerbContext& context) {
   if (options.name != "credible_regions" && options.data.empty())
     return core::invalid_input("evaluate " + options.name + " needs recorded data: name its folder with --data");
   const std::filesystem::path folder = std::filesystem::path(options.data) / options.name;
@@ -134,7 +134,7 @@ core::Status run(const Options& options, VerbContext& context) {
 Verb add_evaluate_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
       "evaluate", "Figures on real data, and of the likelihood's calibration on simulated frames (docs/accuracy.md)");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateOptions>();
   verb->add_option("NAME", options->name,
                    "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
                    "the transparent material explains better than the opaque one), or credible_regions (tempering, on "

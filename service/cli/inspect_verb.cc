@@ -18,7 +18,7 @@ namespace {
 
 using core::fixed_text;
 
-struct Options {
+struct InspectOptions {
   std::string file;
   std::string model;
   std::string use;
@@ -40,7 +40,7 @@ bool is_recording(const std::filesystem::path& path) {
 }
 
 /// kInvalidInput for an option that is for the other kind of file.
-core::Status check_options(const Options& options, bool recording) {
+core::Status check_options(const InspectOptions& options, bool recording) {
   for (const char* name :
        recording ? std::span<const char* const>(kMeshOptions) : std::span<const char* const>(kRecordingOptions))
     if (options.verb->count(name) > 0)
@@ -123,7 +123,7 @@ std::string text_of(const DepthNoise& noise) {
   return text;
 }
 
-core::Status inspect_mesh(Options& options, VerbContext& context) {
+core::Status inspect_mesh(InspectOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.file}));
   PRESCENE_RETURN_IF_ERROR(check_apart("-o", options.model, "--report", options.report));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.file}));
@@ -151,7 +151,7 @@ core::Status inspect_mesh(Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
-core::Status run(Options& options, VerbContext& context) {
+core::Status run(InspectOptions& options, VerbContext& context) {
   const bool recording = is_recording(options.file);
   PRESCENE_RETURN_IF_ERROR(check_options(options, recording));
   if (!recording) return inspect_mesh(options, context);
@@ -176,7 +176,7 @@ Verb add_inspect_verb(CLI::App& app) {
       "inspect",
       "What a mesh holds (scale, closedness, mass, symmetry, how it can lie), and a model file of it; or what is "
       "believed at a frame of a recording, and why");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InspectOptions>();
   verb->add_option("FILE", options->file,
                    "Mesh (PLY, OBJ, STL, glTF, COLLADA), or recording (.mcap, or a folder of images)")
       ->required();

@@ -20,7 +20,7 @@ namespace {
 
 using core::fixed_text;
 
-struct Options {
+struct PredictOptions {
   std::string scene;
   std::string report;
   std::string stepper = "automatic";
@@ -126,7 +126,7 @@ std::optional<double> seconds_of(const std::string& text) {
 }
 
 /// What is printed and drawn decides what is asked for; what is not shown is not worked out.
-belief::PredictDetail detail_of(const Options& options, bool json) {
+belief::PredictDetail detail_of(const PredictOptions& options, bool json) {
   belief::PredictDetail tell;
   const bool pictures = !options.report.empty() || !options.heat_map.empty();
   const bool full = (json && !options.outcomes_only) || pictures;
@@ -141,7 +141,7 @@ belief::PredictDetail detail_of(const Options& options, bool json) {
   return tell;
 }
 
-core::Status run(const Options& options, VerbContext& context) {
+core::Status run(const PredictOptions& options, VerbContext& context) {
   if (options.outcomes_only && (!context.options().json || !options.report.empty() || !options.heat_map.empty()))
     return core::invalid_input(
         "--outcomes-only is for --json without --report and --heat-map, which show where things end: leave it out (the "
@@ -187,7 +187,7 @@ core::Status run(const Options& options, VerbContext& context) {
 
 Verb add_predict_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("predict", "What happens in a scene: probabilities of its outcomes, with intervals");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PredictOptions>();
   verb->add_option("SCENE", options->scene, "Scene file (docs/scene_files.md)")->required();
   verb->add_option("--tolerance", options->effort.tolerance, "Half width of the intervals to reach")
       ->check(in_range(belief::kTolerances))

@@ -10,7 +10,7 @@
 namespace prescene::service {
 namespace {
 
-struct Options {
+struct RecordOptions {
   std::string output;
   std::string simulate;
   SimulatedRecordingOptions simulation;
@@ -18,7 +18,7 @@ struct Options {
   InputTopics topics;
 };
 
-core::Status record_simulation(const Options& options, VerbContext& context) {
+core::Status record_simulation(const RecordOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, {options.simulate}));
   PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log()));
@@ -34,7 +34,7 @@ core::Status record_simulation(const Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
-core::Status record_bus(const Options& options, VerbContext& context) {
+core::Status record_bus(const RecordOptions& options, VerbContext& context) {
   const std::string output = live_recording_path(options.output, context);
   PRESCENE_TRY(const auto recording, RecordingWriter::create(output, {"", "", context.options().seed, ""}));
   PRESCENE_TRY(const std::uint64_t messages,
@@ -48,7 +48,7 @@ core::Status record_bus(const Options& options, VerbContext& context) {
 
 Verb add_record_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("record", "Record the robot's topics, or a scene as a simulated robot would see it");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordOptions>();
   verb->add_option("-o,--output", options->output, "Recording to write (MCAP)")->check(file_name())->required();
   verb->add_option("--simulate", options->simulate,
                    "Scene file to play with a simulated RGB-D camera, instead of listening")

@@ -21,7 +21,7 @@ namespace {
 using core::fixed_text;
 using nlohmann::ordered_json;
 
-struct Options {
+struct ReplayOptions {
   std::string input;
   BackendSettings backends;
   std::string scene;
@@ -47,22 +47,22 @@ core::Result<TimedQuestion> timed_question(const std::string& text) {
   return TimedQuestion{at, text.substr(colon + 1)};
 }
 
-ReplayInputOptions input_of(const Options& options) {
+ReplayInputOptions input_of(const ReplayOptions& options) {
   return {options.input, options.scene, options.depth_scale, options.frame_rate, options.read};
 }
 
 /// What the recording was made with, but for what the command line says otherwise.
-core::Result<TrackerSettings> settings_of(const Options& options, const ReplayInput& input) {
+core::Result<TrackerSettings> settings_of(const ReplayOptions& options, const ReplayInput& input) {
   if (!input.has_settings()) return options.tracker;
   PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
   return with_given(*options.verb, std::move(recorded), options.tracker);
 }
 
-void tell_unchecked(const Options& options, const std::string& unchecked, VerbContext& context) {
+void tell_unchecked(const ReplayOptions& options, const std::string& unchecked, VerbContext& context) {
   if (!unchecked.empty()) core::log(context.log(), core::LogLevel::kInfo, options.input + ": " + unchecked);
 }
 
-core::Status run_over_dds(Options& options, VerbContext& context) {
+core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
   PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   for (const std::string& text : options.questions) {
@@ -129,7 +129,7 @@ core::Status run_over_dds(Options& options, VerbContext& context) {
   return core::ok_status();
 }
 
-core::Status run_here(Options& options, VerbContext& context) {
+core::Status run_here(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
   PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   Backends backends(context.pool(), options.backends);
@@ -221,7 +221,7 @@ core::Status run_here(Options& options, VerbContext& context) {
 Verb add_replay_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
       "replay", "Replay a recording or a folder of images: here, or onto the bus for a running `serve`");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   verb->add_option("RECORDING", options->input,
                    "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
       ->required();

@@ -10,14 +10,14 @@
 namespace prescene::service {
 namespace {
 
-struct Options {
+struct ServeOptions {
   std::string scene;
   std::string record;
   LiveSettings settings;
   BackendSettings backends;
 };
 
-core::Status run(Options& options, VerbContext& context) {
+core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(validate(options.settings.tracker.topics));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
@@ -41,7 +41,7 @@ core::Status run(Options& options, VerbContext& context) {
 
 Verb add_serve_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("serve", "Track a scene live: listen on DDS, publish the belief, answer questions");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ServeOptions>();
   verb->add_option("--scene", options->scene, "Scene file: models, supports, robot, objects (docs/scene_files.md)")
       ->required();
   verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)")

@@ -13,7 +13,7 @@ namespace prescene::service {
 namespace {
 
 constexpr std::size_t kLeastFlight = 8;
-constexpr std::size_t kLastFrames = 5;
+constexpr std::size_t kRestFrames = 5;
 // Of the search's steps, each after a round without gain.
 constexpr int kHalvings = 3;
 
@@ -55,7 +55,7 @@ core::Result<CubeMeasurements> measure_cube(const std::vector<CubeToss>& tosses,
   double weighted = 0.0;
   std::vector<std::pair<double, double>> estimates;
   for (const CubeToss& toss : tosses) {
-    for (std::size_t i = toss.frames.size() - std::min(kLastFrames, toss.frames.size()); i < toss.frames.size(); ++i) {
+    for (std::size_t i = toss.frames.size() - std::min(kRestFrames, toss.frames.size()); i < toss.frames.size(); ++i) {
       heights.push_back(toss.frames[i].X_WO.translation.z());
     }
     std::size_t flight = 0;

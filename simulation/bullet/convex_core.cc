@@ -17,7 +17,7 @@ constexpr int kCapPoints = 12;
 constexpr double kFlatCap = 1e-3;
 
 // std::hypot is too slow here.
-double length_of(double x, double y) { return std::sqrt(x * x + y * y); }
+double hypotenuse(double x, double y) { return std::sqrt(x * x + y * y); }
 
 double core_radius(double rounding, double thinnest) { return std::min(rounding, kLargestShare * thinnest); }
 
@@ -132,13 +132,13 @@ Vector3d ConvexCore::support(const Vector3d& d) const {
       return vertices[best];
     }
     case Kind::kCylinder: {
-      const double s = length_of(d.x(), d.y());
+      const double s = hypotenuse(d.x(), d.y());
       const double z = d.z() >= 0.0 ? half_.y() : half_.z();
       if (s == 0.0) return {half_.x(), 0.0, z};
       return {half_.x() * d.x() / s, half_.x() * d.y() / s, z};
     }
     case Kind::kCone: {
-      const double s = length_of(d.x(), d.y());
+      const double s = hypotenuse(d.x(), d.y());
       const double tip = d.z() * half_.y();
       const double rim = s * half_.x() + d.z() * half_.z();
       if (tip > rim) return {0.0, 0.0, half_.y()};
@@ -159,7 +159,7 @@ Vector3d ConvexCore::support(const Vector3d& d) const {
 void ConvexCore::cap(double z, const Vector3d& direction, Feature& feature) const {
   // One point lies where the rim is lowest in `direction`, so that a tilted rim touches where it should. A flat cap
   // keeps its points: where it is lowest would be noise, and contacts that jump about never come to rest.
-  const bool tilted = length_of(direction.x(), direction.y()) > kFlatCap;
+  const bool tilted = hypotenuse(direction.x(), direction.y()) > kFlatCap;
   const double start = tilted ? std::atan2(direction.y(), direction.x()) : 0.0;
   const double turn = (z > 0.0 ? 2.0 : -2.0) * std::numbers::pi / kCapPoints;
   for (int i = 0; i < kCapPoints; ++i) {
@@ -215,7 +215,7 @@ void ConvexCore::facing(const Vector3d& d, Feature& feature) const {
       break;
     }
     case Kind::kCylinder: {
-      const double s = length_of(d.x(), d.y());
+      const double s = hypotenuse(d.x(), d.y());
       if (std::abs(d.z()) > s) {
         cap(d.z() > 0.0 ? half_.y() : half_.z(), d, feature);
       } else {
@@ -227,7 +227,7 @@ void ConvexCore::facing(const Vector3d& d, Feature& feature) const {
       break;
     }
     case Kind::kCone: {
-      const double s = length_of(d.x(), d.y());
+      const double s = hypotenuse(d.x(), d.y());
       const double height = half_.y() - half_.z();
       const double slant = std::hypot(half_.x(), height);
       const double side = (s * height + d.z() * half_.x()) / slant;  // alignment with the side's normal

@@ -19,8 +19,8 @@ constexpr double kRunAway = 3.0;
 constexpr double kLeastDrop = 0.25;
 // Time constants of an upright rod on its tip: it turns 6 times as far, a fat body still more than kRunAway times.
 constexpr double kTimeConstants = 2.5;
-constexpr double kShortest = 0.1;  // s
-constexpr double kLongest = 1.0;
+constexpr double kShortestWindow = 0.1;  // s
+constexpr double kLongestWindow = 1.0;
 // m: whatever sinks by this much did not rest.
 constexpr double kSunk = 2e-3;
 constexpr int kNudgeAxes = 4;
@@ -110,7 +110,7 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
     if (i == object) tallest = before_.back().height;
   }
   const double time_constant = std::sqrt(4.0 / 3.0 * tallest / gravity.norm());
-  const double time = std::clamp(kTimeConstants * time_constant, kShortest, kLongest);
+  const double time = std::clamp(kTimeConstants * time_constant, kShortestWindow, kLongestWindow);
   const int steps = static_cast<int>(std::ceil(time / world.dt()));
 
   const auto runs_away = [&](int i) {

@@ -17,7 +17,7 @@ using collision::SurfaceSpheres;
 // Patches whose normals agree by more than this cosine are of the same side of two bodies and don't meet.
 constexpr double kSameSide = 0.2;
 // Gaps that differ by less (m) are equal: the first pair of them counts.
-constexpr double kSameGap = 1e-9;
+constexpr double kSameSphereGap = 1e-9;
 constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
 /// A patch and what was found for it.
@@ -114,7 +114,7 @@ struct SphereContactFinder::Pairs {
     const auto index = static_cast<std::uint32_t>(contacts.size());
     contacts.push_back({point, index_a, index_b});
     for (Candidate* c : {&a[index_a], &b[index_b]})
-      if (c->contact == kNone || point.gap < contacts[c->contact].point.gap - kSameGap) c->contact = index;
+      if (c->contact == kNone || point.gap < contacts[c->contact].point.gap - kSameSphereGap) c->contact = index;
   }
 };
 

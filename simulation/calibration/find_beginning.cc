@@ -46,10 +46,10 @@ core::Status check(const std::vector<TimedPose>& frames) {
 
 std::string millimetres(double metres) { return core::fixed_text(1e3 * metres, metres < 0.0095 ? 1 : 0) + " mm"; }
 
-class Beginning {
+class BeginningFit {
  public:
-  Beginning(const std::vector<TimedPose>& frames, const belief::Scene& scene, const Simulator& simulator,
-            core::ThreadPool& pool, double position_noise)
+  BeginningFit(const std::vector<TimedPose>& frames, const belief::Scene& scene, const Simulator& simulator,
+               core::ThreadPool& pool, double position_noise)
       : frames_(frames),
         scene_(scene),
         simulator_(simulator),
@@ -159,7 +159,7 @@ class Beginning {
 core::Result<RecordedMotion> find_beginning(std::string name, std::vector<TimedPose> frames, const belief::Scene& scene,
                                             const Simulator& simulator, core::ThreadPool& pool, double position_noise) {
   if (core::Status status = check(frames); !status.ok()) return status.at(name);
-  const auto found = Beginning(frames, scene, simulator, pool, position_noise).find();
+  const auto found = BeginningFit(frames, scene, simulator, pool, position_noise).find();
   if (!found) return found.status().at(name);
   return RecordedMotion{std::move(name), std::move(frames), found->first, found->second};
 }

@@ -15,6 +15,7 @@
 
 #include "flight_cost.h"
 #include "observed_flight.h"
+#include "prescene/core/order_statistics.h"
 #include "prescene/simulation/calibration/keep_untold.h"
 
 namespace prescene::simulation {
@@ -45,12 +46,6 @@ core::Status check(const FlightPrior& prior) {
   if ((J - J.transpose()).cwiseAbs().maxCoeff() > 1e-9 * J.cwiseAbs().maxCoeff() || J.llt().info() != Eigen::Success)
     return core::invalid_input("the prior's inertia is not symmetric and positive definite");
   return core::ok_status();
-}
-
-double median(std::vector<double>* values) {
-  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
 }
 
 /// The estimation under way.
@@ -180,8 +175,8 @@ class FlightFit {
     // A normal number's median size; half of each flight's motion was fitted to either kind of error.
     const auto all = static_cast<double>(3 * frames);
     const double freed = std::sqrt(all / (all - 0.5 * kFlightMotion * static_cast<double>(flights_.size())));
-    position_noise_ = std::max(kLeastNoise, 1.4826 * freed * median(&of_positions));
-    rotation_noise_ = std::max(kLeastNoise, 1.4826 * freed * median(&of_rotations));
+    position_noise_ = std::max(kLeastNoise, 1.4826 * freed * core::upper_median(of_positions));
+    rotation_noise_ = std::max(kLeastNoise, 1.4826 * freed * core::upper_median(of_rotations));
     const auto weight = [](const double* error, double noise) {
       const double size = Eigen::Map<const Vector3d>(error).norm() / noise;
       return std::sqrt(size > kHuber ? kHuber / size : 1.0) / noise;

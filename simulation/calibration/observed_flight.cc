@@ -10,7 +10,7 @@ namespace prescene::simulation {
 namespace {
 
 // Of the rotation that is integrated at once, rad.
-constexpr double kLongestStep = 0.15;
+constexpr double kLongestInterval = 0.15;
 
 }  // namespace
 
@@ -34,7 +34,7 @@ core::Result<ObservedFlight> observed_flight(std::span<const TimedPose> poses, s
         return core::invalid_input(place + ": more than a quarter turn before pose " + std::to_string(i) +
                                    "; give frames closer together");
       }
-      const int steps = 1 + static_cast<int>(turn / kLongestStep);
+      const int steps = 1 + static_cast<int>(turn / kLongestInterval);
       frame.steps = steps;
       // What lies before the middle is reached from the frame after it.
       if (i <= flight.middle) flight.frames.back().steps = steps;

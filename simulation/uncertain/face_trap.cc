@@ -10,7 +10,7 @@ namespace prescene::simulation {
 namespace {
 
 // m: how deep resting bodies sink into what they lie on, and more.
-constexpr double kSunk = 2e-3;
+constexpr double kFaceSunk = 2e-3;
 
 }  // namespace
 
@@ -81,7 +81,7 @@ std::optional<Trap> trap_of(const ConvexPolytope& hull, const Pose& X_WO, const 
   const Vector3d down_O = X_WO.rotation.conjugate() * Vector3d(0.0, 0.0, -1.0);
   double reach = 0.0;
   for (const Vector3d& v : hull.vertices) reach = std::max(reach, down_O.dot(v - center_of_mass_O));
-  if ((X_WO * center_of_mass_O).z() - reach < plane_height - kSunk) return std::nullopt;
+  if ((X_WO * center_of_mass_O).z() - reach < plane_height - kFaceSunk) return std::nullopt;
 
   // The face through which the vertical below the centre of mass leaves the body.
   const ConvexPolytope::Face* below = nullptr;

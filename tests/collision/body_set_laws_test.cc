@@ -15,7 +15,7 @@
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::body_set_laws_test {
 namespace {
 
 using geometry::Pose;
@@ -136,4 +136,4 @@ TEST(BodySets, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::body_set_laws_test

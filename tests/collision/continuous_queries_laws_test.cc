@@ -19,7 +19,7 @@
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::continuous_queries_laws_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -446,4 +446,4 @@ TEST(ContinuousQueriesScratch, DoesNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::continuous_queries_laws_test

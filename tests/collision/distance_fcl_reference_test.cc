@@ -15,7 +15,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::distance_fcl_reference_test {
 namespace {
 
 using tests::PlacementMethod;
@@ -90,4 +90,4 @@ TEST(DistancesOfMadePairs, AreThoseOfFcl) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::distance_fcl_reference_test

@@ -19,7 +19,7 @@
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::distance_queries_laws_test {
 namespace {
 
 // Of the nearest pair in single precision: distance_queries.h.
@@ -326,4 +326,4 @@ TEST_F(DistanceQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::distance_queries_laws_test

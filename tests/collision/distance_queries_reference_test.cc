@@ -20,7 +20,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::distance_queries_reference_test {
 namespace {
 
 using tests::PlacementMethod;
@@ -120,4 +120,4 @@ TEST(MadeDistances, AreLeast) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::distance_queries_reference_test

@@ -11,7 +11,7 @@
 #include "prescene/collision/exact_triangles.h"
 #include "rational_reference.h"
 
-namespace prescene::collision {
+namespace prescene::collision::exact_triangles_reference_test {
 namespace {
 
 constexpr int kPairsOfAKind = 3000;
@@ -81,4 +81,4 @@ TEST(ExactTriangles, AnswerWhatIsKnown) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::exact_triangles_reference_test

@@ -8,7 +8,7 @@
 
 #include "prescene/core/random.h"
 
-namespace prescene::collision {
+namespace prescene::collision::hierarchy_laws_test {
 namespace {
 
 std::vector<Item> random_items(std::size_t count, std::uint64_t seed) {
@@ -159,4 +159,4 @@ TEST_P(HierarchyLaws, EndsForAMillionItems) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::hierarchy_laws_test

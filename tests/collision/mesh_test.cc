@@ -7,7 +7,7 @@
 
 #include "prescene/geometry/primitives.h"
 
-namespace prescene::collision {
+namespace prescene::collision::mesh_test {
 namespace {
 
 using ::testing::AllOf;
@@ -80,4 +80,4 @@ TEST(Mesh, HashesItsContentAndNotItsName) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::mesh_test

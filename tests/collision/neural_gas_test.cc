@@ -9,7 +9,7 @@
 #include "prescene/core/random.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::neural_gas_test {
 namespace {
 
 Item point(float x, float y, float z, float weight) {
@@ -79,4 +79,4 @@ TEST(NeuralGas, IsTheSameForEveryInstructionSet) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::neural_gas_test

@@ -10,7 +10,7 @@
 #include "prescene/collision/expansion.h"
 #include "rational_reference.h"
 
-namespace prescene::collision {
+namespace prescene::collision::orientation_reference_test {
 namespace {
 
 TEST(Orientation, HasTheSignOfTheRationalDeterminant) {
@@ -58,4 +58,4 @@ TEST(Expansion, KeepsWhatDoublesLose) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::orientation_reference_test

@@ -20,7 +20,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/contact_configurations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::penetration_laws_test {
 namespace {
 
 using geometry::Pose;
@@ -304,4 +304,4 @@ TEST(Penetration, DoesNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::penetration_laws_test

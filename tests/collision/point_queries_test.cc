@@ -16,7 +16,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::point_queries_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -168,4 +168,4 @@ TEST_P(PointQueries, DoNotAllocate) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::point_queries_test

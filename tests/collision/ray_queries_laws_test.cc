@@ -18,7 +18,7 @@
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::ray_queries_laws_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -308,4 +308,4 @@ TEST(RayQueriesInFrames, CountTheirTestsAndDoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::ray_queries_laws_test

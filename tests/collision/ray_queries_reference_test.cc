@@ -16,7 +16,7 @@
 #include "prescene/tests/peers/ray_caster.h"
 #include "prescene/tests/support/collision_meshes.h"
 
-namespace prescene::collision {
+namespace prescene::collision::ray_queries_reference_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -167,4 +167,4 @@ TEST(RayQueriesAgainstEmbree, HitTheSamePlaces) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::ray_queries_reference_test

@@ -7,7 +7,7 @@
 
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::collision {
+namespace prescene::collision::transform_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -49,4 +49,4 @@ TEST(Transform, RefusesWhatIsNotRigid) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::transform_test

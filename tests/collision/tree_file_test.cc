@@ -16,7 +16,7 @@
 #include "prescene/core/random.h"
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::collision {
+namespace prescene::collision::tree_file_test {
 namespace {
 
 using core::StatusCode;
@@ -266,4 +266,4 @@ TEST(TreeFile, WritersOfOneFileDoNotMix) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::tree_file_test

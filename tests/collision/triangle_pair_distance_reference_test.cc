@@ -11,7 +11,7 @@
 #include "nasty_triangles.h"
 #include "rational_reference.h"
 
-namespace prescene::collision {
+namespace prescene::collision::triangle_pair_distance_reference_test {
 namespace {
 
 constexpr int kPairsOfAKind = 250;
@@ -53,4 +53,4 @@ TEST(TrianglePairDistance, AgreesWithRationalNumbers) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::triangle_pair_distance_reference_test

@@ -18,7 +18,7 @@
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::triangle_queries_laws_test {
 namespace {
 
 std::shared_ptr<const Mesh> to_mesh(const geometry::TriangleMesh& mesh) {
@@ -254,4 +254,4 @@ TEST(TriangleQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::triangle_queries_laws_test

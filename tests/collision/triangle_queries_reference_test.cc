@@ -28,7 +28,7 @@
 #include "prescene/tests/support/contact_configurations.h"
 #include "prescene/tests/support/target_test.h"
 
-namespace prescene::collision {
+namespace prescene::collision::triangle_queries_reference_test {
 namespace {
 
 using tests::PlacementMethod;
@@ -233,4 +233,4 @@ INSTANTIATE_TEST_SUITE_P(TriangleQueries, MadePairs, testing::Range(0, 4), [](co
 });
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::triangle_queries_reference_test

@@ -18,7 +18,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::collision {
+namespace prescene::collision::triangle_tree_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -161,4 +161,4 @@ TEST(TriangleTree, TakesAnyMesh) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::triangle_tree_test

@@ -12,7 +12,7 @@
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::geometry {
+namespace prescene::geometry::mesh_laws_test {
 namespace {
 
 using tests::closed_meshes;
@@ -349,4 +349,4 @@ TEST(Simplified, KeepsTheBorderOfAnOpenSurface) {
 }
 
 }  // namespace
-}  // namespace prescene::geometry
+}  // namespace prescene::geometry::mesh_laws_test

@@ -11,7 +11,7 @@
 #include "prescene/tests/support/generators.h"
 #include "prescene/tests/support/matchers.h"
 
-namespace prescene::geometry {
+namespace prescene::geometry::symmetry_test {
 namespace {
 
 using tests::is_near;
@@ -179,4 +179,4 @@ TEST(SuggestSymmetry, OpenMeshesAreJudgedByTheirSurface) {
 }
 
 }  // namespace
-}  // namespace prescene::geometry
+}  // namespace prescene::geometry::symmetry_test

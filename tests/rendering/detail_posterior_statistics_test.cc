@@ -21,7 +21,7 @@
 #include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/rendering/simulated_camera.h"
 
-namespace prescene::rendering {
+namespace prescene::rendering::detail_posterior_statistics_test {
 namespace {
 
 using geometry::Matrix6d;
@@ -214,4 +214,4 @@ TEST(DetailPosterior, TheLevelThatIsChosenMovesLittleOfIt) {
 }
 
 }  // namespace
-}  // namespace prescene::rendering
+}  // namespace prescene::rendering::detail_posterior_statistics_test

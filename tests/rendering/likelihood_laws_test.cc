@@ -17,7 +17,7 @@
 #include "prescene/rendering/simd/simd_likelihood.h"
 #include "scenes.h"
 
-namespace prescene::rendering {
+namespace prescene::rendering::likelihood_laws_test {
 namespace {
 
 using geometry::Pose;
@@ -383,4 +383,4 @@ INSTANTIATE_TEST_SUITE_P(Backends, SmallBlock, testing::ValuesIn(kBackends), kNa
 INSTANTIATE_TEST_SUITE_P(Backends, FullView, testing::ValuesIn(kBackends), kName);
 
 }  // namespace
-}  // namespace prescene::rendering
+}  // namespace prescene::rendering::likelihood_laws_test

@@ -12,7 +12,7 @@
 #include "prescene/tests/peers/ray_caster.h"
 #include "scenes.h"
 
-namespace prescene::rendering {
+namespace prescene::rendering::renderer_contract_test {
 namespace {
 
 using core::Purpose;
@@ -485,4 +485,4 @@ INSTANTIATE_TEST_SUITE_P(Backends, RendererContract, testing::ValuesIn(kBackends
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
-}  // namespace prescene::rendering
+}  // namespace prescene::rendering::renderer_contract_test

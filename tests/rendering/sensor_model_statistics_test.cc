@@ -9,7 +9,7 @@
 
 #include "prescene/rendering/sensor_model.h"
 
-namespace prescene::rendering {
+namespace prescene::rendering::sensor_model_statistics_test {
 namespace {
 
 using core::Purpose;
@@ -271,4 +271,4 @@ TEST(SensorModelOptions, AreRefusedByTheNameOfTheField) {
 }
 
 }  // namespace
-}  // namespace prescene::rendering
+}  // namespace prescene::rendering::sensor_model_statistics_test

@@ -13,7 +13,7 @@
 #include "prescene/service/support_score.h"
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::service {
+namespace prescene::service::followed_support_test {
 namespace {
 
 using geometry::Pose;
@@ -154,4 +154,4 @@ TEST(SupportScore, ComparesWithTheFirstMeasurementAndCountsGaps) {
 }
 
 }  // namespace
-}  // namespace prescene::service
+}  // namespace prescene::service::followed_support_test

@@ -13,7 +13,7 @@
 #include "prescene/service/simulated_recording.h"
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::service {
+namespace prescene::service::recording_damage_laws_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -172,4 +172,4 @@ TEST_F(RecordingDamageLaws, AFlippedBitInTheSceneOfACutRecordingIsNoticed) {
 }
 
 }  // namespace
-}  // namespace prescene::service
+}  // namespace prescene::service::recording_damage_laws_test

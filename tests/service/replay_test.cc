@@ -7,7 +7,7 @@
 #include "prescene/service/simulated_recording.h"
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::service {
+namespace prescene::service::replay_test {
 namespace {
 
 constexpr const char* kScene = R"(name: box
@@ -55,4 +55,4 @@ TEST(Replay, StoppedOnRequestKeepsTheStepsThatWereMade) {
 }
 
 }  // namespace
-}  // namespace prescene::service
+}  // namespace prescene::service::replay_test

@@ -13,7 +13,7 @@
 #include "prescene/service/simulated_recording.h"
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::service {
+namespace prescene::service::tracked_physics_test {
 namespace {
 
 using ::testing::Contains;
@@ -156,4 +156,4 @@ TEST_F(FailingPhysics, IsNotToldWhereNothingFailed) {
 }
 
 }  // namespace
-}  // namespace prescene::service
+}  // namespace prescene::service::tracked_physics_test

@@ -9,7 +9,7 @@
 #include "prescene/tests/support/paths.h"
 #include "program.h"
 
-namespace prescene::tests {
+namespace prescene::tests::session_test {
 namespace {
 
 using nlohmann::ordered_json;
@@ -227,4 +227,4 @@ TEST_F(Session, AskingNobodySaysSo) {
 }
 
 }  // namespace
-}  // namespace prescene::tests
+}  // namespace prescene::tests::session_test

@@ -18,7 +18,7 @@
 #include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::continuous_shape_queries_test {
 namespace {
 
 using core::RandomStream;
@@ -290,4 +290,4 @@ TEST(ContinuousShapeQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::continuous_shape_queries_test

@@ -17,7 +17,7 @@
 #include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::continuous_sphere_queries_test {
 namespace {
 
 using core::RandomStream;
@@ -307,4 +307,4 @@ TEST(ContinuousSphereQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::continuous_sphere_queries_test

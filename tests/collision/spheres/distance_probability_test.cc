@@ -15,7 +15,7 @@
 #include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::distance_probability_test {
 namespace {
 
 using core::RandomStream;
@@ -236,4 +236,4 @@ TEST(DistanceProbability, DoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::distance_probability_test

@@ -13,7 +13,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::collision {
+namespace prescene::collision::pack_spheres_test {
 namespace {
 
 using geometry::Vector3d;
@@ -360,4 +360,4 @@ TEST(PackSpheresWithEdges, BoxTipsAtItsAngle) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::pack_spheres_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-namespace prescene::collision {
+namespace prescene::collision::sphere_packing_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -37,4 +37,4 @@ TEST(SpherePacking, RefusesBadSpheres) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::sphere_packing_test

@@ -9,7 +9,7 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::collision {
+namespace prescene::collision::sphere_queries_laws_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -175,4 +175,4 @@ TEST(SphereQueriesLaw, ForceAndTorqueAreTheGradientOfTheEnergy) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::sphere_queries_laws_test

@@ -18,7 +18,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::collision {
+namespace prescene::collision::sphere_queries_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -324,4 +324,4 @@ TEST(SphereQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::sphere_queries_test

@@ -16,7 +16,7 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 
-namespace prescene::collision {
+namespace prescene::collision::sphere_tree_file_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -125,4 +125,4 @@ TEST(SphereTreeRestore, RefusesPartsThatAreNoTree) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::sphere_tree_file_test

@@ -9,7 +9,7 @@
 
 #include "prescene/core/random.h"
 
-namespace prescene::collision {
+namespace prescene::collision::sphere_tree_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -103,4 +103,4 @@ TEST(BoundingSphere, OfThreeIsTheSmallest) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::sphere_tree_test

@@ -14,7 +14,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::collision {
+namespace prescene::collision::static_shape_queries_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -181,4 +181,4 @@ TEST(StaticShapeQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::static_shape_queries_test

@@ -12,7 +12,7 @@
 #include "prescene/geometry/triangle_distance.h"
 #include "prescene/tests/support/generators.h"
 
-namespace prescene::collision {
+namespace prescene::collision::static_shape_test {
 namespace {
 
 using geometry::Vector3d;
@@ -230,4 +230,4 @@ TEST(StaticShapes, RefuseBadInput) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::static_shape_test

@@ -20,7 +20,7 @@
 #include "prescene/tests/support/collision_meshes.h"
 #include "prescene/tests/support/hollow_meshes.h"
 
-namespace prescene::collision {
+namespace prescene::collision::surface_spheres_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -195,4 +195,4 @@ TEST(NearPairs, AreThoseOfBruteForceOnEveryInstructionSet) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::surface_spheres_test

@@ -18,7 +18,7 @@
 #include "prescene/core/random.h"
 #include "prescene/tests/support/allocations.h"
 
-namespace prescene::collision {
+namespace prescene::collision::uncertain_shape_queries_test {
 namespace {
 
 using core::RandomStream;
@@ -418,4 +418,4 @@ TEST(UncertainShapeQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::uncertain_shape_queries_test

@@ -16,7 +16,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "uncertain_settings.h"
 
-namespace prescene::collision {
+namespace prescene::collision::uncertain_sphere_queries_test {
 namespace {
 
 TEST(UncertainSphereQueries, BoundsHoldAndMomentsAgreeWithDraws) {
@@ -304,4 +304,4 @@ TEST(UncertainSphereQueries, DoNotAllocateOnceWarm) {
 }
 
 }  // namespace
-}  // namespace prescene::collision
+}  // namespace prescene::collision::uncertain_sphere_queries_test

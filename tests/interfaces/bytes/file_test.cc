@@ -12,7 +12,7 @@
 
 #include "prescene/tests/support/paths.h"
 
-namespace prescene::interfaces {
+namespace prescene::interfaces::file_test {
 namespace {
 
 using core::StatusCode;
@@ -112,4 +112,4 @@ TEST(InputFile, ReadsAnywhereAndSaysWhereTheFileEnds) {
 }
 
 }  // namespace
-}  // namespace prescene::interfaces
+}  // namespace prescene::interfaces::file_test

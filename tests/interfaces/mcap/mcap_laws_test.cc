@@ -6,7 +6,7 @@
 
 #include "recordings.h"
 
-namespace prescene::interfaces {
+namespace prescene::interfaces::mcap_laws_test {
 namespace {
 
 using tests::TopicMessage;
@@ -72,4 +72,4 @@ TEST(McapLaws, LittleMemoryCostsTheOrderNotTheMessages) {
 }
 
 }  // namespace
-}  // namespace prescene::interfaces
+}  // namespace prescene::interfaces::mcap_laws_test

@@ -15,7 +15,7 @@ const std::string kHeader = "toss,row,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx_mps\n";
 const std::string kFirst = "4,0,0.0,0.1,0.2,0.3,0.6,0.8,0,0,0.5\n";
 
 core::Result<std::vector<CubeToss>> read(const std::string& text) {
-  const tests::ScratchDir scratch;
+  const prescene::tests::ScratchDir scratch;
   std::ofstream(scratch.path() / "tosses_even.csv", std::ios::binary) << text;
   return read_cube_tosses(scratch.path());
 }

@@ -9,7 +9,7 @@
 #include "prescene/tests/support/allocations.h"
 #include "sphere_scenes.h"
 
-namespace prescene::tests {
+namespace prescene::tests::spheres_concave_test {
 namespace {
 
 using geometry::BoxShape;
@@ -318,4 +318,4 @@ TEST(ConcaveSpheres, AreMadeOnceAndRefusedWithAReason) {
 }
 
 }  // namespace
-}  // namespace prescene::tests
+}  // namespace prescene::tests::spheres_concave_test

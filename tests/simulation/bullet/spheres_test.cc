@@ -7,7 +7,7 @@
 #include "prescene/tests/support/closed_forms.h"
 #include "sphere_scenes.h"
 
-namespace prescene::tests {
+namespace prescene::tests::spheres_test {
 namespace {
 
 using geometry::BoxShape;
@@ -115,4 +115,4 @@ TEST(Spheres, RoundThingsRollDownAnInclineAsTheyShould) {
 }
 
 }  // namespace
-}  // namespace prescene::tests
+}  // namespace prescene::tests::spheres_test

@@ -13,7 +13,7 @@
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 #include "prescene/tests/support/simulated_motions.h"
 
-namespace prescene::tests {
+namespace prescene::tests::find_beginning_test {
 namespace {
 
 using geometry::Pose;
@@ -145,4 +145,4 @@ TEST(FreeFall, IsUnbiasedAndItsErrorsAreAsLargeAsItSays) {
 }
 
 }  // namespace
-}  // namespace prescene::tests
+}  // namespace prescene::tests::find_beginning_test

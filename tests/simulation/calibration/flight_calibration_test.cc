@@ -11,7 +11,7 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/sampling.h"
 
-namespace prescene::tests {
+namespace prescene::tests::flight_calibration_test {
 namespace {
 
 using geometry::Matrix3d;
@@ -185,4 +185,4 @@ TEST(FlightCalibration, RefusesWhatIsNoFlight) {
 }
 
 }  // namespace
-}  // namespace prescene::tests
+}  // namespace prescene::tests::flight_calibration_test

@@ -13,7 +13,7 @@
 #include "expect_equal_estimates.h"
 #include "toy_problems.h"
 
-namespace prescene::simulation {
+namespace prescene::simulation::outcome_estimator_test {
 namespace {
 
 using tests::ToyProblem;
@@ -457,4 +457,4 @@ TEST(OutcomeEstimator, WithoutUncertaintyOneInstanceTellsAll) {
 }
 
 }  // namespace
-}  // namespace prescene::simulation
+}  // namespace prescene::simulation::outcome_estimator_test

@@ -10,7 +10,7 @@
 #include "prescene/simulation/uncertain/certifier.h"
 #include "prescene/tests/support/uncertain_scenes.h"
 
-namespace prescene::simulation {
+namespace prescene::simulation::scene_nets_statistics_test {
 namespace {
 
 #ifdef NDEBUG
@@ -89,4 +89,4 @@ TEST(SceneNetsStatistics, LoseNothingOnATumblingBox) {
 }
 
 }  // namespace
-}  // namespace prescene::simulation
+}  // namespace prescene::simulation::scene_nets_statistics_test
