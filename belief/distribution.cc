@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/belief/distribution.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::belief {
@@ -219,8 +219,8 @@ Vector3d variance(const Vector3Distribution& distribution) {
 
 Eigen::MatrixXd covariance_square_root(const Eigen::MatrixXd& covariance) {
   PRESCENE_CHECK(covariance.rows() == covariance.cols());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(covariance);
+  const Eigen::VectorXd& values = eigen.values;  // ascending
   const double largest = values.size() > 0 ? values[values.size() - 1] : 0.0;
   // Zero eigenvalues come out as some 1e-16 of the largest.
   const double threshold = 1e-13 * largest;
@@ -229,7 +229,7 @@ Eigen::MatrixXd covariance_square_root(const Eigen::MatrixXd& covariance) {
   Eigen::MatrixXd root(covariance.rows(), rank);
   for (Eigen::Index i = 0; i < rank; ++i) {
     const Eigen::Index from = values.size() - 1 - i;
-    root.col(i) = std::sqrt(values[from]) * eigen.eigenvectors().col(from);
+    root.col(i) = std::sqrt(values[from]) * eigen.vectors.col(from);
   }
   return root;
 }

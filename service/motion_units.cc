@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/motion_units.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -9,6 +8,7 @@
 
 #include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::service {
 namespace {
@@ -40,7 +40,7 @@ std::optional<Movement> beginning_of(const std::vector<simulation::TimedPose>& f
     powers.row(static_cast<Eigen::Index>(i)) << 1.0, t, t * t;
     places.row(static_cast<Eigen::Index>(i)) = frames[i].X_WO.translation.transpose();
   }
-  const Eigen::Matrix3d fit = powers.colPivHouseholderQr().solve(places);
+  const Eigen::Matrix3d fit = geometry::solve_least_squares(powers, places);
   return Movement{fit.row(1).norm(), 2.0 * fit.row(2).norm()};
 }
 

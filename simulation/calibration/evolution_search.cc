@@ -2,13 +2,14 @@
 #include "prescene/simulation/calibration/evolution_search.h"
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "reflect.h"
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::simulation {
 namespace {
@@ -140,18 +141,18 @@ void EvolutionSearch::run(const Cost& cost, int max_evaluations, const SearchPro
   while (!stopped && !best.settled && best.evaluations < max_evaluations) {
     best.settled = s.done();
     if (best.settled) break;
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(s.covariance);
-    const VectorXd lengths = eigen.eigenvalues().cwiseMax(1e-20).cwiseSqrt();
+    const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(s.covariance);
+    const VectorXd lengths = eigen.values.cwiseMax(1e-20).cwiseSqrt();
     std::vector<VectorXd> moves;
     std::vector<double> costs;
     for (int child = 0; child < s.k.children && !stopped && best.evaluations < max_evaluations; ++child) {
       VectorXd z(s.n);
       for (Eigen::Index i = 0; i < s.n; ++i) z[i] = s.stream.normal();
-      moves.emplace_back(eigen.eigenvectors() * lengths.cwiseProduct(z));
+      moves.emplace_back(eigen.vectors * lengths.cwiseProduct(z));
       costs.push_back(tried(s.values_of(s.mean + s.sigma * moves.back())));
     }
     if (static_cast<int>(costs.size()) < s.k.children) break;
-    s.adapt(moves, costs, eigen.eigenvectors(), lengths);
+    s.adapt(moves, costs, eigen.vectors, lengths);
   }
 }
 

@@ -16,6 +16,7 @@
 #include "flight_cost.h"
 #include "observed_flight.h"
 #include "prescene/core/order_statistics.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/simulation/calibration/keep_untold.h"
 
 namespace prescene::simulation {
@@ -215,10 +216,11 @@ class FlightFit {
     const Jacobian& own = parts[3];
     const Eigen::MatrixXd own_information = own.transpose() * own;
     const Eigen::MatrixXd coupling = shared.transpose() * own;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(own_information);
     Say say;
-    say.information = shared.transpose() * shared - coupling * solver.solve(coupling.transpose());
-    say.score = shared.transpose() * errors - coupling * solver.solve(own.transpose() * errors);
+    say.information =
+        shared.transpose() * shared - coupling * geometry::solve_symmetric(own_information, coupling.transpose());
+    say.score =
+        shared.transpose() * errors - coupling * geometry::solve_symmetric(own_information, own.transpose() * errors);
     return say;
   }
 
@@ -230,12 +232,12 @@ class FlightFit {
       says.push_back(say_of(i));
       information += says.back().information;
     }
-    const ParameterMatrix inverse = information.inverse();
+    const ParameterMatrix inverse = geometry::inverse(information);
     // As if each flight were left out in turn [MacKinnon & White 1985]: few flights are not overconfident then.
     ParameterMatrix spread = prior;
     for (const Say& say : says) {
       const ParameterMatrix others = ParameterMatrix::Identity() - say.information * inverse;
-      const Parameters score = others.partialPivLu().solve(say.score);
+      const Parameters score = geometry::solve(others, say.score);
       spread += score * score.transpose();
     }
     return inverse * spread * inverse;

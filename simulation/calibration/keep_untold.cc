@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/simulation/calibration/keep_untold.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <vector>
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::simulation {
 namespace {
@@ -37,7 +38,7 @@ void keep_untold(const VectorXd& prior_mean, const VectorXd& prior_deviation, Ve
     across.col(a) = covariance->col(i);
     for (Index b = 0; b < count; ++b) own(a, b) = (*covariance)(i, untold[static_cast<std::size_t>(b)]);
   }
-  *value += across * own.ldlt().solve(back);
+  *value += across * geometry::solve_symmetric(own, back);
   for (const Index i : untold) {
     (*value)[i] = prior_mean[i];
     set_error(covariance, i, prior_deviation[i]);

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/simulation/calibration/m_estimate.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +9,7 @@
 #include "point_response.h"
 #include "prescene/core/check.h"
 #include "prescene/core/sobol.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "reflect.h"
 
 namespace prescene::simulation {
@@ -92,9 +90,8 @@ Step step_from(const VectorXd& u, const PointResponse& response, const Neighbour
   const MatrixXd slopes = response.slopes(u);
   const auto cases = static_cast<double>(slopes.rows());
   // Directions in which the scores do not rise tell nothing.
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(response.curvature(u));
-  const MatrixXd H =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
+  const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(response.curvature(u));
+  const MatrixXd H = eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
   const VectorXd slope = slopes.colwise().mean().transpose();
   const MatrixXd centred = slopes.rowwise() - slope.transpose();
   // No freedom is taken off for the parameters: jumps of the simulation, which the trials see as slopes, widen the
@@ -102,12 +99,12 @@ Step step_from(const VectorXd& u, const PointResponse& response, const Neighbour
   MatrixXd B = centred.transpose() * centred / (cases * (cases - 1.0));
   B *= std::pow(student_factor(cases - 1.0), 2);
   B.diagonal().array() += 1e-12 * B.trace() + 1e-300;
-  const MatrixXd weights = B.ldlt().solve(H).transpose();  // H B^-1
+  const MatrixXd weights = geometry::solve_symmetric(B, H).transpose();  // H B^-1
   const MatrixXd prior = around.factor.transpose() * problem.precision.asDiagonal() * around.factor;
   const VectorXd pull = around.factor.transpose() *
                         problem.precision.cwiseProduct(problem.prior_mean - around.center - around.factor * u);
   Step step;
-  step.covariance = (weights * H + prior).inverse();
+  step.covariance = geometry::inverse(weights * H + prior);
   step.covariance = 0.5 * (step.covariance + step.covariance.transpose()).eval();
   step.move = step.covariance * (pull - weights * slope);
   return step;
@@ -123,15 +120,15 @@ VectorXd shortened(const VectorXd& v, double longest) {
 /// The next trials are spread as the estimate is uncertain, but no less than jumps of the simulation need.
 Neighbourhood about(const VectorXd& center, const Neighbourhood& before, const MatrixXd& covariance, double reach,
                     const VectorXd& least) {
-  const MatrixXd in_u = before.factor.triangularView<Eigen::Lower>().solve(
-      before.factor.triangularView<Eigen::Lower>().solve(covariance).transpose());
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (in_u + in_u.transpose()));
+  const MatrixXd in_u =
+      geometry::solve_lower(before.factor, geometry::solve_lower(before.factor, covariance).transpose());
+  const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(0.5 * (in_u + in_u.transpose()));
   const VectorXd lengths =
-      (reach * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt()).cwiseMax(1.0 / kMostChange).cwiseMin(kMostChange);
-  const MatrixXd factor = before.factor * eigen.eigenvectors() * lengths.asDiagonal();
+      (reach * eigen.values.cwiseMax(0.0).cwiseSqrt()).cwiseMax(1.0 / kMostChange).cwiseMin(kMostChange);
+  const MatrixXd factor = before.factor * eigen.vectors * lengths.asDiagonal();
   MatrixXd spread = factor * factor.transpose();
   spread.diagonal() += least.cwiseAbs2();
-  return {center, spread.llt().matrixL()};
+  return {center, geometry::cholesky_factor(spread)};
 }
 
 /// What one round says.
@@ -218,7 +215,8 @@ core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& paramet
       best_score = score;
     }
     const RoundEstimate found = estimate_of(PointResponse(observations, trials, simulated), around, problem);
-    const double moved = rms(found.covariance.llt().matrixL().solve(found.value - around.center));
+    const double moved =
+        rms(geometry::solve_lower(geometry::cholesky_factor(found.covariance), found.value - around.center));
     if (settled > 0 || (round > 0 && moved < options.accuracy)) ++settled;
     rounds.push_back(found);
     around =

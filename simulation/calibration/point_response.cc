@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "point_response.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::simulation {
 namespace {
@@ -48,7 +49,7 @@ PointResponse::PointResponse(const Observations& observations, const MatrixXd& t
   const Index rows = observations.points.rows() * observations.samples;  // Numbers of a view.
   MatrixXd design(count, 1 + parameters_);
   design << VectorXd::Ones(count), trials;
-  const MatrixXd inverse = design.completeOrthogonalDecomposition().pseudoInverse();
+  const MatrixXd inverse = geometry::pseudo_inverse(design);
   const VectorXd uncertainty = inverse.bottomRows(parameters_).rowwise().squaredNorm();
   const double freedom = std::max(1.0, static_cast<double>(count - design.cols()));
   MatrixXd table(count, rows);

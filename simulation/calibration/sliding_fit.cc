@@ -2,10 +2,11 @@
 #include "prescene/simulation/calibration/sliding_fit.h"
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::simulation {
 namespace {
@@ -24,13 +25,13 @@ struct End {
 End fit_end(const Eigen::VectorXd& times, const Eigen::MatrixX3d& values) {
   Eigen::MatrixX3d powers(times.size(), 3);
   powers << Eigen::VectorXd::Ones(times.size()), times, times.cwiseAbs2();
-  const Eigen::Matrix<double, 2, 3> line = powers.leftCols<2>().colPivHouseholderQr().solve(values);
+  const Eigen::Matrix<double, 2, 3> line = geometry::solve_least_squares(powers.leftCols<2>(), values);
   End end{line.row(0).transpose(), line.row(1).transpose(), Vector3d::Zero(), 0.0};
   Eigen::MatrixX3d residuals = values - powers.leftCols<2>() * line;
   if (end.slope.norm() > 1e-12) {
     end.direction = end.slope.normalized();
     const Eigen::VectorXd along = values * end.direction;
-    const Eigen::Vector3d parabola = powers.colPivHouseholderQr().solve(along);
+    const Eigen::Vector3d parabola = geometry::solve_least_squares(powers, along);
     end.value += (parabola[0] - end.value.dot(end.direction)) * end.direction;
     end.slope += (parabola[1] - end.slope.dot(end.direction)) * end.direction;
     residuals += (along - powers * parabola - residuals * end.direction) * end.direction.transpose();
