@@ -165,7 +165,10 @@ void BulletSimulator::run_one(Worker& worker, const belief::WorldState& start, c
       flights += flown;
     }
     const double begin = world.time();
-    world.step();
+    if (!world.step(cancellation)) {
+      trajectory.end = belief::TrajectoryEnd::kCancelled;
+      break;
+    }
     ++done;
     if (world.diverged()) {
       trajectory.end = belief::TrajectoryEnd::kDiverged;

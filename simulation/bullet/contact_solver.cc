@@ -28,13 +28,16 @@ btScalar time_to_close(btScalar gap, btScalar speed, btScalar acceleration, btSc
 
 }  // namespace
 
-void ContactSolver::solve_step(std::span<btCollisionObject*> bodies, std::span<SolverContact> contacts,
-                               const SolverSettings& settings, double dt, std::span<BodyResult> results) {
+bool ContactSolver::solve_step(std::span<btCollisionObject*> bodies, std::span<SolverContact> contacts,
+                               const SolverSettings& settings, double dt, std::span<BodyResult> results,
+                               const core::Cancellation* cancellation) {
   PRESCENE_DCHECK(bodies.size() == results.size());
   bodies_ = bodies;
   given_ = contacts;
   results_ = results;
   settings_ = settings;
+  cancellation_ = cancellation;
+  cancelled_ = false;
   btContactSolverInfo info;
   info.m_timeStep = dt;
   info.m_numIterations = settings.iterations;
@@ -48,6 +51,7 @@ void ContactSolver::solve_step(std::span<btCollisionObject*> bodies, std::span<S
     bodies[i]->setWorldArrayIndex(static_cast<int>(i));
   }
   solveGroup(bodies.data(), static_cast<int>(bodies.size()), nullptr, 0, nullptr, 0, info, nullptr, nullptr);
+  return !cancelled_;
 }
 
 ContactSolver::Row ContactSolver::make_row(const btVector3& direction, const btVector3& arm_a, const btVector3& arm_b,
@@ -230,7 +234,7 @@ void ContactSolver::solveGroupCacheFriendlySplitImpulseIterations(btCollisionObj
                                                                   const btContactSolverInfo& info, btIDebugDraw*) {
   const bool overlap = std::any_of(rows_.begin(), rows_.end(), [](const Contact& c) { return c.push_target > 0.0; });
   if (!overlap) return;
-  for (int iteration = 0; iteration < info.m_numIterations; ++iteration) {
+  for (int iteration = 0; iteration < info.m_numIterations && !cut_off(); ++iteration) {
     btScalar change = 0.0;
     for (Contact& c : rows_) change = std::max(change, solve_push(c));
     if (change <= settings_.converged) break;
@@ -241,6 +245,7 @@ btScalar ContactSolver::solveSingleIteration(int iteration, btCollisionObject** 
                                              btPersistentManifold** manifolds, int manifold_count,
                                              btTypedConstraint** constraints, int constraint_count,
                                              const btContactSolverInfo& info, btIDebugDraw* drawer) {
+  if (cut_off()) return 0.0;  // the last iteration
   // Bullet's own contact pools are empty: this solves the joints.
   btScalar residual = btSequentialImpulseConstraintSolver::solveSingleIteration(
       iteration, bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info, drawer);
@@ -252,6 +257,11 @@ btScalar ContactSolver::solveSingleIteration(int iteration, btCollisionObject** 
       change = solve_contacts();
   }
   return std::max(residual, change * change);
+}
+
+bool ContactSolver::cut_off() {
+  cancelled_ = cancelled_ || (cancellation_ && cancellation_->requested());
+  return cancelled_;
 }
 
 btScalar ContactSolver::solve_contacts() {

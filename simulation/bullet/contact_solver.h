@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "bullet_types.h"
+#include "prescene/core/progress.h"
 
 namespace prescene::simulation {
 
@@ -64,9 +65,11 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
   BT_DECLARE_ALIGNED_ALLOCATOR();
 
   /// Changes the velocities of `bodies` (gravity already added) so that the contacts hold at the end of a step of `dt`
-  /// seconds. results.size() == bodies.size(). No allocation once the pools have grown.
-  void solve_step(std::span<btCollisionObject*> bodies, std::span<SolverContact> contacts,
-                  const SolverSettings& settings, double dt, std::span<BodyResult> results);
+  /// seconds. results.size() == bodies.size(). No allocation once the pools have grown. False when it was cancelled
+  /// between two iterations: the velocities are of no use then.
+  bool solve_step(std::span<btCollisionObject*> bodies, std::span<SolverContact> contacts,
+                  const SolverSettings& settings, double dt, std::span<BodyResult> results,
+                  const core::Cancellation* cancellation);
 
  protected:
   void convertContacts(btPersistentManifold** manifolds, int count, const btContactSolverInfo& info) override;
@@ -105,6 +108,8 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
     btScalar hit_time = 0.0;
   };
 
+  /// Whether the step was cancelled.
+  bool cut_off();
   Row make_row(const btVector3& direction, const btVector3& arm_a, const btVector3& arm_b, const btSolverBody& a,
                const btSolverBody& b) const;
   Contact make_contact(const SolverContact& given, btScalar dt);
@@ -126,6 +131,8 @@ class ContactSolver : public btSequentialImpulseConstraintSolver {
   std::span<SolverContact> given_;
   std::span<BodyResult> results_;
   SolverSettings settings_;
+  const core::Cancellation* cancellation_ = nullptr;
+  bool cancelled_ = false;
 };
 
 }  // namespace prescene::simulation

@@ -7,6 +7,12 @@
 #include "prescene/belief/body_names.h"
 
 namespace prescene::simulation {
+namespace {
+
+// A step with more contacts may take seconds: whether it is cancelled is looked at on the way.
+constexpr std::size_t kManyContacts = 256;
+
+}  // namespace
 
 InstanceWorld::Bounds InstanceWorld::parts_box(int index, const Frame& X_WO) const {
   Bounds box{Vector3d::Constant(1e30), Vector3d::Constant(-1e30)};
@@ -34,13 +40,14 @@ void InstanceWorld::sweep(int index) {
   m.high += swell;
 }
 
-void InstanceWorld::find_contacts() {
+bool InstanceWorld::find_contacts(const core::Cancellation* cancellation) {
   contacts_.clear();
   contact_keys_.clear();
   const int count = body_count();
   for (int a = 0; a < scene_->object_count; ++a) {
     const Moving& ma = moving_[static_cast<std::size_t>(a)];
     if (!ma.present) continue;
+    if (cancellation && contacts_.size() >= kManyContacts && cancellation->requested()) return false;
     for (int b = a + 1; b < count; ++b) {
       const Moving& mb = moving_[static_cast<std::size_t>(b)];
       if (!mb.present || !(ma.dynamic || mb.dynamic)) continue;
@@ -48,6 +55,7 @@ void InstanceWorld::find_contacts() {
       find_pair(a, b);
     }
   }
+  return true;
 }
 
 void InstanceWorld::find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb,
@@ -153,11 +161,11 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
   }
 }
 
-void InstanceWorld::solve() {
+bool InstanceWorld::solve(const core::Cancellation* cancellation) {
   if (contacts_.empty()) {
     for (BodyResult& result : results_) result = BodyResult{};
     warm_.clear();
-    return;
+    return true;
   }
   const auto count = static_cast<std::size_t>(body_count());
   for (std::size_t i = 0; i < count; ++i) {
@@ -178,7 +186,9 @@ void InstanceWorld::solve() {
     body.setAngularVelocity(to_bullet(m.spin));
     body.updateInertiaTensor();
   }
-  solver_.solve_step(rigid_pointers_, contacts_, settings_, dt(), results_);
+  const bool many = contacts_.size() >= kManyContacts;
+  if (!solver_.solve_step(rigid_pointers_, contacts_, settings_, dt(), results_, many ? cancellation : nullptr))
+    return false;
   warm_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const SolverContact& c = contacts_[i];
@@ -186,6 +196,7 @@ void InstanceWorld::solve() {
     warm_.push_back({contact_keys_[i], moving_[static_cast<std::size_t>(c.body_b)].X_WO.inverse_times(c.position),
                      c.impulse, c.friction_impulse});
   }
+  return true;
 }
 
 void InstanceWorld::note_touches() {

@@ -87,7 +87,7 @@ bool InstanceWorld::restore(ByteReader& in) {
 InstanceWorld::Footing InstanceWorld::footing(int object, const Vector3d& down) {
   place_kinematic();
   place_dynamic();
-  find_contacts();
+  find_contacts(nullptr);
   Footing footing;
   footprint_.clear();
   for (const SolverContact& c : contacts_) {

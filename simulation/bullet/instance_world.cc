@@ -109,16 +109,16 @@ Pose InstanceWorld::object_pose(const Object& object) const {
   return {object.R_WO, object.p_WCm - object.R_WO * object.physical.center_of_mass};
 }
 
-void InstanceWorld::step() {
+bool InstanceWorld::step(const core::Cancellation* cancellation) {
   run_actions();
   place_kinematic();
   place_dynamic();
-  find_contacts();
-  solve();
+  if (!find_contacts(cancellation) || !solve(cancellation)) return false;
   integrate();
   ++steps_;
   note_touches();
   note_calm();
+  return true;
 }
 
 void InstanceWorld::run_actions() {

@@ -12,6 +12,7 @@
 #include "compiled_scene.h"
 #include "contact_finder.h"
 #include "contact_solver.h"
+#include "prescene/core/progress.h"
 #include "prescene/simulation/action_player.h"
 #include "sphere_contacts.h"
 
@@ -34,7 +35,9 @@ class InstanceWorld {
 
   /// Starts over from `start`; nothing of what was before remains.
   void reset(const belief::WorldState& start, const std::vector<belief::Action>& actions, core::RandomStream stream);
-  void step();
+  /// False when cancelled within the step, which a heap of hundreds makes long: the world is then of no use before the
+  /// next reset.
+  bool step(const core::Cancellation* cancellation = nullptr);
   /// Takes up to `most` steps at once in which nothing can touch anything, as bounds on the ways of all objects say,
   /// and returns how many: 0 when something might. Leaves the same bits as that many calls of step(). Ends early where
   /// something becomes calm, and does not start where an object might get beyond `world_radius` (m).
@@ -154,11 +157,12 @@ class InstanceWorld {
   bool clear_for(int steps, double world_radius);
   Bounds parts_box(int body, const Frame& X_WO) const;
   void sweep(int body);
-  void find_contacts();
+  /// False when cancelled.
+  bool find_contacts(const core::Cancellation* cancellation);
   void find_pair(int a, int b);
   void find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb, double range);
   void add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b);
-  void solve();
+  bool solve(const core::Cancellation* cancellation);
   void integrate();
   void note_touches();
   void note_calm();

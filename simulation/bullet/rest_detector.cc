@@ -132,7 +132,7 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
     world.nudge(object, std::cos(angle) * u + std::sin(angle) * v, kNudge);
     for (int s = 0; s < steps && returns; ++s) {
       if (cancellation && cancellation->requested()) returns = false;
-      world.step();
+      returns = world.step(cancellation) && returns;
       for (int i = 0; i < world.object_count() && returns; ++i) returns = !world.free(i) || !runs_away(i);
     }
     ByteReader before(saved_);
