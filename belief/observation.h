@@ -28,7 +28,7 @@ struct Observation {
   core::TimeNs stamp_ns = 0;
   RgbdFrame frame;
   Pose X_WC;
-  /// Poses X_WG of kinematic bodies by the name of Scene::robot; a body that is not named is where its timeline says.
+  /// Poses X_WG of kinematic bodies by the name of Scene::robot; a body that is not named is where it was last.
   std::map<std::string, Pose> robot;
 
   friend bool operator==(const Observation&, const Observation&) = default;

@@ -29,6 +29,25 @@ void note(const char* stage, StepResult& result) {
   result.trace.emplace_back(stage, belief::content_hash(result.belief));
 }
 
+/// Of the scene's robot bodies. A scene's timeline runs on another clock than the frames: a body that is not named
+/// stands where it was last, or where its timeline begins.
+std::vector<Pose> robot_poses(const Belief& belief, const belief::Observation& observation, std::uint32_t* degraded) {
+  const belief::Scene& scene = *belief.scene;
+  std::vector<Pose> X_WG;
+  for (std::size_t i = 0; i < scene.robot.size(); ++i) {
+    const auto named = observation.robot.find(scene.robot[i].name);
+    if (named != observation.robot.end()) {
+      X_WG.push_back(named->second);
+    } else {
+      const Pose X_WG_start = belief::pose_at(scene.robot[i], 0.0);
+      X_WG.push_back(i < belief.robot.size() ? belief.robot[i] : X_WG_start);
+      // A body that stands still is where it stands, named or not.
+      if (scene.robot[i].timeline.size() > 1 || X_WG.back() != X_WG_start) *degraded |= kRobotPoseAssumed;
+    }
+  }
+  return X_WG;
+}
+
 }  // namespace
 
 std::string degraded_text(std::uint32_t bits) {
@@ -61,23 +80,6 @@ ParticleFilter::ParticleFilter(const rendering::LikelihoodBatch& likelihood, ren
 
 Belief ParticleFilter::start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const {
   return belief_from_priors(std::move(scene), seed, 0, settings_.initialise);
-}
-
-std::vector<Pose> ParticleFilter::robot_poses(const belief::Scene& scene, const belief::Observation& observation,
-                                              std::uint32_t* degraded) const {
-  const double time = 1e-9 * static_cast<double>(observation.stamp_ns - settings_.scene_start_ns);
-  std::vector<Pose> X_WG;
-  for (std::size_t i = 0; i < scene.robot.size(); ++i) {
-    const auto named = observation.robot.find(scene.robot[i].name);
-    if (named != observation.robot.end()) {
-      X_WG.push_back(named->second);
-    } else {
-      X_WG.push_back(belief::robot_pose_at(scene, scene.actions, static_cast<int>(i), time));
-      // A body that stands still is where it stands, told or not.
-      if (scene.robot[i].timeline.size() > 1) *degraded |= kRobotPoseAssumed;
-    }
-  }
-  return X_WG;
 }
 
 void ParticleFilter::note_failed_rendering(StepResult& result) {
@@ -248,7 +250,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
                          geometry::validate(observation.frame.camera).ok();
   if (has_depth && observation.X_WC.is_finite()) follow_supports(observation, result);
 
-  const std::vector<Pose> X_WG = robot_poses(*belief.scene, observation, &result.degraded);
+  const std::vector<Pose> X_WG = robot_poses(belief, observation, &result.degraded);
   if (!first) {
     PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, simulators_,
                                    core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads());

@@ -45,9 +45,6 @@ struct FilterSettings {
   bool recover = true;   ///< Look for objects that are not tracked.
   double max_gap = 1.0;  ///< s; a longer pause between frames is predicted as one of this length.
   double island_gap = 0.005;  ///< m; objects nearer than this form an island.
-  /// Time of Scene timelines and actions: s between their start and the stamp 0 (robot bodies that no observation
-  /// names).
-  core::TimeNs scene_start_ns = 0;
 };
 
 /// Bits of StepResult::degraded.
@@ -58,7 +55,7 @@ enum Degraded : std::uint32_t {
   kNoSupportFound = 1u << 3,     ///< Objects had to be looked for, but nothing that they could stand on was seen.
   kObjectsMissing = 1u << 4,     ///< Some that were looked for at the start were not found.
   kImpossibleWeights = 1u << 5,  ///< A set's weights were all zero or not finite and were made equal.
-  kRobotPoseAssumed = 1u << 6,   ///< A robot body was put where its timeline says: the observation did not name it.
+  kRobotPoseAssumed = 1u << 6,   ///< A robot body was not named: it was taken to stand where it was last.
   kPhysicsFailed = 1u << 7,      ///< Particles went on at constant velocity in place of physics (see physics_failure).
   kRenderingFailed = 1u << 8,    ///< A picture was not drawn (see rendering_failure): what it was to show hid nothing.
 };
@@ -109,8 +106,6 @@ class ParticleFilter {
   StepResult step(const belief::Belief& belief, const belief::Observation& observation, const belief::Control& control);
 
  private:
-  std::vector<Pose> robot_poses(const belief::Scene& scene, const belief::Observation& observation,
-                                std::uint32_t* degraded) const;
   void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result) const;
   void first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "filter_fixture.h"
@@ -52,6 +53,34 @@ TEST(ParticleFilter, TracksAMovingCarton) {
   EXPECT_LT(*std::max_element(adds.begin(), adds.end()), 0.02);
   std::nth_element(adds.begin(), adds.begin() + 22, adds.end());
   EXPECT_LT(adds[22], 0.005);
+}
+
+TEST(ParticleFilter, ARobotBodyThatIsNotNamedStandsWhereItWasLast) {
+  Backends backends;
+  SimulatedSequence sequence =
+      still_sequence({box_model("box", {0.06, 0.10, 0.18})}, {Pose::from_translation({0.0, 0.0, 0.09})});
+  auto scene = std::make_shared<belief::Scene>(*sequence.scene);
+  const Pose X_begin = Pose::from_translation({0.3, 0.0, 0.9}), X_end = Pose::from_translation({-0.3, 0.0, 0.9}),
+             X_named = Pose::from_translation({0.2, 0.1, 0.9});
+  belief::KinematicBody hand;
+  hand.name = "hand";
+  hand.timeline = {{0.0, X_begin}, {2.0, X_end}};
+  scene->robot.push_back(hand);
+  sequence.scene = scene;
+  ParticleFilter filter = backends.make_filter();
+  Belief belief = filter.start(sequence.scene, 7);
+  const std::optional<Pose> named[] = {std::nullopt, X_named, std::nullopt};
+  const Pose expected[] = {X_begin, X_named, X_named};
+  for (int frame = 0; frame < 3; ++frame) {
+    belief::Observation observation = sequence.observe(frame, *backends.renderer);
+    observation.stamp_ns += 1'700'000'000'000'000'000;  // Of a clock that knows nothing of the scene's timeline.
+    observation.robot.clear();
+    if (named[frame]) observation.robot["hand"] = *named[frame];
+    StepResult result = filter.step(belief, observation, {});
+    belief = std::move(result.belief);
+    EXPECT_EQ(belief.robot.at(0), expected[frame]) << frame;
+    EXPECT_EQ(result.degraded, named[frame] ? 0u : std::uint32_t{kRobotPoseAssumed}) << degraded_text(result.degraded);
+  }
 }
 
 TEST(ParticleFilter, ARestingObjectStaysStill) {
