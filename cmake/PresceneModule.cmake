@@ -111,6 +111,11 @@ endfunction()
 
 # For sources whose loops are worth more than -O2. Not in debug builds: with sanitizers they would take minutes each.
 set(PRESCENE_KERNEL_OPTIONS "$<$<NOT:$<CONFIG:Debug>>:-O3>")
+# clang's sanitizers take up to a quarter of an hour for one of them. Fuzz targets are after what reads input; the asan
+# preset sees the kernels in every test.
+if(PRESCENE_FUZZERS)
+  list(APPEND PRESCENE_KERNEL_OPTIONS -fno-sanitize=all)
+endif()
 
 # prescene_simd_sources(<target>): its sources may be compiled once for each instruction set, through Highway. They then
 # include themselves by their name, so their folder is searched for headers. Left out are SSSE3, which is of no use beside
