@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Included by CTest's test file for one test executable: asks it for its cases, with the file that each is written in, and
-# adds them. The answer is kept until the executable changes.
+# adds them. The answer is kept until the executable changes. Those of tests/long_tests.txt get the label "long" too.
+file(STRINGS "${CMAKE_CURRENT_LIST_DIR}/../tests/long_tests.txt" _long_tests REGEX "^[^#]")
 
 function(prescene_kind_of file folder result)
   if(folder MATCHES "^tests/(system|real_data)")
@@ -64,7 +65,12 @@ macro(prescene_add_case target case kind)
   endif()
   add_test("${target}:${case}" "${prescene_test_executable}" "--gtest_filter=${case}"
            --gtest_also_run_disabled_tests)
-  set_tests_properties("${target}:${case}" PROPERTIES LABELS ${kind} TIMEOUT ${prescene_test_timeout}
+  set(_labels ${kind})
+  list(FIND _long_tests "${target}:${case}" _at)  # CTest's scripts know no IN_LIST
+  if(_at GREATER_EQUAL 0)
+    list(APPEND _labels long)
+  endif()
+  set_tests_properties("${target}:${case}" PROPERTIES LABELS "${_labels}" TIMEOUT ${prescene_test_timeout}
                        ENVIRONMENT "${prescene_test_environment}" DISABLED ${_disabled}
                        SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
   if(prescene_test_resource_lock)

@@ -9,7 +9,9 @@ usage: ./dev VERB
 
   setup [run|develop|MODULE]... install the missing Debian packages (default: run), or those that a module needs
   build [PRESET] [TARGET]...   build (default preset: release)
-  test [--preset P] [FILTER]... build, then run all tests, or those whose name matches a FILTER (regular expressions)
+  test [--preset P] [--all] [FILTER]...
+                               build, then run the tests of tests/, with --all also those that take long, or those whose
+                               name matches a FILTER (regular expressions); --long K/N: the K-th of N parts of the long ones
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE]...               format, layer and clang-tidy checks
@@ -106,10 +108,16 @@ verb_build() {
 # ---------------------------------------------------------------------------------------------------- test
 
 verb_test() {
-  local preset=release filter=()
+  local preset=release filter=() which=(-LE '^long$')
   while [ $# -gt 0 ]; do
     case $1 in
       --preset) preset=${2:?--preset needs a name}; shift 2 ;;
+      --all) which=(); shift ;;
+      --long)
+        [[ ${2:-} =~ ^[1-9][0-9]*/[1-9][0-9]*$ ]] || fail "--long needs a part such as 1/4"
+        which=(-R "$(long_tests "${2%/*}" "${2#*/}")")
+        shift 2
+        ;;
       *) filter+=("$1"); shift ;;
     esac
   done
@@ -118,8 +126,13 @@ verb_test() {
     # Of several -R ctest heeds the last.
     timed "tests that match ${filter[*]}" run_tests "$preset" -R "$(IFS='|'; echo "${filter[*]}")"
   else
-    timed "tests" run_tests "$preset"
+    timed "tests" run_tests "$preset" "${which[@]}"
   fi
+}
+
+# A regular expression of every N-th long test, from the K-th on.
+long_tests() {
+  grep -v '^#' tests/long_tests.txt | awk -v k="$1" -v n="$2" 'NR % n == k % n' | sed 's/[][\.*^$()+?{|]/\\&/g' | sed 's/.*/^&$/' | paste -sd'|' -
 }
 
 run_tests() {
