@@ -46,13 +46,33 @@ Result<std::vector<FolderFrame>> list_with_poses(const fs::path& folder, const F
   return frames;
 }
 
-/// The color.png files of a folder by name.
-std::vector<FolderFrame> list_without_poses(const fs::path& folder, const FrameFolderOptions& options) {
+Status cannot_look(const fs::path& path, const std::error_code& error) {
+  return core::unavailable(path.string() + ": cannot be looked at: " + error.message() + "; make it readable");
+}
+
+/// Whether something of that name is there, readable or not: a link that leads nowhere is. Fails where that can't be
+/// told.
+Result<bool> is_there(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status found = fs::symlink_status(path, error);
+  if (found.type() == fs::file_type::not_found) return false;
+  if (error) return cannot_look(path, error);
+  return true;
+}
+
+/// The color.png files of a folder by name; none where there is no such folder.
+Result<std::vector<FolderFrame>> list_without_poses(const fs::path& folder, const FrameFolderOptions& options) {
+  PRESCENE_TRY(const bool there, is_there(folder));
   std::vector<fs::path> colors;
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().filename().string().ends_with(kColorSuffix)) colors.push_back(entry->path());
+  if (there) {
+    fs::directory_iterator entry(folder, error);
+    if (error == std::errc::not_a_directory) return std::vector<FolderFrame>{};
+    for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
+      if (entry->path().filename().string().ends_with(kColorSuffix)) colors.push_back(entry->path());
+    }
   }
+  if (error) return cannot_look(folder, error);
   std::sort(colors.begin(), colors.end());
   std::vector<FolderFrame> frames;
   for (const fs::path& color : colors) {
@@ -68,12 +88,15 @@ Result<std::vector<FolderFrame>> list_frames(const fs::path& folder, const Frame
   if (!fs::is_directory(folder, error)) {
     return core::not_found(folder.string() + ": is no folder; give the folder with the frames");
   }
-  if (fs::exists(folder / kPosesFile, error)) return list_with_poses(folder, options);
+  PRESCENE_TRY(const bool has_poses, is_there(folder / kPosesFile));
+  if (has_poses) return list_with_poses(folder, options);
   for (const fs::path& place : {folder / "frames", folder}) {
-    std::vector<FolderFrame> frames = list_without_poses(place, options);
+    PRESCENE_TRY(std::vector<FolderFrame> frames, list_without_poses(place, options));
     if (!frames.empty()) return frames;
   }
-  if (fs::exists(folder / "color.png", error) || fs::exists(folder / "depth.png", error)) {
+  PRESCENE_TRY(const bool has_color, is_there(folder / "color.png"));
+  PRESCENE_TRY(const bool has_depth, is_there(folder / "depth.png"));
+  if (has_color || has_depth) {
     return std::vector<FolderFrame>{
         {folder.filename().string(), folder / "color.png", folder / "depth.png", options.first_stamp_ns, {}}};
   }
@@ -83,10 +106,10 @@ Result<std::vector<FolderFrame>> list_frames(const fs::path& folder, const Frame
 
 Result<PinholeCamera> find_camera(const fs::path& folder, const FrameFolderOptions& options, const FolderFrame& first) {
   PRESCENE_TRY(const ImageSize size, read_png_size(first.depth, options.limits));
-  std::error_code error;
+  PRESCENE_TRY(const bool has_intrinsics, is_there(folder / kIntrinsicsFile));
   PinholeCamera camera;
   std::string place;
-  if (fs::exists(folder / kIntrinsicsFile, error)) {
+  if (has_intrinsics) {
     place = (folder / kIntrinsicsFile).string();
     PRESCENE_TRY(camera, parse_file(folder / kIntrinsicsFile, parse_intrinsics));
     camera.width = size.width;

@@ -54,7 +54,7 @@ class FrameFolder {
  public:
   /// Reads the list, the camera and the first image's size, and checks that every file is there. kNotFound for missing
   /// files, kInvalidInput for wrong cells, poses that are not rigid, stamps that do not grow, and file names that leave
-  /// the folder; the text names file and line.
+  /// the folder; kUnavailable where a folder or file can't be looked at to the end; the text names file and line.
   static core::Result<FrameFolder> open(const std::filesystem::path& folder, const FrameFolderOptions& options = {});
 
   const geometry::PinholeCamera& camera() const { return camera_; }

@@ -159,6 +159,29 @@ TEST_F(FrameFolders, WorkWithoutPoses) {
   EXPECT_THAT(message(), HasSubstr("b.depth.png: is missing"));
 }
 
+TEST_F(FrameFolders, WhatCannotBeReadIsNotTakenForMissing) {
+  const fs::path poses = folder_ / "camera_poses.csv";
+  const fs::path intrinsics = folder_ / "intrinsics.K.txt";
+  const fs::path frames = folder_ / "frames";
+  const FrameFolderOptions with_camera{.camera = PinholeCamera{8, 6, 10, 10, 4, 3}};
+  // Not a camera that stands still: a link to itself, and one that leads nowhere.
+  fs::remove(poses);
+  fs::create_symlink(poses.filename(), poses);
+  EXPECT_THAT(message(), HasSubstr("camera_poses.csv: cannot be opened"));
+  fs::remove(poses);
+  fs::create_symlink("nowhere.csv", poses);
+  EXPECT_THAT(message(), HasSubstr("camera_poses.csv: no such file"));
+  fs::remove(poses);
+  // Nor another camera, nor the frames beside.
+  fs::remove(intrinsics);
+  fs::create_symlink(intrinsics.filename(), intrinsics);
+  EXPECT_THAT(message(with_camera), HasSubstr("intrinsics.K.txt: cannot be opened"));
+  fs::remove(intrinsics);
+  EXPECT_EQ(message(with_camera), "");
+  fs::create_symlink(frames.filename(), frames);
+  EXPECT_THAT(message(with_camera), HasSubstr("frames: cannot be looked at"));
+}
+
 TEST_F(FrameFolders, HoldASingleFrame) {
   const fs::path single = folder_ / "single";
   fs::create_directory(single);
