@@ -20,9 +20,12 @@ void Inbox::put(interfaces::ReceivedMessage&& message) {
       waiting.pop_front();
       ++dropped_[topic];
     }
-    bytes += message.cdr.size();
-    messages_.push_back(std::move(message));
-    waiting.push_back(std::prev(messages_.end()));
+    // In an order that leaves all as it was where the memory ends.
+    std::list<interfaces::ReceivedMessage> added;
+    added.push_back(std::move(message));
+    waiting.push_back(added.begin());
+    bytes += added.front().cdr.size();
+    messages_.splice(messages_.end(), added);
   }
   changed_.notify_one();
 }

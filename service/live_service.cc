@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <new>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
@@ -198,10 +197,10 @@ core::Status LiveService::Impl::join_bus() {
         desk->ask((*std::move(question)).data);
       else
         ++unreadable_questions;
-    } catch (const std::bad_alloc&) {
+    } catch (const std::exception&) {
       ++unreadable_questions;
     }
-    inbox.put(std::move(message));  // for the recording
+    inbox.put(std::move(message));  // for the recording; an exception of it is the node's to count
   });
 }
 

@@ -1,11 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/interfaces/dds/dds_node.h"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <deque>
+#include <exception>
 #include <mutex>
+#include <optional>
+#include <span>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -32,9 +40,33 @@ std::string configuration(const DdsOptions& options) {
       "<General><MaxMessageSize>65500B</MaxMessageSize></General>"
       "<Internal><SocketReceiveBufferSize max=\"" +
       std::to_string(options.receive_buffer_bytes) + "B\"/><MaxSampleSize>" +
-      std::to_string(options.max_message_bytes) + "B</MaxSampleSize></Internal>";
+      // Beyond our own limit, so that what exceeds it comes here and is counted.
+      std::to_string(2 * options.max_message_bytes) + "B</MaxSampleSize></Internal>";
   if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
   return xml;
+}
+
+// What the system grants of a receive buffer, bytes; nothing where it does not say.
+std::optional<int> granted_buffer(int asked) {
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) return std::nullopt;
+  int granted = 0;
+  socklen_t size = sizeof(granted);
+  const bool told = ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &asked, sizeof(asked)) == 0 &&
+                    ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size) == 0;
+  ::close(socket);
+  if (!told) return std::nullopt;
+  return granted / 2;  // Linux doubles it for its own bookkeeping
+}
+
+void check_buffer(const DdsOptions& options, const core::LogSink& log) {
+  const std::optional<int> granted = granted_buffer(options.receive_buffer_bytes);
+  if (!granted || *granted >= options.receive_buffer_bytes) return;
+  core::log(
+      log, core::LogLevel::kWarning,
+      "the system grants a receive buffer of " + std::to_string(*granted >> 10) + " KiB instead of " +
+          std::to_string(options.receive_buffer_bytes >> 10) +
+          " KiB, so images may be lost: sysctl -w net.core.rmem_max=" + std::to_string(options.receive_buffer_bytes));
 }
 
 }  // namespace
@@ -48,6 +80,7 @@ struct DdsNode::Impl {
     std::atomic<std::uint64_t> arrived{0};  // samples that the middleware offered to the reader's history
     std::uint64_t taken = 0;                // of them, those that the node's thread took; touched by it alone
     std::uint64_t told_overwritten = 0;     // of them, those counted as dropped already
+    bool has_more = false;                  // something may wait; touched by the node's thread alone
   };
   struct Publication {
     std::string topic;
@@ -56,7 +89,6 @@ struct DdsNode::Impl {
   };
 
   DdsOptions options;
-  core::LogSink log;
   dds_entity_t participant = 0;
   dds_entity_t waitset = 0;
   dds_entity_t stop = 0;
@@ -65,6 +97,7 @@ struct DdsNode::Impl {
   std::deque<Subscription> subscriptions;
   std::deque<Publication> publications;
   std::atomic<std::uint64_t> dropped{0};
+  std::atomic<bool> stopping{false};
   std::thread thread;
 
   ~Impl() {
@@ -76,10 +109,13 @@ struct DdsNode::Impl {
   void run();
   void stop_receiving() {
     if (!thread.joinable()) return;
+    stopping = true;
     dds_set_guardcondition(stop, true);
     thread.join();
   }
+  /// Takes what waits, or a good part of it; has_more then says whether more may wait.
   void take(Subscription& subscription);
+  void deliver(Subscription& subscription, const ddsi_serdata* sample, const dds_sample_info_t& info);
   void count_losses(Subscription& subscription, std::uint64_t arrived);
   core::Result<dds_entity_t> make_topic(const std::string& topic, const std::string& type) const;
   template <class CType, class Message>
@@ -88,50 +124,69 @@ struct DdsNode::Impl {
 };
 
 void DdsNode::Impl::run() {
-  std::vector<dds_attach_t> triggered(64);
-  for (;;) {
-    const dds_return_t count = dds_waitset_wait(waitset, triggered.data(), triggered.size(), DDS_INFINITY);
+  std::array<dds_attach_t, 64> triggered{};
+  for (bool has_more = false; !stopping;) {
+    const dds_return_t count =
+        dds_waitset_wait(waitset, triggered.data(), triggered.size(), has_more ? 0 : DDS_INFINITY);
     if (count < 0) return;
     const auto filled = std::min(static_cast<std::size_t>(count), triggered.size());
-    for (std::size_t i = 0; i < filled; ++i) {
-      if (triggered[i] == 0) return;  // the stop condition
+    const std::span came(triggered.data(), filled);
+    std::size_t subscribed = 0;
+    {
+      const std::lock_guard lock(mutex);
+      subscribed = subscriptions.size();
+    }
+    // Each in turn, those that have more and those of which something came.
+    has_more = false;
+    for (std::size_t i = 0; i < subscribed && !stopping; ++i) {
       Subscription* subscription = nullptr;
       {
         const std::lock_guard lock(mutex);
-        subscription = &subscriptions[static_cast<std::size_t>(triggered[i] - 1)];
+        subscription = &subscriptions[i];
       }
+      const bool has_come = std::find(came.begin(), came.end(), static_cast<dds_attach_t>(i + 1)) != came.end();
+      if (!has_come && !subscription->has_more) continue;
       take(*subscription);
+      has_more = has_more || subscription->has_more;
     }
   }
 }
 
 void DdsNode::Impl::take(Subscription& subscription) {
   constexpr std::uint32_t kBatch = 16;
-  // What has arrived by now is taken below, or was overwritten.
+  // More than the deepest history (topic_table.cc), so that what has arrived by now is taken below, or was overwritten,
+  // however fast more comes.
+  constexpr int kBatches = 7;
   const std::uint64_t arrived = subscription.arrived.load(std::memory_order_acquire);
-  for (;;) {
+  subscription.has_more = true;
+  for (int batch = 0; batch < kBatches && subscription.has_more; ++batch) {
     ddsi_serdata* samples[kBatch] = {};
     dds_sample_info_t infos[kBatch];
     const dds_return_t count = dds_takecdr(subscription.reader, samples, kBatch, infos, DDS_ANY_STATE);
-    if (count <= 0) break;
     for (dds_return_t i = 0; i < count; ++i) {
-      if (infos[i].valid_data) {
-        ++subscription.taken;
-        const std::size_t size = ddsi_serdata_size(samples[i]);
-        if (size <= options.max_message_bytes) {
-          ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size),
-                                  infos[i].source_timestamp, core::steady_now_ns()};
-          ddsi_serdata_to_ser(samples[i], 0, size, message.cdr.data());
-          subscription.on_message(std::move(message));
-        } else {
-          dropped.fetch_add(1, std::memory_order_relaxed);
-        }
+      try {
+        if (infos[i].valid_data && !stopping) deliver(subscription, samples[i], infos[i]);
+      } catch (const std::exception&) {
+        dropped.fetch_add(1, std::memory_order_relaxed);
       }
       ddsi_serdata_unref(samples[i]);
     }
-    if (count < static_cast<dds_return_t>(kBatch)) break;
+    subscription.has_more = count == static_cast<dds_return_t>(kBatch) && !stopping;
   }
   count_losses(subscription, arrived);
+}
+
+void DdsNode::Impl::deliver(Subscription& subscription, const ddsi_serdata* sample, const dds_sample_info_t& info) {
+  ++subscription.taken;
+  const std::size_t size = ddsi_serdata_size(sample);
+  if (size > options.max_message_bytes) {
+    dropped.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size), info.source_timestamp,
+                          core::steady_now_ns()};
+  ddsi_serdata_to_ser(sample, 0, size, message.cdr.data());
+  subscription.on_message(std::move(message));
 }
 
 // Cyclone's own count of lost samples leaves out those that newer ones push out of the reader's history.
@@ -172,7 +227,6 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   }
   auto impl = std::make_unique<Impl>();
   impl->options = options;
-  impl->log = log;
   const auto domain_id = static_cast<dds_domainid_t>(options.domain);
   const dds_entity_t domain = dds_create_domain(domain_id, configuration(options).c_str());
   // A second node of this process finds the domain made already and shares its configuration.
@@ -195,6 +249,7 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
     PRESCENE_TRY(impl->graph, GraphAnnouncement::create(impl->participant, *options.ros_distro));
     impl->announce();
   }
+  check_buffer(options, log);
   impl->thread = std::thread([raw = impl.get()] { raw->run(); });
   return std::unique_ptr<DdsNode>(new DdsNode(std::move(impl)));
 }

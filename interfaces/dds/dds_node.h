@@ -31,9 +31,12 @@ struct DdsOptions {
   /// Publish which nodes there are (for `ros2 node list`); topics work without it. Set it to the release that all
   /// others on the bus have: the wrong form confuses their nodes.
   std::optional<RosDistro> ros_distro;
-  /// Receive buffer asked of the system; RGB-D is lost below 4 MiB. A smaller one that the system grants is logged.
+  /// Receive buffer asked of the system; RGB-D is lost below 4 MiB. Where the system grants a smaller one, that is
+  /// logged as a warning.
   int receive_buffer_bytes = 8 << 20;
-  std::size_t max_message_bytes = std::size_t{64} << 20;  ///< Larger samples are dropped unread.
+  /// Larger samples are dropped unread and counted; those of more than twice that Cyclone drops itself, with a warning
+  /// of its own and uncounted.
+  std::size_t max_message_bytes = std::size_t{64} << 20;
 };
 
 /// How a topic is offered or asked for; names say who uses it.
@@ -71,8 +74,10 @@ class DdsNode {
   DdsNode(const DdsNode&) = delete;
   DdsNode& operator=(const DdsNode&) = delete;
 
-  /// Calls `on_message` for each sample, from the node's one thread, until the node ends. Types: those of messages.h
-  /// that ros_messages.idl holds; another one is kUnsupported.
+  /// Calls `on_message` for each sample, from the node's one thread, until the node ends. Topics take turns, so that a
+  /// flood of one does not keep the others waiting. An exception that leaves `on_message` ends the work on its sample
+  /// only, which counts as dropped. Types: those of messages.h that ros_messages.idl holds; another one is
+  /// kUnsupported.
   core::Status subscribe(const std::string& topic, const std::string& type, TopicQos qos,
                          std::function<void(ReceivedMessage&&)> on_message);
 
@@ -92,15 +97,17 @@ class DdsNode {
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
 
-  /// No callback runs once this has returned; publishing goes on. Not to be called from a callback.
+  /// No callback runs once this has returned, which takes no longer than the one that runs now; publishing goes on. Not
+  /// to be called from a callback.
   void stop_receiving();
 
   /// How many readers on the bus match a publisher now.
   int matched_readers(DdsPublisher publisher) const;
   /// How many writers match a subscription now, 0 for an unknown topic.
   int matched_writers(const std::string& topic) const;
-  /// Samples that reached this node and were dropped unread: too large, rejected by the middleware, or overwritten by
-  /// newer ones before the node's thread took them. What the network loses of best-effort topics nobody can count.
+  /// Samples that reached this node and were dropped: too large (see DdsOptions), overwritten by newer ones before the
+  /// node's thread took them, without memory to hold them, or given up by their callback with an exception. What the
+  /// network loses of best-effort topics nobody can count.
   std::uint64_t dropped_samples() const;
 
   struct Impl;

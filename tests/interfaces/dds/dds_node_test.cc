@@ -6,8 +6,15 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <functional>
+#include <limits>
+#include <memory>
 #include <mutex>
+#include <new>
 #include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
@@ -214,6 +221,102 @@ TEST(DdsNode, CountsWhatNewerSamplesPushOutBeforeItIsRead) {
   const std::size_t unheard = static_cast<std::size_t>(std::stoul(first->data));  // sent before they had met
   EXPECT_LT(read.size(), 500u);
   EXPECT_EQ(read.size() + (*reader)->dropped_samples(), sent - unheard);
+}
+
+/// Two nodes, and what the second one hears of the first.
+class TwoNodes : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(writer_.ok()) << writer_.status().message();
+    ASSERT_TRUE(reader_.ok()) << reader_.status().message();
+  }
+  DdsPublisher text_publisher(const std::string& topic) {
+    const auto publisher = (*writer_)->advertise(topic, "std_msgs/msg/String", TopicQos::kReliable);
+    EXPECT_TRUE(publisher.ok()) << publisher.status().message();
+    return *publisher;
+  }
+  void listen(const std::string& topic, const std::function<void(ReceivedMessage&&)>& on_message) {
+    const core::Status done = (*reader_)->subscribe(topic, "std_msgs/msg/String", TopicQos::kCommands, on_message);
+    ASSERT_TRUE(done.ok()) << done.message();
+  }
+  void meet(DdsPublisher publisher) {
+    while ((*writer_)->matched_readers(publisher) == 0) std::this_thread::yield();
+  }
+  void send(DdsPublisher publisher, const std::string& text) {
+    const core::Status sent = (*writer_)->publish(publisher, RosString{text});
+    EXPECT_TRUE(sent.ok()) << sent.message();
+  }
+
+  static DdsOptions small_messages() {
+    DdsOptions small = options();
+    small.max_message_bytes = 100'000;
+    return small;
+  }
+  Inbox inbox_;
+  core::Result<std::unique_ptr<DdsNode>> writer_ = DdsNode::create(small_messages(), {});
+  core::Result<std::unique_ptr<DdsNode>> reader_ = DdsNode::create(small_messages(), {});
+};
+
+TEST_F(TwoNodes, AnExceptionEndsTheWorkOnItsSampleOnly) {
+  const DdsPublisher publisher = text_publisher("/thrown");
+  listen("/thrown", [&](ReceivedMessage&& message) {
+    const auto text = decode_cdr<RosString>(message.cdr);
+    if (text->data == "memory") throw std::bad_alloc();
+    if (text->data == "other") throw std::runtime_error("a library gave up");
+    inbox_.put(std::move(message));
+  });
+  meet(publisher);
+  for (int i = 0; i < 3; ++i)
+    for (const char* text : {"memory", "good", "other"}) send(publisher, text);
+  send(publisher, "last");
+  EXPECT_TRUE(inbox_.wait_for(4));
+  EXPECT_EQ((*reader_)->dropped_samples(), 6u);
+}
+
+TEST_F(TwoNodes, AFloodKeepsNeitherOtherTopicsNorTheEndWaiting) {
+  const DdsPublisher flood = text_publisher("/flood");
+  const DdsPublisher other = text_publisher("/other");
+  std::mutex gate;
+  // Each sample that is read brings the next: there is always a full batch of them.
+  listen("/flood", [&](ReceivedMessage&&) {
+    const std::lock_guard wait(gate);
+    send(flood, "again");
+  });
+  listen("/other", [&](ReceivedMessage&& message) { inbox_.put(std::move(message)); });
+  meet(flood);
+  meet(other);
+  {
+    const std::lock_guard closed(gate);
+    for (int i = 0; i < 64; ++i) send(flood, "first");
+  }
+  send(other, "now");
+  EXPECT_TRUE(inbox_.wait_for(1));
+  (*reader_)->stop_receiving();
+}
+
+TEST_F(TwoNodes, ASampleJustBeyondTheLimitIsCounted) {
+  const DdsPublisher publisher = text_publisher("/large");
+  listen("/large", [&](ReceivedMessage&& message) { inbox_.put(std::move(message)); });
+  meet(publisher);
+  send(publisher, std::string(100'001, 'x'));
+  send(publisher, std::string(99'900, 'x'));
+  EXPECT_TRUE(inbox_.wait_for(1));
+  EXPECT_EQ((*reader_)->dropped_samples(), 1u);
+  EXPECT_LT(inbox_.messages()[0].cdr.size(), 100'000u);
+}
+
+TEST(DdsNode, SaysWhenTheSystemGrantsASmallerReceiveBuffer) {
+  std::vector<std::string> lines;
+  const auto log = [&](core::LogLevel, const std::string& line) { lines.push_back(line); };
+  DdsOptions modest = options();
+  modest.receive_buffer_bytes = 8192;
+  EXPECT_TRUE(DdsNode::create(modest, log).ok());
+  EXPECT_TRUE(lines.empty());
+  DdsOptions greedy = options();
+  greedy.receive_buffer_bytes = std::numeric_limits<int>::max();  // no system grants that
+  EXPECT_TRUE(DdsNode::create(greedy, log).ok());
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NE(lines[0].find("sysctl -w net.core.rmem_max=2147483647"), std::string::npos) << lines[0];
 }
 
 TEST(DdsNode, AnnouncesItselfInEitherForm) {
