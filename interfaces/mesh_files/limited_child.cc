@@ -15,6 +15,7 @@
 #include <csignal>
 #include <exception>
 #include <new>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -80,12 +81,15 @@ Result<std::size_t> mapped_bytes() {
   return pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
-bool limit(int resource, rlim_t value) {
+bool limit(int resource, rlim_t soft, rlim_t hard) {
   rlimit now{};
   if (::getrlimit(static_cast<__rlimit_resource_t>(resource), &now) != 0) return false;
-  now.rlim_cur = now.rlim_max = std::min(value, now.rlim_max);
+  now.rlim_max = std::min(hard, now.rlim_max);
+  now.rlim_cur = std::min(soft, now.rlim_max);
   return ::setrlimit(static_cast<__rlimit_resource_t>(resource), &now) == 0;
 }
+
+bool limit(int resource, rlim_t value) { return limit(resource, value, value); }
 
 // Closes every file from `first` on.
 void close_from(int first) {
@@ -110,7 +114,9 @@ bool set_limits(std::size_t mapped, const ChildLimits& limits) {
   const auto seconds = static_cast<rlim_t>(std::chrono::ceil<std::chrono::seconds>(limits.time).count());
   // Not dumpable: a limit on core files does not hold where the system pipes them to a program.
   return ::prctl(PR_SET_DUMPABLE, 0) == 0 && limit(RLIMIT_CORE, 0) && limit(RLIMIT_FSIZE, 0) &&
-         limit(RLIMIT_CPU, seconds + 1) && (!kLimitsMemory || limit(RLIMIT_AS, mapped + limits.memory_bytes));
+         // Beyond the soft limit it ends by SIGXCPU, which tells why; at the hard one by SIGKILL, which does not.
+         limit(RLIMIT_CPU, seconds + 1, seconds + 2) &&
+         (!kLimitsMemory || limit(RLIMIT_AS, mapped + limits.memory_bytes));
 }
 
 void restore_default_signals() {
@@ -124,6 +130,14 @@ void restore_default_signals() {
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
+}
+
+// Where nobody is told of children's ends, none is kept to be waited for, and its number may be another's next.
+bool ends_are_lost() {
+  struct sigaction action {};
+  if (::sigaction(SIGCHLD, nullptr, &action) != 0) return false;
+  const bool ignored = (action.sa_flags & SA_SIGINFO) == 0 && action.sa_handler == SIG_IGN;  // NOLINT(*-union-access)
+  return ignored || (action.sa_flags & SA_NOCLDWAIT) != 0;
 }
 
 [[noreturn]] void end_out_of_memory() { ::_exit(kExitOutOfMemory); }
@@ -155,14 +169,24 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  // How it ended. One that has closed its pipe without ending is killed; one that was ending already keeps its status.
-  int end() {
+  // How it ended, as waitpid tells it; nothing where another in this process has waited for it. One that has closed its
+  // pipe without ending is killed; one that was ending already keeps its status.
+  std::optional<int> end() {
     if (process_ <= 0) return status_;
-    ::kill(process_, SIGKILL);
-    while (::waitpid(process_, &status_, 0) < 0) {
-      if (errno == EINTR) continue;
-      status_ = 0;  // Somebody else in this process has waited for it: what it wrote must tell.
-      break;
+    siginfo_t ended{};
+    // Without waiting, and leaving it to be waited for: one that is gone must not be killed by its number.
+    int found = -1;
+    do {
+      found = ::waitid(P_PID, static_cast<id_t>(process_), &ended, WEXITED | WNOHANG | WNOWAIT);
+    } while (found != 0 && errno == EINTR);
+    if (found == 0) {
+      ::kill(process_, SIGKILL);
+      int status = 0;
+      pid_t waited = -1;
+      do {
+        waited = ::waitpid(process_, &status, 0);
+      } while (waited < 0 && errno == EINTR);
+      if (waited == process_) status_ = status;
     }
     process_ = -1;
     return status_;
@@ -170,7 +194,7 @@ class Child {
 
  private:
   pid_t process_;
-  int status_ = 0;
+  std::optional<int> status_;
 };
 
 std::string seconds_text(std::chrono::milliseconds time) {
@@ -181,7 +205,12 @@ Status out_of_time(const ChildLimits& limits) {
   return core::resource_exhausted("did not finish within " + seconds_text(limits.time));
 }
 
-Status status_of_end(int status, const ChildLimits& limits) {
+Status status_of_end(std::optional<int> end, const ChildLimits& limits) {
+  if (!end)
+    return core::unavailable(
+        "ended in a way that can't be told: another part of this process waited for it; wait for one's own children "
+        "only");
+  const int status = *end;
   if (WIFEXITED(status)) {
     switch (WEXITSTATUS(status)) {
       case 0:
@@ -242,6 +271,9 @@ void ChildOutput::write(std::span<const std::uint8_t> bytes) {
 
 Result<std::vector<std::uint8_t>> run_in_child(const std::function<void(ChildOutput&)>& work, const ChildLimits& limits,
                                                const core::Cancellation* cancellation) {
+  if (ends_are_lost())
+    return core::unavailable(
+        "cannot be started: SIGCHLD is ignored, so how it ends could not be told; set SIGCHLD to its default");
   std::size_t mapped = 0;
   if (kLimitsMemory) {
     PRESCENE_TRY(mapped, mapped_bytes());

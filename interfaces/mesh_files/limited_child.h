@@ -38,11 +38,14 @@ class ChildOutput {
 
 /// What `work` wrote, once it has returned in the child. The child is a copy of this process with only the calling
 /// thread; it has no open files, no standard input and output, writes no core file and ends with this process. `work`
-/// must not need locks that other threads of this process may hold, except those of memory allocation.
+/// must not need locks that other threads of this process may hold, except those of memory allocation. This process
+/// has to leave the child to this function: SIGCHLD is not to be ignored (a program that is started by others may
+/// inherit that), nor may others wait for just any child.
 ///
 /// The status of a failure says what happened, as a sentence without its subject. kResourceExhausted: "ran out of its
 /// 800.0 MiB of memory", "did not finish within 8 s", more output than the limit; kInvalidInput: "crashed (signal
-/// 11)", threw, or ended otherwise; kCancelled, within a tenth of a second; kUnavailable: no process can be started.
+/// 11)", threw, or ended otherwise; kCancelled, within a tenth of a second; kUnavailable: no process can be started, or
+/// how it ended can't be told, since SIGCHLD is ignored or another waited for it.
 core::Result<std::vector<std::uint8_t>> run_in_child(const std::function<void(ChildOutput&)>& work,
                                                      const ChildLimits& limits,
                                                      const core::Cancellation* cancellation = nullptr);

@@ -144,6 +144,7 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGCHLD, SIG_DFL);  // whoever started the program may ignore it, and that is inherited
   for (const service::Verb& verb : verbs) {
     if (!verb.app->parsed()) continue;
     service::VerbContext context(options, cancellation);

@@ -3,6 +3,8 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,6 +15,8 @@
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
+
+#include "prescene/tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -52,6 +56,48 @@ TEST(LimitedChild, SaysHowTheWorkFailed) {
   EXPECT_EQ(message_of([](ChildOutput& out) { out.write(std::vector<std::uint8_t>(std::size_t{9} << 20)); }),
             "resource exhausted: gave more than 8.0 MiB");
   EXPECT_FALSE(has_children()) << "each was waited for";
+}
+
+TEST(LimitedChild, IsNotStartedWhereItsEndWouldBeLost) {
+  std::signal(SIGCHLD, SIG_IGN);
+  const std::string ignored = message_of([](ChildOutput&) { throw std::bad_alloc(); });
+  std::signal(SIGCHLD, SIG_DFL);
+  EXPECT_THAT(ignored, HasSubstr("unavailable: cannot be started: SIGCHLD is ignored"));
+  EXPECT_TRUE(run_in_child([](ChildOutput&) {}, kLimits).ok());
+}
+
+TEST(LimitedChild, WhoseEndAnotherTookIsNotTakenForDone) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path gate = folder.path() / "gate";
+  ASSERT_EQ(::mkfifo(gate.c_str(), 0600), 0);
+  // Waits for just any child, as a program around this library might, and opens the gate then.
+  std::thread greedy([&] {
+    while (::waitpid(-1, nullptr, 0) <= 0) std::this_thread::yield();
+    ::close(::open(gate.c_str(), O_WRONLY));
+  });
+  // The child's own child keeps the pipe open until the gate opens.
+  const auto result = run_in_child(
+      [&](ChildOutput&) {
+        if (::fork() == 0) ::close(::open(gate.c_str(), O_RDONLY));
+        ::_exit(97);
+      },
+      kLimits);
+  greedy.join();
+  EXPECT_THAT(to_string(result.status()), HasSubstr("unavailable: ended in a way that can't be told"));
+}
+
+TEST(LimitedChild, IsToldByASignalThatItsProcessorTimeIsUp) {
+  const auto limits = run_in_child(
+      [](ChildOutput& out) {
+        rlimit time{};
+        ::getrlimit(RLIMIT_CPU, &time);
+        const std::uint8_t below = time.rlim_cur < time.rlim_max ? 1 : 0;
+        out.write({&below, 1});
+      },
+      kLimits);
+  ASSERT_TRUE(limits.ok());
+  EXPECT_EQ(limits->at(0), 1) << "at the hard limit it would be killed without a reason";
+  EXPECT_EQ(message_of([](ChildOutput&) { ::raise(SIGXCPU); }), "resource exhausted: did not finish within 60 s");
 }
 
 TEST(LimitedChild, EndsWhoDoesNotReturn) {
