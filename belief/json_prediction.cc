@@ -135,9 +135,9 @@ Json paths_json(const std::vector<ObjectPath>& paths) {
   return json;
 }
 
-Json stepper_json(const PredictAnswer& predict) {
-  Json json{{"name", predict.stepper}};
-  if (!predict.not_lockstep.empty()) json["not_lockstep"] = predict.not_lockstep;
+Json stepper_json(const Basis& basis) {
+  Json json{{"name", basis.stepper}};
+  if (!basis.not_lockstep.empty()) json["not_lockstep"] = basis.not_lockstep;
   return json;
 }
 
@@ -160,6 +160,23 @@ Json outcome_probability_json(const OutcomeProbability& outcome) {
   return json;
 }
 
+void add_basis(const Basis& basis, Json& json) {
+  json["converged"] = basis.converged;
+  json["stopped"] = basis.stopped;
+  json["instances"] = basis.instances;
+  json["failed_instances"] = basis.failed_instances;
+  json["simulated_seconds"] = basis.simulated_seconds;
+  json["flown_seconds"] = basis.flown_seconds;
+  json["step"] = basis.step;
+  json["certificates"] = certificates_json(basis.certificates);
+  json["overlaps"] = {{"share", basis.overlapping_share}, {"deepest", basis.deepest_overlap}};
+  json["dropped_contacts"] = {{"instances", basis.crowded_instances}, {"contacts", basis.dropped_contacts}};
+  json["wall_seconds"] = basis.wall_seconds;
+  json["cpu_seconds"] = basis.cpu_seconds;
+  json["remarks"] = basis.remarks;
+  if (!basis.stepper.empty()) json["stepper"] = stepper_json(basis);
+}
+
 Json prediction_json(const PredictAnswer& predict) {
   Json outcomes = Json::array(), poses = Json::array(), runs = Json::array();
   for (const OutcomeProbability& outcome : predict.outcomes) outcomes.push_back(outcome_probability_json(outcome));
@@ -170,25 +187,12 @@ Json prediction_json(const PredictAnswer& predict) {
                     {"share", run.share},
                     {"timeline", to_json(run.timeline)},
                     {"trajectory", to_json(run.trajectory)}});
-  Json json{{"outcomes", std::move(outcomes)},
-            {"converged", predict.converged},
-            {"stopped", predict.stopped},
-            {"instances", predict.instances},
-            {"failed_instances", predict.failed_instances},
-            {"simulated_seconds", predict.simulated_seconds},
-            {"flown_seconds", predict.flown_seconds},
-            {"step", predict.step},
-            {"certificates", certificates_json(predict.certificates)},
-            {"overlaps", {{"share", predict.overlapping_share}, {"deepest", predict.deepest_overlap}}},
-            {"dropped_contacts", {{"instances", predict.crowded_instances}, {"contacts", predict.dropped_contacts}}},
-            {"wall_seconds", predict.wall_seconds},
-            {"cpu_seconds", predict.cpu_seconds},
-            {"remarks", predict.remarks},
-            {"history", history_json(predict.history)},
-            {"final_poses", std::move(poses)},
-            {"typical_runs", std::move(runs)},
-            {"left_out", predict.left_out}};
-  if (!predict.stepper.empty()) json["stepper"] = stepper_json(predict);
+  Json json{{"outcomes", std::move(outcomes)}};
+  add_basis(predict, json);
+  json["history"] = history_json(predict.history);
+  json["final_poses"] = std::move(poses);
+  json["typical_runs"] = std::move(runs);
+  json["left_out"] = predict.left_out;
   if (!predict.inputs.empty()) json["inputs"] = inputs_json(predict.inputs);
   if (!predict.chaos.empty()) json["chaos"] = chaos_json(predict.chaos);
   if (!predict.contact_times.empty()) json["contacts"] = contacts_json(predict);

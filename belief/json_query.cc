@@ -206,18 +206,16 @@ struct AnswerJson {
   }
   Json operator()(const PredictAnswer& predict) const { return prediction_json(predict); }
   Json operator()(const StabilityAnswer& stability) const {
-    return {{"object", stability.object},
-            {"stable", outcome_probability_json(stability.stable)},
-            {"likely_event", stability.likely_event},
-            {"instances", stability.instances},
-            {"simulated_seconds", stability.simulated_seconds},
-            {"wall_seconds", stability.wall_seconds}};
+    Json json{{"object", stability.object},
+              {"stable", outcome_probability_json(stability.stable)},
+              {"likely_event", stability.likely_event}};
+    add_basis(stability, json);
+    return json;
   }
   Json operator()(const ViewAnswer& view) const {
-    return {{"depth", image_json(view.depth, "32FC1")},
-            {"labels", image_json(view.labels, "16UC1")},
-            {"label_names", view.label_names},
-            {"presence", image_json(view.presence, "32FC1")}};
+    return {{"depth", image_json(view.depth, "32FC1")},  {"labels", image_json(view.labels, "16UC1")},
+            {"label_names", view.label_names},           {"presence", image_json(view.presence, "32FC1")},
+            {"failed_instances", view.failed_instances}, {"remarks", view.remarks}};
   }
 };
 

@@ -38,9 +38,12 @@ Action action_from(const JsonAt& at);
 Outcome outcome_from(const JsonAt& at);
 ExclusiveOutcomes exclusive_from(const JsonAt& at);
 Json exclusive_json(const ExclusiveOutcomes& group);
+struct Basis;
 struct OutcomeProbability;
 struct PredictAnswer;
 Json outcome_probability_json(const OutcomeProbability& outcome);
+/// Puts its fields into the object.
+void add_basis(const Basis& basis, Json& json);
 Json prediction_json(const PredictAnswer& predict);
 
 }  // namespace prescene::belief

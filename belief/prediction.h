@@ -183,22 +183,9 @@ struct CertificateSummary {
   friend bool operator==(const CertificateSummary&, const CertificateSummary&) = default;
 };
 
-struct PredictAnswer {
-  std::vector<OutcomeProbability> outcomes;
-  std::vector<FinalPoses> final_poses;
-  std::vector<TypicalRun> typical_runs;
-  /// The scene's outcomes (groups by their name) that need an object which is lost or was never found.
-  std::vector<std::string> left_out;
-  std::vector<ProbabilityStage> history;  ///< At each growth of the net, the last being the answer.
-  std::vector<DecidingInputs> inputs;
-  std::vector<ChaosCheck> chaos;
-  std::vector<double> contact_times;      ///< s
-  std::vector<ContactForecast> contacts;  ///< Likeliest first.
-  std::optional<FlightForecast> flight;
-  std::optional<ModelError> model_error;
-  std::vector<ObjectPath> paths;
+/// What an answer's probabilities rest on, and how far they can be trusted.
+struct Basis {
   std::vector<std::string> remarks;  ///< What one should know before trusting the numbers, in sentences.
-
   int instances = 0;
   int failed_instances = 0;  ///< Simulations that blew up: of no outcome; their share widens the intervals.
   double simulated_seconds = 0.0;
@@ -218,6 +205,24 @@ struct PredictAnswer {
   double cpu_seconds = 0.0;  ///< Of all threads of the process meanwhile.
   bool converged = false;    ///< All intervals reached the tolerance.
   std::string stopped;       ///< "converged", "max_instances", "exact", "time_limit", "cancelled".
+
+  friend bool operator==(const Basis&, const Basis&) = default;
+};
+
+struct PredictAnswer : Basis {
+  std::vector<OutcomeProbability> outcomes;
+  std::vector<FinalPoses> final_poses;
+  std::vector<TypicalRun> typical_runs;
+  /// The scene's outcomes (groups by their name) that need an object which is lost or was never found.
+  std::vector<std::string> left_out;
+  std::vector<ProbabilityStage> history;  ///< At each growth of the net, the last being the answer.
+  std::vector<DecidingInputs> inputs;
+  std::vector<ChaosCheck> chaos;
+  std::vector<double> contact_times;      ///< s
+  std::vector<ContactForecast> contacts;  ///< Likeliest first.
+  std::optional<FlightForecast> flight;
+  std::optional<ModelError> model_error;
+  std::vector<ObjectPath> paths;
 
   friend bool operator==(const PredictAnswer&, const PredictAnswer&) = default;
 };

@@ -87,13 +87,12 @@ struct WhereAnswer {
 
   friend bool operator==(const WhereAnswer&, const WhereAnswer&) = default;
 };
-struct StabilityAnswer {
+struct StabilityAnswer : Basis {
   std::string object;
   OutcomeProbability stable;
-  std::string likely_event;  ///< What happens in the typical run that is not stable; empty if none.
-  int instances = 0;
-  double simulated_seconds = 0.0;
-  double wall_seconds = 0.0;
+  /// What happens in the typical run that is not stable; empty if none is, or if the time ran out before that was
+  /// known, which the remarks say.
+  std::string likely_event;
 
   friend bool operator==(const StabilityAnswer&, const StabilityAnswer&) = default;
 };
@@ -102,6 +101,10 @@ struct ViewAnswer {
   geometry::LabelImage labels;
   std::vector<std::string> label_names;
   geometry::Image<float> presence;  ///< Probability per pixel that some object is there.
+  /// Foreseen states that `presence` would be averaged over and that blew up in the simulator; it is that of the
+  /// others.
+  int failed_instances = 0;
+  std::vector<std::string> remarks;  ///< What one should know before trusting the images, in sentences.
 
   friend bool operator==(const ViewAnswer&, const ViewAnswer&) = default;
 };

@@ -91,6 +91,8 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   if (foresight.estimate.instances.empty())
     return core::cancelled(
         "stopped before the first simulated instance was finished: give more time, or a shorter duration");
+  if (foresight.estimate.failed == static_cast<int>(foresight.estimate.instances.size()))
+    return core::invalid_input("every instance failed in the simulator: look at the scene's shapes, masses and speeds");
   return foresight;
 }
 

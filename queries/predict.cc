@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "basis.h"
 #include "prediction_parts.h"
 #include "prescene/core/text.h"
 #include "prescene/queries/final_poses.h"
@@ -132,58 +133,6 @@ std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
   return history;
 }
 
-/// What the numbers rest on.
-void account(const Foresight& foresight, belief::PredictAnswer& answer) {
-  constexpr double kNoticed = 0.002;  // m: what poses that rest by a scene file's rounded numbers do not reach
-  const simulation::OutcomeEstimate& estimate = foresight.estimate;
-  answer.instances = static_cast<int>(estimate.instances.size());
-  answer.failed_instances = estimate.failed;
-  answer.simulated_seconds = estimate.simulated_seconds;
-  answer.flown_seconds = estimate.flown_seconds;
-  answer.step = foresight.simulator->step_size();
-  const simulation::StepperUse stepper = foresight.simulator->stepper();
-  answer.stepper = stepper.name;
-  answer.not_lockstep = stepper.not_lockstep;
-  answer.certificates = {foresight.certifier != nullptr, estimate.certificates.certified, estimate.certificates.audited,
-                         estimate.certificates.mismatches, estimate.certificates.switched_off};
-  for (const simulation::InstanceRecord& record : estimate.instances) {
-    answer.dropped_contacts += record.dropped_contacts;
-    if (record.dropped_contacts > 0) ++answer.crowded_instances;
-    if (record.deepest_overlap <= kNoticed) continue;
-    answer.overlapping_share += record.weight;
-    answer.deepest_overlap = std::max(answer.deepest_overlap, record.deepest_overlap);
-  }
-  answer.wall_seconds = estimate.wall_seconds;
-  answer.cpu_seconds = estimate.cpu_seconds;
-  answer.converged = estimate.converged;
-  answer.stopped = simulation::to_string(estimate.stop);
-}
-
-std::string missing_text(const std::vector<std::string>& missing) {
-  std::string names;
-  for (const std::string& part : missing) names += (names.empty() ? "" : ", ") + part;
-  return "The time ran out, or the question was stopped, before all of the answer was worked out. Missing or "
-         "incomplete: " +
-         names + ". Give more time, or ask for less.";
-}
-
-/// What is too far away is not simulated any more: what is said of it then may not be what is meant.
-void remark_on_leaving(const simulation::OutcomeEstimate& estimate, std::vector<std::string>& remarks) {
-  const double radius = simulation::StopRule{}.world_radius;
-  double share = 0.0;
-  for (const simulation::InstanceRecord& record : estimate.instances) {
-    const auto& objects = record.final.objects;
-    if (std::any_of(objects.begin(), objects.end(), [&](const belief::ObjectState& object) {
-          return !record.failed && object.X_WO.translation.norm() > radius;
-        }))
-      share += record.weight;
-  }
-  if (share > 0.0)
-    remarks.push_back("In " + core::fixed_text(100.0 * share, 1) + " % of the instances something got farther than " +
-                      core::fixed_text(radius, 0) +
-                      " m from the world's origin. It is not simulated beyond, and judged as it was there.");
-}
-
 }  // namespace
 
 // The order of variables is that of simulation::variables_of.
@@ -218,8 +167,6 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   detail.keep_contacts = tell.contacts;
   PRESCENE_TRY(const Foresight foresight,
                foresee(prior, std::move(scene), query.duration.value_or(own.duration), query.effort, context, detail));
-  if (foresight.estimate.failed == static_cast<int>(foresight.estimate.instances.size()))
-    return core::invalid_input("every instance failed in the simulator: look at the scene's shapes, masses and speeds");
 
   belief::PredictAnswer answer;
   account(foresight, answer);
@@ -284,9 +231,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   remark_on_leaving(foresight.estimate, answer.remarks);
   if (!flight.ok())
     answer.remarks.push_back("For how long nothing can touch anything is not told: " + flight.message() + ".");
-  if (foresight.estimate.certain)
-    answer.remarks.push_back(
-        "Nothing in the scene is uncertain: one instance tells what the simulator does, not how sure that is.");
+  remark_on_certainty(foresight.estimate, answer.remarks);
   return answer;
 }
 

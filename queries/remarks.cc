@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "basis.h"
 #include "prediction_parts.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
@@ -107,33 +108,53 @@ void remark_on_model(const belief::PredictAnswer& answer, double confidence, std
                     (error.instances == 1 ? " instance." : " instances."));
 }
 
-}  // namespace
-
-std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort) {
-  std::vector<std::string> remarks;
-  const double failed = static_cast<double>(answer.failed_instances) / std::max(1, answer.instances);
-  if (answer.failed_instances > 0) {
-    std::string text = std::to_string(answer.failed_instances) + " of " + std::to_string(answer.instances) +
+void remark_on_instances(const belief::Basis& basis, std::vector<std::string>& remarks) {
+  const double failed = static_cast<double>(basis.failed_instances) / std::max(1, basis.instances);
+  if (basis.failed_instances > 0) {
+    std::string text = std::to_string(basis.failed_instances) + " of " + std::to_string(basis.instances) +
                        " instances failed in the simulator. They count for no outcome, and their share widens every "
                        "interval.";
     if (failed > kManyFailed)
       text += " That is more than 1 %: do not rely on this answer; look at the scene's shapes, masses and speeds.";
     remarks.push_back(std::move(text));
   }
-  if (answer.overlapping_share > 0.0)
-    remarks.push_back("In " + percent(answer.overlapping_share, 1) +
+  if (basis.overlapping_share > 0.0)
+    remarks.push_back("In " + percent(basis.overlapping_share, 1) +
                       " of the instances things were in each other, at the start or when let go, by up to " +
-                      fixed_text(1000.0 * answer.deepest_overlap, 0) +
+                      fixed_text(1000.0 * basis.deepest_overlap, 0) +
                       " mm. They are parted gently; what comes of it is doubtful.");
-  if (answer.crowded_instances > 0)
-    remarks.push_back("In " + std::to_string(answer.crowded_instances) + " of " + std::to_string(answer.instances) +
+  if (basis.crowded_instances > 0)
+    remarks.push_back("In " + std::to_string(basis.crowded_instances) + " of " + std::to_string(basis.instances) +
                       " instances an object had more contacts in a step than there is room for: " +
-                      std::to_string(answer.dropped_contacts) +
+                      std::to_string(basis.dropped_contacts) +
                       " were left out. Give it fewer parts, or simulate with '--stepper bullet'.");
-  if (answer.certificates.switched_off)
+  if (basis.certificates.switched_off)
     remarks.push_back(
         "Certificates ended too many instances with another outcome than running on: all were run to "
         "rest after all.");
+}
+
+void remark_on_tolerance(const belief::Basis& basis, const belief::Effort& effort, std::vector<std::string>& remarks) {
+  if (!basis.converged && basis.stopped != "exact")
+    remarks.push_back("Not every interval reached +-" + core::rounded_text(effort.tolerance) + ": " +
+                      (basis.stopped == "time_limit"  ? "the time ran out"
+                       : basis.stopped == "cancelled" ? "it was stopped"
+                                                      : "the most instances were run") +
+                      ".");
+}
+
+}  // namespace
+
+std::vector<std::string> remarks_of(const belief::Basis& basis, const belief::Effort& effort) {
+  std::vector<std::string> remarks;
+  remark_on_instances(basis, remarks);
+  remark_on_tolerance(basis, effort, remarks);
+  return remarks;
+}
+
+std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort) {
+  std::vector<std::string> remarks;
+  remark_on_instances(answer, remarks);
   for (const belief::ChaosCheck& check : answer.chaos) {
     if (!check.chaotic) continue;
     remarks.push_back("'" + check.about + "' is chaotic: of " + std::to_string(check.pairs) + " pairs of starts " +
@@ -143,12 +164,7 @@ std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const b
                       "takes four times the instances.");
   }
   if (answer.model_error) remark_on_model(answer, effort.confidence, remarks);
-  if (!answer.converged && answer.stopped != "exact")
-    remarks.push_back("Not every interval reached +-" + core::rounded_text(effort.tolerance) + ": " +
-                      (answer.stopped == "time_limit"  ? "the time ran out"
-                       : answer.stopped == "cancelled" ? "it was stopped"
-                                                       : "the most instances were run") +
-                      ".");
+  remark_on_tolerance(answer, effort, remarks);
   return remarks;
 }
 

@@ -2,6 +2,7 @@
 // Object stability: does it stay as it is, or as it is when it is let go now?
 #include <utility>
 
+#include "basis.h"
 #include "prescene/queries/typical_runs.h"
 #include "tasks.h"
 
@@ -59,13 +60,16 @@ core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief
   belief::StabilityAnswer answer;
   answer.object = query.object;
   answer.stable = {"stable", "", stays.probability, stays.low, stays.high};
+  account(foresight, answer);
+  answer.remarks = remarks_of(answer, query.effort);
   if (const std::optional<std::size_t> unstable = typical_instance(foresight, 0, {0, 1}, index)) {
     if (const auto run = run_again(foresight, prior, *unstable, context))
       answer.likely_event = event_text(*foresight.scene, *run, *object, query.max_move, query.max_turn);
+    else
+      answer.remarks.push_back(missing_text({"likely_event"}));
   }
-  answer.instances = static_cast<int>(foresight.estimate.instances.size());
-  answer.simulated_seconds = foresight.estimate.simulated_seconds;
-  answer.wall_seconds = foresight.estimate.wall_seconds;
+  remark_on_leaving(foresight.estimate, answer.remarks);
+  remark_on_certainty(foresight.estimate, answer.remarks);
   return answer;
 }
 

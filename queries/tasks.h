@@ -37,8 +37,8 @@ struct ForesightDetail {
   bool keep_contacts = false;
 };
 /// Fails when the duration is out of range, when the memory for a question does not hold it, when no simulator can be
-/// made, or when the query was cancelled before an instance was finished. The scene's outcomes are what is judged, its
-/// actions what is done.
+/// made, when the query was cancelled before an instance was finished, or when every instance failed in the simulator.
+/// The scene's outcomes are what is judged, its actions what is done.
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
                                 const belief::Effort& effort, const QueryContext& context,
                                 const ForesightDetail& detail = {});

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Observation anticipation: Z*_t+1 ~ P(Z_t+1 | X_t+1), as the noise-free view of the predicted belief.
 #include <algorithm>
+#include <string>
 #include <utility>
 
+#include "basis.h"
 #include "prescene/belief/robot_motion.h"
-#include "tasks.h"
 
 namespace prescene::queries {
 namespace {
@@ -71,6 +72,9 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
                            std::span(&likeliest, 1), context.cancellation);
   if (likeliest.end == belief::TrajectoryEnd::kCancelled)
     return core::cancelled("stopped before the view was foreseen");
+  if (likeliest.end == belief::TrajectoryEnd::kDiverged)
+    return core::invalid_input(
+        "the likeliest start failed in the simulator: look at the scene's shapes, masses and speeds");
 
   PRESCENE_TRY(const std::unique_ptr<rendering::Renderer> renderer, context.make_renderer());
   filter::MeshCache own_meshes;
@@ -86,17 +90,29 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
 
   belief::ViewAnswer answer;
   answer.presence = geometry::Image<float>(camera.width, camera.height, 0.0f);
+  answer.failed_instances = foresight.estimate.failed;
+  if (answer.failed_instances > 0)
+    answer.remarks.push_back(std::to_string(answer.failed_instances) + " of " +
+                             std::to_string(foresight.estimate.instances.size()) +
+                             " foreseen states failed in the simulator; presence is that of the others. Look at the "
+                             "scene's shapes, masses and speeds.");
+  remark_on_leaving(foresight.estimate, answer.remarks);
+  double followed = 0.0;  // of the weights
+  for (const simulation::InstanceRecord& record : foresight.estimate.instances)
+    if (!record.failed) followed += record.weight;
   rendering::RenderedView images;
   for (const simulation::InstanceRecord& record : foresight.estimate.instances) {
+    if (record.failed) continue;
     if (context.cancellation && context.cancellation->requested())
       return core::cancelled("stopped before all views were drawn: give more time, or a smaller camera image");
     const auto [drawn, status] = draw(record.final, &images);
     PRESCENE_RETURN_IF_ERROR(status);
+    const double share = foresight.estimate.failed > 0 ? record.weight / followed : record.weight;
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         const std::uint16_t label = images.labels(x, y);
         if (label != 0 && drawn.kinds[label - 1u] == filter::InstanceKind::kObject)
-          answer.presence(x, y) += static_cast<float>(record.weight);
+          answer.presence(x, y) += static_cast<float>(share);
       }
     }
   }

@@ -63,6 +63,7 @@ std::vector<ReportSection> sections_of(const belief::StabilityAnswer& answer, co
                      " s.";
   if (!answer.likely_event.empty()) text += " When it does not stay, it typically " + answer.likely_event + ".";
   section.blocks.push_back(TextBlock{std::move(text)});
+  for (const std::string& remark : answer.remarks) section.blocks.push_back(TextBlock{remark});
   return {std::move(section)};
 }
 
@@ -90,7 +91,9 @@ std::vector<ReportSection> sections_of(const belief::ViewAnswer& answer, const b
   tint(answer.presence, 0.9, presence);
   pictures.pictures.push_back({"The likeliest depth image, with outlines", std::move(labelled)});
   pictures.pictures.push_back({"Probability that an object is seen at a pixel", std::move(presence)});
-  return {{"What the camera will see", {std::move(pictures)}}};
+  ReportSection section{"What the camera will see", {std::move(pictures)}};
+  for (const std::string& remark : answer.remarks) section.blocks.push_back(TextBlock{remark});
+  return {std::move(section)};
 }
 
 std::vector<ReportSection> sections_of(const std::monostate&, const belief::Scene&) { return {}; }

@@ -19,8 +19,10 @@ std::string interval(const nlohmann::ordered_json& p) {
 
 /// What a probability rests on: few instances, wide intervals.
 std::string basis(const nlohmann::ordered_json& answer) {
-  return "from " + counted(answer.value("instances", std::size_t{0}), "instance") + ", " +
-         fixed_text(answer.value("wall_seconds", 0.0), 1) + " s\n";
+  std::string text = "from " + counted(answer.value("instances", std::size_t{0}), "instance") + ", " +
+                     fixed_text(answer.value("wall_seconds", 0.0), 1) + " s\n";
+  for (const std::string& remark : answer.value("remarks", std::vector<std::string>{})) text += remark + "\n";
+  return text;
 }
 
 std::string short_form(const nlohmann::ordered_json& answer) {

@@ -196,6 +196,24 @@ TEST(AnswerToJson, TellsWhoSimulatedAndWhyNotInLockstep) {
             Json::parse(R"({"name": "bullet", "not_lockstep": "five objects"})"));
 }
 
+TEST(AnswerToJson, TellsWhatStabilityRestsOn) {
+  StabilityAnswer stability;
+  stability.object = "cup";
+  stability.instances = 64;
+  stability.failed_instances = 3;
+  stability.converged = true;
+  stability.stopped = "converged";
+  stability.stepper = "lockstep";
+  stability.remarks = {"3 of 64 instances failed"};
+  const Json json = to_json(Answer{"", 0, {}, stability})["stability"];
+  EXPECT_EQ(json["instances"], 64);
+  EXPECT_EQ(json["failed_instances"], 3);
+  EXPECT_EQ(json["converged"], true);
+  EXPECT_EQ(json["stopped"], "converged");
+  EXPECT_EQ(json["stepper"], Json::parse(R"({"name": "lockstep"})"));
+  EXPECT_EQ(json["remarks"], Json::parse(R"(["3 of 64 instances failed"])"));
+}
+
 TEST(AnswerToJson, WritesImagesInBase64) {
   ViewAnswer view;
   view.depth = geometry::DepthImage(2, 1, 1.0F);  // 00 00 80 3f twice

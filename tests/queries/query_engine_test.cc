@@ -45,6 +45,50 @@ StabilityQuery stability_of(const std::string& object) {
   return query;
 }
 
+/// A simulator whose runs are a formula, some of which end otherwise than by their duration.
+class EndingOtherwise final : public simulation::Simulator {
+ public:
+  using End =
+      std::function<std::optional<belief::TrajectoryEnd>(const belief::WorldState&, const simulation::RunRequest&)>;
+  EndingOtherwise(tests::FakeSimulator::Formula formula, End end) : fake_(std::move(formula)), end_(std::move(end)) {}
+
+  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
+           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
+           std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
+    fake_.run(starts, request, stream, numbers, pool, trajectories, cancellation);
+    for (std::size_t i = 0; i < starts.size(); ++i)
+      if (const auto end = end_(starts[i], request)) trajectories[i].end = *end;
+  }
+  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>&,
+                                                      const core::RandomStream&) const override {
+    return nullptr;
+  }
+
+ private:
+  tests::FakeSimulator fake_;
+  End end_;
+};
+
+QueryContext context_ending(const EndingOtherwise::End& end, core::ThreadPool& pool) {
+  QueryContext context = context_with(slide, pool);
+  context.make_simulator = [end](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    return std::unique_ptr<simulation::Simulator>(std::make_unique<EndingOtherwise>(slide, end));
+  };
+  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
+    return rendering::make_reference_renderer();
+  };
+  return context;
+}
+
+/// Runs blow up whose carton is slippery (of a weight of 0.25), rough, or both.
+EndingOtherwise::End blowing_up(bool slippery, bool rough) {
+  return [=](const belief::WorldState& start, const simulation::RunRequest&) -> std::optional<belief::TrajectoryEnd> {
+    if (start.objects[0].physical.friction < tests::kSlideBelow ? slippery : rough)
+      return belief::TrajectoryEnd::kDiverged;
+    return std::nullopt;
+  };
+}
+
 TEST(Predict, AScenesPriorsGiveTheProbabilityOfTheirOutcomes) {
   core::ThreadPool pool(2);
   const Answer answer = queries::answer(sliding_scene(), 1, {"q1", PredictQuery{}}, context_with(slide, pool));
@@ -418,6 +462,45 @@ TEST(Stability, AHeldObjectIsLetGo) {
   EXPECT_GT(retreat.normalized().dot(geometry::Vector3d(0.2 - 0.12, 0.0, 0.3 - 0.1).normalized()), 0.999);
 }
 
+TEST(Stability, InstancesThatFailedAreToldAndWidenItsInterval) {
+  core::ThreadPool pool(1);
+  const Answer answer =
+      queries::answer(two_hypotheses(), {"", stability_of("carton")}, context_ending(blowing_up(true, false), pool));
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  const auto& told = std::get<StabilityAnswer>(answer.what);
+  EXPECT_NEAR(told.stable.probability, 0.75, 1e-12);
+  EXPECT_GE(told.stable.high, 1.0 - 1e-12) << "those that failed may all have stayed";
+  EXPECT_GT(told.failed_instances, 0);
+  EXPECT_LT(told.failed_instances, told.instances);
+  EXPECT_FALSE(told.converged);
+  EXPECT_EQ(told.stopped, "max_instances");
+  EXPECT_EQ(told.likely_event, "") << "none moved";
+  ASSERT_EQ(told.remarks.size(), 2u);
+  EXPECT_THAT(told.remarks[0], HasSubstr("failed in the simulator"));
+  EXPECT_THAT(told.remarks[1], HasSubstr("Not every interval"));
+}
+
+TEST(Stability, OfInstancesThatAllFailedIsAnError) {
+  core::ThreadPool pool(1);
+  const Answer answer =
+      queries::answer(two_hypotheses(), {"", stability_of("carton")}, context_ending(blowing_up(true, true), pool));
+  EXPECT_THAT(answer.error.message(), HasSubstr("every instance failed in the simulator"));
+}
+
+TEST(Stability, AnEventThatWasNotWorkedOutInTimeIsNamedInTheRemarks) {
+  core::ThreadPool pool(1);
+  // What is told has states farther apart than what is judged.
+  const auto stopped = [](const belief::WorldState&, const simulation::RunRequest& request) {
+    return request.sample_interval > 0.03 ? std::optional(belief::TrajectoryEnd::kCancelled) : std::nullopt;
+  };
+  const Answer answer = queries::answer(two_hypotheses(), {"", stability_of("carton")}, context_ending(stopped, pool));
+  const auto& told = std::get<StabilityAnswer>(answer.what);
+  EXPECT_NEAR(told.stable.probability, 0.75, 1e-12);
+  EXPECT_EQ(told.likely_event, "");
+  ASSERT_FALSE(told.remarks.empty());
+  EXPECT_THAT(told.remarks.back(), HasSubstr("likely_event"));
+}
+
 TEST(Stability, OfAnObjectThatIsNotThereIsAnError) {
   core::ThreadPool pool(1);
   belief::Belief belief = two_hypotheses();
@@ -456,6 +539,30 @@ TEST(View, ShowsTheLikeliestAndWhereObjectsMayBe) {
   EXPECT_EQ(seen.presence(tx, ty), 0.0f);
   const auto [hx, hy] = pixel(0.2, 0.0, 0.3);
   EXPECT_EQ(seen.labels(hx, hy), 4);
+}
+
+TEST(View, StatesThatFailedAreNotDrawn) {
+  core::ThreadPool pool(1);
+  const belief::Belief belief = two_hypotheses();
+  const Answer answer = queries::answer(belief, {"", ViewQuery{}}, context_ending(blowing_up(true, false), pool));
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  const auto& seen = std::get<ViewAnswer>(answer.what);
+  EXPECT_GT(seen.failed_instances, 0);
+  ASSERT_EQ(seen.remarks.size(), 1u);
+  EXPECT_THAT(seen.remarks[0], HasSubstr("failed in the simulator"));
+  const Eigen::Vector2d p =
+      belief.scene->camera->intrinsics.project(belief.X_WC.inverse() * geometry::Vector3d(0.12, 0.0, 0.2));
+  EXPECT_NEAR(seen.presence(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))), 1.0, 1e-5);
+}
+
+TEST(View, WhoseLikeliestStateFailedIsAnError) {
+  core::ThreadPool pool(1);
+  const auto error_of = [&](bool slippery) {
+    return queries::answer(two_hypotheses(), {"", ViewQuery{}}, context_ending(blowing_up(slippery, true), pool))
+        .error.message();
+  };
+  EXPECT_THAT(error_of(false), HasSubstr("the likeliest start failed in the simulator"));
+  EXPECT_THAT(error_of(true), HasSubstr("every instance failed in the simulator"));
 }
 
 TEST(Documentation, ItsQuestionsAreUnderstood) {

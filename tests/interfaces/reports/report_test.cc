@@ -292,7 +292,9 @@ TEST(AnswerSections, ShowEveryKindOfAnswer) {
   stability.object = "cup";
   stability.stable = {"stable", "", 0.25, 0.2, 0.3};
   stability.likely_event = "tips over";
+  stability.remarks = {"3 of 64 instances failed"};
   answer.what = stability;
+  EXPECT_THAT(page_of(answer), HasSubstr("3 of 64 instances failed"));
   EXPECT_THAT(page_of(answer), HasSubstr("it typically tips over."));
 
   belief::WhereAnswer where;
