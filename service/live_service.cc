@@ -6,7 +6,7 @@
 #include <chrono>
 #include <exception>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <string>
 #include <utility>
 
 #include "prescene/belief/json.h"
@@ -95,7 +95,6 @@ struct LiveService::Impl {
   core::TimeNs now();
   ServiceHealth health() const;
   void tell_what_changed(const ServiceHealth& health);
-  void say_once(const std::string& text);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -120,9 +119,9 @@ struct LiveService::Impl {
   double step_seconds = 0.0;
   std::vector<std::string> degraded;
   std::string last_refusal;
+  std::string logged_refusal;
   std::uint64_t not_simulated = 0;
   std::string physics_failure;
-  std::set<std::string> said;  // by say_once
   const Backends* backends = nullptr;
   std::optional<core::Stopwatch> since_frame;
   bool was_tracking = false;
@@ -212,9 +211,9 @@ core::TimeNs LiveService::Impl::now() {
 
 void LiveService::Impl::refuse(const core::Status& status) {
   ++refused;
-  if (status.message() == last_refusal) return;  // a driver repeats its mistake with each frame
   last_refusal = status.message();
-  core::log(log, core::LogLevel::kWarning, "message refused: " + last_refusal);
+  if (last_refusal == logged_refusal) return;  // a driver repeats its mistake with each frame
+  if (log_limiter.log(core::LogLevel::kWarning, "message refused: " + last_refusal)) logged_refusal = last_refusal;
 }
 
 void LiveService::Impl::note_failure(const std::string& of, const std::exception& error) {
@@ -341,25 +340,23 @@ ServiceHealth LiveService::Impl::health() const {
   return health;
 }
 
-void LiveService::Impl::say_once(const std::string& text) {
-  // Reasons name objects and counts of a scene, so they are few; more than these stand in /diagnostics only.
-  constexpr std::size_t kMostSaid = 32;
-  if (said.size() < kMostSaid && said.insert(text).second) core::log(log, core::LogLevel::kWarning, text);
-}
-
 void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
   if (!health.physics_failure.empty())
-    say_once("physics failed, so what it was to move goes on at constant velocity: " + health.physics_failure);
+    log_limiter.log_once(
+        core::LogLevel::kWarning,
+        "physics failed, so what it was to move goes on at constant velocity: " + health.physics_failure);
   if (!health.steppers.last_reason.empty())
-    say_once("simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
-             health.steppers.last_reason);
+    log_limiter.log_once(core::LogLevel::kWarning,
+                         "simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
+                             health.steppers.last_reason);
+  // What the log holds back is said at the next look, if it is still so then.
   const bool tracking = is_tracking(health);
   if (tracking && !was_tracking) {
-    core::log(log, core::LogLevel::kInfo, "frames come: " + health_text(health));
+    if (!log_limiter.log(core::LogLevel::kInfo, "frames come: " + health_text(health))) return;
   } else if (tracking && !health.degraded.empty() && !was_degraded) {
-    core::log(log, core::LogLevel::kWarning, health_text(health));
+    if (!log_limiter.log(core::LogLevel::kWarning, health_text(health))) return;
   } else if (!tracking && (was_tracking || (!told_why_not && !health.last_skip.empty()))) {
-    core::log(log, core::LogLevel::kWarning, health_text(health));
+    if (!log_limiter.log(core::LogLevel::kWarning, health_text(health))) return;
     told_why_not = !health.last_skip.empty();
   }
   if (tracking) told_why_not = false;

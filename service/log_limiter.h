@@ -4,6 +4,7 @@
 //
 //   LogLimiter limiter(log, {});
 //   core::log(limiter.sink(), core::LogLevel::kWarning, "the same fault as a moment ago");
+//   if (!limiter.log(core::LogLevel::kWarning, "no frames come")) ...
 //   ... limiter.held_back()
 #pragma once
 
@@ -18,6 +19,7 @@ namespace prescene::service {
 struct LogLimit {
   double lines_per_second = 0.5;     ///< In the long run.
   int burst = 20;                    ///< Lines at once after a quiet time.
+  int for_errors = 5;                ///< Of these, so many are kept for errors: a flood of warnings holds none back.
   double repeat_after_s = 30.0;      ///< The same text is not logged again before.
   std::size_t longest_line = 1'000;  ///< Bytes; the rest of a line is cut off.
 };
@@ -32,7 +34,12 @@ class LogLimiter {
   LogLimiter(const LogLimiter&) = delete;
   LogLimiter& operator=(const LogLimiter&) = delete;
 
-  /// Must not outlive the limiter.
+  /// Logs a line, or holds it back and counts it; true where it was logged.
+  bool log(core::LogLevel level, const std::string& text);
+  /// Logs a text once in the limiter's life, as soon as a call of this finds that it may be logged. Of such texts 32 at
+  /// most.
+  void log_once(core::LogLevel level, const std::string& text);
+  /// log() as a sink. Must not outlive the limiter.
   core::LogSink sink();
   /// Lines that were not logged, since the start.
   std::uint64_t held_back() const;

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,30 @@ TEST_F(LogLimiterTest, ALineIsRepeatedOnlyAfterAWhileWithTheCountOfWhatWasLeftOu
   now_s_ = 20.0;
   log(core::LogLevel::kWarning, "one");
   EXPECT_EQ(lines_.back(), "one") << "a count is given once";
+}
+
+TEST_F(LogLimiterTest, AFloodOfWarningsHoldsNoErrorBack) {
+  LogLimiter limiter(collect(), {.burst = 20, .for_errors = 5}, [&] { return now_s_; });
+  for (int i = 0; i < 1000; ++i) limiter.log(core::LogLevel::kWarning, "warning " + std::to_string(i));
+  EXPECT_EQ(lines_.size(), 15u);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(limiter.log(core::LogLevel::kError, "error " + std::to_string(i)));
+  EXPECT_FALSE(limiter.log(core::LogLevel::kError, "one too many"));
+  // What time brings is for errors first.
+  now_s_ = 4.0;
+  EXPECT_FALSE(limiter.log(core::LogLevel::kWarning, "warning"));
+  EXPECT_TRUE(limiter.log(core::LogLevel::kError, "one more"));
+}
+
+TEST_F(LogLimiterTest, WhatIsToBeSaidOnceIsSaidWhenItMayBe) {
+  LogLimiter limiter(collect(), {}, [&] { return now_s_; });
+  int i = 0;
+  while (limiter.log(core::LogLevel::kWarning, "warning " + std::to_string(i))) ++i;
+  limiter.log_once(core::LogLevel::kWarning, "physics failed");
+  EXPECT_THAT(lines_, ::testing::Not(::testing::Contains(::testing::StartsWith("physics failed"))));
+  for (now_s_ = 10.0; now_s_ < 1000.0; now_s_ += 10.0) limiter.log_once(core::LogLevel::kWarning, "physics failed");
+  EXPECT_EQ(std::count_if(lines_.begin(), lines_.end(),
+                          [](const std::string& line) { return line.starts_with("physics failed"); }),
+            1);
 }
 
 TEST_F(LogLimiterTest, ManyDifferentLinesAreBoundedInNumberAndLength) {
