@@ -78,17 +78,29 @@ DeskCounts AnsweringDesk::counts() const {
 }
 
 void AnsweringDesk::ask(std::string question_json) {
+  try {
+    take(std::move(question_json));
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void AnsweringDesk::take(std::string question_json) {
+  const std::size_t bytes = std::min(question_json.size(), kLongestQuestion + 1);
+  const bool may_have_id = question_json.size() <= kLongestWithId;
+  if (question_json.size() > bytes) {  // what is longer is refused by the reader, and need not be kept
+    question_json.resize(bytes);
+    question_json.shrink_to_fit();
+  }
   {
     const std::lock_guard lock(mutex_);
-    const std::size_t bytes = std::min(question_json.size(), kLongestQuestion + 1);
     if (unread_.size() < settings_.max_unread && unread_bytes_ + bytes <= settings_.max_unread_bytes) {
-      question_json.resize(bytes);  // what is longer is refused by the reader, and need not be kept
       unread_.push_back(std::move(question_json));
       unread_bytes_ += bytes;
       read_changed_.notify_one();
       return;
     }
-    if (question_json.size() > kLongestWithId || too_many_.size() >= kMostRefusalsWaiting) {
+    if (!may_have_id || too_many_.size() >= kMostRefusalsWaiting) {
       ++counts_.unanswered;
       return;
     }
@@ -117,83 +129,97 @@ void AnsweringDesk::read_questions() {
         unread_bytes_ -= question.size();
       }
     }
-    if (is_refusal)
-      refuse(id, too_many_wait(settings_.max_unread));
-    else
+    if (!is_refusal) {
       read(question);
+      continue;
+    }
+    try {
+      refuse(id, too_many_wait(settings_.max_unread));
+    } catch (const std::exception&) {
+      drop();
+    }
   }
 }
 
 void AnsweringDesk::read(const std::string& question_json) {
   std::string id;
-  core::Status reason;
   try {
     if (question_json.size() > kLongestQuestion)
       return refuse("", core::resource_exhausted("the question is longer than " + std::to_string(kLongestQuestion) +
                                                  " bytes: make it shorter"));
-    auto query = belief::query_from_json(question_json);
-    if (!query) return refuse(id_of(question_json), query.status());
-    if (std::holds_alternative<belief::WhereQuery>(query->what)) return answer(*query);
-    id = query->id;
-    bound_effort(*query, settings_);
-    const std::lock_guard lock(mutex_);
-    const auto is_same = [&id](const belief::Query& other) { return other.id == id; };
-    if (!id.empty() && (id == id_in_work_ || std::any_of(waiting_.begin(), waiting_.end(), is_same))) {
-      ++counts_.repeated;
-      return;
+    auto read = belief::query_from_json(question_json);
+    if (!read) return refuse(id_of(question_json), read.status());
+    if (std::holds_alternative<belief::WhereQuery>(read->what)) return answer(*read);
+    id = read->id;
+    bound_effort(*read, settings_);
+    const auto query = std::make_shared<const belief::Query>(*std::move(read));
+    core::Status reason;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto has_id = [&id](const auto& other) { return other && other->id == id; };
+      const auto same_id = std::find_if(waiting_.begin(), waiting_.end(), has_id);
+      const auto& other = same_id != waiting_.end() ? *same_id : in_work_;
+      if (!id.empty() && has_id(other)) {
+        if (*other == *query) {
+          ++counts_.repeated;
+          return;
+        }
+        reason = core::invalid_input("another question with the id '" + id +
+                                     "' is not answered yet: choose another id, one that no other client uses");
+      } else if (waiting_.size() < settings_.max_waiting) {
+        waiting_.push_back(query);
+        simulate_changed_.notify_one();
+        return;
+      } else {
+        reason = too_many_wait(settings_.max_waiting);
+      }
     }
-    if (waiting_.size() < settings_.max_waiting) {
-      waiting_.push_back(*std::move(query));
-      simulate_changed_.notify_one();
-      return;
+    refuse(id, reason);
+  } catch (const std::exception&) {
+    try {
+      refuse(id, note_exception("the question could not be read"));
+    } catch (const std::exception&) {
+      drop();
     }
-    reason = too_many_wait(settings_.max_waiting);
-  } catch (const std::exception& error) {
-    note_failure(error.what());
-    reason = core::unavailable(std::string("the question could not be read: ") + error.what());
   }
-  refuse(id, reason);
 }
 
 void AnsweringDesk::simulate_questions() {
   for (;;) {
-    belief::Query query;
+    std::shared_ptr<const belief::Query> query;
     {
       std::unique_lock lock(mutex_);
       simulate_changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
       if (stop_.requested()) return;
       query = std::move(waiting_.front());
       waiting_.pop_front();
-      id_in_work_ = query.id;
+      in_work_ = query;
     }
-    answer(query);
+    answer(*query);
   }
 }
 
 void AnsweringDesk::answer(const belief::Query& query) {
-  Reply reply;
-  core::Status reason;
-  try {
-    reply = reply_to(query);
-    if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
-      reason = core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
-                                        " MiB, more than clients take: ask for less at a time");
-  } catch (const std::bad_alloc&) {
-    reason = core::resource_exhausted("the answer does not fit into the memory: ask for less");
-  } catch (const std::exception& error) {
-    note_failure(error.what());
-    reason = core::unavailable(std::string("the question could not be answered: ") + error.what());
-  }
-  {
+  const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
     const std::lock_guard lock(mutex_);
-    if (!std::holds_alternative<belief::WhereQuery>(query.what)) id_in_work_.clear();
-    if (reason.ok()) ++(reply.is_answer ? counts_.answered : counts_.refused);
+    if (in_work_.get() == &query) in_work_.reset();
+  };
+  try {
+    const Reply reply = reply_to(query);
+    finish();
+    if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
+      return refuse(query.id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
+                                                       " MiB, more than clients take: ask for less at a time"));
+    send(reply.text, reply.is_answer ? &DeskCounts::answered : &DeskCounts::refused);
+  } catch (const std::exception&) {
+    finish();
+    try {
+      refuse(query.id, note_exception("the question could not be answered"));
+    } catch (const std::exception&) {
+      drop();
+    }
   }
-  if (reason.ok())
-    send(reply.text);
-  else
-    refuse(query.id, reason);
 }
 
 AnsweringDesk::Reply AnsweringDesk::reply_to(const belief::Query& query) {
@@ -210,25 +236,53 @@ AnsweringDesk::Reply AnsweringDesk::reply_to(const belief::Query& query) {
 }
 
 void AnsweringDesk::refuse(const std::string& id, const core::Status& reason) {
+  try {
+    send(error_answer(id, reason), &DeskCounts::refused);
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void AnsweringDesk::send(const std::string& answer, std::uint64_t DeskCounts::*fate) {
+  // Counted before: whoever has the answer finds it counted.
   {
     const std::lock_guard lock(mutex_);
-    ++counts_.refused;
+    ++(counts_.*fate);
   }
-  send(error_answer(id, reason));
-}
-
-void AnsweringDesk::send(const std::string& answer) {
   try {
     on_answer_(answer);
-  } catch (const std::exception& error) {
-    note_failure(error.what());
+  } catch (const std::exception&) {
+    {
+      const std::lock_guard lock(mutex_);
+      --(counts_.*fate);
+    }
+    drop();
   }
 }
 
-void AnsweringDesk::note_failure(const std::string& what) {
+void AnsweringDesk::drop() {
+  try {
+    static_cast<void>(note_exception("no answer could be sent"));
+  } catch (const std::exception&) {  // no memory for its text, either
+  }
   const std::lock_guard lock(mutex_);
-  ++counts_.failed;
-  counts_.last_failure = what;
+  ++counts_.unanswered;
+}
+
+core::Status AnsweringDesk::note_exception(const char* doing) {
+  try {
+    throw;
+  } catch (const std::bad_alloc&) {
+    return core::resource_exhausted(std::string(doing) + ": it does not fit into the memory; ask for less");
+  } catch (const std::exception& error) {
+    {
+      const std::lock_guard lock(mutex_);
+      ++counts_.failed;
+      counts_.last_failure_ns = core::steady_now_ns();
+      counts_.last_failure = error.what();
+    }
+    return core::unavailable(std::string(doing) + ": " + error.what());
+  }
 }
 
 }  // namespace prescene::service

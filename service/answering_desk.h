@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "prescene/belief/belief.h"
+#include "prescene/core/clock.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
 #include "prescene/queries/query_engine.h"
@@ -31,14 +32,20 @@ struct DeskSettings {
   std::size_t most_bytes = std::size_t{512} << 20;
 };
 
-/// What became of the questions since the start.
+/// What became of the questions since the start. Each that was asked and neither waits nor is worked on counts as
+/// answered, refused, unanswered or repeated, once.
 struct DeskCounts {
-  std::uint64_t answered = 0;    ///< As asked.
-  std::uint64_t refused = 0;     ///< Answered with an error: not understood, not possible, or too many waited.
-  std::uint64_t unanswered = 0;  ///< Dropped without an answer: so many came that not even an error could be sent.
-  std::uint64_t repeated = 0;    ///< Came again while the same id waited: not counted above.
-  std::uint64_t failed = 0;      ///< Of those refused: an exception ended the work on them, which is a bug.
-  std::string last_failure;      ///< What the last exception said.
+  std::uint64_t answered = 0;  ///< As asked.
+  std::uint64_t refused = 0;   ///< Answered with an error: not understood, not possible, or too many waited.
+  /// Dropped without an answer: so many came that not even an error could be sent, or the answer could not be handed
+  /// over.
+  std::uint64_t unanswered = 0;
+  std::uint64_t repeated = 0;  ///< Came again while the same question with the same id waited.
+  /// Exceptions, other than that the memory ended, that ended the work on a question or on handing over its answer:
+  /// bugs. Such questions are among those refused or unanswered.
+  std::uint64_t failed = 0;
+  std::string last_failure;          ///< What the last of these exceptions said, and when, as of
+  core::TimeNs last_failure_ns = 0;  ///< core::steady_now_ns().
   friend bool operator==(const DeskCounts&, const DeskCounts&) = default;
 };
 
@@ -60,13 +67,15 @@ class AnsweringDesk {
   AnsweringDesk& operator=(const AnsweringDesk&) = delete;
 
   /// Takes a question; returns at once, from any thread. One that is not understood or comes when too many wait gets an
-  /// answer that says so. A question whose id waits to be simulated, or is being simulated, is not taken again: clients
-  /// ask again when an answer is late.
+  /// answer that says so. A question that waits to be simulated, or is being simulated, is not taken again: clients ask
+  /// again when an answer is late. Another question with its id is refused: its asker would take the first one's answer
+  /// for its own. No exception leaves it.
   void ask(std::string question_json);
 
   DeskCounts counts() const;
 
  private:
+  // No exception leaves these.
   void read_questions();
   void read(const std::string& question_json);
   void simulate_questions();
@@ -74,12 +83,18 @@ class AnsweringDesk {
     std::string text;
     bool is_answer = false;  ///< Else the reason why there is none.
   };
-  /// Answers and counts; no exception leaves it.
+  /// Answers and counts; no exception leaves it, nor the three below.
   void answer(const belief::Query& query);
-  Reply reply_to(const belief::Query& query);
   void refuse(const std::string& id, const core::Status& reason);
-  void send(const std::string& answer);
-  void note_failure(const std::string& what);
+  /// Counts the question as `fate`, and as unanswered where the answer can't be handed over.
+  void send(const std::string& answer, std::uint64_t DeskCounts::*fate);
+  /// In a handler: the question got no answer, because of the exception.
+  void drop();
+  Reply reply_to(const belief::Query& query);
+  /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
+  /// refuse the question with.
+  core::Status note_exception(const char* doing);
+  void take(std::string question_json);
 
   Backends& backends_;
   core::ThreadPool pool_;
@@ -93,8 +108,8 @@ class AnsweringDesk {
   std::deque<std::string> unread_;
   std::size_t unread_bytes_ = 0;
   std::deque<std::string> too_many_;  // ids of questions that found no room
-  std::deque<belief::Query> waiting_;
-  std::string id_in_work_;
+  std::deque<std::shared_ptr<const belief::Query>> waiting_;
+  std::shared_ptr<const belief::Query> in_work_;  // null: none
   DeskCounts counts_;
 
   std::thread reader_, simulator_;  // last: they use all above

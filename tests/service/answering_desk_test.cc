@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <thread>
@@ -12,6 +13,7 @@
 #include "desk_fixture.h"
 #include "prescene/core/utf8.h"
 #include "prescene/service/outside_json.h"
+#include "prescene/tests/support/allocations.h"
 
 namespace prescene::service {
 namespace {
@@ -109,6 +111,17 @@ TEST(AnsweringDesk, LongQuestionsDoNotFillTheMemoryBeforeTheyAreRead) {
   EXPECT_EQ(desk.counts().refused, 3u);
 }
 
+TEST(AnsweringDesk, OfALongQuestionThatWaitsItsBeginningIsKeptOnly) {
+  Desk desk({});
+  const std::string huge(std::size_t{30} << 20, 'x');
+  const std::vector<std::string> questions(3, huge);
+  const std::uint64_t before = tests::heap_bytes();  // 0 under sanitizers
+  std::uint64_t waiting = 0;
+  desk.ask_at_once(questions, [&] { waiting = tests::heap_bytes(); });
+  desk.answers(3);
+  EXPECT_LT(waiting, before + huge.size());
+}
+
 TEST(AnsweringDesk, AnExceptionEndsNeitherThread) {
   std::atomic<bool> broken{true};
   const auto belief = tests::belief_of(tests::kBoxScene);
@@ -126,6 +139,64 @@ TEST(AnsweringDesk, AnExceptionEndsNeitherThread) {
   for (const std::string& question : questions) desk.ask(question);
   desk.answers(4);
   EXPECT_EQ(desk.counts().answered, 2u);
+}
+
+/// Of questions that neither wait nor are worked on.
+std::uint64_t settled(const DeskCounts& counts) {
+  return counts.answered + counts.refused + counts.unanswered + counts.repeated;
+}
+
+TEST(AnsweringDesk, EachQuestionIsCountedOnceWhateverBecomesOfIt) {
+  // What is not handed over, for want of memory or by a bug, is told by its id.
+  const auto before = [](const std::string& answer) {
+    if (id_of(answer).starts_with("memory")) throw std::bad_alloc();
+    if (id_of(answer).starts_with("bug")) throw std::runtime_error("the bus is gone");
+  };
+  Desk desk(limited_to(0.05), {}, {}, before);
+  const std::vector<std::string> questions = {R"({"id": "good", "where": {}})",
+                                              R"({"id": "memory 1", "where": {}})",
+                                              R"({"id": "bug 1", "where": {}})",
+                                              R"({"id": "refused", "where": {"object": "nothing"}})",
+                                              R"({"id": "memory 2", "wher": {}})",
+                                              R"({"id": "bug 2", "wher": {}})",
+                                              R"({"id": "bug 3", "stability": {"object": "box"}})",
+                                              "not JSON"};
+  for (const std::string& question : questions) desk.ask(question);
+  while (settled(desk.counts()) < questions.size()) std::this_thread::yield();
+  // The last one may just be on its way.
+  ASSERT_EQ(desk.answers(3).size(), 3u);
+  while (desk.counts().unanswered < 5) std::this_thread::yield();
+  const DeskCounts counts = desk.counts();
+  EXPECT_EQ(counts.answered, 1u);
+  EXPECT_EQ(counts.refused, 2u);
+  EXPECT_EQ(counts.unanswered, 5u);
+  EXPECT_EQ(counts.repeated, 0u);
+  EXPECT_EQ(counts.failed, 3u) << "that memory ends is no bug";
+  EXPECT_EQ(counts.last_failure, "the bus is gone");
+  EXPECT_GT(counts.last_failure_ns, 0);
+}
+
+TEST(AnsweringDesk, WhereMemoryEndsAQuestionIsRefusedAndNoBugCounted) {
+  Desk desk(limited_to(0.05), {}, []() -> std::shared_ptr<const belief::Belief> { throw std::bad_alloc(); });
+  desk.ask(R"({"id": "a", "where": {}})");
+  desk.ask(R"({"id": "b", "stability": {"object": "box"}})");
+  for (const std::string& answer : desk.answers(2)) EXPECT_THAT(answer, HasSubstr("resource_exhausted"));
+  EXPECT_EQ(desk.counts().refused, 2u);
+  EXPECT_EQ(desk.counts().failed, 0u);
+}
+
+TEST(AnsweringDesk, AnotherQuestionWithAnIdThatWaitsIsRefused) {
+  Desk desk(limited_to(1e5));
+  desk.ask(kLong);
+  desk.ask(R"({"id": "a", "stability": {"object": "box"}})");
+  desk.ask(R"({"id": "a", "stability": {"object": "box", "max_move": 0.5}})");
+  EXPECT_THAT(desk.answers(1).back(), HasSubstr("choose another id"));
+  desk.ask(R"({"id": "long", "stability": {"object": "box"}})");
+  EXPECT_THAT(desk.answers(2).back(), HasSubstr("choose another id"));
+  desk.ask(R"({"stability": {"max_move": 0.01, "object": "box"}, "id": "a"})");  // the same again
+  desk.ask(kLong);
+  while (desk.counts().repeated < 2) std::this_thread::yield();
+  EXPECT_EQ(desk.counts().refused, 2u);
 }
 
 TEST(AnsweringDesk, AnIdThatIsNotUtf8IsRefusedAndTheAnswerIsText) {

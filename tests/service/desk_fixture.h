@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -49,12 +51,14 @@ class Desk {
  public:
   using Snapshot = std::function<std::shared_ptr<const belief::Belief>()>;
 
+  /// `before` is called with each answer before it is kept.
   explicit Desk(const service::DeskSettings& settings, std::shared_ptr<const belief::Belief> belief = {},
-                const Snapshot& snapshot = {})
+                const Snapshot& snapshot = {}, const service::AnswerSink& before = {})
       : pool_(2), backends_(pool_), belief_(belief ? std::move(belief) : belief_of(kBoxScene)) {
     desk_ = std::make_unique<service::AnsweringDesk>(
         backends_, 1, settings, snapshot ? snapshot : [this] { return belief_; },
-        [this](const std::string& answer) {
+        [this, before](const std::string& answer) {
+          if (before) before(answer);
           const std::lock_guard lock(mutex_);
           answers_.push_back(answer);
           changed_.notify_all();
@@ -62,10 +66,11 @@ class Desk {
   }
 
   void ask(const std::string& question) { desk_->ask(question); }
-  /// All of them before any answer that comes meanwhile can be handed over.
-  void ask_at_once(const std::vector<std::string>& questions) {
+  /// All of them before any answer that comes meanwhile can be handed over; `then` is called before it can, too.
+  void ask_at_once(const std::vector<std::string>& questions, const std::function<void()>& then = {}) {
     const std::lock_guard lock(mutex_);
     for (const std::string& question : questions) desk_->ask(question);
+    if (then) then();
   }
   std::vector<std::string> answers(std::size_t count) {
     std::unique_lock lock(mutex_);
