@@ -79,6 +79,7 @@ class FrameAssembler {
   /// Since the start.
   std::uint64_t skipped_count() const { return skipped_count_; }
   std::uint64_t tf_forgotten() const { return tf_.forgotten(); }
+  std::uint64_t tf_late() const { return tf_.late(); }
 
  private:
   struct Waiting {

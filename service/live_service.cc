@@ -131,6 +131,8 @@ struct LiveService::Impl {
   std::vector<std::string> answered;
   std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
   std::string last_failure;
+  core::TimeNs last_failure_ns = 0;
+  ServiceHealth last_reported;
 
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
@@ -219,6 +221,7 @@ void LiveService::Impl::refuse(const core::Status& status) {
 void LiveService::Impl::note_failure(const std::string& of, const std::exception& error) {
   ++failures;
   last_failure = of + " was left out: " + error.what();
+  last_failure_ns = core::steady_now_ns();
   core::log(log, core::LogLevel::kError, last_failure);
 }
 
@@ -319,16 +322,20 @@ ServiceHealth LiveService::Impl::health() const {
   health.skipped_frames = tracker->skipped_count();
   health.refused_messages = refused;
   health.dropped_in_inbox = inbox.dropped_by_topic();
+  const InputTopics& topics = settings.tracker.topics;
+  health.image_topics = {topics.depth, topics.color, topics.camera_info};
   health.lost_on_bus = node->dropped_samples();
   health.unsent = unsent.load(std::memory_order_relaxed);
   health.unlogged = log_limiter.held_back();
   health.tf_forgotten = tracker->tf_forgotten();
+  health.tf_late = tracker->tf_late();
   health.is_recording = recording != nullptr;
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
   health.questions = desk->counts();
   health.unreadable_questions = unreadable_questions;
   health.failures = failures;
-  health.last_failure = last_failure.empty() ? health.questions.last_failure : last_failure;
+  health.last_failure = last_failure;
+  health.last_failure_ns = last_failure_ns;
   if (since_frame) health.seconds_since_frame = since_frame->seconds();
   health.last_step_seconds = step_seconds;
   health.degraded = degraded;
@@ -367,9 +374,10 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
 void LiveService::Impl::publish_diagnostics() {
   const ServiceHealth now = health();
   tell_what_changed(now);
-  check_sent(
-      node->publish(diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(core::wall_now_ns()), ""},
-                                                                {to_diagnostic(now, settings.dds.node_name)}}));
+  check_sent(node->publish(
+      diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(core::wall_now_ns()), ""},
+                                                  {to_diagnostic(now, last_reported, settings.dds.node_name)}}));
+  last_reported = now;
 }
 
 core::Status LiveService::run(const core::Cancellation& cancellation) {

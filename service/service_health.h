@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/answering_desk.h"
 #include "prescene/service/backends.h"
@@ -24,6 +25,8 @@ struct ServiceHealth {
   std::uint64_t refused_messages = 0;
   /// Messages that waited for the tracker and were dropped because too many did, by topic.
   std::map<std::string, std::uint64_t> dropped_in_inbox;
+  /// Of whose messages the newest is all that counts: dropping others is no loss.
+  std::vector<std::string> image_topics;
   std::uint64_t lost_on_bus = 0;  ///< Samples that reached this process and were never read.
   DeskCounts questions;
   std::uint64_t unreadable_questions = 0;  ///< Messages on the topic of questions that hold no text.
@@ -31,6 +34,7 @@ struct ServiceHealth {
   std::uint64_t failures = 0;      ///< Messages and frames that ended in an exception and were left out.
   std::uint64_t unlogged = 0;      ///< Lines that were left out of the log because too many came.
   std::uint64_t tf_forgotten = 0;  ///< Transforms that were forgotten early for want of room.
+  std::uint64_t tf_late = 0;       ///< Transforms that came when they were older than what is kept.
   bool is_recording = false;
   std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
@@ -41,7 +45,8 @@ struct ServiceHealth {
   std::vector<std::string> degraded;  ///< What the last step could not do fully.
   std::string last_skip;              ///< Why the last frame since the last step was skipped; "" = none was.
   std::string last_refusal;           ///< Why the last refused message was.
-  std::string last_failure;           ///< What the last exception said, of a step or of a question.
+  std::string last_failure;           ///< What the last exception outside of questions said, and when, as of
+  core::TimeNs last_failure_ns = 0;   ///< core::steady_now_ns().
 };
 
 /// True while frames come and are used.
@@ -50,7 +55,9 @@ bool is_tracking(const ServiceHealth& health);
 /// What it does and, while it does not track, why not: "no frame is used: tf does not connect ...".
 std::string health_text(const ServiceHealth& health);
 
-/// kWarn before the first frame and for degraded steps, kError when frames stopped or the recording failed.
-interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const std::string& hardware_id);
+/// kWarn before the first frame, for degraded steps and when something failed or was lost since `before`, the health of
+/// the last report (or none); kError when frames stopped or the recording failed. The values are those since the start.
+interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const ServiceHealth& before,
+                                              const std::string& hardware_id);
 
 }  // namespace prescene::service

@@ -65,7 +65,10 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
     return core::ok_status();
   }
   if (!edge.samples.empty() && stamp_ns + core::ns_of(settings_.history_s) < edge.samples.back().first) {
-    if (++edge.too_old_in_a_row < kTooOldToBeWrong) return core::ok_status();
+    if (++edge.too_old_in_a_row < kTooOldToBeWrong) {
+      ++late_;
+      return core::ok_status();
+    }
     sample_count_ -= edge.samples.size();
     edge.samples.clear();
   }

@@ -47,6 +47,8 @@ class TfBuffer {
   /// Transforms that are kept now, and those that were forgotten before the end of the history for want of room.
   std::size_t sample_count() const { return sample_count_; }
   std::uint64_t forgotten() const { return forgotten_; }
+  /// Transforms that came when they were older than the history, and were left out.
+  std::uint64_t late() const { return late_; }
   /// Forgets moving edges: the clock jumped back.
   void forget_moving();
 
@@ -72,6 +74,7 @@ class TfBuffer {
   std::map<std::string, int> parents_;  // number of edges that have this frame as their parent
   std::size_t sample_count_ = 0;        // over all edges
   std::uint64_t forgotten_ = 0;
+  std::uint64_t late_ = 0;
 };
 
 }  // namespace prescene::service

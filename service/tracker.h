@@ -53,6 +53,7 @@ class Tracker {
   std::string last_skip() const { return assembler_.last_skip(); }
   /// Transforms that tf's buffer forgot early for want of room, since the start.
   std::uint64_t tf_forgotten() const { return assembler_.tf_forgotten(); }
+  std::uint64_t tf_late() const { return assembler_.tf_late(); }
 
   /// The newest belief; a snapshot that never changes. Safe from any thread.
   std::shared_ptr<const belief::Belief> belief() const;

@@ -3,6 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <functional>
+#include <string>
+#include <vector>
+
 namespace prescene::service {
 namespace {
 
@@ -10,8 +14,8 @@ using interfaces::RosDiagnosticLevel;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-RosDiagnosticLevel level(const ServiceHealth& health) {
-  return static_cast<RosDiagnosticLevel>(to_diagnostic(health, "here").level);
+RosDiagnosticLevel level(const ServiceHealth& health, const ServiceHealth& before = {}) {
+  return static_cast<RosDiagnosticLevel>(to_diagnostic(health, before, "here").level);
 }
 
 TEST(ServiceHealth, SaysWhatItWaitsForAndWhyFramesAreOfNoUse) {
@@ -46,13 +50,13 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.steps = 3;
   health.skipped_frames = 5;
   health.lost_on_bus = 7;
-  health.questions = {11, 13, 17, 19, 2, "no"};
+  health.questions = {11, 13, 17, 19, 2, "no", 5};
   health.unreadable_questions = 1;
   health.failures = 4;
   health.not_simulated = 111;
   health.physics_failure = "no simulator could be made";
   health.steppers = {13, 17, "the scene has 5"};
-  const auto status = to_diagnostic(health, "here");
+  const auto status = to_diagnostic(health, {}, "here");
   EXPECT_EQ(status.hardware_id, "here");
   const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"},
                                                      {"skipped frames", "5"},
@@ -60,6 +64,7 @@ TEST(ServiceHealth, CarriesItsCounts) {
                                                      {"questions answered", "11"},
                                                      {"questions refused", "13"},
                                                      {"questions without an answer", "18"},
+                                                     {"questions repeated", "19"},
                                                      {"failures", "6"},
                                                      {"particles without physics", "111"},
                                                      {"last failure of physics", "no simulator could be made"},
@@ -76,15 +81,60 @@ TEST(ServiceHealth, TellsOfEveryLossByItsPlace) {
   health.failures = 1;
   health.unlogged = 900;
   health.tf_forgotten = 6;
-  const auto status = to_diagnostic(health, "here");
+  health.tf_late = 8;
+  const auto status = to_diagnostic(health, {}, "here");
   const std::vector<interfaces::RosKeyValue> some = {{"dropped in the inbox", "15"},
                                                      {"dropped by topic", "/camera/depth 3, /tf 12"},
                                                      {"not sent", "4"},
                                                      {"failures", "1"},
                                                      {"lines not logged", "900"},
                                                      {"transforms forgotten early", "6"},
+                                                     {"transforms too late", "8"},
                                                      {"recording", "off"}};
   for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
+}
+
+TEST(ServiceHealth, WarnsOfWhatWasLostSinceTheLastReportAndNotForEver) {
+  ServiceHealth quiet;
+  quiet.seconds_since_frame = 0.1;
+  quiet.image_topics = {"/camera/depth"};
+  const std::vector<std::function<void(ServiceHealth&)>> losses = {
+      [](ServiceHealth& health) { ++health.failures; },
+      [](ServiceHealth& health) { ++health.questions.failed; },
+      [](ServiceHealth& health) { ++health.questions.unanswered; },
+      [](ServiceHealth& health) { ++health.unreadable_questions; },
+      [](ServiceHealth& health) { ++health.lost_on_bus; },
+      [](ServiceHealth& health) { ++health.unsent; },
+      [](ServiceHealth& health) { ++health.tf_forgotten; },
+      [](ServiceHealth& health) { ++health.tf_late; },
+      [](ServiceHealth& health) { ++health.dropped_in_inbox["/tf"]; }};
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    ServiceHealth health = quiet;
+    losses[i](health);
+    EXPECT_EQ(level(health, quiet), RosDiagnosticLevel::kWarn) << i;
+    EXPECT_EQ(level(health, health), RosDiagnosticLevel::kOk) << i;
+  }
+  ServiceHealth busy = quiet;
+  busy.dropped_in_inbox["/camera/depth"] = 3;  // newer ones came
+  EXPECT_EQ(level(busy, quiet), RosDiagnosticLevel::kOk);
+}
+
+TEST(ServiceHealth, ShowsTheNewestFailure) {
+  const auto shown = [](const ServiceHealth& health) {
+    for (const auto& value : to_diagnostic(health, {}, "here").values)
+      if (value.key == "last failure") return value.value;
+    return std::string("none");
+  };
+  ServiceHealth health;
+  EXPECT_EQ(shown(health), "");
+  health.questions.last_failure = "of a question";
+  EXPECT_EQ(shown(health), "of a question");
+  health.last_failure = "of a frame";
+  health.last_failure_ns = 20;
+  health.questions.last_failure_ns = 10;
+  EXPECT_EQ(shown(health), "of a frame");
+  health.questions.last_failure_ns = 30;
+  EXPECT_EQ(shown(health), "of a question");
 }
 
 TEST(ServiceHealth, AFailedRecordingIsAnErrorHoweverWellItTracks) {
@@ -96,7 +146,7 @@ TEST(ServiceHealth, AFailedRecordingIsAnErrorHoweverWellItTracks) {
   health.recording_failure = "run.mcap: no space left";
   EXPECT_EQ(level(health), RosDiagnosticLevel::kError);
   EXPECT_THAT(health_text(health), HasSubstr("run.mcap: no space left"));
-  EXPECT_THAT(to_diagnostic(health, "here").values,
+  EXPECT_THAT(to_diagnostic(health, {}, "here").values,
               ::testing::Contains(interfaces::RosKeyValue{"recording", "failed: run.mcap: no space left"}));
 }
 

@@ -33,6 +33,17 @@ TEST(TfBuffer, ComposesAlongTheTreeInBothDirections) {
   EXPECT_LT((*X_CG * (*X_GC * p_GQ) - p_GQ).norm(), 1e-12);
 }
 
+TEST(TfBuffer, CountsWhatCameTooLate) {
+  TfBuffer tf({.history_s = 1.0});
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(tf.add("world", "hand", 100 * kSecond + i, Pose(), false).ok());
+  EXPECT_EQ(tf.late(), 0u);
+  ASSERT_TRUE(tf.add("world", "hand", 90 * kSecond, Pose(), false).ok());
+  ASSERT_TRUE(tf.add("world", "hand", 101 * kSecond, Pose(), false).ok());
+  ASSERT_TRUE(tf.add("world", "hand", 91 * kSecond, Pose(), false).ok());
+  EXPECT_EQ(tf.late(), 2u);
+  EXPECT_EQ(tf.forgotten(), 0u);
+}
+
 TEST(TfBuffer, InterpolatesBetweenSamplesAndRefusesTimesOutside) {
   TfBuffer tf;
   ASSERT_TRUE(tf.add("world", "hand", 1 * kSecond, turned_z(0.0, {0.0, 0.0, 0.0}), false).ok());
