@@ -45,7 +45,8 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
   QuestionClient* raw = client.get();
   interfaces::DdsOptions options = dds;
   options.node_name = "prescene_client";
-  PRESCENE_TRY(client->node_, interfaces::DdsNode::create(options, log));
+  // Without the log: a small receive buffer costs a client but time, as its topics are reliable.
+  PRESCENE_TRY(client->node_, interfaces::DdsNode::create(options, {}));
   PRESCENE_RETURN_IF_ERROR(
       client->node_->subscribe(kAnswerTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
                                [raw, log](interfaces::ReceivedMessage&& message) {
@@ -54,8 +55,9 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
                                  const auto answer = parse_or_discard(text->data);
                                  if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
                                  const std::lock_guard lock(raw->mutex_);
-                                 if (answer["id"].get<std::string>() != raw->waiting_for_) return;  // somebody else's
-                                 raw->answers_[raw->waiting_for_] = text->data;
+                                 const auto waiting = raw->answers_.find(answer["id"].get<std::string>());
+                                 if (waiting == raw->answers_.end()) return;  // somebody else's
+                                 waiting->second = text->data;
                                  raw->changed_.notify_all();
                                }));
   PRESCENE_TRY(client->queries_,
@@ -65,39 +67,69 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
 
 QuestionClient::~QuestionClient() { node_.reset(); }
 
+/// Answers with an id are kept while it lives.
+class QuestionClient::Waiting {
+ public:
+  Waiting(QuestionClient& client, std::string id) : client_(client), id_(std::move(id)) {
+    const std::lock_guard lock(client_.mutex_);
+    is_first_ = client_.answers_.try_emplace(id_).second;
+  }
+  ~Waiting() {
+    if (!is_first_) return;
+    const std::lock_guard lock(client_.mutex_);
+    client_.answers_.erase(id_);
+  }
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+
+  /// Whether nobody else waits for an answer with this id.
+  bool is_first() const { return is_first_; }
+  /// The answer if it comes within the time; asked for again, the next one.
+  std::optional<std::string> answer_within(std::chrono::milliseconds time) {
+    std::unique_lock lock(client_.mutex_);
+    std::optional<std::string>& answer = client_.answers_.at(id_);
+    client_.changed_.wait_for(lock, time, [&] { return answer.has_value(); });
+    return std::exchange(answer, std::nullopt);
+  }
+
+ private:
+  QuestionClient& client_;
+  std::string id_;
+  bool is_first_ = false;
+};
+
 core::Result<std::string> QuestionClient::ask(const std::string& question_json, double timeout,
                                               const core::Cancellation& cancellation) {
   auto question = parse_or_discard(question_json);
   if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/queries.md)");
-  if (!question.contains("id") || !question["id"].is_string()) question["id"] = new_id();
-  const std::string id = question["id"].get<std::string>();
-  {
-    const std::lock_guard lock(mutex_);
-    waiting_for_ = id;
-    answers_.clear();
-  }
+  if (question.contains("id") && !question["id"].is_string())
+    return core::invalid_input("id: a question's id is a text, in quotes; leave it out to have one made");
+  if (!question.contains("id") || question["id"] == "") question["id"] = new_id();
+  Waiting waiting(*this, question["id"].get<std::string>());
+  if (!waiting.is_first())
+    return core::invalid_input("id: a question with this id waits for its answer already; choose another id");
   const auto deadline =
       steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>(timeout));
   auto ask_at = steady_clock::now();
   bool found_service = false;
   bool was_busy = false;
+  core::Status sent;  // of the last try
   while (steady_clock::now() < deadline) {
     if (cancellation.requested()) return core::cancelled("stopped on request");
     // Both ways must be open, or the answer would be lost.
     const bool there = node_->matched_readers(queries_) > 0 && node_->matched_writers(kAnswerTopic) > 0;
     found_service = found_service || there;
     if (there && steady_clock::now() >= ask_at) {
-      PRESCENE_RETURN_IF_ERROR(node_->publish(queries_, interfaces::RosString{belief::json_text(question)}));
-      ask_at = steady_clock::now() + kAskAgain;
+      sent = node_->publish(queries_, interfaces::RosString{belief::json_text(question)});
+      if (sent.ok()) ask_at = steady_clock::now() + kAskAgain;  // else at once: what holds it up may pass
     }
-    std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, kAskInterval, [&] { return answers_.contains(id); })) continue;
-    const std::string answer = std::exchange(answers_[id], {});
-    answers_.clear();
-    if (!says_ask_again(answer)) return answer;
+    std::optional<std::string> answer = waiting.answer_within(kAskInterval);
+    if (!answer) continue;
+    if (!says_ask_again(*answer)) return *std::move(answer);
     was_busy = true;
     ask_at = steady_clock::now() + kBusyPause;
   }
+  if (!sent.ok()) return sent;
   const std::string waited = " within " + core::rounded_text(timeout) + " s";
   if (was_busy)
     return core::unavailable("the service had too many questions waiting" + waited + ": ask fewer at a time");

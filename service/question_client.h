@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "prescene/core/progress.h"
@@ -20,18 +21,21 @@ class QuestionClient {
   ~QuestionClient();
 
   /// Sends a question (JSON; an id is added if it has none) as soon as a service is there, and waits for its answer. A
-  /// service that starts again meanwhile is asked again. Fails with kUnavailable after `timeout` s (no service, or no
-  /// answer), kInvalidInput when the question is not a JSON object, kCancelled.
+  /// service that starts again meanwhile is asked again. May be called from several threads at once, with ids of their
+  /// own. Fails with kUnavailable after `timeout` s (no service, no answer, or the middleware took no question),
+  /// kInvalidInput when the question is not a JSON object, its id is no text, or another thread waits for an answer
+  /// with its id, kCancelled.
   core::Result<std::string> ask(const std::string& question_json, double timeout,
                                 const core::Cancellation& cancellation);
 
  private:
   QuestionClient() = default;
 
+  class Waiting;
+
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::map<std::string, std::string> answers_;  // by id, only those waited for
-  std::string waiting_for_;
+  std::map<std::string, std::optional<std::string>> answers_;  // by id, of those waited for; nothing until it came
   interfaces::DdsPublisher queries_;
   std::unique_ptr<interfaces::DdsNode> node_;  // last: its thread ends first
 };
