@@ -52,13 +52,29 @@ struct McapWriter::Impl {
   std::set<std::uint16_t> chunk_schemas;
 
   Status write_bytes(std::span<const std::uint8_t> bytes);
+  Status add_message(const records::Channel& channel, const records::MessageHead& head,
+                     std::span<const std::uint8_t> data);
   void begin_message(const records::Channel& channel);
+  /// Where the open chunk ends before a message.
+  struct Mark {
+    std::size_t bytes = 0;
+    bool has_channel = false;  ///< The chunk holds the message's channel already, ...
+    bool has_schema = false;   ///< ... and its schema.
+    std::size_t entries = 0;   ///< Of that channel.
+    records::ChunkHead head;
+    std::uint64_t messages = 0;
+    std::uint64_t chunks = 0;                                                      ///< That were written.
+    std::uint64_t all_messages = 0, start_time = 0, end_time = 0, of_channel = 0;  ///< Of the statistics.
+  };
+  Mark mark(const records::Channel& channel) const;
+  void go_back_to(const Mark& mark, const records::Channel& channel);
   Status end_chunk();
   Status write_summary();
 };
 
 Status McapWriter::Impl::write_bytes(std::span<const std::uint8_t> bytes) {
   if (!failure.ok()) return failure;
+  failure = Status(core::StatusCode::kUnavailable, "not written");  // stays where an exception ends the next line
   failure = file.write(bytes);
   position += bytes.size();
   data_crc = crc32(bytes, data_crc);
@@ -74,6 +90,61 @@ void McapWriter::Impl::begin_message(const records::Channel& channel) {
     records::append(schemas[channel.schema_id - std::size_t{1}], &chunk);
   }
   records::append(channel, &chunk);
+}
+
+McapWriter::Impl::Mark McapWriter::Impl::mark(const records::Channel& channel) const {
+  const auto entries = chunk_channels.find(channel.id);
+  const auto count = statistics.channel_message_counts.find(channel.id);
+  Mark mark;
+  mark.bytes = chunk.size();
+  mark.has_channel = entries != chunk_channels.end();
+  mark.has_schema = chunk_schemas.contains(channel.schema_id);
+  mark.entries = mark.has_channel ? entries->second.entries.size() : 0;
+  mark.head = chunk_head;
+  mark.messages = chunk_messages;
+  mark.chunks = statistics.chunk_count;
+  mark.all_messages = statistics.message_count;
+  mark.start_time = statistics.start_time;
+  mark.end_time = statistics.end_time;
+  mark.of_channel = count == statistics.channel_message_counts.end() ? 0 : count->second;
+  return mark;
+}
+
+/// Takes no memory: it is called where there was none.
+void McapWriter::Impl::go_back_to(const Mark& mark, const records::Channel& channel) {
+  if (statistics.chunk_count != mark.chunks) {  // The message is in the file, or a part of it.
+    failure = Status(core::StatusCode::kResourceExhausted, "out of memory");
+    return;
+  }
+  chunk.resize(mark.bytes);
+  if (!mark.has_channel) {
+    chunk_channels.erase(channel.id);
+  } else {
+    chunk_channels.find(channel.id)->second.entries.resize(mark.entries);
+  }
+  if (!mark.has_schema) chunk_schemas.erase(channel.schema_id);
+  chunk_head = mark.head;
+  chunk_messages = mark.messages;
+  statistics.message_count = mark.all_messages;
+  statistics.start_time = mark.start_time;
+  statistics.end_time = mark.end_time;
+  if (mark.of_channel == 0) {
+    statistics.channel_message_counts.erase(channel.id);
+  } else {
+    statistics.channel_message_counts.find(channel.id)->second = mark.of_channel;
+  }
+}
+
+Status McapWriter::Impl::add_message(const records::Channel& channel, const records::MessageHead& head,
+                                     std::span<const std::uint8_t> data) {
+  begin_message(channel);
+  chunk_channels[channel.id].entries.emplace_back(head.log_time, chunk.size());
+  records::append(head, data, &chunk);
+  add_time(head.log_time, chunk_messages++, &chunk_head.start_time, &chunk_head.end_time);
+  add_time(head.log_time, statistics.message_count++, &statistics.start_time, &statistics.end_time);
+  ++statistics.channel_message_counts[channel.id];
+  if (chunk.size() >= options.chunk_bytes) return end_chunk();
+  return core::ok_status();
 }
 
 Status McapWriter::Impl::end_chunk() {
@@ -182,8 +253,13 @@ Result<int> McapWriter::add_channel(const McapChannel& channel) {
     }
     record.schema_id = schema->id;
   }
-  impl.channels.push_back(channel);
   impl.channel_records.push_back(std::move(record));
+  try {
+    impl.channels.push_back(channel);
+  } catch (...) {
+    impl.channel_records.pop_back();
+    throw;
+  }
   return static_cast<int>(impl.channels.size()) - 1;
 }
 
@@ -203,15 +279,13 @@ Status McapWriter::write(const McapMessage& message) {
   const bool too_late = impl.chunk_messages > 0 && head.log_time > impl.chunk_head.start_time &&
                         head.log_time - impl.chunk_head.start_time > static_cast<std::uint64_t>(impl.options.chunk_ns);
   if (too_late) PRESCENE_RETURN_IF_ERROR(impl.end_chunk());
-
-  impl.begin_message(channel);
-  impl.chunk_channels[channel.id].entries.emplace_back(head.log_time, impl.chunk.size());
-  records::append(head, message.data, &impl.chunk);
-  add_time(head.log_time, impl.chunk_messages++, &impl.chunk_head.start_time, &impl.chunk_head.end_time);
-  add_time(head.log_time, impl.statistics.message_count++, &impl.statistics.start_time, &impl.statistics.end_time);
-  ++impl.statistics.channel_message_counts[channel.id];
-  if (impl.chunk.size() >= impl.options.chunk_bytes) return impl.end_chunk();
-  return core::ok_status();
+  const Impl::Mark mark = impl.mark(channel);
+  try {
+    return impl.add_message(channel, head, message.data);
+  } catch (...) {
+    impl.go_back_to(mark, channel);
+    throw;
+  }
 }
 
 Status McapWriter::write_metadata(const McapMetadata& metadata) {

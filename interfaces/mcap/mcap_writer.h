@@ -41,6 +41,7 @@ class McapWriter {
   /// The number to give to messages. An equal channel gets the same number again.
   core::Result<int> add_channel(const McapChannel& channel);
   /// The message's channel is one that add_channel returned (checked). kInvalidInput for negative times.
+  /// Where memory ends in the middle of it, the exception is passed on and the recording is as it was before.
   core::Status write(const McapMessage& message);
   core::Status write_metadata(const McapMetadata& metadata);
   /// Ends the current chunk and hands everything to the operating system.

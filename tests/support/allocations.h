@@ -13,6 +13,11 @@ bool can_count_allocations();
 /// Calls of operator new so far, on all threads.
 std::uint64_t allocation_count();
 
+/// The next `count` calls of operator new on this thread succeed, the one after them throws std::bad_alloc, once.
+void fail_allocation_after(std::uint64_t count);
+/// Takes that back; true if it had not thrown yet.
+bool stop_failing_allocations();
+
 /// Bytes of the heap that are in use now.
 std::uint64_t heap_bytes();
 

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <new>
 
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
+#include "prescene/tests/support/allocations.h"
 #include "prescene/tests/support/paths.h"
 #include "recordings.h"
 
@@ -68,6 +70,45 @@ TEST(McapWriter, EndsChunksByTheirTimeSpan) {
   };
   EXPECT_EQ(chunks(1'000'000'000), 4) << "0 to 0.8 s, 1.2 to 2.0, 2.4 to 3.2, 3.6";
   EXPECT_EQ(chunks(100'000'000'000), 1);
+}
+
+// Wherever memory ends while a message is written, the recording holds the others and is sound.
+TEST(McapWriter, AMessageThatMemoryEndsInLeavesNothingBehind) {
+  if (!tests::can_count_allocations()) GTEST_SKIP() << "a sanitizer has an allocator of its own";
+  const tests::ScratchDir scratch;
+  const auto path = scratch.path() / "a.mcap";
+  int failed = 0;
+  for (const std::size_t chunk_bytes : {std::size_t{1} << 20, std::size_t{300}}) {
+    bool went_through = false;
+    for (std::uint64_t after = 0; !went_through; ++after) {
+      auto writer = McapWriter::create(path, {.chunk_bytes = chunk_bytes});
+      ASSERT_TRUE(writer.ok());
+      const int first = *(*writer)->add_channel(tests::channel_of("/1"));
+      const int second = *(*writer)->add_channel(tests::channel_of("/2"));
+      ASSERT_TRUE((*writer)->write({first, 0, 5, 5, {1, 2, 3}}).ok());
+      const McapMessage message{second, 0, 6, 6, Bytes(500, 7)};
+      core::Status written;
+      bool threw = false;
+      tests::fail_allocation_after(after);
+      try {
+        written = (*writer)->write(message);
+      } catch (const std::bad_alloc&) {
+        threw = true;
+      }
+      went_through = tests::stop_failing_allocations();
+      failed += threw ? 1 : 0;
+      ASSERT_TRUE(threw || written.ok()) << after << ": " << written.message();
+      ASSERT_TRUE((*writer)->write({first, 1, 7, 7, {4}}).ok()) << after;
+      ASSERT_TRUE((*writer)->write({second, 1, 8, 8, {5}}).ok()) << after;
+      ASSERT_TRUE((*writer)->close().ok()) << after;
+      auto reader = McapReader::open(path);
+      ASSERT_TRUE(reader.ok()) << after << ": " << reader.status().message();
+      EXPECT_EQ(tests::read_all(reader->get()).size(), threw ? 3U : 4U) << after;
+      EXPECT_EQ((*reader)->message_count(), threw ? 3U : 4U) << after;
+      EXPECT_TRUE((*reader)->loss().nothing()) << after << ": " << (*reader)->loss().text();
+    }
+  }
+  EXPECT_GT(failed, 5);
 }
 
 TEST(McapWriter, RosChannelsCarrySchemaHashAndQos) {
