@@ -72,13 +72,17 @@ void carry(Particle& particle, const Pose& X_WG_from, const Pose& X_WG_to, doubl
   particle.covariance = turn * particle.covariance * turn.transpose();
 }
 
-/// When within the step (s from its start) the object is let go of, if it is.
-std::optional<double> release_time(const belief::Control& control, const std::string& object, double dt) {
+/// When within the step (s from its start) the object is let go of, if it is not grasped again after that.
+std::optional<double> release_time(const belief::Control& control, const belief::Scene& scene,
+                                   const std::string& object, double dt) {
+  std::optional<double> time;
   for (const belief::Action& action : control.actions) {
     const auto* release = std::get_if<belief::Release>(&action.what);
-    if (release != nullptr && release->object == object) return std::clamp(action.time, 0.0, dt);
+    const auto* grasp = std::get_if<belief::Grasp>(&action.what);
+    if (release != nullptr && release->object == object && !time) time = std::clamp(action.time, 0.0, dt);
+    if (grasp != nullptr && grasp->object == object && belief::find_robot_body(scene, grasp->hand)) time.reset();
   }
-  return std::nullopt;
+  return time;
 }
 
 /// The scene with the object held by this hand, or by none (a copy: the context of earlier beliefs stays as it was).
@@ -305,7 +309,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     ObjectBelief& object = belief.objects[i];
     const bool tracked = object.state == belief::TrackState::kTracked;
     const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
-    const std::optional<double> released = release_time(control, object.name, dt);
+    const std::optional<double> released = release_time(control, *belief.scene, object.name, dt);
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
     change_modes(options, tracked, hand.has_value(), draws, object);
     const Vector3d centre = centre_of(*belief.scene, object);

@@ -135,6 +135,16 @@ TEST_F(Predict, ReleasedIsHeldByNobody) {
   EXPECT_FALSE(belief.scene->objects[0].held_by.has_value());
 }
 
+TEST_F(Predict, WhatIsLetGoAndGraspedAgainIsHeld) {
+  belief::Belief belief = hand_and_object(MotionMode::kHeld, true);
+  belief::Control control;
+  control.actions.push_back({0.02, belief::Release{"box"}});
+  control.actions.push_back({0.04, belief::Grasp{"box", "hand"}});
+  run(belief, Pose::from_translation({0.0, 0.0, 0.4}), 0.1, without_mode_changes(), control);
+  EXPECT_EQ(belief.scene->objects[0].held_by, "hand");
+  EXPECT_EQ(belief.objects[0].particles[0].mode, MotionMode::kHeld);
+}
+
 TEST_F(Predict, AHandThatHasNotLetGoCarriesOnWhatSeemedToSlip) {
   PredictOptions options = without_mode_changes();
   options.regrasp_probability = 1.0;
