@@ -18,7 +18,11 @@ constexpr std::size_t kMaxColors = 8;
 constexpr std::size_t kMaxWaitingPixels = std::size_t{1} << 25;
 constexpr std::size_t kMaxSkippedKept = 1000;
 // A stamp this much older than the last one taken means that the sender's clock was set back (a looped recording).
+// One that is ahead of it by more than this, and by more than kFastestClock times the time that went by, means that the
+// clock was set forward. Either may also be one wrong stamp: only so many frames in a row are believed, as in tf.
 constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
+constexpr core::TimeNs kFastestClock = 10;  // of a recording that is played fast
+constexpr int kTooManyToBeWrong = 3;
 
 /// Whether so many images wait that the oldest has to go.
 template <class Entries, class Image>
@@ -52,14 +56,17 @@ core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, Messag
   interfaces::DepthImageReport report;
   PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules, &report));
 
-  if (last_taken_ns_ && stamp_ns + kClockJumpNs < *last_taken_ns_) clock_jumped_back();
   Waiting entry{index,
                 stamp_ns,
                 received_ns,
                 std::move(frame_id),
                 std::make_shared<geometry::DepthImage>(std::move(depth)),
                 std::move(report.warnings)};
-  if (last_taken_ns_ && stamp_ns <= *last_taken_ns_) {
+  if (const char* doubt = doubt_of_stamp(entry)) {
+    skip(entry, doubt);
+    return core::ok_status();
+  }
+  if (last_taken_ && stamp_ns <= last_taken_->stamp_ns) {
     skip(entry, "not newer than the frame before it");
     return core::ok_status();
   }
@@ -71,6 +78,23 @@ core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, Messag
     waiting_.pop_front();
   }
   return core::ok_status();
+}
+
+const char* FrameAssembler::doubt_of_stamp(const Waiting& frame) {
+  if (!last_taken_) return nullptr;
+  const core::TimeNs step_ns = frame.stamp_ns - last_taken_->stamp_ns;
+  const core::TimeNs went_by_ns = std::max<core::TimeNs>(0, frame.received_ns - last_taken_->received_ns);
+  // Divided, as the product may be out of range.
+  const bool is_ahead = (step_ns - kClockJumpNs) / kFastestClock > went_by_ns;
+  ahead_in_a_row_ = is_ahead ? ahead_in_a_row_ + 1 : 0;
+  behind_in_a_row_ = step_ns < -kClockJumpNs ? behind_in_a_row_ + 1 : 0;
+  if (is_ahead && ahead_in_a_row_ < kTooManyToBeWrong)
+    return "far ahead of the frame before it: its stamp is wrong, or the sender's clock was set";
+  if (behind_in_a_row_ == 0) return nullptr;
+  if (behind_in_a_row_ < kTooManyToBeWrong)
+    return "far behind the frame before it: its stamp is wrong, or the sender's clock was set";
+  clock_jumped_back();
+  return nullptr;
 }
 
 core::Status FrameAssembler::add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs) {
@@ -166,7 +190,7 @@ std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
     const bool out_of_time = now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
     Attempt attempt = assemble(waiting, out_of_time);
     if (attempt.frame) {
-      last_taken_ns_ = waiting.stamp_ns;
+      last_taken_ = Taken{waiting.stamp_ns, waiting.received_ns};
       for (std::size_t older = 0; older + 1 < newest; ++older) skip(waiting_[older], "a newer frame was ready");
       waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(newest));
       return std::move(attempt.frame);
@@ -204,7 +228,8 @@ void FrameAssembler::clock_jumped_back() {
   waiting_.clear();
   colors_.clear();
   tf_.forget_moving();
-  last_taken_ns_.reset();
+  last_taken_.reset();
+  ahead_in_a_row_ = behind_in_a_row_ = 0;
 }
 
 }  // namespace prescene::service

@@ -4,6 +4,10 @@
 //
 // The newest complete frame wins: a frame older than one already taken is skipped, never queued. The assembler reads no
 // clock; time is what its caller says, so a recording assembles to the same observations.
+//
+// A frame whose stamp is more than a second before the last one taken, or far ahead of it, is skipped: one stamp may be
+// wrong. Three such in a row mean that the sender's clock was set, and count; where it went back, what was known of the
+// moving frames of tf is forgotten.
 #pragma once
 
 #include <cstdint>
@@ -102,6 +106,8 @@ class FrameAssembler {
   };
   Attempt assemble(const Waiting& waiting, bool out_of_time) const;
   const Color* color_of(const Waiting& waiting) const;
+  /// Why a frame's stamp is not believed, or null. Counts those in a row, and follows a clock that was set.
+  const char* doubt_of_stamp(const Waiting& frame);
   void skip(const Waiting& waiting, std::string reason);
   void clock_jumped_back();
 
@@ -114,7 +120,13 @@ class FrameAssembler {
   std::optional<geometry::PinholeCamera> camera_;
   MessageIndex camera_index_ = 0;
   std::vector<std::string> camera_doubts_;
-  std::optional<core::TimeNs> last_taken_ns_;
+  struct Taken {
+    core::TimeNs stamp_ns;
+    core::TimeNs received_ns;
+  };
+  std::optional<Taken> last_taken_;
+  int ahead_in_a_row_ = 0;            // frames whose stamps are far ahead of the last one taken, ...
+  int behind_in_a_row_ = 0;           // ... or before it
   std::deque<SkippedFrame> skipped_;  // not taken yet, bounded
   std::uint64_t skipped_count_ = 0;
 };

@@ -135,14 +135,67 @@ TEST(FrameAssembler, UsesTheSetCameraPoseWhenTfKnowsNone) {
   EXPECT_DOUBLE_EQ(frame->observation.X_WC.translation.z(), 3.0);
 }
 
+/// An assembler that only needs depth images; whether the frame of this stamp is used when it comes at this time.
+class OfDepthOnly {
+ public:
+  OfDepthOnly() {
+    EXPECT_TRUE(assembler_.add_camera_info(camera_info(), 1).ok());
+    EXPECT_TRUE(assembler_.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  }
+  bool uses(core::TimeNs stamp_ns, core::TimeNs received_ns) {
+    EXPECT_TRUE(assembler_.add_depth(depth_at(stamp_ns), index_++, received_ns).ok());
+    const auto frame = assembler_.take(received_ns);
+    return frame && frame->observation.stamp_ns == stamp_ns;
+  }
+  FrameAssembler& operator*() { return assembler_; }
+
+ private:
+  FrameAssembler assembler_{without_color(), {}};
+  MessageIndex index_ = 3;
+};
+
 TEST(FrameAssembler, StartsAgainWhenTheClockJumpsBack) {
-  FrameAssembler assembler(without_color(), {});
-  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
-  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
-  ASSERT_TRUE(assembler.add_depth(depth_at(60'000 * kMs), 3, 0).ok());
-  ASSERT_TRUE(assembler.take(1).has_value());
-  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 4, 2).ok());
-  EXPECT_TRUE(assembler.take(3).has_value());
+  OfDepthOnly assembler;
+  ASSERT_TRUE(assembler.uses(60'000 * kMs, 0));
+  EXPECT_FALSE(assembler.uses(100 * kMs, 33 * kMs)) << "one or two stamps may be wrong";
+  EXPECT_FALSE(assembler.uses(133 * kMs, 66 * kMs));
+  EXPECT_TRUE(assembler.uses(166 * kMs, 99 * kMs));
+  EXPECT_TRUE(assembler.uses(199 * kMs, 132 * kMs));
+  EXPECT_EQ((*assembler).skipped_count(), 2u);
+}
+
+TEST(FrameAssembler, FollowsAClockThatIsSetForward) {
+  OfDepthOnly assembler;
+  ASSERT_TRUE(assembler.uses(100 * kMs, 100 * kMs));
+  EXPECT_FALSE(assembler.uses(3'600'000 * kMs, 133 * kMs));
+  EXPECT_FALSE(assembler.uses(3'600'033 * kMs, 166 * kMs));
+  EXPECT_TRUE(assembler.uses(3'600'066 * kMs, 199 * kMs));
+  EXPECT_TRUE(assembler.uses(3'600'099 * kMs, 232 * kMs));
+}
+
+TEST(FrameAssembler, OneWrongStampCostsOneFrame) {
+  OfDepthOnly assembler;
+  int used = 0;
+  for (int i = 0; i < 30; ++i) {
+    const core::TimeNs now_ns = (100'000 + 33 * i) * kMs;
+    if (i % 10 == 3) {
+      EXPECT_FALSE(assembler.uses(now_ns + 3'600'000 * kMs, now_ns)) << "an hour ahead";
+    } else if (i % 10 == 6) {
+      EXPECT_FALSE(assembler.uses(now_ns - 90'000 * kMs, now_ns)) << "long ago";
+    } else {
+      EXPECT_TRUE(assembler.uses(now_ns, now_ns)) << i;
+      ++used;
+    }
+  }
+  EXPECT_EQ(used, 24);
+}
+
+TEST(FrameAssembler, APauseAndAFastReplayAreNoJumps) {
+  OfDepthOnly assembler;
+  ASSERT_TRUE(assembler.uses(100 * kMs, 100 * kMs));
+  EXPECT_TRUE(assembler.uses(60'000 * kMs, 60'000 * kMs)) << "the camera had gone for a minute";
+  EXPECT_TRUE(assembler.uses(62'000 * kMs, 60'200 * kMs)) << "a frame each 2 s, ten times as fast";
+  EXPECT_TRUE(assembler.uses(64'000 * kMs, 60'400 * kMs));
 }
 
 TEST(FrameAssembler, ABadMessageIsRefusedAndLosesNothing) {
