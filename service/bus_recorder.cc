@@ -18,25 +18,12 @@ constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t
 core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const InputTopics& topics,
                                           const core::Cancellation& cancellation, const core::LogSink& log,
                                           RecordingWriter& recording) {
-  using interfaces::TopicQos;
   Inbox inbox({{topics.depth, kWaitingImages}, {topics.color, kWaitingImages}, {topics.tf, kWaitingTransforms}});
   PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
-  struct Row {
-    std::string topic;
-    const char* type;
-    TopicQos qos;
-  };
-  for (const Row& row : {Row{topics.depth, "sensor_msgs/msg/Image", TopicQos::kSensor},
-                         Row{topics.color, "sensor_msgs/msg/Image", TopicQos::kSensor},
-                         Row{topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor},
-                         Row{topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf},
-                         Row{topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic},
-                         Row{kControlTopic, "std_msgs/msg/String", TopicQos::kReliable},
-                         Row{kQueryTopic, "std_msgs/msg/String", TopicQos::kReliable},
-                         Row{kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable}}) {
-    if (row.topic.empty()) continue;
-    PRESCENE_RETURN_IF_ERROR(node->subscribe(
-        row.topic, row.type, row.qos, [&](interfaces::ReceivedMessage&& message) { inbox.put(std::move(message)); }));
+  for (const BusTopic& topic : bus_topics(topics)) {
+    PRESCENE_RETURN_IF_ERROR(
+        node->subscribe(topic.name, topic.type, topic.read,
+                        [&inbox](interfaces::ReceivedMessage&& message) { inbox.put(std::move(message)); }));
   }
   std::uint64_t messages = 0;
   core::TimeNs last_ns = 0;

@@ -26,13 +26,6 @@ steady_clock::duration seconds(double value) {
   return std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>(value));
 }
 
-TopicQos qos_of(const interfaces::ReceivedMessage& message) {
-  if (message.type == "sensor_msgs/msg/Image") return TopicQos::kImages;
-  if (message.type == "tf2_msgs/msg/TFMessage")
-    return message.topic.ends_with("static") ? TopicQos::kLatched : TopicQos::kTf;
-  return TopicQos::kReliable;
-}
-
 /// What comes back from the service; filled by the bus's thread.
 class Listener {
  public:
@@ -89,6 +82,7 @@ class BusPlayer {
  public:
   BusPlayer(interfaces::DdsNode& node, Listener& listener) : node_(node), listener_(listener) {}
 
+  /// What comes back goes to the listener, which outlives the node; the player does not.
   core::Status open() {
     const auto text_of = [](const interfaces::ReceivedMessage& message) {
       const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
@@ -96,18 +90,24 @@ class BusPlayer {
     };
     PRESCENE_RETURN_IF_ERROR(
         node_.subscribe(kBeliefTopic, "std_msgs/msg/String", TopicQos::kReliable,
-                        [this, text_of](auto&& message) { listener_.add_belief(text_of(message)); }));
-    PRESCENE_RETURN_IF_ERROR(
-        node_.subscribe(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable,
-                        [this, text_of](auto&& message) { listener_.add_answer(text_of(message)); }));
-    PRESCENE_TRY(questions_, node_.advertise(kQueryTopic, "std_msgs/msg/String", TopicQos::kReliable));
+                        [&listener = listener_, text_of](auto&& message) { listener.add_belief(text_of(message)); }));
+    for (const BusTopic& topic : bus_topics({})) {
+      if (topic.name == kQueryTopic) {
+        PRESCENE_TRY(questions_, node_.advertise(topic.name, topic.type, topic.write));
+      } else if (topic.name == kAnswerTopic) {
+        PRESCENE_RETURN_IF_ERROR(node_.subscribe(
+            topic.name, topic.type, topic.read,
+            [&listener = listener_, text_of](auto&& message) { listener.add_answer(text_of(message)); }));
+      }
+    }
     return core::ok_status();
   }
 
   core::Result<DdsPublisher> publisher_of(const interfaces::ReceivedMessage& message) {
     auto found = publishers_.find(message.topic);
     if (found == publishers_.end()) {
-      PRESCENE_TRY(const DdsPublisher publisher, node_.advertise(message.topic, message.type, qos_of(message)));
+      PRESCENE_TRY(const DdsPublisher publisher,
+                   node_.advertise(message.topic, message.type, offered_as(message.topic, message.type)));
       found = publishers_.emplace(message.topic, publisher).first;
     }
     return found->second;

@@ -180,18 +180,10 @@ core::Status LiveService::Impl::join_bus() {
     PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name),
                                                      "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kState));
   }
-  const auto deliver = [this](ReceivedMessage&& message) { inbox.put(std::move(message)); };
-  const InputTopics& topics = settings.tracker.topics;
-  PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.depth, "sensor_msgs/msg/Image", TopicQos::kSensor, deliver));
-  if (!topics.color.empty()) {
-    PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.color, "sensor_msgs/msg/Image", TopicQos::kSensor, deliver));
-  }
-  PRESCENE_RETURN_IF_ERROR(
-      node->subscribe(topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor, deliver));
-  PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf, deliver));
-  PRESCENE_RETURN_IF_ERROR(node->subscribe(topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, deliver));
-  PRESCENE_RETURN_IF_ERROR(node->subscribe(kControlTopic, "std_msgs/msg/String", TopicQos::kCommands, deliver));
-  return node->subscribe(kQueryTopic, "std_msgs/msg/String", TopicQos::kCommands, [this](ReceivedMessage&& message) {
+  const std::function<void(ReceivedMessage &&)> deliver = [this](ReceivedMessage&& message) {
+    inbox.put(std::move(message));
+  };
+  const std::function<void(ReceivedMessage &&)> deliver_question = [this](ReceivedMessage&& message) {
     try {
       auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
       if (question)
@@ -202,7 +194,13 @@ core::Status LiveService::Impl::join_bus() {
       ++unreadable_questions;
     }
     inbox.put(std::move(message));  // for the recording; an exception of it is the node's to count
-  });
+  };
+  for (const BusTopic& topic : bus_topics(settings.tracker.topics)) {
+    if (topic.name == kAnswerTopic) continue;  // ours
+    const auto& take = topic.name == kQueryTopic ? deliver_question : deliver;
+    PRESCENE_RETURN_IF_ERROR(node->subscribe(topic.name, topic.type, topic.read, take));
+  }
+  return core::ok_status();
 }
 
 core::TimeNs LiveService::Impl::now() {

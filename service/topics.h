@@ -2,9 +2,12 @@
 // The topics that Prescene listens to and speaks on, live and in recordings.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "prescene/core/status.h"
+#include "prescene/interfaces/dds/dds_node.h"
 
 namespace prescene::service {
 
@@ -36,5 +39,26 @@ std::string pose_topic(const std::string& object);
 inline constexpr const char* kTruthTopic = "/prescene/truth";      ///< Simulated truth of each frame.
 inline constexpr const char* kOutcomeTopic = "/prescene/outcome";  ///< What the simulation came to.
 inline constexpr const char* kStepTopic = "/prescene/step";        ///< One step record a belief step.
+
+/// A topic as it is on the bus.
+struct BusTopic {
+  std::string name;
+  const char* type = "";
+  interfaces::TopicQos read{};   ///< How whoever may lose nothing of it listens.
+  interfaces::TopicQos write{};  ///< How it is offered, by a robot or by who plays a recording in its place.
+};
+/// What a session is made of: what the robot sends (colour only where it is named), the questions and the answers. The
+/// service, `record` and `replay --over-dds` all take it from here, so that one keeps what another does.
+std::vector<BusTopic> bus_topics(const InputTopics& topics);
+/// How a recorded topic is offered: as its row of bus_topics() says, one of another name by its type.
+interfaces::TopicQos offered_as(const std::string& topic, const std::string& type);
+
+/// Whether the JSON on this topic is parsed when a recording is read: steps, truth and outcomes are.
+bool is_parsed_in_recordings(const std::string& topic);
+/// Such a document is written, read and parsed up to this size: it takes some twenty times its text, and packs so well
+/// that a small file could hold a huge one.
+inline constexpr std::size_t kMostParsedJsonBytes = std::size_t{8} << 20;
+/// Bytes of the largest JSON document that is written on this topic; others are as large as on the bus.
+std::size_t most_json_bytes(const std::string& topic);
 
 }  // namespace prescene::service

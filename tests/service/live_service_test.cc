@@ -7,11 +7,13 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
+#include "prescene/service/bus_replay.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/tests/service/robot_on_bus.h"
 #include "prescene/tests/support/paths.h"
@@ -162,6 +164,22 @@ TEST_F(LiveServiceTest, ARecordingThatFailsStandsInDiagnosticsAndInTheStatus) {
   const core::Status status = stop();
   EXPECT_FALSE(status.ok());
   EXPECT_THAT(status.message(), HasSubstr("run.mcap"));
+}
+
+TEST_F(LiveServiceTest, AReplayThatFailsEndsWhileTheServiceSpeaks) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  BusReplayOptions options;
+  options.dds.domain = own_domain();
+  const tests::ScratchDir folder;
+  EXPECT_TRUE(robot_.send_until(
+      [&, tries = 0]() mutable {
+        const auto result = replay_over_bus(folder.path() / "none.mcap", options, {}, {}, {});
+        EXPECT_EQ(result.status().code(), core::StatusCode::kNotFound);
+        return ++tries == 20;
+      },
+      kNoon + kSecond));
+  EXPECT_TRUE(stop().ok());
 }
 
 TEST_F(LiveServiceTest, RefusesWhatMakesNoSenseAndGoesOn) {

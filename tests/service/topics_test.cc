@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/topics.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace prescene::service::topics_test {
+namespace {
+
+using interfaces::TopicQos;
+
+BusTopic named(const std::string& name) {
+  const std::vector<BusTopic> rows = bus_topics({});
+  const auto row = std::find_if(rows.begin(), rows.end(), [&](const BusTopic& topic) { return topic.name == name; });
+  EXPECT_NE(row, rows.end()) << name;
+  return row == rows.end() ? BusTopic{} : *row;
+}
+
+// Of a burst none may push out another before it is read, live and in `record` and `replay`, which all listen so.
+TEST(BusTopics, ControlsQuestionsAndAnswersAreReadWithoutOneReplacingAnother) {
+  for (const char* name : {kControlTopic, kQueryTopic, kAnswerTopic}) {
+    EXPECT_EQ(named(name).read, TopicQos::kCommands) << name;
+  }
+  EXPECT_EQ(offered_as(kControlTopic, "std_msgs/msg/String"), TopicQos::kCommands);
+}
+
+TEST(BusTopics, ColourIsLeftOutWhereItIsNotNamed) {
+  InputTopics topics;
+  const std::size_t all = bus_topics(topics).size();
+  topics.color.clear();
+  EXPECT_EQ(bus_topics(topics).size(), all - 1);
+}
+
+TEST(BusTopics, ARenamedTopicIsOfferedByItsType) {
+  EXPECT_EQ(offered_as("/robot/depth", "sensor_msgs/msg/Image"), TopicQos::kImages);
+  EXPECT_EQ(offered_as("/robot/tf_static", "tf2_msgs/msg/TFMessage"), TopicQos::kLatched);
+  EXPECT_EQ(offered_as("/robot/tf", "tf2_msgs/msg/TFMessage"), TopicQos::kTf);
+  EXPECT_EQ(offered_as("/tf_static", "tf2_msgs/msg/TFMessage"), TopicQos::kLatched);
+}
+
+}  // namespace
+}  // namespace prescene::service::topics_test
