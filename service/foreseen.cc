@@ -138,7 +138,7 @@ ordered_json to_json(const OutcomeRecord& record) {
 
 core::Result<OutcomeRecord> outcome_record_from_json(const std::string& text) {
   const core::Status bad = core::data_loss("the record of outcomes of the recording is damaged");
-  const ordered_json json = parse_or_discard(text);
+  const ordered_json json = parse_or_discard(text, kMostParsedJsonBytes);
   const auto is_time = [](const ordered_json& value) {
     return value.is_number_unsigned() && value.get<std::uint64_t>() <= std::uint64_t{INT64_MAX} / 2;
   };

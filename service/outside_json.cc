@@ -8,15 +8,13 @@
 namespace prescene::service {
 namespace {
 
-// Above all that is sent: the images of a view of 4 million pixels are 54 MB.
-constexpr std::size_t kMostBytes = 256u << 20;
 // Bytes: what is refused for its long id is still told to whoever sent it, unless that were a burden.
 constexpr std::size_t kLongestIdKept = 4096;
 
 }  // namespace
 
-nlohmann::ordered_json parse_or_discard(std::string_view text) {
-  auto document = belief::parse_json(text, kMostBytes);
+nlohmann::ordered_json parse_or_discard(std::string_view text, std::size_t most_bytes) {
+  auto document = belief::parse_json(text, most_bytes);
   return document ? *std::move(document) : nlohmann::ordered_json(nlohmann::ordered_json::value_t::discarded);
 }
 

@@ -2,14 +2,19 @@
 // JSON that others sent: over the bus, in a recording, on the command line.
 #pragma once
 
+#include <cstddef>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 
 namespace prescene::service {
 
-/// The document; discarded (is_discarded()) where it is no JSON or nested too deep to be copied.
-nlohmann::ordered_json parse_or_discard(std::string_view text);
+/// Bytes above all that is sent: the images of a view of 4 million pixels are 54 MB.
+inline constexpr std::size_t kMostJsonBytes = std::size_t{256} << 20;
+
+/// The document; discarded (is_discarded()) where it is no JSON, longer than `most_bytes` or nested too deep to be
+/// copied.
+nlohmann::ordered_json parse_or_discard(std::string_view text, std::size_t most_bytes = kMostJsonBytes);
 /// The "id" of a question or an answer; empty where there is none, or a very long one.
 std::string id_of_document(const nlohmann::ordered_json& document);
 std::string id_of(std::string_view text);

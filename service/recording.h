@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -44,7 +45,11 @@ struct StepRecord {
   double seconds = 0.0;               ///< Wall time it took; not replayed.
 };
 nlohmann::ordered_json to_json(const StepRecord& record);
+/// kInvalidInput naming the key that is missing or is not what to_json() writes; lists and seconds may be missing.
 core::Result<StepRecord> step_record_from_json(const std::string& text);
+
+/// Times beyond it, in the year 2116, are written as this one and read as damage. The sum of two is in range.
+inline constexpr core::TimeNs kLatestRecordedNs = std::numeric_limits<core::TimeNs>::max() / 2;
 
 /// Where to record a robot: `path`, or where that is a file already, "run-2.mcap", "run-3.mcap", ... beside it. What a
 /// robot saw can't be seen again, so nothing live is written over it.
@@ -56,16 +61,18 @@ class RecordingWriter {
   static core::Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& path,
                                                                const RecordingInfo& info);
 
-  /// Messages of the robot; numbered 0, 1, ... in the order of these calls.
+  /// Messages of the robot; numbered 0, 1, ... in the order of these calls. Their times are clamped to 1970 and
+  /// kLatestRecordedNs: a sender's clock may say anything. What ends in an exception is not in the recording, and has
+  /// no number.
   core::Result<MessageIndex> write(const interfaces::ReceivedMessage& message);
-  /// One JSON document on a /prescene/ topic.
+  /// One JSON document on a /prescene/ topic. kResourceExhausted, writing nothing, above most_json_bytes().
   core::Status write_json(const std::string& topic, const std::string& json, core::TimeNs time_ns);
   core::Status flush() { return writer_->flush(); }
   core::Status close() { return writer_->close(); }
 
  private:
   explicit RecordingWriter(std::unique_ptr<interfaces::McapWriter> writer) : writer_(std::move(writer)) {}
-  core::Status write(const std::string& topic, const interfaces::McapChannel& channel, core::TimeNs log_ns,
+  core::Status write(const interfaces::McapChannel& channel, std::uint32_t sequence, core::TimeNs log_ns,
                      core::TimeNs publish_ns, std::vector<std::uint8_t> data);
 
   std::unique_ptr<interfaces::McapWriter> writer_;
@@ -78,7 +85,9 @@ class RecordingWriter {
 struct RecordedEntry {
   interfaces::ReceivedMessage message;  ///< `cdr` holds the JSON text of entries that are JSON.
   bool is_json = false;
-  MessageIndex index = 0;  ///< Of a robot message, as when it was written.
+  /// Of a robot message, as when it was written, whatever was lost before it. In a recording of another program,
+  /// or one whose description is damaged: its place among those that are read.
+  MessageIndex index = 0;
 };
 
 struct RecordingReadOptions {
@@ -95,8 +104,8 @@ class RecordingReader {
 
   /// From the recording's metadata; defaults where it has none (a recording made by other tools).
   const RecordingInfo& info() const { return info_; }
-  /// In the order of log times; empty at the end. Errors of McapReader::next; kResourceExhausted for JSON of more than
-  /// 8 MiB.
+  /// In the order of log times; empty at the end. Errors of McapReader::next; kResourceExhausted for JSON that would be
+  /// parsed and is longer than kMostParsedJsonBytes (with `salvage`, that is left out and counted).
   core::Result<std::optional<RecordedEntry>> next();
   /// What could not be read, and what could not be checked: a sentence each, empty = nothing. Complete at the end.
   std::string loss_text() const;
@@ -104,11 +113,16 @@ class RecordingReader {
   std::optional<std::uint64_t> message_count() const { return reader_->message_count(); }
 
  private:
-  explicit RecordingReader(std::unique_ptr<interfaces::McapReader> reader) : reader_(std::move(reader)) {}
+  RecordingReader(std::unique_ptr<interfaces::McapReader> reader, bool salvage)
+      : reader_(std::move(reader)), salvage_(salvage) {}
+  MessageIndex index_of(std::uint32_t sequence);
 
   std::unique_ptr<interfaces::McapReader> reader_;
+  bool salvage_ = false;
   RecordingInfo info_;
   bool info_is_damaged_ = false;
+  bool is_numbered_ = false;         // sequences are the lower bits of the messages' numbers
+  std::uint64_t too_long_json_ = 0;  // left out
   MessageIndex next_index_ = 0;
 };
 

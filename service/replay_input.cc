@@ -37,7 +37,7 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
 
 core::Result<TrackerSettings> ReplayInput::recorded_settings() const {
   if (info_.settings.empty()) return TrackerSettings{};
-  auto recorded = with_recorded({}, parse_or_discard(info_.settings));
+  auto recorded = with_recorded({}, parse_or_discard(info_.settings, kMostParsedJsonBytes));
   if (!recorded) return recorded.status().at(path_.string() + ": recorded settings");
   return recorded;
 }

@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
 #include "prescene/core/utf8.h"
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/topics.h"
 #include "prescene/tests/support/paths.h"
 
 namespace prescene::service {
@@ -25,6 +29,8 @@ TEST(StepRecord, ReadsBackWhatWasWritten) {
   record.tf_until = 38;
   record.skipped = {{12, 5, "a newer frame was ready"}};
   record.belief_hash = "0123456789abcdef";
+  record.degraded = {"few pixels"};
+  record.seconds = 0.125;
   const auto read = step_record_from_json(to_json(record).dump());
   ASSERT_TRUE(read.ok()) << read.status().message();
   EXPECT_EQ(read->step, record.step);
@@ -35,6 +41,12 @@ TEST(StepRecord, ReadsBackWhatWasWritten) {
   EXPECT_EQ(read->color, record.color);
   EXPECT_EQ(read->tf_until, record.tf_until);
   EXPECT_EQ(read->belief_hash, record.belief_hash);
+  ASSERT_EQ(read->skipped.size(), 1u);
+  EXPECT_EQ(read->skipped[0].depth, 12u);
+  EXPECT_EQ(read->skipped[0].stamp_ns, 5);
+  EXPECT_EQ(read->skipped[0].reason, "a newer frame was ready");
+  EXPECT_EQ(read->degraded, record.degraded);
+  EXPECT_EQ(read->seconds, 0.125);
   record.color.reset();
   EXPECT_EQ(step_record_from_json(to_json(record).dump())->color, std::nullopt);
 }
@@ -56,6 +68,14 @@ TEST(StepRecord, RefusesWhatIsNotOne) {
     nlohmann::ordered_json without = whole;
     without.erase(key);
     EXPECT_EQ(step_record_from_json(without.dump()).status().code(), core::StatusCode::kInvalidInput) << key;
+  }
+  for (const auto& [key, wrong] : std::map<std::string, const char*>{
+           {"color", "-3"}, {"skipped", R"([{"depth": 1}])"}, {"degraded", "[7]"}, {"seconds", "\"long\""}}) {
+    nlohmann::ordered_json other = whole;
+    other[key] = nlohmann::ordered_json::parse(wrong);
+    const auto read = step_record_from_json(other.dump());
+    EXPECT_EQ(read.status().code(), core::StatusCode::kInvalidInput) << key;
+    EXPECT_NE(read.status().message().find("'" + key + "'"), std::string::npos) << read.status().message();
   }
   EXPECT_FALSE(step_record_from_json("{").ok());
   EXPECT_FALSE(step_record_from_json("[1]").ok());
@@ -113,6 +133,110 @@ TEST(Recording, KeepsMessagesInOrderWithTheirNumbers) {
   EXPECT_FALSE(end->has_value());
   EXPECT_EQ((*reader)->loss_text(), "");
   EXPECT_EQ((*reader)->unchecked_text(), "");
+}
+
+/// The entries of a recording.
+std::vector<RecordedEntry> entries_of(const std::filesystem::path& path, const RecordingReadOptions& options = {}) {
+  std::vector<RecordedEntry> entries;
+  const auto reader = RecordingReader::open(path, options);
+  EXPECT_TRUE(reader.ok()) << reader.status().message();
+  while (reader) {
+    auto entry = (*reader)->next();
+    EXPECT_TRUE(entry.ok()) << entry.status().message();
+    if (!entry || !*entry) break;
+    entries.push_back(**std::move(entry));
+  }
+  return entries;
+}
+
+interfaces::ReceivedMessage text_message(const std::string& text, core::TimeNs source_ns, core::TimeNs received_ns) {
+  return {"/a", "std_msgs/msg/String", interfaces::encode_cdr(interfaces::RosString{text}), source_ns, received_ns};
+}
+
+// A clock that was never set, or a sender that makes its stamps up.
+TEST(Recording, KeepsMessagesOfImpossibleTimes) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  {
+    const auto writer = RecordingWriter::create(path, {});
+    ASSERT_TRUE(writer.ok());
+    EXPECT_TRUE((*writer)->write(text_message("before 1970", -5, 10)).ok());
+    EXPECT_TRUE((*writer)->write(text_message("the end", std::numeric_limits<core::TimeNs>::max(), 11)).ok());
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto entries = entries_of(path);
+  ASSERT_EQ(entries.size(), 2u);
+  EXPECT_EQ(entries[0].message.source_ns, 0);
+  EXPECT_EQ(entries[1].message.source_ns, kLatestRecordedNs);
+}
+
+TEST(Recording, ALargeAnswerIsReadAgain) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  const std::string answer = R"({"view": ")" + std::string(most_json_bytes(kAnswerTopic) - 12, 'x') + "\"}";
+  {
+    const auto writer = RecordingWriter::create(path, {});
+    ASSERT_TRUE(writer.ok());
+    ASSERT_TRUE((*writer)->write_json(kAnswerTopic, answer, 10).ok());
+    EXPECT_EQ((*writer)->write_json(kAnswerTopic, answer + "   ", 11).code(), core::StatusCode::kResourceExhausted);
+    EXPECT_EQ((*writer)->write_json(kStepTopic, answer, 12).code(), core::StatusCode::kResourceExhausted)
+        << "what is parsed is bounded more closely";
+    ASSERT_TRUE((*writer)->write(text_message("after it", 13, 13)).ok());
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto entries = entries_of(path);
+  ASSERT_EQ(entries.size(), 2u);
+  EXPECT_EQ(entries[0].message.cdr.size(), answer.size());
+  EXPECT_EQ(entries[1].index, 0u);
+}
+
+TEST(Recording, SalvageLeavesOutTruthThatWouldUnfold) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  {
+    const auto writer = interfaces::McapWriter::create(path, {});
+    ASSERT_TRUE(writer.ok());
+    const auto channel = (*writer)->add_channel({kTruthTopic, "json", {"truth", "jsonschema", "{}"}, {}});
+    ASSERT_TRUE(channel.ok());
+    ASSERT_TRUE((*writer)->write({*channel, 0, 1, 1, std::vector<std::uint8_t>(kMostParsedJsonBytes + 1, ' ')}).ok());
+    ASSERT_TRUE((*writer)->write({*channel, 1, 2, 2, {'{', '}'}}).ok());
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  EXPECT_EQ((*reader)->next().status().code(), core::StatusCode::kResourceExhausted);
+  const auto salvaging = RecordingReader::open(path, {.salvage = true});
+  ASSERT_TRUE(salvaging.ok());
+  const auto entry = (*salvaging)->next();
+  ASSERT_TRUE(entry.ok() && entry->has_value());
+  EXPECT_EQ((*entry)->message.received_ns, 2);
+  EXPECT_NE((*salvaging)->loss_text().find("1 JSON documents above the size limit"), std::string::npos);
+}
+
+TEST(Recording, NumbersStandBehindAGapThatSalvageLeft) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  const std::string landmark = "the chunk to be damaged";
+  {
+    const auto writer = RecordingWriter::create(path, {});
+    ASSERT_TRUE(writer.ok());
+    for (int i = 0; i < 9; ++i) {  // three chunks of three
+      ASSERT_TRUE((*writer)->write(text_message(i == 4 ? landmark : "n" + std::to_string(i), 10 + i, 10 + i)).ok());
+      if (i % 3 == 2) {
+        ASSERT_TRUE((*writer)->flush().ok());
+      }
+    }
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  auto bytes = *interfaces::read_file(path, std::size_t{1} << 20);
+  const auto found = std::search(bytes.begin(), bytes.end(), landmark.begin(), landmark.end());
+  ASSERT_NE(found, bytes.end()) << "the text is not compressed";
+  *found ^= 1U;
+  ASSERT_TRUE(interfaces::write_file(path, bytes).ok());
+  const auto entries = entries_of(path, {.salvage = true});
+  std::vector<MessageIndex> numbers;
+  for (const RecordedEntry& entry : entries) numbers.push_back(entry.index);
+  EXPECT_EQ(numbers, (std::vector<MessageIndex>{0, 1, 2, 6, 7, 8}));
 }
 
 }  // namespace

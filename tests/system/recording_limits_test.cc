@@ -55,10 +55,6 @@ class HandRecording {
           interfaces::encode_cdr(interfaces::to_ros_image_32fc1(depth, header())));
   }
 
-  void write_json(const std::string& topic, const std::string& json) {
-    EXPECT_TRUE(writer_->write_json(topic, json, now_).ok());
-  }
-
   void close() { EXPECT_TRUE(writer_->close().ok()); }
 
  private:
@@ -71,6 +67,18 @@ class HandRecording {
   std::unique_ptr<service::RecordingWriter> writer_;
   core::TimeNs now_ = kStart;
 };
+
+/// A recording of one truth record that no writer of ours would write, and the scene beside it.
+void write_truth(const std::filesystem::path& path, const std::string& json) {
+  const auto writer = interfaces::McapWriter::create(path, {});
+  ASSERT_TRUE(writer.ok()) << writer.status().message();
+  const auto truth =
+      (*writer)->add_channel({service::kTruthTopic, "json", {"truth", "jsonschema", R"({"type": "object"})"}, {}});
+  ASSERT_TRUE(truth.ok());
+  ASSERT_TRUE((*writer)->write({*truth, 0, kStart, kStart, {json.begin(), json.end()}}).ok());
+  ASSERT_TRUE((*writer)->close().ok());
+  write_file(path.parent_path() / "box.yaml", kScene);
+}
 
 TEST(RecordingLimits, ASmallFileOfTheLargestImagesTakesLessThanAGigabyte) {
   const ScratchDir folder;
@@ -114,13 +122,9 @@ TEST(RecordingLimits, LargerImagesAreRefusedAndSayingWhyTakesNoMemory) {
 TEST(RecordingLimits, AMessageOfMoreThanAChunkMayHaveIsRefused) {
   const ScratchDir folder;
   const std::string path = (folder.path() / "bomb.mcap").string();
-  {
-    HandRecording recording(path);
-    recording.write_json(service::kTruthTopic, std::string(std::size_t{129} << 20, ' '));
-    recording.close();
-  }
+  ASSERT_NO_FATAL_FAILURE(write_truth(path, std::string(std::size_t{129} << 20, ' ')));
   EXPECT_LT(std::filesystem::file_size(path), 900'000U);
-  const Finished finished = run_program({"replay", path});
+  const Finished finished = run_program({"replay", path, "--scene", (folder.path() / "box.yaml").string()});
   EXPECT_EQ(finished.exit_code, 2) << finished.err;
   EXPECT_NE(finished.err.find("up to 128.0 MiB are read"), std::string::npos) << finished.err;
   EXPECT_LT(finished.most_memory, kGigabyte);
@@ -133,12 +137,10 @@ TEST(RecordingLimits, JsonThatWouldUnfoldIsRefused) {
     std::string zeros = "[";
     zeros.reserve(std::size_t{61} << 20);
     while (zeros.size() < std::size_t{60} << 20) zeros += "0,";
-    HandRecording recording(path);
-    recording.write_json(service::kTruthTopic, zeros + "0]");
-    recording.close();
+    ASSERT_NO_FATAL_FAILURE(write_truth(path, zeros + "0]"));
   }
   EXPECT_LT(std::filesystem::file_size(path), 900'000U);
-  const Finished finished = run_program({"replay", path});
+  const Finished finished = run_program({"replay", path, "--scene", (folder.path() / "box.yaml").string()});
   EXPECT_EQ(finished.exit_code, 2) << finished.err;
   EXPECT_NE(finished.err.find("up to 8.0 MiB are read"), std::string::npos) << finished.err;
   EXPECT_LT(finished.most_memory, kGigabyte);
