@@ -84,13 +84,15 @@ struct LiveService::Impl {
   /// Counts an exception of a library, or the end of memory: what came next may do better.
   void note_failure(const std::string& of, const std::exception& error);
   void record(const std::string& topic, const std::string& json);
+  /// Without one of its steps a recording can't be replayed: it ends where that can't be written.
+  void record_step(const StepRecord& step);
   /// The recording ends here, and is an error of the run.
   void give_up_recording(const core::Status& why);
   /// Steps the belief if a frame is complete, records what was answered, publishes.
   void look_after_frames();
   /// Counts and logs a message that the middleware did not take.
   void check_sent(const core::Status& status);
-  void publish(const TrackerStep& step);
+  void publish();
   void publish_diagnostics();
   core::TimeNs now();
   ServiceHealth health() const;
@@ -229,6 +231,14 @@ void LiveService::Impl::record(const std::string& topic, const std::string& json
   if (!written.ok()) give_up_recording(written);
 }
 
+void LiveService::Impl::record_step(const StepRecord& step) {
+  try {
+    record(kStepTopic, belief::json_text(to_json(step)));
+  } catch (const std::exception& error) {
+    give_up_recording(core::unavailable(std::string("a step could not be recorded: ") + error.what()));
+  }
+}
+
 void LiveService::Impl::give_up_recording(const core::Status& why) {
   recording_status = why;
   core::log(log, core::LogLevel::kError, why.message() + "; going on without recording");
@@ -276,13 +286,14 @@ void LiveService::Impl::look_after_frames() {
   for (const std::string& answer : answers_given) record(kAnswerTopic, answer);
   try {
     if (const auto step = tracker->step(now_ns)) {
+      record_step(step->record);  // first: whatever fails below, the step was made
       ++steps;
       since_frame.emplace();
       step_seconds = step->record.seconds;
       degraded = step->record.degraded;
       not_simulated += static_cast<std::uint64_t>(step->counters.not_simulated);
       if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
-      publish(*step);
+      publish();
     }
   } catch (const std::exception& error) {
     note_failure("a frame", error);
@@ -296,7 +307,7 @@ void LiveService::Impl::check_sent(const core::Status& status) {
   core::log(log, core::LogLevel::kWarning, status.message());
 }
 
-void LiveService::Impl::publish(const TrackerStep& step) {
+void LiveService::Impl::publish() {
   const std::shared_ptr<const belief::Belief> belief = tracker->belief();
   const BeliefSummary summary = summary_of(*belief);
   const std::string& world = settings.tracker.assembler.world_frame;
@@ -310,7 +321,6 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   }
   if (marker_limit.due()) check_sent(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
   record(kBeliefTopic, json);
-  record(kStepTopic, belief::json_text(to_json(step.record)));
 }
 
 ServiceHealth LiveService::Impl::health() const {

@@ -166,6 +166,26 @@ TEST_F(LiveServiceTest, ARecordingThatFailsStandsInDiagnosticsAndInTheStatus) {
   EXPECT_THAT(status.message(), HasSubstr("run.mcap"));
 }
 
+TEST_F(LiveServiceTest, RecordsAStepBeforeAnythingThatIsMadeOfIt) {
+  const tests::ScratchDir folder;
+  auto recording = RecordingWriter::create(folder.path() / "run.mcap", {});
+  ASSERT_TRUE(recording.ok()) << recording.status().message();
+  start(*std::move(recording));
+  ASSERT_TRUE(tracks_from(kNoon));
+  ASSERT_TRUE(stop().ok());
+  const auto reader = RecordingReader::open(folder.path() / "run.mcap");
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  std::vector<std::string> order;
+  for (;;) {
+    const auto entry = (*reader)->next();
+    ASSERT_TRUE(entry.ok()) << entry.status().message();
+    if (!*entry) break;
+    if ((*entry)->is_json) order.push_back((*entry)->message.topic);
+  }
+  ASSERT_GE(order.size(), 2u);
+  for (std::size_t i = 0; i < order.size(); ++i) EXPECT_EQ(order[i], i % 2 == 0 ? kStepTopic : kBeliefTopic) << i;
+}
+
 TEST_F(LiveServiceTest, AReplayThatFailsEndsWhileTheServiceSpeaks) {
   start();
   ASSERT_TRUE(tracks_from(kNoon));
