@@ -11,9 +11,9 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/topics.h"
-#include "prescene/service/tracker.h"
 
 namespace prescene::service {
 namespace {
@@ -178,26 +178,73 @@ void ForeseenAndCame::add(const RecordedEntry& entry) {
   if (entry.is_json) {
     if (entry.message.topic != kOutcomeTopic) return;
     auto record = outcome_record_from_json({entry.message.cdr.begin(), entry.message.cdr.end()});
-    if (record) truth_ = *std::move(record);
+    if (record)
+      truth_ = *std::move(record);
+    else if (damaged_records_++ == 0)
+      first_damage_ = record.status();
     return;
   }
+  if (entry.message.topic == depth_topic_) return add_frame(entry.message);
   if (entry.message.topic != kControlTopic) return;
-  const auto text = interfaces::decode_cdr<interfaces::RosString>(entry.message.cdr, interfaces::kSmallMessage);
-  if (!text) return;
-  const auto actions = parse_control(text->data, entry.message.received_ns);
-  if (!actions) return;
-  for (const auto& [time_ns, action] : *actions) {
-    const auto* release = std::get_if<belief::Release>(&action.what);
-    if (release != nullptr && released_.size() < kMostReleases) released_.push_back({release->object, time_ns});
-  }
+  // What makes no sense was refused by the tracker, too, which said so.
+  static_cast<void>(controls_.take_in(
+      entry.message, frames_.empty() ? std::nullopt : std::optional<core::TimeNs>(frames_.back().stamp_ns)));
+}
+
+void ForeseenAndCame::add_frame(const interfaces::ReceivedMessage& message) {
+  // An image begins with its stamp, behind the four bytes that every message begins with; so does a clock, which is
+  // nothing but that.
+  constexpr std::size_t kBytesToStamp = 12;
+  if (message.cdr.size() < kBytesToStamp) return;
+  const auto stamp = interfaces::decode_cdr<interfaces::RosClock>({message.cdr.data(), kBytesToStamp});
+  if (!stamp) return;
+  const auto stamp_ns = interfaces::to_stamp_ns(stamp->clock);
+  if (!stamp_ns) return;
+  const bool went_back = !frames_.empty() && *stamp_ns < frames_.back().stamp_ns;
+  if (went_back) controls_.begin_again();
+  if (went_back || frames_.empty()) controls_.begin_at(*stamp_ns);
+  frames_.push_back({message.received_ns, *stamp_ns});
+  for (const auto& [time_ns, action] : controls_.all())
+    if (time_ns <= *stamp_ns) note_release(time_ns, action, released_);
+  controls_.forget_due(*stamp_ns);
+}
+
+void ForeseenAndCame::note_release(core::TimeNs time_ns, const belief::Action& action,
+                                   std::vector<Released>& releases) {
+  const auto* release = std::get_if<belief::Release>(&action.what);
+  if (release != nullptr && releases.size() < kMostReleases) releases.push_back({release->object, time_ns});
+}
+
+std::vector<ForeseenAndCame::Released> ForeseenAndCame::releases() const {
+  std::vector<Released> all = released_;
+  for (const auto& [time_ns, action] : controls_.all()) note_release(time_ns, action, all);
+  return all;
 }
 
 void ForeseenAndCame::add(double at, const std::string& question, const std::string& answer) {
   asked_.push_back({at, question, answer});
 }
 
-double ForeseenAndCame::seconds(core::TimeNs time_ns) const {
-  return core::seconds_of(time_ns - first_ns_.value_or(summaries_.empty() ? time_ns : summaries_.begin()->first));
+core::TimeNs ForeseenAndCame::stamp_at(double at) const {
+  const core::TimeNs received_ns = first_ns_.value_or(0) + static_cast<core::TimeNs>(std::llround(at * 1e9));
+  if (frames_.empty()) return received_ns;
+  const auto later = std::upper_bound(frames_.begin(), frames_.end(), received_ns,
+                                      [](core::TimeNs time_ns, const Frame& f) { return time_ns < f.received_ns; });
+  const Frame& frame = later == frames_.begin() ? *later : *std::prev(later);
+  if (std::abs(frame.received_ns - frame.stamp_ns) <= kSameClockNs) return received_ns;
+  // How fast the robot's clock goes is not known: the newest frame is what could be asked about.
+  return std::min(frame.stamp_ns, frame.stamp_ns + received_ns - frame.received_ns);
+}
+
+double ForeseenAndCame::seconds(core::TimeNs stamp_ns) const {
+  core::TimeNs received_ns = stamp_ns;
+  const auto nearest = std::min_element(frames_.begin(), frames_.end(), [&](const Frame& a, const Frame& b) {
+    return std::abs(a.stamp_ns - stamp_ns) < std::abs(b.stamp_ns - stamp_ns);
+  });
+  if (nearest != frames_.end() && std::abs(nearest->received_ns - nearest->stamp_ns) > kSameClockNs)
+    received_ns = nearest->received_ns + (stamp_ns - nearest->stamp_ns);
+  return core::seconds_of(received_ns -
+                          first_ns_.value_or(summaries_.empty() ? received_ns : summaries_.begin()->first));
 }
 
 const ObjectSummary* ForeseenAndCame::object_at(const std::string& name, core::TimeNs time_ns) const {
@@ -225,14 +272,15 @@ void ForeseenAndCame::relate(const Asked& asked, std::uint64_t step, Comparison*
   // Times of a question count from the belief that it was answered from.
   const auto from =
       std::find_if(summaries_.begin(), summaries_.end(), [&](const auto& entry) { return entry.second.step == step; });
-  const core::TimeNs asked_ns = first_ns_.value_or(0) + static_cast<core::TimeNs>(std::llround(asked.at * 1e9));
+  const core::TimeNs asked_ns = stamp_at(asked.at);
   const core::TimeNs meant_ns = (from != summaries_.end() ? from->first : asked_ns) +
                                 static_cast<core::TimeNs>(std::llround(actions.front().time * 1e9));
   const std::string& name = release->object;
   comparison->question = "What if " + name + " is let go at " + fixed_text(seconds(meant_ns), 2) + " s?";
-  const auto real = std::find_if(released_.begin(), released_.end(),
+  const std::vector<Released> released = releases();
+  const auto real = std::find_if(released.begin(), released.end(),
                                  [&](const Released& r) { return r.object == name && r.time_ns >= asked_ns; });
-  if (real == released_.end()) {
+  if (real == released.end()) {
     comparison->note = "The robot did not let " + name + " go after that: what came says nothing about this answer.";
     return;
   }

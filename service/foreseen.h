@@ -13,6 +13,8 @@
 #include "prescene/belief/trajectory.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/recording.h"
+#include "prescene/service/topics.h"
+#include "prescene/service/waiting_controls.h"
 
 namespace prescene::service {
 
@@ -65,11 +67,17 @@ std::string foreseen_text(const Comparison::Row& row);
 std::string came_text(const Comparison::Row& row);
 
 /// Collects while a recording is played; anything may come in any order.
+///
+/// Stamps of frames, beliefs and controls are by the robot's clock, the times of a recording by another: the two are
+/// brought together by the depth images, of which both are known. Without one they are taken for the same.
 class ForeseenAndCame {
  public:
-  explicit ForeseenAndCame(std::shared_ptr<const belief::Scene> scene) : scene_(std::move(scene)) {}
+  /// `depth_topic` is where the recording has its depth images.
+  explicit ForeseenAndCame(std::shared_ptr<const belief::Scene> scene, std::string depth_topic = InputTopics().depth)
+      : scene_(std::move(scene)), depth_topic_(std::move(depth_topic)) {}
 
-  /// Times count from the first entry.
+  /// Entries in the order of the recording. Times count from the first. A record of outcomes that is damaged is left
+  /// out, and counted.
   void add(const RecordedEntry& entry);
   void add(const BeliefSummary& summary) { summaries_[summary.stamp_ns] = summary; }
   /// What was asked and answered, as JSON, and when (s into the recording).
@@ -79,6 +87,9 @@ class ForeseenAndCame {
   std::vector<Comparison> comparisons() const;
   /// Whether what came is the simulated truth, rather than read off the tracked poses.
   bool knows_truth() const { return truth_.has_value(); }
+  /// Records of outcomes that could not be read, and why the first could not.
+  std::uint64_t damaged_records() const { return damaged_records_; }
+  const core::Status& first_damage() const { return first_damage_; }
 
  private:
   struct Asked {
@@ -89,7 +100,18 @@ class ForeseenAndCame {
     std::string object;
     core::TimeNs time_ns = 0;
   };
-  double seconds(core::TimeNs time_ns) const;
+  struct Frame {
+    core::TimeNs received_ns = 0;
+    core::TimeNs stamp_ns = 0;
+  };
+  void add_frame(const interfaces::ReceivedMessage& message);
+  static void note_release(core::TimeNs time_ns, const belief::Action& action, std::vector<Released>& releases);
+  /// All that is known of now.
+  std::vector<Released> releases() const;
+  /// The robot's time when the recording was played so far, s.
+  core::TimeNs stamp_at(double at) const;
+  /// The reverse: s into the recording, of a time of the robot's.
+  double seconds(core::TimeNs stamp_ns) const;
   Comparison compared(const Asked& asked, const OutcomeRecord& came) const;
   /// Sets the question's text, the note and whether it can be compared.
   void relate(const Asked& asked, std::uint64_t step, Comparison* comparison) const;
@@ -98,7 +120,12 @@ class ForeseenAndCame {
   std::shared_ptr<const belief::Scene> scene_;
   std::optional<core::TimeNs> first_ns_;
   std::map<core::TimeNs, BeliefSummary> summaries_;
+  std::string depth_topic_;
+  std::vector<Frame> frames_;
+  WaitingControls controls_;  // not yet reached by the frames
   std::vector<Released> released_;
+  std::uint64_t damaged_records_ = 0;
+  core::Status first_damage_;
   std::vector<Asked> asked_;
   std::optional<OutcomeRecord> truth_;
 };

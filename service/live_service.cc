@@ -337,6 +337,8 @@ ServiceHealth LiveService::Impl::health() const {
   health.unlogged = log_limiter.held_back();
   health.tf_forgotten = tracker->tf_forgotten();
   health.tf_late = tracker->tf_late();
+  health.waiting_controls = tracker->waiting_controls();
+  health.dropped_controls = tracker->dropped_controls();
   health.is_recording = recording != nullptr;
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
   health.questions = desk->counts();

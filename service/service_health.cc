@@ -13,7 +13,8 @@ using interfaces::RosDiagnosticLevel;
 /// What failed or was lost since the start; only ever grows.
 std::uint64_t losses_of(const ServiceHealth& health) {
   std::uint64_t sum = health.lost_on_bus + health.unsent + health.failures + health.tf_forgotten + health.tf_late +
-                      health.unreadable_questions + health.questions.unanswered + health.questions.failed;
+                      health.dropped_controls + health.unreadable_questions + health.questions.unanswered +
+                      health.questions.failed;
   for (const auto& [topic, count] : health.dropped_in_inbox) {
     const auto& images = health.image_topics;
     if (std::find(images.begin(), images.end(), topic) == images.end()) sum += count;
@@ -56,9 +57,9 @@ std::string joined(const std::vector<std::string>& words) {
 // Every member is bound to a name, so that one which is added does not compile until it is told of here.
 std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics, lost_on_bus,
-               questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late, is_recording,
-               recording_failure, seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers,
-               degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
+               questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late, waiting_controls,
+               dropped_controls, is_recording, recording_failure, seconds_since_frame, last_step_seconds, not_simulated,
+               physics_failure, steppers, degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
@@ -78,6 +79,8 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"lines not logged", std::to_string(unlogged)},
           {"transforms forgotten early", std::to_string(tf_forgotten)},
           {"transforms too late", std::to_string(tf_late)},
+          {"controls waiting", std::to_string(waiting_controls)},
+          {"controls dropped", std::to_string(dropped_controls)},
           {"recording", recording_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},
           {"last step, s", core::rounded_text(last_step_seconds)},

@@ -30,11 +30,13 @@ struct ServiceHealth {
   std::uint64_t lost_on_bus = 0;  ///< Samples that reached this process and were never read.
   DeskCounts questions;
   std::uint64_t unreadable_questions = 0;  ///< Messages on the topic of questions that hold no text.
-  std::uint64_t unsent = 0;        ///< Messages of ours that the middleware did not take: a reader does not keep up.
-  std::uint64_t failures = 0;      ///< Messages and frames that ended in an exception and were left out.
-  std::uint64_t unlogged = 0;      ///< Lines that were left out of the log because too many came.
-  std::uint64_t tf_forgotten = 0;  ///< Transforms that were forgotten early for want of room.
-  std::uint64_t tf_late = 0;       ///< Transforms that came when they were older than what is kept.
+  std::uint64_t unsent = 0;          ///< Messages of ours that the middleware did not take: a reader does not keep up.
+  std::uint64_t failures = 0;        ///< Messages and frames that ended in an exception and were left out.
+  std::uint64_t unlogged = 0;        ///< Lines that were left out of the log because too many came.
+  std::uint64_t tf_forgotten = 0;    ///< Transforms that were forgotten early for want of room.
+  std::uint64_t tf_late = 0;         ///< Transforms that came when they were older than what is kept.
+  std::size_t waiting_controls = 0;  ///< Actions of controls that wait for a frame.
+  std::uint64_t dropped_controls = 0;  ///< Those that were dropped, as their stamps are by another clock.
   bool is_recording = false;
   std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.

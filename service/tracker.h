@@ -18,6 +18,7 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/recording.h"
 #include "prescene/service/tracker_settings.h"
+#include "prescene/service/waiting_controls.h"
 
 namespace prescene::service {
 
@@ -43,7 +44,9 @@ class Tracker {
   /// something impossible is refused, and named with its topic; nothing else is lost by it.
   core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
   /// One belief step with the newest frame that is complete at `now_ns`; empty if there is none. Where the sender's
-  /// clock went back (a recording is played again) the belief starts anew.
+  /// clock went back (a recording is played again) the belief starts anew. Controls wait for the first step that they
+  /// can act in, which is the second of a belief. Where it ends in an exception nothing is changed but that the frame
+  /// is gone.
   std::optional<TrackerStep> step(core::TimeNs now_ns);
   /// When step() should be tried again although nothing came in.
   std::optional<core::TimeNs> next_deadline() const { return assembler_.next_deadline(); }
@@ -54,6 +57,9 @@ class Tracker {
   /// Transforms that tf's buffer forgot early for want of room, since the start.
   std::uint64_t tf_forgotten() const { return assembler_.tf_forgotten(); }
   std::uint64_t tf_late() const { return assembler_.tf_late(); }
+  /// Actions of controls that wait for a frame, and those that were dropped since the start, as in WaitingControls.
+  std::size_t waiting_controls() const { return controls_.count(); }
+  std::uint64_t dropped_controls() const { return controls_.dropped(); }
 
   /// The newest belief; a snapshot that never changes. Safe from any thread.
   std::shared_ptr<const belief::Belief> belief() const;
@@ -63,12 +69,6 @@ class Tracker {
   Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
           Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
           std::unique_ptr<rendering::LikelihoodBatch> likelihood);
-  /// Forgets the belief: after a jump of the sender's clock nothing is known of the time between.
-  void start_again();
-  core::Status take_control(const interfaces::ReceivedMessage& message);
-  /// When a message was sent, in the time of the frames' stamps.
-  core::TimeNs sent_at(const interfaces::ReceivedMessage& message) const;
-  belief::Control control_until(core::TimeNs stamp_ns);
 
   TrackerSettings settings_;
   std::unique_ptr<rendering::Renderer> renderer_;
@@ -76,15 +76,10 @@ class Tracker {
   filter::ParticleFilter filter_;
   FrameAssembler assembler_;
   MessageIndex last_index_ = 0;
-  std::vector<std::pair<core::TimeNs, belief::Action>> controls_;  // not yet executed, ascending
-  std::shared_ptr<const belief::Scene> scene_;                     // as given
-  mutable std::mutex mutex_;                                       // guards belief_
+  WaitingControls controls_;
+  std::shared_ptr<const belief::Scene> scene_;  // as given
+  mutable std::mutex mutex_;                    // guards belief_
   std::shared_ptr<const belief::Belief> belief_;
 };
-
-/// The actions of a control message: {"stamp_ns": n, "actions": [...]}; times of the actions count from the stamp (from
-/// `sent_ns` if there is none).
-core::Result<std::vector<std::pair<core::TimeNs, belief::Action>>> parse_control(const std::string& json,
-                                                                                 core::TimeNs sent_ns);
 
 }  // namespace prescene::service

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/topics.h"
 
@@ -184,6 +185,65 @@ TEST_F(ForeseenAndCameTest, TheSimulatedTruthGoesBeforeWhatWasTracked) {
   const Comparison late = asked(2.4, release_);
   EXPECT_TRUE(foreseen_.knows_truth());
   EXPECT_EQ(came_text(late.rows[0]), "no");
+}
+
+/// A live recording of a robot on simulated time: frames are stamped by it, entries by the machine's steady clock, and
+/// controls are sent at wall times.
+class OnSimulatedTime : public ::testing::Test {
+ protected:
+  static constexpr core::TimeNs kMs = 1'000'000;
+  static constexpr core::TimeNs kBooted = 1000 * 1000 * kMs;  // steady time of the first entry
+
+  void SetUp() override {
+    for (int i = 0; i <= 40; ++i) {
+      const core::TimeNs received_ns = kBooted + 100 * kMs * i;
+      interfaces::RosImage image;
+      image.header.stamp = interfaces::to_ros_time(100 * kMs * i);
+      image.header.frame_id = "camera";
+      add(InputTopics().depth, "sensor_msgs/msg/Image", interfaces::encode_cdr(image), received_ns);
+      if (i == 25)
+        add(kControlTopic, "std_msgs/msg/String",
+            interfaces::encode_cdr(
+                interfaces::RosString{R"({"actions": [{"time": 0, "release": {"object": "box"}}]})"}),
+            received_ns + kMs);
+      BeliefSummary summary = summary_at(static_cast<std::uint64_t>(i), 0.1 * i, {0.0, 0.0, i < 26 ? 1.0 : 0.05});
+      summary.stamp_ns -= kStart;
+      foreseen_.add(summary);
+    }
+  }
+  void add(const std::string& topic, const std::string& type, std::vector<std::uint8_t> cdr, core::TimeNs received_ns) {
+    RecordedEntry entry;
+    entry.message = {topic, type, std::move(cdr), kStart, received_ns};
+    foreseen_.add(entry);
+  }
+
+  ForeseenAndCame foreseen_{scene()};
+};
+
+TEST_F(OnSimulatedTime, AReleaseIsFoundByTheClockOfTheFrames) {
+  const nlohmann::ordered_json answer = {
+      {"step", 24},
+      {"predict",
+       {{"outcomes", {{{"name", "low"}, {"group", "height"}, {"probability", 0.9}, {"interval", {0.8, 1.0}}}}}}}};
+  foreseen_.add(2.4, R"({"predict": {"actions": [{"time": 0, "release": {"object": "box"}}]}})", answer.dump());
+  const std::vector<Comparison> comparisons = foreseen_.comparisons();
+  ASSERT_EQ(comparisons.size(), 1U);
+  EXPECT_THAT(comparisons[0].question, HasSubstr("let go at 2.40 s"));
+  EXPECT_THAT(comparisons[0].note, HasSubstr("let box go at 2.50 s, 0.10 s later and from the same place"));
+  EXPECT_TRUE(comparisons[0].comparable);
+  EXPECT_EQ(came_text(comparisons[0].rows[0]), "yes, from 2.60 s on");
+}
+
+TEST(ForeseenAndCame, CountsDamagedRecordsOfWhatCame) {
+  ForeseenAndCame foreseen(scene());
+  RecordedEntry entry;
+  entry.message = {kOutcomeTopic, "", {'{', '}'}, kStart, kStart};
+  entry.is_json = true;
+  foreseen.add(entry);
+  foreseen.add(entry);
+  EXPECT_EQ(foreseen.damaged_records(), 2U);
+  EXPECT_THAT(foreseen.first_damage().message(), HasSubstr("damaged"));
+  EXPECT_FALSE(foreseen.knows_truth());
 }
 
 }  // namespace

@@ -186,6 +186,26 @@ TEST_F(LiveServiceTest, RecordsAStepBeforeAnythingThatIsMadeOfIt) {
   for (std::size_t i = 0; i < order.size(); ++i) EXPECT_EQ(order[i], i % 2 == 0 ? kStepTopic : kBeliefTopic) << i;
 }
 
+TEST_F(LiveServiceTest, TellsWhichControlsWaitAndWhyOneIsRefused) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  const auto controlled = [&](const std::string& json, const std::function<bool()>& done) {
+    return robot_.send_until(
+        [&] {
+          robot_.control(json);
+          return done();
+        },
+        kNoon + kSecond);
+  };
+  const std::string action = R"("actions": [{"time": 3000, "release": {"object": "box"}}]})";
+  EXPECT_TRUE(controlled("{" + action, [&] { return std::stoi("0" + robot_.diagnostics()["controls waiting"]) > 0; }));
+  EXPECT_EQ(robot_.diagnostics()["controls dropped"], "0");
+  EXPECT_TRUE(controlled(R"({"stamp_ns": 2000000000000000000, )" + action, [&] {
+    return robot_.diagnostics()["last refusal"].find("after the newest frame's stamp") != std::string::npos;
+  }));
+  EXPECT_TRUE(stop().ok());
+}
+
 TEST_F(LiveServiceTest, AReplayThatFailsEndsWhileTheServiceSpeaks) {
   start();
   ASSERT_TRUE(tracks_from(kNoon));

@@ -50,6 +50,8 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.steps = 3;
   health.skipped_frames = 5;
   health.lost_on_bus = 7;
+  health.waiting_controls = 23;
+  health.dropped_controls = 29;
   health.questions = {11, 13, 17, 19, 2, "no", 5};
   health.unreadable_questions = 1;
   health.failures = 4;
@@ -61,6 +63,8 @@ TEST(ServiceHealth, CarriesItsCounts) {
   const std::vector<interfaces::RosKeyValue> some = {{"steps", "3"},
                                                      {"skipped frames", "5"},
                                                      {"lost on the bus", "7"},
+                                                     {"controls waiting", "23"},
+                                                     {"controls dropped", "29"},
                                                      {"questions answered", "11"},
                                                      {"questions refused", "13"},
                                                      {"questions without an answer", "18"},
@@ -107,6 +111,7 @@ TEST(ServiceHealth, WarnsOfWhatWasLostSinceTheLastReportAndNotForEver) {
       [](ServiceHealth& health) { ++health.unsent; },
       [](ServiceHealth& health) { ++health.tf_forgotten; },
       [](ServiceHealth& health) { ++health.tf_late; },
+      [](ServiceHealth& health) { ++health.dropped_controls; },
       [](ServiceHealth& health) { ++health.dropped_in_inbox["/tf"]; }};
   for (std::size_t i = 0; i < losses.size(); ++i) {
     ServiceHealth health = quiet;

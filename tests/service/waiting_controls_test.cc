@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/waiting_controls.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/service/simulated_recording.h"
+#include "prescene/service/tracker.h"
+#include "prescene/tests/support/paths.h"
+
+namespace prescene::service::waiting_controls_test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr core::TimeNs kSecond = 1'000'000'000;
+constexpr core::TimeNs kNoon = 1'700'000'000 * kSecond;
+constexpr const char* kGrasp = R"({"actions": [{"time": 0, "grasp": {"object": "box", "hand": "gripper"}}]})";
+constexpr const char* kRelease = R"({"actions": [{"time": 0.5, "release": {"object": "box"}}]})";
+
+interfaces::ReceivedMessage message(const std::string& json, core::TimeNs source_ns) {
+  return {kControlTopic, "std_msgs/msg/String", interfaces::encode_cdr(interfaces::RosString{json}), source_ns, 5};
+}
+
+std::string stamped(core::TimeNs stamp_ns) {
+  return R"({"stamp_ns": )" + std::to_string(stamp_ns) + R"(, "actions": [{"time": 0, "release": {"object": "box"}}]})";
+}
+
+std::vector<std::string> kinds(const belief::Control& control) {
+  std::vector<std::string> kinds;
+  for (const belief::Action& action : control.actions) kinds.push_back(belief::kind_of(action));
+  return kinds;
+}
+
+TEST(WaitingControls, GiveWhatIsDueInItsOrderAndKeepTheRest) {
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(kRelease, kNoon), kNoon).ok());
+  ASSERT_TRUE(controls.take_in(message(kGrasp, kNoon + kSecond / 10), kNoon).ok());
+  EXPECT_THAT(kinds(controls.due(kNoon, kNoon + kSecond / 5)), ElementsAre("grasp"));
+  controls.forget_due(kNoon + kSecond / 5);
+  EXPECT_EQ(controls.count(), 1u);
+  const belief::Control later = controls.due(kNoon + kSecond / 5, kNoon + kSecond);
+  EXPECT_THAT(kinds(later), ElementsAre("release"));
+  EXPECT_NEAR(later.actions[0].time, 0.3, 1e-9);
+}
+
+TEST(WaitingControls, BeforeTheFirstFrameCountFromItWhereTheClocksDiffer) {
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(kRelease, kNoon), std::nullopt).ok());
+  ASSERT_TRUE(controls.take_in(message(kGrasp, kNoon + kSecond), std::nullopt).ok());
+  controls.begin_at(7 * kSecond);  // simulated time
+  EXPECT_THAT(kinds(controls.due(7 * kSecond, 7 * kSecond)), ElementsAre("grasp"));
+  EXPECT_THAT(kinds(controls.due(7 * kSecond, 8 * kSecond)), ElementsAre("grasp", "release"));
+  EXPECT_EQ(controls.dropped(), 0u);
+}
+
+TEST(WaitingControls, AStampOfAnotherClockIsRefusedWithBothTimes) {
+  WaitingControls controls;
+  const core::Status refused = controls.take_in(message(stamped(kNoon), kNoon), 7 * kSecond);
+  EXPECT_EQ(refused.code(), core::StatusCode::kInvalidInput);
+  EXPECT_THAT(refused.message(), HasSubstr("1700000000.000 s"));
+  EXPECT_THAT(refused.message(), HasSubstr("7.000 s"));
+  EXPECT_THAT(refused.message(), HasSubstr("leave stamp_ns out"));
+  EXPECT_EQ(controls.count(), 0u);
+  EXPECT_TRUE(controls.take_in(message(stamped(8 * kSecond), kNoon), 7 * kSecond).ok());
+}
+
+TEST(WaitingControls, AnEarlyStampOfAnotherClockIsDroppedAndCounted) {
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(stamped(kNoon), kNoon), std::nullopt).ok());
+  ASSERT_TRUE(controls.take_in(message(stamped(6 * kSecond), kNoon), std::nullopt).ok());
+  controls.begin_at(7 * kSecond);
+  EXPECT_EQ(controls.count(), 1u);
+  EXPECT_EQ(controls.dropped(), 1u);
+}
+
+TEST(WaitingControls, OutliveAClockThatGoesBack) {
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(kGrasp, kNoon), 5000 * kSecond).ok());
+  controls.begin_again();
+  controls.begin_at(7 * kSecond);
+  EXPECT_THAT(kinds(controls.due(7 * kSecond, 8 * kSecond)), ElementsAre("grasp"));
+}
+
+TEST(WaitingControls, AreBounded) {
+  WaitingControls controls;
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(controls.take_in(message(kGrasp, kNoon), kNoon).ok());
+  EXPECT_EQ(controls.take_in(message(kGrasp, kNoon), kNoon).code(), core::StatusCode::kResourceExhausted);
+}
+
+constexpr const char* kScene = R"(name: box
+duration: 0.5
+models:
+  box: {box: [0.12, 0.08, 0.1], mass: 0.4}
+supports:
+  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
+robot:
+  gripper: {box: [0.02, 0.02, 0.02], timeline: [{time: 0, position: [0, 0, 0.3]}]}
+objects:
+  box: {model: box, pose: {position: [0, 0, 0.05]}}
+camera:
+  width: 80
+  height: 60
+  fov_deg: 55
+  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
+)";
+
+TEST(Tracker, AGraspBeforeTheFirstFrameActsInTheFirstStepThatPredicts) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path path = folder.path() / "run.mcap";
+  core::ThreadPool pool(1);
+  Backends backends(pool);
+  const auto scene = load_scene_text(kScene, "box.yaml", {});
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  {
+    const auto recording = RecordingWriter::create(path, {});
+    ASSERT_TRUE(recording.ok());
+    SimulatedRecordingOptions options;
+    options.rate = 10.0;
+    ASSERT_TRUE(simulate_recording(**scene, options, 1, backends, {}, {}, **recording).ok());
+    ASSERT_TRUE((*recording)->close().ok());
+  }
+  const auto tracker = Tracker::create(*scene, {}, 1, backends);
+  ASSERT_TRUE(tracker.ok()) << tracker.status().message();
+  ASSERT_TRUE((*tracker)->take_in(message(kGrasp, kNoon), 0).ok());
+  EXPECT_EQ((*tracker)->waiting_controls(), 1u);
+  const auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  std::vector<bool> held;
+  for (;;) {
+    const auto entry = (*reader)->next();
+    ASSERT_TRUE(entry.ok());
+    if (!*entry) break;
+    if ((*entry)->is_json) continue;
+    ASSERT_TRUE((*tracker)->take_in((*entry)->message, (*entry)->index + 1).ok());
+    while ((*tracker)->step((*entry)->message.received_ns))
+      held.push_back((*tracker)->belief()->scene->objects[0].held_by == "gripper");
+  }
+  ASSERT_GE(held.size(), 3u);
+  EXPECT_FALSE(held[0]) << "nothing is predicted for the first frame";
+  EXPECT_TRUE(held[1]);
+  EXPECT_EQ((*tracker)->waiting_controls(), 0u);
+}
+
+}  // namespace
+}  // namespace prescene::service::waiting_controls_test
