@@ -14,6 +14,17 @@ namespace prescene::service {
 using core::fixed_text;
 using nlohmann::ordered_json;
 
+void DamagedRecords::add(const core::Status& first, std::uint64_t count) {
+  if (first.ok() || count == 0) return;
+  if (count_ == 0) first_ = first.message();
+  count_ += count;
+}
+
+std::string DamagedRecords::text() const {
+  if (count_ == 0) return "";
+  return counted(count_, "record") + " of what really happened left out; the first: " + first_;
+}
+
 ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows) {
   ordered_json json = ordered_json::array();
   for (const ObjectTrackingScore& row : rows) json.push_back(to_json(row));

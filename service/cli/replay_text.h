@@ -14,6 +14,20 @@
 
 namespace prescene::service {
 
+/// Records of the truth and of outcomes that a recording holds but that can't be read: they are left out, and told.
+class DamagedRecords {
+ public:
+  /// `first` is ok where there are none.
+  void add(const core::Status& first, std::uint64_t count = 1);
+  std::uint64_t count() const { return count_; }
+  /// "3 records of what really happened left out; the first: ...", empty if there are none.
+  std::string text() const;
+
+ private:
+  std::uint64_t count_ = 0;
+  std::string first_;
+};
+
 nlohmann::ordered_json tracking_json(const std::vector<ObjectTrackingScore>& rows);
 /// Each object's error in each frame, where the recording holds the truth.
 void add_errors(const TrackingScore& score, nlohmann::ordered_json& steps);

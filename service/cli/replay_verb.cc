@@ -75,7 +75,8 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   options.bus.read.check_data = false;  // It was when the input was opened.
   TrackingScore score(input.scene());
   SessionReport report(input.scene(), settings.topics);
-  ForeseenAndCame foreseen(input.scene());
+  ForeseenAndCame foreseen(input.scene(), settings.topics.depth);
+  DamagedRecords damaged;
   FinalStates states;
   PRESCENE_TRY(BusReplayResult result,
                replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
@@ -84,8 +85,13 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
                                  foreseen.add(entry);
                                  if (!entry.is_json || entry.message.topic != kTruthTopic) return;
                                  const std::string json(entry.message.cdr.begin(), entry.message.cdr.end());
-                                 if (const auto truth = truth_from_json(json)) score.add(*truth);
+                                 const auto truth = truth_from_json(json);
+                                 if (truth)
+                                   score.add(*truth);
+                                 else
+                                   damaged.add(truth.status());
                                }));
+  damaged.add(foreseen.first_damage(), foreseen.damaged_records());
   for (const BeliefSummary& summary : result.beliefs) {
     score.add(summary);
     report.add(summary);
@@ -109,6 +115,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   if (!result.loss.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + result.loss);
+  if (damaged.count() > 0) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + damaged.text());
   tell_unchecked(options, result.unchecked, context);
   context.print({{"recording", options.input},
                  {"messages", result.messages},
@@ -118,6 +125,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
                  {"answers", answers},
                  {"foreseen", foreseen_json(foreseen)},
                  {"loss", result.loss},
+                 {"damaged_records", damaged.count()},
                  {"unchecked", result.unchecked}},
                 std::to_string(result.messages) + " messages played, " + std::to_string(result.beliefs.size()) +
                     " beliefs came back\n" + answers_text(result.answers) + foreseen_text_of(foreseen) + states.text() +
@@ -162,9 +170,17 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     steps.push_back(std::move(record));
     return core::ok_status();
   };
+  DamagedRecords damaged;
   const JsonSink on_json = [&](const std::string& topic, const std::string& json, core::TimeNs) -> core::Status {
-    if (topic != kTruthTopic) return core::ok_status();
-    if (const auto truth = truth_from_json(json)) score.add(*truth);
+    if (topic == kTruthTopic) {
+      const auto truth = truth_from_json(json);
+      if (truth)
+        score.add(*truth);
+      else
+        damaged.add(truth.status());
+    } else if (topic == kOutcomeTopic) {
+      if (const auto outcomes = outcome_record_from_json(json); !outcomes) damaged.add(outcomes.status());
+    }
     return core::ok_status();
   };
   const core::Result<ReplaySummary> summary =
@@ -185,6 +201,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
       if (!problem.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + problem);
     }
   }
+  if (damaged.count() > 0) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + damaged.text());
   tell_unchecked(options, summary->unchecked, context);
   context.print(
       {{"recording", options.input},
@@ -196,6 +213,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"compared_steps", summary->compared},
        {"different_steps", summary->different},
        {"loss", summary->loss},
+       {"damaged_records", damaged.count()},
        {"unchecked", summary->unchecked},
        {"degraded", degraded_json(*summary)},
        {"objects", states.json()},
