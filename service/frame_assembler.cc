@@ -177,7 +177,8 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
     const core::Result<geometry::Pose> X_WG = tf_.lookup(settings_.world_frame, body, waiting.stamp_ns);
     if (X_WG) {
       observation.robot[body] = *X_WG;
-    } else if (tf_.knows(body) && !out_of_time) {
+    } else if ((tf_.knows(body) || !last_taken_) && !out_of_time) {
+      // At the start nothing is known of a body yet: the first frame waits for it, later ones go without.
       return {{}, X_WG.status().message(), false};
     }
   }

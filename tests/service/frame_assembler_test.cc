@@ -60,6 +60,22 @@ TEST(FrameAssembler, PairsWhatBelongsTogether) {
   EXPECT_TRUE(assembler.take_skipped().empty());
 }
 
+TEST(FrameAssembler, TheFirstFrameWaitsForRobotBodiesThatNothingIsKnownOf) {
+  FrameAssembler assembler(without_color(), {"gripper", "never"});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 3, 101 * kMs).ok());
+  EXPECT_FALSE(assembler.take(102 * kMs).has_value());
+  ASSERT_TRUE(assembler.add_tf(transform("gripper", 100 * kMs, 2.0), 4, false).ok());
+  const auto first = assembler.take(*assembler.next_deadline());
+  ASSERT_TRUE(first.has_value());
+  EXPECT_EQ(first->observation.robot.count("gripper"), 1u);
+  EXPECT_EQ(first->observation.robot.count("never"), 0u);
+  ASSERT_TRUE(assembler.add_tf(transform("gripper", 140 * kMs, 2.0), 5, false).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(133 * kMs), 6, 160 * kMs).ok());
+  EXPECT_TRUE(assembler.take(161 * kMs).has_value()) << "what never comes is waited for once";
+}
+
 TEST(FrameAssembler, GoesWithoutColourWhenItDoesNotComeInTime) {
   FrameAssembler assembler({}, {});
   ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
