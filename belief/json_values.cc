@@ -244,7 +244,11 @@ core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes) {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {
     return core::invalid_input("byte " + std::to_string(error.byte) +
-                               ": this is not JSON: check quotes, commas and brackets there");
+                               (std::string_view(error.what()).find("surrogate") != std::string_view::npos
+                                    ? ": half of a character: \\ud800 to \\udfff stand for one in pairs only"
+                                    : ": this is not JSON: check quotes, commas and brackets there"));
+  } catch (const Json::out_of_range&) {
+    return core::invalid_input("this is not JSON that can be read: a number is out of range, give one up to 1.8e308");
   } catch (const std::exception&) {
     return core::invalid_input("this is not JSON that can be read: check for numbers that are too large");
   }

@@ -78,7 +78,10 @@ struct QueryCheck {
 
 Status check_number(double value, const ScalarRange& range) {
   if (value >= range.low && value <= range.high) return {};
-  return core::invalid_input(core::rounded_text(value) + " is out of range: " + range.remedy);
+  return core::invalid_input(
+      core::rounded_text(value) + " is out of range: " + range.remedy +
+      // Where the remedy says "above 0", this is.
+      (value > 0.0 && value < range.low ? "; the least is " + core::rounded_text(range.low) : ""));
 }
 
 Status validate(const Effort& effort) {

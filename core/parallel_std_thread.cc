@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 #include "prescene/core/check.h"
@@ -27,7 +28,11 @@ struct Job {
 
 struct ThreadPool::Impl {
   explicit Impl(int count) : threads(count) {
-    for (int i = 1; i < count; ++i) workers.emplace_back([this] { work(); });
+    try {
+      for (int i = 1; i < count; ++i) workers.emplace_back([this] { work(); });
+    } catch (const std::system_error&) {
+      threads = 1 + static_cast<int>(workers.size());  // The system makes no more.
+    }
   }
   ~Impl() {
     {

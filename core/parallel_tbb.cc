@@ -6,8 +6,11 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <mutex>
 #include <optional>
+#include <system_error>
 #include <thread>
+#include <vector>
 
 #include "prescene/core/check.h"
 #include "prescene/core/parallel.h"
@@ -15,6 +18,23 @@
 namespace prescene::core {
 
 namespace {
+
+/// How many of so many threads the system makes, ours among them. TBB ends the program where it can't make one.
+int possible_threads(int count) {
+  std::vector<std::thread> workers;
+  std::mutex hold;
+  {
+    const std::lock_guard lock(hold);  // Until all are there together.
+    try {
+      while (static_cast<int>(workers.size()) + 1 < count)
+        workers.emplace_back([&hold] { const std::lock_guard released(hold); });
+    } catch (const std::system_error&) {
+      count = 1 + static_cast<int>(workers.size());
+    }
+  }
+  for (std::thread& worker : workers) worker.join();
+  return count;
+}
 
 int hardware_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
@@ -35,7 +55,7 @@ struct ThreadPool::Impl {
 ThreadPool::ThreadPool(int threads) {
   PRESCENE_CHECK(threads >= 0);
   if (threads == 0) threads = hardware_threads();
-  impl_ = std::make_unique<Impl>(threads);
+  impl_ = std::make_unique<Impl>(possible_threads(threads));
 }
 
 ThreadPool::~ThreadPool() = default;

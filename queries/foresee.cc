@@ -88,6 +88,9 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,
                                     prior.stream, options, *context.pool, cancellation, context.progress);
+  if (foresight.estimate.instances.empty() && !context.simulate_until && context.cancellation &&
+      context.cancellation->requested())
+    return core::cancelled("stopped on request before the first simulated instance was finished");
   if (foresight.estimate.instances.empty())
     return core::cancelled(
         "stopped before the first simulated instance was finished: give more time, or a shorter duration");

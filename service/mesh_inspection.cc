@@ -89,6 +89,9 @@ std::optional<std::string> hollow_remark(const MeshInspection& found, const Mesh
   const auto fills = [&] {
     return options.use == belief::MeshUse::kConvexHull || options.use == belief::MeshUse::kConvexParts;
   };
+  if (!found.mass && found.hull_mass && found.inside_out && (!options.use || fills()))
+    return "in a scene it collides as its convex hull, because it is inside out: nothing gets into its hollows; turn "
+           "its triangles around";
   if (!found.mass && found.hull_mass && (!options.use || fills()))
     return "in a scene it collides as its convex hull, because it is not closed: nothing gets into its hollows; close "
            "it";
@@ -99,6 +102,79 @@ std::optional<std::string> hollow_remark(const MeshInspection& found, const Mesh
            " nothing gets into that; leave --use out, or choose spheres or decompose";
   if (options.use) return std::nullopt;
   return share + ": in a scene it collides as spheres, which keep that, unless the key 'use' says otherwise";
+}
+
+/// The solid angle of the closed surface as seen from `p`, over that of a sphere: 1 inside, 0 outside
+/// (Van Oosterom & Strackee 1983, each triangle).
+double winding_number(const geometry::TriangleMesh& mesh, const geometry::Vector3d& p) {
+  double sum = 0.0;
+  for (const auto& t : mesh.triangles) {
+    const geometry::Vector3d a = mesh.vertices[t[0]] - p;
+    const geometry::Vector3d b = mesh.vertices[t[1]] - p;
+    const geometry::Vector3d c = mesh.vertices[t[2]] - p;
+    const double la = a.norm();
+    const double lb = b.norm();
+    const double lc = c.norm();
+    sum += std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum / (2.0 * std::numbers::pi);
+}
+
+/// A part that is inside out is a cavity where it lies in another part; elsewhere its volume would be subtracted.
+std::optional<std::string> reversed_parts_remark(const geometry::TriangleMesh& mesh) {
+  constexpr std::size_t kLooks = 16;  // Vertices of a part at which is looked; a part that sticks out shows by a few.
+  constexpr std::size_t kMostParts = 32;  // At each vertex the whole mesh is gone through.
+  std::vector<geometry::TriangleMesh> cavities;
+  geometry::TriangleMesh solid;
+  for (geometry::TriangleMesh& part : geometry::connected_components(mesh)) {
+    if (geometry::signed_volume(part) < 0.0) {
+      if (cavities.size() < kMostParts) cavities.push_back(std::move(part));
+      continue;
+    }
+    const auto first = static_cast<std::uint32_t>(solid.vertices.size());
+    solid.vertices.insert(solid.vertices.end(), part.vertices.begin(), part.vertices.end());
+    for (const auto& t : part.triangles) solid.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  std::size_t parts = 0;
+  std::size_t triangles = 0;
+  for (const geometry::TriangleMesh& part : cavities) {
+    const std::size_t stride = std::max<std::size_t>(1, part.vertices.size() / kLooks);
+    bool outside = false;
+    for (std::size_t i = 0; i < part.vertices.size() && !outside; i += stride)
+      outside = winding_number(solid, part.vertices[i]) < 0.5;
+    if (!outside) continue;
+    ++parts;
+    triangles += part.triangles.size();
+  }
+  if (parts == 0) return std::nullopt;
+  return std::to_string(parts) + (parts == 1 ? " part" : " parts") + " of " + std::to_string(triangles) +
+         " triangles that lie outside of the others are inside out, so that their volume is subtracted: turn these "
+         "triangles around, or give the mass yourself";
+}
+
+/// What belongs to a unit or density that is none.
+core::Status check_sizes(const MeshInspection& found) {
+  const auto& mass = found.mass ? found.mass : found.hull_mass;
+  const bool finite = found.box.sizes().allFinite() && std::isfinite(found.surface_area) &&
+                      (!mass || (std::isfinite(mass->mass) && mass->p_BoBcm.allFinite() && mass->I_BBcm_B.allFinite()));
+  if (finite) return core::ok_status();
+  return core::invalid_input(found.path.string() +
+                             ": sizes or masses are beyond all numbers: choose another --scale or --density");
+}
+
+/// As `validate` checks the file. The mesh is the one that was found.
+core::Status check_model(const interfaces::ModelFile& file, const MeshInspection& found,
+                         const std::filesystem::path& model_path) {
+  interfaces::SceneFileOptions options;
+  options.read_mesh = [&found](const interfaces::MeshRequest&) -> core::Result<geometry::TriangleMesh> {
+    return found.loaded.mesh;
+  };
+  const core::Status status =
+      interfaces::parse_model(interfaces::model_yaml(file), model_path.string(), model_path.stem().string(), options)
+          .status();
+  if (status.ok()) return status;
+  return core::invalid_input(found.path.string() + ": a model of it would not be valid: choose another --scale or " +
+                             "--density\n" + status.message());
 }
 
 }  // namespace
@@ -123,7 +199,13 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
   if (closed) {
     found.mass = *closed;
   } else {
-    found.remarks.push_back("no volume of its own: " + closed.status().message());
+    found.inside_out = found.topology.bounds_volume() && geometry::signed_volume(mesh) < 0.0;
+    found.remarks.push_back(found.inside_out
+                                ? "inside out: its triangles are clockwise seen from outside; turn them around"
+                                : "no volume of its own: " + closed.status().message());
+  }
+  if (closed && found.topology.components > 1) {
+    if (auto remark = reversed_parts_remark(mesh)) found.remarks.push_back(*std::move(remark));
   }
   PRESCENE_RETURN_IF_ERROR(steps.begin(0.4, "convex hull"));
   auto hull = geometry::convex_hull(mesh.vertices, options.read.cancellation);
@@ -135,6 +217,7 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
   } else {
     found.remarks.push_back("flat: " + hull.status().message());
   }
+  PRESCENE_RETURN_IF_ERROR(check_sizes(found));
   if (auto remark = hollow_remark(found, options)) found.remarks.push_back(*std::move(remark));
 
   PRESCENE_RETURN_IF_ERROR(steps.begin(0.75, "symmetry"));
@@ -206,6 +289,7 @@ core::Result<interfaces::ModelFile> model_file(const MeshInspection& found, cons
   file.remarks.insert(file.remarks.end(), found.remarks.begin(), found.remarks.end());
   file.remarks.push_back("The mass is that of " + core::rounded_text(found.density) + " kg/m^3" +
                          (found.mass ? "" : " in its convex hull") + ": weigh the object.");
+  PRESCENE_RETURN_IF_ERROR(check_model(file, found, model_path));
   return file;
 }
 

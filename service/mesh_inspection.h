@@ -36,6 +36,7 @@ struct MeshInspection {
   std::optional<geometry::MassProperties> mass;  ///< At the density; empty when the mesh is not closed.
   /// Of the convex hull, when the mesh itself is not closed.
   std::optional<geometry::MassProperties> hull_mass;
+  bool inside_out = false;  ///< It encloses a volume, but its triangles face inwards.
   double density = 0.0;
   geometry::SymmetryGroup symmetry;                  ///< A suggestion.
   std::vector<geometry::RestingPose> resting_poses;  ///< Likeliest first; empty for a flat mesh.
@@ -50,7 +51,8 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
 nlohmann::ordered_json to_json(const MeshInspection& inspection);
 /// A model file that scene files can name (docs/scene_files.md): the mesh, mass properties and symmetry, with remarks
 /// as comments. `model_path` is where it will lie: the mesh is named relative to it. Fails with kInvalidInput for a
-/// flat mesh. The file says what the mesh collides as only where the options do.
+/// flat mesh, and where a scene could not use the model (of 100 m, say). The file says what the mesh collides as only
+/// where the options do.
 core::Result<interfaces::ModelFile> model_file(const MeshInspection& inspection, const MeshInspectionOptions& options,
                                                const std::filesystem::path& model_path);
 /// "none", "continuous about z, both ways round", "4 turns about z", ...

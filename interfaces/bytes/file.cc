@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <string>
@@ -57,6 +58,24 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, s
   return bytes;
 }
 
+Result<std::filesystem::path> create_beside(const std::filesystem::path& path, const std::filesystem::path& named) {
+  static std::atomic<unsigned> count{0};
+  // What an ended program of the same number left is another's and stays.
+  constexpr int kMostTries = 1000;
+  for (int i = 0; i < kMostTries; ++i) {
+    // Short, so that any name that a file may have leaves room for it.
+    std::filesystem::path made = path;
+    made.replace_filename(".prescene-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".partial");
+    const int descriptor = ::open(made.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      ::close(descriptor);
+      return made;
+    }
+    if (errno != EEXIST) return write_error(named.empty() ? path : named, errno);
+  }
+  return write_error(named.empty() ? path : named, EEXIST);
+}
+
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
   std::error_code ignored;
   const std::filesystem::file_status there = std::filesystem::status(path, ignored);
@@ -75,13 +94,14 @@ Status write_file(const std::filesystem::path& path, std::span<const std::uint8_
     const std::filesystem::path resolved = std::filesystem::canonical(path, error);
     if (!error) target = resolved;
   }
-  std::filesystem::path partial = target;
-  partial += ".partial";
+  PRESCENE_TRY(const std::filesystem::path partial, create_beside(target, path));
   Status status;
   {
-    PRESCENE_TRY(OutputFile file, OutputFile::create(partial, path));
-    status = file.write(bytes);
-    if (const Status closed = file.close(); status.ok()) status = closed;
+    auto file = OutputFile::create(partial, path);
+    status = file ? file->write(bytes) : file.status();
+    if (file) {
+      if (const Status closed = file->close(); status.ok()) status = closed;
+    }
   }
   std::error_code error;
   if (status.ok()) {

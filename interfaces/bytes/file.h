@@ -19,6 +19,12 @@ namespace prescene::interfaces {
 /// now; the text begins with the path.
 core::Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::size_t max_bytes);
 
+/// Creates an empty file of a name that nothing had, in the folder of `path`, with the permissions of any new file: for
+/// what is written aside and renamed to `path` when it is whole. The caller removes it where that fails. kUnavailable
+/// as write_file; errors speak of `named`, if any, in place of `path`.
+core::Result<std::filesystem::path> create_beside(const std::filesystem::path& path,
+                                                  const std::filesystem::path& named = {});
+
 /// Writes beside the target and renames at the end: the old content stays when anything fails. Makes no folders.
 /// Whatever keeps a file from being written is kUnavailable, with the path as it was given and the system's reason.
 core::Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);

@@ -112,7 +112,9 @@ std::optional<double> read_number(const LocatedValue& value, Problems& problems,
   }
   if (number < range.low || number > range.high) {
     problems.add(value.place, value.path, number_text(number) + " is out of range",
-                 unit_guess(number, range) + std::string(range.remedy));
+                 unit_guess(number, range) + std::string(range.remedy) +
+                     // Where the remedy says "more than 0", this is.
+                     (number > 0.0 && number < range.low ? "; the least is " + number_text(range.low) : ""));
     return std::nullopt;
   }
   return number;

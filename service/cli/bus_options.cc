@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <map>
 
+#include "prescene/interfaces/bytes/text.h"
 #include "verb.h"
 
 namespace prescene::service {
+namespace {
+
+constexpr int kLastDomain = 230;
+
+}  // namespace
 
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
   auto* group = verb.add_option_group("Bus", "How to join the DDS bus");
-  group->add_option("--domain", dds.domain, "DDS domain")
-      ->envname("ROS_DOMAIN_ID")
-      ->check(CLI::Range(0, 230))
-      ->capture_default_str();
+  group->add_option("--domain", dds.domain, "DDS domain; default: that of ROS_DOMAIN_ID, else 0")
+      ->check(CLI::Range(0, kLastDomain));
   const std::map<std::string, interfaces::RosDistro> distros = {{"humble", interfaces::RosDistro::kHumble},
                                                                 {"jazzy", interfaces::RosDistro::kJazzy}};
   group
@@ -21,6 +26,19 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
           "--ros-distro", [&dds, distros](const std::string& name) { dds.ros_distro = distros.at(name); },
           "Show up in `ros2 node list` of this release (humble or jazzy); topics work without")
       ->check(CLI::IsMember({"humble", "jazzy"}));
+}
+
+core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds) {
+  const char* variable = std::getenv("ROS_DOMAIN_ID");
+  if (verb.get_option("--domain")->count() > 0 || variable == nullptr || *variable == '\0') return core::ok_status();
+  const std::string text = variable;
+  int domain = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), domain);
+  if (error != std::errc() || end != text.data() + text.size() || domain < 0 || domain > kLastDomain)
+    return core::invalid_input("the environment's ROS_DOMAIN_ID is " + interfaces::quote(text) +
+                               ", not a whole number from 0 to 230: set it to one, or give --domain");
+  dds.domain = domain;
+  return core::ok_status();
 }
 
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics) {

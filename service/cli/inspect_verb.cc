@@ -56,7 +56,10 @@ std::string text_of(const MeshInspection& found) {
   std::string text = found.doubtful_scale ? "warning: " + *found.doubtful_scale + " (--scale)\n" : "";
   text += found.path.string() + ": " + std::to_string(found.loaded.mesh.triangles.size()) + " triangles, " +
           fixed_text(size.x(), 4) + " x " + fixed_text(size.y(), 4) + " x " + fixed_text(size.z(), 4) + " m, " +
-          (found.topology.watertight() ? "closed" : "not closed") + "\n";
+          (found.inside_out              ? "closed, but inside out"
+           : found.topology.watertight() ? "closed"
+                                         : "not closed") +
+          "\n";
   const auto& mass = found.mass ? found.mass : found.hull_mass;
   if (mass) {
     const geometry::Vector3d& com = mass->p_BoBcm;
@@ -189,7 +192,7 @@ Verb add_inspect_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--scale", options->inspection.read.metres_per_unit,
                    "Metres per unit of the file: 0.001 for millimetres")
-      ->check(positive_number())
+      ->check(number_between(1e-6, 1e6))
       ->capture_default_str();
   verb->add_flag("--y-up", options->y_up, "The file's y axis points up");
   verb->add_option("--report", options->report, "Write an HTML page with pictures")->check(file_name());

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program: reads the arguments, runs one verb, says how it went.
+#include <fcntl.h>
+#include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
@@ -10,6 +12,7 @@
 #include <iostream>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "prescene/core/spelling.h"
@@ -26,6 +29,24 @@ extern "C" void on_interrupt(int signal_number) {
   std::signal(signal_number, SIG_DFL);
 }
 
+/// A file that is opened later would become standard output or error where that is closed, and what is printed would
+/// go into it.
+void open_standard_streams() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
+    // The lowest free number is this one: those below it are open.
+    if (open("/dev/null", descriptor == STDIN_FILENO ? O_RDONLY : O_WRONLY) < 0) std::_Exit(1);
+  }
+}
+
+void handle_signals() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // Writing beyond the limit is then an error like that of a full disk.
+  std::signal(SIGCHLD, SIG_DFL);  // Whoever started us may ignore it, and no child's exit code could be had.
+}
+
 /// The libraries below throw where memory ends; everything else is a Status, or a bug that should not look like a
 /// crash.
 prescene::core::Status run(const prescene::service::Verb& verb, prescene::service::VerbContext& context) {
@@ -33,6 +54,10 @@ prescene::core::Status run(const prescene::service::Verb& verb, prescene::servic
     return verb.run(context);
   } catch (const std::bad_alloc&) {
     return prescene::core::unavailable("the memory is used up: give smaller images, meshes or limits");
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      return prescene::core::unavailable("no more threads can be made: give a smaller --threads, or raise `ulimit -u`");
+    return prescene::core::unavailable(std::string("the system refused: ") + error.what());
   } catch (const std::exception& error) {
     return prescene::core::unavailable(std::string("a library gave up: ") + error.what() +
                                        ": this is a bug of prescene, please report it with the command");
@@ -107,6 +132,7 @@ void add_common_options(CLI::App& verb, prescene::service::CommonOptions& option
 
 int main(int argc, char** argv) {
   using namespace prescene;
+  open_standard_streams();
   CLI::App app(
       "Prescene keeps a belief about the objects in front of a robot and looks ahead of it.\n"
       "Exit codes: 0 = done, 1 = could not do it, 2 = bad arguments or bad input.");
@@ -141,10 +167,7 @@ int main(int argc, char** argv) {
     return static_cast<int>(service::ExitCode::kBadInput);
   }
 
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGCHLD, SIG_DFL);  // whoever started the program may ignore it, and that is inherited
+  handle_signals();
   for (const service::Verb& verb : verbs) {
     if (!verb.app->parsed()) continue;
     service::VerbContext context(options, cancellation);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/bus_recorder.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/simulated_recording.h"
@@ -16,25 +18,57 @@ struct RecordOptions {
   SimulatedRecordingOptions simulation;
   interfaces::DdsOptions dds;
   InputTopics topics;
+  const CLI::App* verb = nullptr;
 };
 
-core::Status record_simulation(const RecordOptions& options, VerbContext& context) {
-  PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, {options.simulate}));
-  PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
-  PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log()));
+/// `status`, speaking of the recording that was asked for, not of the file beside it.
+core::Status with_name(const core::Status& status, const std::filesystem::path& aside, const std::string& output) {
+  std::string text = status.message();
+  if (const std::size_t at = text.find(aside.string()); at != std::string::npos)
+    text.replace(at, aside.string().size(), output);
+  return {status.code(), text};
+}
+
+/// Writes the recording `aside`; kCancelled with what is done in it.
+core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene& scene, const std::string& text,
+                         const RecordOptions& options, VerbContext& context) {
   PRESCENE_TRY(const auto recording,
-               RecordingWriter::create(options.output, {options.simulate, text, context.options().seed, ""}));
+               RecordingWriter::create(aside, {options.simulate, text, context.options().seed, ""}));
   Backends backends(context.pool());
-  const core::Status simulated = simulate_recording(*scene, options.simulation, context.options().seed, backends,
+  const core::Status simulated = simulate_recording(scene, options.simulation, context.options().seed, backends,
                                                     context.cancellation(), context.progress("recording"), *recording);
   PRESCENE_RETURN_IF_ERROR(recording->close());
-  PRESCENE_RETURN_IF_ERROR(simulated);
+  return simulated;
+}
+
+core::Status record_simulation(const RecordOptions& options, VerbContext& context) {
+  if (options.verb->count("--domain") > 0)
+    return core::invalid_input("--domain is for recording the bus, and --simulate needs none: leave one of them out");
+  PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {options.simulate}));
+  PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
+  PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log()));
+  // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
+  std::error_code error;
+  const bool replaces = std::filesystem::exists(options.output, error);
+  const std::filesystem::path target =
+      replaces ? std::filesystem::canonical(options.output, error) : std::filesystem::path(options.output);
+  PRESCENE_TRY(const std::filesystem::path aside, interfaces::create_beside(target, options.output));
+  core::Status status = simulate_to(aside, *scene, text, options, context);
+  const bool cancelled = status.code() == core::StatusCode::kCancelled;
+  const bool keeps = status.ok() || (cancelled && !replaces);
+  if (keeps) std::filesystem::rename(aside, target, error);
+  if (keeps && error) status = core::unavailable(options.output + ": cannot be replaced: " + error.message());
+  if (!keeps || error) std::filesystem::remove(aside, error);
+  if (cancelled && replaces) return core::cancelled("stopped on request; " + options.output + " is as it was");
+  if (!status.ok()) return with_name(status, aside, options.output);
   context.print({{"recording", options.output}, {"scene", scene->name}, {"simulated", true}},
                 "recorded " + options.output + "\n");
   return core::ok_status();
 }
 
-core::Status record_bus(const RecordOptions& options, VerbContext& context) {
+core::Status record_bus(RecordOptions& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
+  PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {}));
   const std::string output = live_recording_path(options.output, context);
   PRESCENE_TRY(const auto recording, RecordingWriter::create(output, {"", "", context.options().seed, ""}));
   PRESCENE_TRY(const std::uint64_t messages,
@@ -58,6 +92,7 @@ Verb add_record_verb(CLI::App& app) {
       ->needs("--simulate")
       ->capture_default_str();
   add_bus_options(*verb, options->dds, options->topics);
+  options->verb = verb;
   verb->footer(
       "Examples: prescene record -o run.mcap                  (until Ctrl-C)\n"
       "          prescene record --simulate scenarios/milk_on_bin.yaml -o milk.mcap --seed 1");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "final_states.h"
@@ -234,6 +235,22 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   return check_steps(*summary, settings.topics).at(options.input);
 }
 
+/// kInvalidInput for an option that would do nothing.
+core::Status check_options(const ReplayOptions& options) {
+  const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
+  if (!options.over_dds) {
+    for (const char* name : {"--domain", "--ros-distro"})
+      if (given(name))
+        return core::invalid_input(std::string(name) + " is for --over-dds: leave it out, or give that too");
+  }
+  if (std::error_code none; std::filesystem::is_directory(options.input, none)) return core::ok_status();
+  for (const char* name : {"--depth-scale", "--frame-rate"})
+    if (given(name))
+      return core::invalid_input(std::string(name) + " is for folders of images, and " + options.input +
+                                 " is none: leave it out");
+  return core::ok_status();
+}
+
 }  // namespace
 
 Verb add_replay_verb(CLI::App& app) {
@@ -273,6 +290,8 @@ Verb add_replay_verb(CLI::App& app) {
       "Examples: prescene replay milk.mcap --report milk.html\n"
       "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");
   return {verb, [options](VerbContext& context) -> core::Status {
+            PRESCENE_RETURN_IF_ERROR(check_options(*options));
+            if (options->over_dds) PRESCENE_RETURN_IF_ERROR(take_domain(*options->verb, options->bus.dds));
             PRESCENE_RETURN_IF_ERROR(check_output("--report", options->report, {options->input, options->scene}));
             PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
             return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);

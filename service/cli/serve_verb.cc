@@ -15,13 +15,15 @@ struct ServeOptions {
   std::string record;
   LiveSettings settings;
   BackendSettings backends;
+  const CLI::App* verb = nullptr;
 };
 
 core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(validate(options.settings.tracker.topics));
+  PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.settings.dds));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
-  PRESCENE_RETURN_IF_ERROR(check_output("--record", options.record, {options.scene}));
+  PRESCENE_RETURN_IF_ERROR(check_recording("--record", options.record, {options.scene}));
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
@@ -57,6 +59,7 @@ Verb add_serve_verb(CLI::App& app) {
   add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
   add_camera_options(*verb, options->settings.tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
+  options->verb = verb;
   verb->footer(
       "Runs until Ctrl-C. Topics: docs/ros2.md\n"
       "Example: prescene serve --scene scenarios/milk_on_bin.yaml");

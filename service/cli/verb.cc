@@ -5,6 +5,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
@@ -22,6 +23,7 @@
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/core/utf8.h"
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/service/recording.h"
 
@@ -78,6 +80,16 @@ std::string fitted(const std::string& line, std::size_t columns) {
   return line.substr(0, end) + dots;
 }
 
+/// Whether one of our own descriptors, such as standard output, is this pipe.
+bool is_open_here(const struct stat& pipe) {
+  constexpr int kMostDescriptors = 256;
+  for (int descriptor = 0; descriptor < kMostDescriptors; ++descriptor) {
+    struct stat of {};
+    if (fstat(descriptor, &of) == 0 && of.st_dev == pipe.st_dev && of.st_ino == pipe.st_ino) return true;
+  }
+  return false;
+}
+
 std::string duration_text(double seconds) {
   if (seconds < 90.0) return fixed_text(seconds, 0) + " s";
   return fixed_text(seconds / 60.0, 1) + " min";
@@ -108,7 +120,14 @@ VerbContext::VerbContext(const CommonOptions& options, const core::Cancellation&
 VerbContext::~VerbContext() { end_progress(); }
 
 core::ThreadPool& VerbContext::pool() {
-  if (!pool_) pool_ = std::make_unique<core::ThreadPool>(options_.threads);
+  if (!pool_) {
+    pool_ = std::make_unique<core::ThreadPool>(options_.threads);
+    if (pool_->threads() < options_.threads) {
+      core::log(log_, core::LogLevel::kWarning,
+                "the system allows no more than " + counted(static_cast<std::size_t>(pool_->threads()), "thread") +
+                    ", not --threads " + std::to_string(options_.threads) + ": raise `ulimit -u` for more");
+    }
+  }
   return *pool_;
 }
 
@@ -217,7 +236,11 @@ CLI::Validator utf8_text() {
 }
 
 CLI::Validator file_name() {
-  return {[](std::string& text) { return text.empty() ? std::string("a file name is needed, not ''") : std::string(); },
+  return {[](std::string& text) -> std::string {
+            if (text.empty()) return "a file name is needed, not ''";
+            if (text.front() != '-') return "";
+            return "a file name is needed before the option " + text + "; a file of that name is ./" + text;
+          },
           "", "file name"};
 }
 
@@ -261,10 +284,35 @@ core::Status check_output(const std::string& option, const std::string& output,
     if (device >= 0) close(device);
     return takes ? core::ok_status() : core::unavailable(wont + why + "; name another file");
   }
-  const bool there = std::filesystem::exists(output, none);
-  if (access(there ? output.c_str() : folder.c_str(), W_OK) != 0)
-    return core::unavailable(wont + "no permission; name another place");
+  struct stat there {};
+  if (stat(output.c_str(), &there) != 0 && errno != ENOENT)
+    return core::unavailable(wont + std::strerror(errno) + "; name another place");
+  if (std::filesystem::exists(output, none) && !S_ISREG(there.st_mode)) {
+    // Nobody may read from a pipe with a name, and opening it would wait for ever. Standard output's is open already.
+    if (S_ISFIFO(there.st_mode) && is_open_here(there)) return core::ok_status();
+    return core::unavailable(wont + "it is no regular file; name one, or /dev/stdout to send it through a pipe");
+  }
+  if (std::filesystem::exists(output, none) && access(output.c_str(), W_OK) != 0)
+    return core::unavailable(wont + std::strerror(errno) + "; name another place");
+  const std::filesystem::path target = std::filesystem::weakly_canonical(output, none);
+  const auto aside = interfaces::create_beside(none ? std::filesystem::path(output) : target, output);
+  if (!aside) return core::unavailable(option + " " + aside.status().message());
+  std::filesystem::remove(*aside, none);
   return core::ok_status();
+}
+
+core::Status check_recording(const std::string& option, const std::string& output,
+                             const std::vector<std::string>& inputs) {
+  if (output.empty()) return core::ok_status();
+  std::error_code none;
+  const std::filesystem::path place = std::filesystem::absolute(output, none).lexically_normal();
+  const std::filesystem::path folder = std::filesystem::weakly_canonical(place.parent_path(), none);
+  const bool there = std::filesystem::exists(output, none);
+  // Redirected to a file, /dev/stdout looks like one, but belongs to who redirected it.
+  if ((there && !std::filesystem::is_regular_file(output, none) && !std::filesystem::is_directory(output, none)) ||
+      folder == "/dev" || folder == std::filesystem::weakly_canonical("/dev/fd", none))
+    return core::unavailable(option + " " + output + ": can't be written: a recording is a file of its own; name one");
+  return check_output(option, output, inputs);
 }
 
 std::string counted(std::size_t number, const std::string& thing) {

@@ -95,8 +95,11 @@ Verb add_replay_verb(CLI::App& app);
 Verb add_serve_verb(CLI::App& app);
 Verb add_ask_verb(CLI::App& app);
 
-/// --domain and --ros-distro; the domain is ROS_DOMAIN_ID's unless given.
+/// --domain and --ros-distro.
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
+/// The domain that ROS_DOMAIN_ID names, unless one was given; to be called by what joins the bus. kInvalidInput where
+/// the variable holds none.
+core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds);
 /// The same and the names of the robot's topics.
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
 /// --world-frame and --camera-pose.
@@ -116,7 +119,7 @@ CLI::Validator number_between(double low, double high);
 CLI::Validator in_range(const belief::ScalarRange& range);
 /// Text that others can read: UTF-8.
 CLI::Validator utf8_text();
-/// A name that is not empty.
+/// A name that is not empty, nor an option that took the place of one.
 CLI::Validator file_name();
 /// Where to record a robot live, see unused_recording_path(); says so when it is another file than the one asked for.
 std::string live_recording_path(const std::string& asked, VerbContext& context);
@@ -126,6 +129,10 @@ core::Status check_apart(const std::string& option, const std::string& output, c
 /// kInvalidInput if `output`, named by `option`, would overwrite one of the inputs; kUnavailable where it can't be
 /// written, so that nobody waits for a result that is then lost. Empty names are no files.
 core::Status check_output(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
+
+/// The same for a recording, which is never a device or pipe.
+core::Status check_recording(const std::string& option, const std::string& output,
+                             const std::vector<std::string>& inputs);
 
 /// "1 object", "2 objects".
 std::string counted(std::size_t number, const std::string& thing);

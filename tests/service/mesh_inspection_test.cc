@@ -130,6 +130,50 @@ TEST(MeshInspection, CanBeStoppedAtEachStep) {
   }
 }
 
+geometry::TriangleMesh inside_out(geometry::TriangleMesh mesh) {
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return mesh;
+}
+
+TEST(MeshInspection, TellsWhatIsInsideOut) {
+  const tests::ScratchDir folder;
+  const auto box = [](double size, double x) {
+    return geometry::transformed(geometry::make_mesh(geometry::BoxShape{Vector3d::Constant(size)}),
+                                 geometry::Pose::from_translation({x, 0, 0}));
+  };
+  const auto remarks_on = [&](const geometry::TriangleMesh& mesh) {
+    EXPECT_TRUE(interfaces::write_ply(folder.path() / "a.ply", mesh).ok());
+    const auto found = inspect_mesh(folder.path() / "a.ply", {});
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    std::string text;
+    for (const std::string& remark : found->remarks) text += remark + "\n";
+    return text;
+  };
+  const std::string whole = remarks_on(inside_out(box(0.1, 0.0)));
+  EXPECT_THAT(whole, testing::HasSubstr("because it is inside out"));
+  EXPECT_THAT(whole, testing::Not(testing::HasSubstr("not closed")));
+  EXPECT_THAT(remarks_on(geometry::joined(box(0.1, 0.0), inside_out(box(0.04, 0.08)))),
+              testing::HasSubstr("1 part of 12 triangles that lie outside of the others are inside out"));
+  EXPECT_THAT(remarks_on(geometry::joined(box(0.1, 0.0), inside_out(box(0.04, 0.0)))),
+              testing::Not(testing::HasSubstr("inside out")))
+      << "a cavity";
+}
+
+TEST(MeshInspection, AModelThatNoSceneCouldUseIsNotMade) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "box.ply";
+  ASSERT_TRUE(interfaces::write_ply(path, geometry::make_mesh(geometry::BoxShape{Vector3d(0.1, 0.1, 0.1)})).ok());
+  for (const double scale : {1e6, 1e3, 1e-5, 1e150}) {
+    MeshInspectionOptions options;
+    options.read.metres_per_unit = scale;
+    const auto found = inspect_mesh(path, options);
+    const core::Status status =
+        found ? model_file(*found, options, folder.path() / "box.yaml").status() : found.status();
+    EXPECT_EQ(status.code(), core::StatusCode::kInvalidInput) << scale;
+    EXPECT_THAT(status.message(), testing::HasSubstr("--scale")) << scale;
+  }
+}
+
 TEST(MeshInspection, AFlatMeshMakesNoModel) {
   const tests::ScratchDir folder;
   const geometry::TriangleMesh flat{{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}}, {{0, 1, 2}}};

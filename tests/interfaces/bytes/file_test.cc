@@ -8,6 +8,7 @@
 
 #include <array>
 #include <filesystem>
+#include <iterator>
 #include <utility>
 
 #include "prescene/tests/support/paths.h"
@@ -82,6 +83,20 @@ TEST(WriteFile, KeepsALinkAndReplacesWhatItNames) {
   ASSERT_TRUE(write_file(dir.path() / "link", "newer").ok());
   EXPECT_TRUE(std::filesystem::is_symlink(dir.path() / "link"));
   EXPECT_EQ(std::filesystem::file_size(dir.path() / "a"), 5U);
+}
+
+TEST(WriteFile, TouchesNoOtherFileAndLeavesNone) {
+  const tests::ScratchDir dir;
+  ASSERT_TRUE(write_file(dir.path() / "a.partial", "another's").ok());
+  ASSERT_TRUE(write_file(dir.path() / "a", "new").ok());
+  EXPECT_EQ(*read_file(dir.path() / "a.partial", 100), bytes_of("another's"));
+  const mode_t mask = umask(0);
+  umask(mask);
+  EXPECT_EQ(static_cast<mode_t>(std::filesystem::status(dir.path() / "a").permissions()), 0666 & ~mask);
+  // A name as long as names may be.
+  ASSERT_TRUE(write_file(dir.path() / std::string(255, 'b'), "long").ok());
+  EXPECT_FALSE(write_file(dir.path() / std::string(256, 'b'), "longer").ok());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir.path()), {}), 3) << "files were left";
 }
 
 TEST(WriteFile, RefusesAFolder) {
