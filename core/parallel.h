@@ -15,8 +15,7 @@ namespace prescene::core {
 /// An arena of threads. Loops given the same arena share its threads; two arenas do not steal each other's.
 class ThreadPool {
  public:
-  /// threads >= 1, or 0 for the number of the machine's hardware threads. Where the system makes no more, they are
-  /// fewer: threads() says how many.
+  /// threads >= 1, or 0 for the number of the machine's hardware threads.
   explicit ThreadPool(int threads = 0);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
