@@ -169,7 +169,7 @@ core::Status check_model(const interfaces::ModelFile& file, const MeshInspection
   options.read_mesh = [&found](const interfaces::MeshRequest&) -> core::Result<geometry::TriangleMesh> {
     return found.loaded.mesh;
   };
-  const core::Status status =
+  core::Status status =
       interfaces::parse_model(interfaces::model_yaml(file), model_path.string(), model_path.stem().string(), options)
           .status();
   if (status.ok()) return status;

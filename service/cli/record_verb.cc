@@ -35,8 +35,8 @@ core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene
   PRESCENE_TRY(const auto recording,
                RecordingWriter::create(aside, {options.simulate, text, context.options().seed, ""}));
   Backends backends(context.pool());
-  const core::Status simulated = simulate_recording(scene, options.simulation, context.options().seed, backends,
-                                                    context.cancellation(), context.progress("recording"), *recording);
+  core::Status simulated = simulate_recording(scene, options.simulation, context.options().seed, backends,
+                                              context.cancellation(), context.progress("recording"), *recording);
   PRESCENE_RETURN_IF_ERROR(recording->close());
   return simulated;
 }
