@@ -8,9 +8,8 @@
 
 #include "prescene/core/random.h"
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/service/load_scene.h"
 #include "prescene/service/recording.h"
-#include "prescene/service/simulated_recording.h"
+#include "prescene/tests/service/recorded_box.h"
 #include "prescene/tests/support/paths.h"
 
 namespace prescene::service::recording_damage_laws_test {
@@ -20,21 +19,6 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr int kFlips = 2000;
 constexpr int kCuts = 500;
-constexpr const char* kScene = R"(name: box
-duration: 0.8
-models:
-  box: {box: [0.12, 0.08, 0.1], mass: 0.4}
-supports:
-  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
-objects:
-  box: {model: box, pose: {position: [0, 0, 0.05]}}
-camera:
-  width: 80
-  height: 60
-  fov_deg: 55
-  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
-)";
-
 /// All that a recording gives.
 struct Content {
   RecordingInfo info;
@@ -56,16 +40,9 @@ bool same(const RecordedEntry& a, const RecordedEntry& b) {
 class RecordingDamageLaws : public ::testing::Test {
  protected:
   void SetUp() override {
-    core::ThreadPool pool(1);
-    Backends backends(pool);
-    const auto scene = load_scene_text(kScene, "box.yaml", {});
-    ASSERT_TRUE(scene.ok()) << scene.status().message();
-    const auto recording = RecordingWriter::create(path_, {"box.yaml", kScene, 1, R"({"world_frame": "world"})"});
-    ASSERT_TRUE(recording.ok());
-    SimulatedRecordingOptions options;
-    options.rate = 20.0;
-    ASSERT_TRUE(simulate_recording(**scene, options, 1, backends, {}, {}, **recording).ok());
-    ASSERT_TRUE((*recording)->close().ok());
+    const core::Status recorded =
+        tests::record_scene(scene_text_, {"box.yaml", scene_text_, 1, R"({"world_frame": "world"})"}, 20.0, path_);
+    ASSERT_TRUE(recorded.ok()) << recorded.message();
     bytes_ = *interfaces::read_file(path_, std::size_t{1} << 30);
     whole_ = content_of(bytes_);
     ASSERT_FALSE(whole_.refused);
@@ -110,6 +87,7 @@ class RecordingDamageLaws : public ::testing::Test {
   }
 
   tests::ScratchDir folder_;
+  const std::string scene_text_ = tests::box_scene("0.8");
   std::filesystem::path path_ = folder_.path() / "run.mcap";
   Bytes bytes_;
   Content whole_;
@@ -155,7 +133,7 @@ TEST_F(RecordingDamageLaws, AFlippedBitInTheSceneOfACutRecordingIsNoticed) {
   // A cut takes the checksum of the data section with it.
   core::RandomStream stream(3, core::Purpose::kTest);
   const Bytes cut(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(bytes_.size() / 2));
-  const std::string text = kScene;
+  const std::string& text = scene_text_;
   const auto scene = std::search(cut.begin(), cut.end(), text.begin(), text.end());
   ASSERT_NE(scene, cut.end());
   const auto begin = static_cast<std::size_t>(scene - cut.begin());

@@ -4,42 +4,22 @@
 #include <gtest/gtest.h>
 
 #include "prescene/service/load_scene.h"
-#include "prescene/service/simulated_recording.h"
+#include "prescene/tests/service/recorded_box.h"
 #include "prescene/tests/support/paths.h"
 
 namespace prescene::service::replay_test {
 namespace {
-
-constexpr const char* kScene = R"(name: box
-duration: 0.5
-models:
-  box: {box: [0.12, 0.08, 0.1], mass: 0.4}
-supports:
-  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
-objects:
-  box: {model: box, pose: {position: [0, 0, 0.05]}}
-camera:
-  width: 80
-  height: 60
-  fov_deg: 55
-  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
-)";
 
 TEST(Replay, StoppedOnRequestKeepsTheStepsThatWereMade) {
   const tests::ScratchDir folder;
   const std::filesystem::path path = folder.path() / "run.mcap";
   core::ThreadPool pool(1);
   Backends backends(pool);
-  const auto scene = load_scene_text(kScene, "box.yaml", {});
+  const std::string yaml = tests::box_scene("0.5");
+  const auto scene = load_scene_text(yaml, "box.yaml", {});
   ASSERT_TRUE(scene.ok()) << scene.status().message();
-  {
-    const auto recording = RecordingWriter::create(path, {"box.yaml", kScene, 1, ""});
-    ASSERT_TRUE(recording.ok());
-    SimulatedRecordingOptions options;
-    options.rate = 10.0;
-    ASSERT_TRUE(simulate_recording(**scene, options, 1, backends, {}, {}, **recording).ok());
-    ASSERT_TRUE((*recording)->close().ok());
-  }
+  const core::Status recorded = tests::record_scene(yaml, {"box.yaml", yaml, 1, ""}, 10.0, path);
+  ASSERT_TRUE(recorded.ok()) << recorded.message();
   const auto tracker = Tracker::create(*scene, {}, 1, backends);
   ASSERT_TRUE(tracker.ok()) << tracker.status().message();
   core::Cancellation cancellation;

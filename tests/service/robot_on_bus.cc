@@ -8,9 +8,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
-#include "prescene/service/load_scene.h"
 #include "prescene/service/recording.h"
-#include "prescene/service/simulated_recording.h"
 #include "prescene/service/topics.h"
 #include "prescene/tests/support/paths.h"
 
@@ -34,14 +32,8 @@ Message decoded(const ReceivedMessage& message) {
 void record(const std::string& scene_yaml, const std::function<void(const ReceivedMessage&)>& take) {
   const ScratchDir folder;
   const std::filesystem::path path = folder.path() / "run.mcap";
-  core::ThreadPool pool(1);
-  service::Backends backends(pool);
-  const auto scene = service::load_scene_text(scene_yaml, "scene.yaml", {});
-  ASSERT_TRUE(scene.ok()) << scene.status().message();
-  const auto writer = service::RecordingWriter::create(path, {});
-  ASSERT_TRUE(writer.ok()) << writer.status().message();
-  ASSERT_TRUE(service::simulate_recording(**scene, {}, 1, backends, {}, {}, **writer).ok());
-  ASSERT_TRUE((*writer)->close().ok());
+  const core::Status recorded = record_scene(scene_yaml, {}, service::SimulatedRecordingOptions().rate, path);
+  ASSERT_TRUE(recorded.ok()) << recorded.message();
   const auto reader = service::RecordingReader::open(path);
   ASSERT_TRUE(reader.ok()) << reader.status().message();
   for (;;) {

@@ -16,24 +16,12 @@
 #include "prescene/belief/scene.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/tests/service/recorded_box.h"
 
 namespace prescene::tests {
 
 /// A box at rest on a table, seen by a small camera.
-inline constexpr const char* kBoxScene = R"(name: box
-duration: 0.3
-models:
-  box: {box: [0.12, 0.08, 0.1], mass: 0.4}
-supports:
-  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
-objects:
-  box: {model: box, pose: {position: [0, 0, 0.05], normal: {position: [0.005, 0.005, 0]}}}
-camera:
-  width: 80
-  height: 60
-  fov_deg: 55
-  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
-)";
+inline const std::string kBoxScene = box_scene("0.3", ", normal: {position: [0.005, 0.005, 0]}");
 
 class RobotOnBus {
  public:

@@ -10,7 +10,7 @@
 #include "prescene/filter/predict.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/replay.h"
-#include "prescene/service/simulated_recording.h"
+#include "prescene/tests/service/recorded_box.h"
 #include "prescene/tests/support/paths.h"
 
 namespace prescene::service::tracked_physics_test {
@@ -96,13 +96,8 @@ class FailingPhysics : public ::testing::Test {
     const auto scene = load_scene_text(kFiveBoxes, "boxes.yaml", {});
     EXPECT_TRUE(scene.ok()) << scene.status().message();
     scene_ = *scene;
-    Backends backends(pool_);
-    const auto recording = RecordingWriter::create(path_, {"boxes.yaml", kFiveBoxes, 1, ""});
-    EXPECT_TRUE(recording.ok());
-    SimulatedRecordingOptions options;
-    options.rate = 15.0;
-    EXPECT_TRUE(simulate_recording(*scene_, options, 1, backends, {}, {}, **recording).ok());
-    EXPECT_TRUE((*recording)->close().ok());
+    const core::Status recorded = tests::record_scene(kFiveBoxes, {"boxes.yaml", kFiveBoxes, 1, ""}, 15.0, path_);
+    EXPECT_TRUE(recorded.ok()) << recorded.message();
   }
   std::vector<TrackerStep> tracked_with(Stepper stepper) {
     BackendSettings settings;

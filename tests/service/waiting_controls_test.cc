@@ -6,8 +6,8 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/simulated_recording.h"
 #include "prescene/service/tracker.h"
+#include "prescene/tests/service/recorded_box.h"
 #include "prescene/tests/support/paths.h"
 
 namespace prescene::service::waiting_controls_test {
@@ -91,38 +91,18 @@ TEST(WaitingControls, AreBounded) {
   EXPECT_EQ(controls.take_in(message(kGrasp, kNoon), kNoon).code(), core::StatusCode::kResourceExhausted);
 }
 
-constexpr const char* kScene = R"(name: box
-duration: 0.5
-models:
-  box: {box: [0.12, 0.08, 0.1], mass: 0.4}
-supports:
-  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
-robot:
-  gripper: {box: [0.02, 0.02, 0.02], timeline: [{time: 0, position: [0, 0, 0.3]}]}
-objects:
-  box: {model: box, pose: {position: [0, 0, 0.05]}}
-camera:
-  width: 80
-  height: 60
-  fov_deg: 55
-  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
-)";
-
 TEST(Tracker, AGraspBeforeTheFirstFrameActsInTheFirstStepThatPredicts) {
   const tests::ScratchDir folder;
   const std::filesystem::path path = folder.path() / "run.mcap";
   core::ThreadPool pool(1);
   Backends backends(pool);
-  const auto scene = load_scene_text(kScene, "box.yaml", {});
+  const std::string yaml = tests::box_scene("0.5") + R"(robot:
+  gripper: {box: [0.02, 0.02, 0.02], timeline: [{time: 0, position: [0, 0, 0.3]}]}
+)";
+  const auto scene = load_scene_text(yaml, "box.yaml", {});
   ASSERT_TRUE(scene.ok()) << scene.status().message();
-  {
-    const auto recording = RecordingWriter::create(path, {});
-    ASSERT_TRUE(recording.ok());
-    SimulatedRecordingOptions options;
-    options.rate = 10.0;
-    ASSERT_TRUE(simulate_recording(**scene, options, 1, backends, {}, {}, **recording).ok());
-    ASSERT_TRUE((*recording)->close().ok());
-  }
+  const core::Status recorded = tests::record_scene(yaml, {}, 10.0, path);
+  ASSERT_TRUE(recorded.ok()) << recorded.message();
   const auto tracker = Tracker::create(*scene, {}, 1, backends);
   ASSERT_TRUE(tracker.ok()) << tracker.status().message();
   ASSERT_TRUE((*tracker)->take_in(message(kGrasp, kNoon), 0).ok());
