@@ -176,11 +176,7 @@ void AnsweringDesk::read(const std::string& question_json) {
     }
     refuse(id, reason);
   } catch (const std::exception&) {
-    try {
-      refuse(id, note_exception("the question could not be read"));
-    } catch (const std::exception&) {
-      drop();
-    }
+    refuse_after_exception(id, "the question could not be read");
   }
 }
 
@@ -214,11 +210,7 @@ void AnsweringDesk::answer(const belief::Query& query) {
     send(reply.text, reply.is_answer ? &DeskCounts::answered : &DeskCounts::refused);
   } catch (const std::exception&) {
     finish();
-    try {
-      refuse(query.id, note_exception("the question could not be answered"));
-    } catch (const std::exception&) {
-      drop();
-    }
+    refuse_after_exception(query.id, "the question could not be answered");
   }
 }
 
@@ -238,6 +230,14 @@ AnsweringDesk::Reply AnsweringDesk::reply_to(const belief::Query& query) {
 void AnsweringDesk::refuse(const std::string& id, const core::Status& reason) {
   try {
     send(error_answer(id, reason), &DeskCounts::refused);
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void AnsweringDesk::refuse_after_exception(const std::string& id, const char* doing) {
+  try {
+    refuse(id, note_exception(doing));
   } catch (const std::exception&) {
     drop();
   }

@@ -83,9 +83,11 @@ class AnsweringDesk {
     std::string text;
     bool is_answer = false;  ///< Else the reason why there is none.
   };
-  /// Answers and counts; no exception leaves it, nor the three below.
+  /// Answers and counts; no exception leaves it, nor the four below.
   void answer(const belief::Query& query);
   void refuse(const std::string& id, const core::Status& reason);
+  /// In a handler, of an exception while `doing`.
+  void refuse_after_exception(const std::string& id, const char* doing);
   /// Counts the question as `fate`, and as unanswered where the answer can't be handed over.
   void send(const std::string& answer, std::uint64_t DeskCounts::*fate);
   /// In a handler: the question got no answer, because of the exception.
