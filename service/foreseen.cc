@@ -69,7 +69,7 @@ class Judge {
 };
 
 OutcomeRecord judged(const Judge& judge, belief::Trajectory trajectory, core::TimeNs start_ns) {
-  const auto stamp = [&] { return start_ns + static_cast<core::TimeNs>(std::llround(1e9 * trajectory.final().time)); };
+  const auto stamp = [&] { return start_ns + core::ns_of(trajectory.final().time); };
   OutcomeRecord record;
   record.end_ns = stamp();
   record.outcomes = judge.all(trajectory);
@@ -226,7 +226,7 @@ void ForeseenAndCame::add(double at, const std::string& question, const std::str
 }
 
 core::TimeNs ForeseenAndCame::stamp_at(double at) const {
-  const core::TimeNs received_ns = first_ns_.value_or(0) + static_cast<core::TimeNs>(std::llround(at * 1e9));
+  const core::TimeNs received_ns = first_ns_.value_or(0) + core::ns_of(at);
   if (frames_.empty()) return received_ns;
   const auto later = std::upper_bound(frames_.begin(), frames_.end(), received_ns,
                                       [](core::TimeNs time_ns, const Frame& f) { return time_ns < f.received_ns; });
@@ -273,8 +273,7 @@ void ForeseenAndCame::relate(const Asked& asked, std::uint64_t step, Comparison*
   const auto from =
       std::find_if(summaries_.begin(), summaries_.end(), [&](const auto& entry) { return entry.second.step == step; });
   const core::TimeNs asked_ns = stamp_at(asked.at);
-  const core::TimeNs meant_ns = (from != summaries_.end() ? from->first : asked_ns) +
-                                static_cast<core::TimeNs>(std::llround(actions.front().time * 1e9));
+  const core::TimeNs meant_ns = (from != summaries_.end() ? from->first : asked_ns) + core::ns_of(actions.front().time);
   const std::string& name = release->object;
   comparison->question = "What if " + name + " is let go at " + fixed_text(seconds(meant_ns), 2) + " s?";
   const std::vector<Released> released = releases();

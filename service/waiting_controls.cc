@@ -47,7 +47,7 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
     // An hour bounds what is plausible, and keeps the sum in range.
     if (!(std::abs(action.time) <= 3600.0))
       return core::invalid_input("time: actions start within an hour of their control");
-    control.actions.emplace_back(static_cast<core::TimeNs>(std::llround(action.time * 1e9)), std::move(action));
+    control.actions.emplace_back(core::ns_of(action.time), std::move(action));
   }
   return control;
 }

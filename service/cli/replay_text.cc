@@ -6,6 +6,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/service/outside_json.h"
 #include "verb.h"
 
@@ -60,12 +61,12 @@ std::string tracking_text(const std::vector<ObjectTrackingScore>& rows) {
 
 std::string supports_text(const std::vector<SupportRow>& rows) {
   if (rows.empty()) return "";
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
   std::vector<std::vector<std::string>> cells = {{"support", "frames", "measured", "median tilt, deg", "largest",
                                                   "median height, mm", "largest", "points off it, mm"}};
   for (const SupportRow& row : rows) {
     cells.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
-                     fixed_text(row.median_tilt * kDegrees, 2), fixed_text(row.largest_tilt * kDegrees, 2),
+                     fixed_text(row.median_tilt * geometry::kDegreesPerRadian, 2),
+                     fixed_text(row.largest_tilt * geometry::kDegreesPerRadian, 2),
                      fixed_text(1e3 * row.median_height, 1), fixed_text(1e3 * row.largest_height, 1),
                      fixed_text(1e3 * row.median_rms, 1)});
   }
