@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "prescene/interfaces/ros_messages/messages.h"
+
 namespace prescene::interfaces {
 
 /// What ROS 2 calls one message type.
@@ -28,5 +30,77 @@ std::string ros2msg_schema(const RosType& type);
 /// The type of a struct of messages.h; defined for each of them.
 template <class Message>
 const RosType& ros_type();
+template <>
+const RosType& ros_type<RosDuration>();
+template <>
+const RosType& ros_type<RosTime>();
+template <>
+const RosType& ros_type<RosDiagnosticArray>();
+template <>
+const RosType& ros_type<RosDiagnosticStatus>();
+template <>
+const RosType& ros_type<RosKeyValue>();
+template <>
+const RosType& ros_type<RosPoint>();
+template <>
+const RosType& ros_type<RosPose>();
+template <>
+const RosType& ros_type<RosPoseArray>();
+template <>
+const RosType& ros_type<RosPoseStamped>();
+template <>
+const RosType& ros_type<RosPoseWithCovariance>();
+template <>
+const RosType& ros_type<RosPoseWithCovarianceStamped>();
+template <>
+const RosType& ros_type<RosQuaternion>();
+template <>
+const RosType& ros_type<RosTransform>();
+template <>
+const RosType& ros_type<RosTransformStamped>();
+template <>
+const RosType& ros_type<RosTwist>();
+template <>
+const RosType& ros_type<RosTwistStamped>();
+template <>
+const RosType& ros_type<RosVector3>();
+template <>
+const RosType& ros_type<RosClock>();
+template <>
+const RosType& ros_type<RosCameraInfo>();
+template <>
+const RosType& ros_type<RosCompressedImage>();
+template <>
+const RosType& ros_type<RosImage>();
+template <>
+const RosType& ros_type<RosJointState>();
+template <>
+const RosType& ros_type<RosRegionOfInterest>();
+template <>
+const RosType& ros_type<RosColorRgba>();
+template <>
+const RosType& ros_type<RosHeader>();
+template <>
+const RosType& ros_type<RosString>();
+template <>
+const RosType& ros_type<RosTfMessage>();
+template <>
+const RosType& ros_type<RosBoundingBox3d>();
+template <>
+const RosType& ros_type<RosDetection3d>();
+template <>
+const RosType& ros_type<RosDetection3dArray>();
+template <>
+const RosType& ros_type<RosObjectHypothesis>();
+template <>
+const RosType& ros_type<RosObjectHypothesisWithPose>();
+template <>
+const RosType& ros_type<RosMarker>();
+template <>
+const RosType& ros_type<RosMarkerArray>();
+template <>
+const RosType& ros_type<RosMeshFile>();
+template <>
+const RosType& ros_type<RosUvCoordinate>();
 
 }  // namespace prescene::interfaces
