@@ -43,8 +43,8 @@ struct Distance {
 /// The least distance of a point of A from one of B; nothing where that is more than the limit. Zero, with triangles
 /// that intersect, exactly where `collide` says so, whatever the tolerances. The points and their distance are computed
 /// in double precision, from the pair of triangles that is the nearest in single precision: beyond the tolerance, the
-/// answer is at most 2^-19 of the size of the box about two triangles that far apart above the least distance, and it
-/// is never below it. Which of several pairs within that is answered is not promised.
+/// answer is at most 2^-19 of the size of the box about two triangles that far apart, and 1e-18 m, above the least
+/// distance, and it is never below it. Which of several pairs within that is answered is not promised.
 std::optional<Distance> distance(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB,
                                  const DistanceOptions& options, QueryScratch& scratch, QueryCounts* counts = nullptr);
 
