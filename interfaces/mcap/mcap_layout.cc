@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 
+#include "mcap_compression.h"
 #include "prescene/interfaces/bytes/byte_reader.h"
 #include "prescene/interfaces/bytes/crc32.h"
 #include "prescene/interfaces/bytes/text.h"
@@ -25,6 +26,7 @@ constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
 constexpr std::size_t kMaxIds = 65535;  // of schemas and of channels: they have 16 bits
 constexpr std::uint64_t kDataEndBytes = records::kFrameBytes + sizeof(std::uint32_t);
 constexpr std::size_t kCheckStep = std::size_t{1} << 20;
+constexpr std::uint64_t kMaxChunkHead = records::ChunkHead::kBytesBeforeName + records::ChunkHead::kMaxNameBytes + 8;
 
 struct Frame {
   Op op{};
@@ -73,16 +75,25 @@ class LayoutFinder {
 
   Status read_header() {
     const std::optional<Frame> frame = frame_at(position_);
-    if (!frame || frame->op != Op::kHeader || frame->length > limit_ - position_ - records::kFrameBytes) {
-      return nothing_readable();
+    const bool is_header = frame && frame->op == Op::kHeader;
+    if (!frame || (is_header && frame->length > limit_ - position_ - records::kFrameBytes)) {
+      return salvage_ ? pass_over_header() : nothing_readable();
     }
-    if (frame->length > kMaxHeaderBytes) {
-      return core::invalid_input(source_.name() + ": has a header of " + size_text(frame->length) +
-                                 "; is it a recording?");
+    if (is_header && frame->length <= kMaxHeaderBytes) {
+      PRESCENE_TRY(const std::vector<std::uint8_t> content, content_at(position_, *frame));
+      if (parse(content, &out_.header)) {
+        position_ += records::kFrameBytes + frame->length;
+        return core::ok_status();
+      }
     }
-    PRESCENE_TRY(const std::vector<std::uint8_t> content, content_at(position_, *frame));
-    if (!parse(content, &out_.header)) return nothing_readable();
-    position_ += records::kFrameBytes + frame->length;
+    if (salvage_) return pass_over_header();
+    return core::data_loss(source_.name() + ": its header is damaged" + kDamageRemedy);
+  }
+
+  /// The walk begins where it stands, and finds its way from there.
+  Status pass_over_header() {
+    out_.header = {};
+    out_.loss.damaged_header = true;
     return core::ok_status();
   }
 
@@ -179,7 +190,7 @@ class LayoutFinder {
         PRESCENE_TRY(const bool good, add_record(*frame));
         if (good) continue;
       }
-      skip_damage();
+      PRESCENE_RETURN_IF_ERROR(skip_damage());
     }
     return core::ok_status();
   }
@@ -200,27 +211,63 @@ class LayoutFinder {
     return content;
   }
 
-  std::uint64_t next_known_chunk() const {
-    const auto next = known_chunks_.upper_bound(position_);
-    return next == known_chunks_.end() ? limit_ : next->first;
+  /// Where the next chunk after the position begins: one that the index knows or, in what is salvaged without an
+  /// index, one that agrees with itself.
+  Result<std::uint64_t> next_chunk() {
+    const auto known = known_chunks_.upper_bound(position_);
+    if (known != known_chunks_.end()) return known->first;
+    if (!salvage_ || !known_chunks_.empty()) return limit_;
+    std::vector<std::uint8_t> block;
+    for (std::uint64_t begin = position_ + 1; begin < limit_; begin += block.size()) {
+      block.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kCheckStep, limit_ - begin)));
+      PRESCENE_RETURN_IF_ERROR(source_.read(begin, block));
+      for (auto at = block.begin();; ++at) {
+        at = std::find(at, block.end(), static_cast<std::uint8_t>(Op::kChunk));
+        if (at == block.end()) break;
+        const std::uint64_t offset = begin + static_cast<std::uint64_t>(at - block.begin());
+        if (is_sound_chunk(offset)) return offset;
+      }
+    }
+    return limit_;
   }
 
-  void skip_damage() {
-    const std::uint64_t next = next_known_chunk();
+  bool is_sound_chunk(std::uint64_t offset) {
+    const std::optional<Frame> frame = frame_at(offset);
+    if (!frame || frame->op != Op::kChunk) return false;
+    const std::uint64_t content_begin = offset + records::kFrameBytes;
+    if (frame->length > limit_ - content_begin) return false;
+    const Result<std::span<const std::uint8_t>> head =
+        source_.peek(content_begin, static_cast<std::size_t>(std::min<std::uint64_t>(frame->length, kMaxChunkHead)));
+    records::ChunkHead parsed;
+    return head && parse(*head, &parsed) && agree(*frame, parsed) && find_compression(parsed.compression);
+  }
+
+  /// A chunk's length is told twice.
+  static bool agree(const Frame& frame, const records::ChunkHead& head) {
+    return frame.length >= head.bytes() && head.records_size == frame.length - head.bytes();
+  }
+
+  Status skip_damage() {
+    PRESCENE_TRY(const std::uint64_t next, next_chunk());
     out_.loss.lost_bytes += next - position_;
     position_ = next;
+    return core::ok_status();
   }
 
   /// The chunk at the position, also when it is cut; false when there is not even its head.
   Result<bool> add_chunk(const Frame& frame) {
     const std::uint64_t content_begin = position_ + records::kFrameBytes;
-    const bool fits = frame.length <= limit_ - content_begin;
-    const std::uint64_t content_end = fits ? content_begin + frame.length : std::max(content_begin, next_known_chunk());
-    const auto head_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(
-        content_end - content_begin, records::ChunkHead::kBytesBeforeName + records::ChunkHead::kMaxNameBytes + 8));
+    const auto head_bytes =
+        static_cast<std::size_t>(std::min<std::uint64_t>({limit_ - content_begin, frame.length, kMaxChunkHead}));
     PRESCENE_TRY(const std::span<const std::uint8_t> head, source_.peek(content_begin, head_bytes));
     records::ChunkHead parsed;
     if (!parse(head, &parsed)) return false;
+    const bool fits = frame.length <= limit_ - content_begin && (!salvage_ || agree(frame, parsed));
+    std::uint64_t content_end = content_begin + frame.length;
+    if (!fits) {
+      PRESCENE_TRY(content_end, next_chunk());
+      content_end = std::max(content_end, content_begin + parsed.bytes());
+    }
     McapSegment segment;
     segment.chunk = true;
     segment.crc = parsed.uncompressed_crc;

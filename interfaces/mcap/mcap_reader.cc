@@ -311,9 +311,10 @@ std::string McapLoss::text() const {
   std::string out;
   const auto say = [&](const std::string& sentence) { out += (out.empty() ? "" : "; ") + sentence; };
   if (truncated) say("the recording was not closed (cut, or still being written)");
+  if (damaged_header) say("its header is damaged");
   if (bad_index) say("its index is wrong, it was read front to back");
   if (damaged_data) say("the checksum of its data section is wrong");
-  if (lost_bytes > 0) say(size_text(static_cast<std::size_t>(lost_bytes)) + " after the last whole record are lost");
+  if (lost_bytes > 0) say(size_text(static_cast<std::size_t>(lost_bytes)) + " that belong to no whole record are lost");
   if (damaged_chunks > 0)
     say(std::to_string(damaged_chunks) + " damaged chunks were left out or read to their last sound record");
   if (!unknown_compression.empty())

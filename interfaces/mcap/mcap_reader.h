@@ -39,6 +39,7 @@ struct McapReaderOptions {
 /// What could not be read.
 struct McapLoss {
   bool truncated = false;            ///< No footer: the file was cut or is still being written.
+  bool damaged_header = false;       ///< The first record is wrong; its profile is not known.
   bool bad_index = false;            ///< There is an index, but it is wrong; read front to back instead.
   bool damaged_data = false;         ///< The checksum of the data section is wrong.
   std::uint64_t lost_bytes = 0;      ///< After the last whole record; of a cut chunk those of its unpacked content.

@@ -269,6 +269,37 @@ TEST(McapReader, GoesOnBehindADamagedRecordWhereTheIndexKnowsAChunk) {
   EXPECT_EQ(read.back(), messages.back());
 }
 
+TEST(McapReader, GoesOnBehindDamageInACutRecording) {
+  const auto chunk = [](std::uint64_t time, const char* text) {
+    const Bytes records = joined({kDefinitions, hand_message(1, time, text)});
+    return hand_chunk(time, time, records, bitwise_crc(records));
+  };
+  const Bytes first = joined({kStart, chunk(1, "one")});
+  for (const std::size_t at : {0U, 1U, 8U, 9U + 32U}) {  // opcode, its length, the length of what it holds
+    Bytes second = chunk(2, "two");
+    second[at] ^= 0x55;
+    const Bytes cut = joined({first, second, chunk(3, "three"), Bytes(5, 0x06)});
+    const auto reader = opened(cut, {.salvage = true});
+    const std::vector<std::int64_t> read = times(read_all(reader.get()));
+    EXPECT_EQ(read.front(), 1) << at;
+    EXPECT_EQ(read.back(), 3) << at;
+    EXPECT_TRUE(reader->loss().truncated) << at;
+  }
+}
+
+TEST(McapReader, SalvageGoesOnBehindADamagedHeader) {
+  const Bytes records = joined({kDefinitions, hand_message(1, 1, "one")});
+  Bytes bytes = joined({kStart, hand_chunk(1, 1, records, bitwise_crc(records))});
+  for (const std::size_t at : {0U, 5U, 8U, 9U, 16U}) {
+    Bytes damaged = bytes;
+    damaged[magic().size() + at] ^= 0x7f;
+    EXPECT_EQ(failure_of(damaged).code(), StatusCode::kDataLoss) << at;
+    const auto reader = opened(damaged, {.salvage = true});
+    EXPECT_EQ(read_all(reader.get()).size(), 1U) << at;
+    EXPECT_THAT(reader->loss().text(), HasSubstr("its header is damaged")) << at;
+  }
+}
+
 TEST(McapReader, KeepsMetadataAndSkipsAttachments) {
   const Bytes bytes = record({{"/1", 0, 1, 1, {}}}, {}, {{"settings", {{"seed", "1"}}}, {"settings", {{"seed", "2"}}}});
   const auto reader = opened(bytes);
