@@ -192,15 +192,16 @@ core::Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::
   for (const interfaces::McapMetadata& metadata : reader->reader_->metadata()) {
     if (metadata.name != kMetadataName) continue;
     const auto crc = metadata.values.find(kCrcKey);
-    if (crc != metadata.values.end() && crc->second != crc_text(metadata.values)) {
+    if (crc == metadata.values.end() || crc->second != crc_text(metadata.values)) {
       if (!options.salvage) {
-        return core::data_loss(path.string() +
-                               ": the checksum of its scene, seed and settings is wrong; copy it again, or read what "
-                               "is sound by `replay --salvage`");
+        return core::data_loss(path.string() + ": the checksum of its scene, seed and settings is " +
+                               (crc == metadata.values.end() ? "missing" : "wrong") +
+                               "; copy it again, or read what is sound by `replay --salvage`");
       }
       reader->info_is_damaged_ = true;
       continue;
     }
+    reader->has_info_ = true;
     const auto value = [&metadata](const char* key) {
       const auto found = metadata.values.find(key);
       return found == metadata.values.end() ? std::string() : found->second;
@@ -217,7 +218,13 @@ core::Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::
 std::string RecordingReader::loss_text() const {
   std::string text = reader_->loss().text();
   const auto say = [&text](const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; };
-  if (info_is_damaged_) say("its scene, seed and settings are damaged");
+  const auto& channels = reader_->channels();
+  const bool is_ours =
+      std::any_of(channels.begin(), channels.end(), [](const auto& channel) { return channel.topic == kStepTopic; });
+  if (info_is_damaged_)
+    say("its scene, seed and settings are damaged");
+  else if (is_ours && !has_info_)
+    say("its scene, seed and settings are not there");
   if (too_long_json_ > 0) say(std::to_string(too_long_json_) + " JSON documents above the size limit were left out");
   return text;
 }

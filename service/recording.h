@@ -97,8 +97,8 @@ struct RecordingReadOptions {
 
 class RecordingReader {
  public:
-  /// Errors of McapReader::open; kDataLoss where the checksum of what it says about itself is wrong (with `salvage`,
-  /// that is left out).
+  /// Errors of McapReader::open; kDataLoss where the checksum of what it says about itself is wrong or missing (with
+  /// `salvage`, that is left out).
   static core::Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path,
                                                              const RecordingReadOptions& options = {});
 
@@ -120,6 +120,7 @@ class RecordingReader {
   std::unique_ptr<interfaces::McapReader> reader_;
   bool salvage_ = false;
   RecordingInfo info_;
+  bool has_info_ = false;
   bool info_is_damaged_ = false;
   bool is_numbered_ = false;         // sequences are the lower bits of the messages' numbers
   std::uint64_t too_long_json_ = 0;  // left out

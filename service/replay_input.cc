@@ -22,7 +22,8 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
     PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
     input.info_ = reader->info();
     input.read_ = options.read;
-    input.read_.check_data = false;  // Once is enough; chunks are checked whenever they are read.
+    // Once is enough, and chunks are checked whenever they are read; but what is salvaged has its loss told at the end.
+    input.read_.check_data = options.read.salvage;
   }
   if (input.scene_) return input;
   if (!options.scene_file.empty()) {

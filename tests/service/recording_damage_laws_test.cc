@@ -71,6 +71,10 @@ class RecordingDamageLaws : public ::testing::Test {
     return content;
   }
 
+  bool is_whole(const Content& content) const {
+    return same(content.info, whole_.info) && content.entries.size() == whole_.entries.size() && begins_whole(content);
+  }
+
   bool begins_whole(const Content& content) const {
     return content.entries.size() <= whole_.entries.size() &&
            std::equal(content.entries.begin(), content.entries.end(), whole_.entries.begin(),
@@ -146,6 +150,35 @@ TEST_F(RecordingDamageLaws, AFlippedBitInTheSceneOfACutRecordingIsNoticed) {
     ASSERT_TRUE(same(salvaged.info, {}));
     ASSERT_NE(salvaged.loss.find("scene, seed and settings are damaged"), std::string::npos) << salvaged.loss;
     ASSERT_TRUE(begins_whole(salvaged));
+  }
+}
+
+TEST_F(RecordingDamageLaws, WhatIsSalvagedSaysWhatIsLost) {
+  core::RandomStream stream(4, core::Purpose::kTest);
+  for (int i = 0; i < 600; ++i) {
+    const std::size_t at = place_in(bytes_.size(), i, stream);
+    const auto bit = static_cast<std::uint8_t>(1U << stream.uniform_below(8));
+    Bytes damaged = bytes_;
+    damaged[at] ^= bit;
+    const Content content = content_of(damaged, {.salvage = true});
+    if (content.refused || !content.loss.empty()) continue;
+    ASSERT_TRUE(is_whole(content)) << "bit " << int{bit} << " of byte " << at << " of " << bytes_.size();
+  }
+}
+
+TEST_F(RecordingDamageLaws, ADescriptionWithoutItsChecksumIsNotBelieved) {
+  const std::string key = "crc32";
+  const auto place = std::search(bytes_.begin(), bytes_.end(), key.begin(), key.end());
+  ASSERT_NE(place, bytes_.end());
+  Bytes damaged = bytes_;
+  damaged[static_cast<std::size_t>(place - bytes_.begin())] ^= 1;
+  for (const std::size_t length : {bytes_.size(), bytes_.size() / 2}) {
+    damaged.resize(length);
+    EXPECT_TRUE(content_of(damaged).refused) << length;
+    const Content salvaged = content_of(damaged, {.salvage = true});
+    EXPECT_FALSE(salvaged.refused) << length;
+    EXPECT_TRUE(same(salvaged.info, {})) << length;
+    EXPECT_NE(salvaged.loss.find("scene, seed and settings are damaged"), std::string::npos) << salvaged.loss;
   }
 }
 

@@ -203,6 +203,7 @@ TEST(Replay, RefusesADamagedRecordingAndSalvagesWhatIsSound) {
       run_program({"replay", path, "--salvage", "--scene", (folder.path() / "box.yaml").string()});
   EXPECT_EQ(salvaged.exit_code, 0) << salvaged.err;
   EXPECT_NE(salvaged.out.find("its scene, seed and settings are damaged"), std::string::npos) << salvaged.out;
+  EXPECT_NE(salvaged.out.find("the checksum of its data section is wrong"), std::string::npos) << salvaged.out;
 }
 
 }  // namespace
