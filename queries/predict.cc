@@ -228,6 +228,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   if (use_own_outcomes) answer.left_out = prior.left_out;
   answer.remarks = remarks_of(answer, query.effort);
   if (!missing.empty()) answer.remarks.push_back(missing_text(missing));
+  remark_on_actions(*foresight.scene, foresight.request.stop.duration, answer.remarks);
   remark_on_leaving(foresight.estimate, answer.remarks);
   if (!flight.ok())
     answer.remarks.push_back("For how long nothing can touch anything is not told: " + flight.message() + ".");

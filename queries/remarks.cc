@@ -2,6 +2,7 @@
 // What one should know before trusting the numbers, in sentences.
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "basis.h"
 #include "prediction_parts.h"
@@ -144,6 +145,34 @@ void remark_on_tolerance(const belief::Basis& basis, const belief::Effort& effor
 }
 
 }  // namespace
+
+void remark_on_actions(const belief::Scene& scene, double duration, std::vector<std::string>& remarks) {
+  std::set<std::string> held;
+  for (const belief::SceneObject& object : scene.objects)
+    if (object.held_by) held.insert(object.name);
+  for (const belief::Action& action : scene.actions) {  // they ascend in time
+    const std::string object = belief::object_of(action);
+    const std::string which = "'" + belief::kind_of(action) + (object.empty() ? "" : " " + object) + "' at " +
+                              core::rounded_text(action.time) + " s";
+    if (action.time >= duration) {
+      remarks.push_back("The action " + which + " is not done: the " + core::rounded_text(duration) +
+                        " s that are simulated end before. Ask for a longer duration, or for an earlier action.");
+      continue;
+    }
+    const bool grasps = std::holds_alternative<belief::Grasp>(action.what);
+    const bool lets_go =
+        std::holds_alternative<belief::Release>(action.what) || std::holds_alternative<belief::Place>(action.what);
+    if (!object.empty() && !grasps && !held.contains(object))
+      remarks.push_back("Nothing holds '" + object + "' when the action " + which +
+                        (std::holds_alternative<belief::Release>(action.what)
+                             ? " comes: it changes nothing."
+                             : " begins: it is moved as if something that is not seen held it."));
+    if (lets_go)
+      held.erase(object);
+    else if (!object.empty())
+      held.insert(object);
+  }
+}
 
 std::vector<std::string> remarks_of(const belief::Basis& basis, const belief::Effort& effort) {
   std::vector<std::string> remarks;
