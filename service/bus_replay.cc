@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <map>
 #include <mutex>
@@ -11,8 +12,11 @@
 #include <utility>
 
 #include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
+#include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
+#include "prescene/service/question_client.h"
 #include "prescene/service/topics.h"
 
 namespace prescene::service {
@@ -22,8 +26,14 @@ using interfaces::DdsPublisher;
 using interfaces::TopicQos;
 using std::chrono::steady_clock;
 
+// How late a request to cancel is seen.
+constexpr std::chrono::milliseconds kSlice(50);
+// s; a recording whose times are years apart is played until someone stops it.
+constexpr double kLongestWait = 1e9;
+
 steady_clock::duration seconds(double value) {
-  return std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>(value));
+  return std::chrono::duration_cast<steady_clock::duration>(
+      std::chrono::duration<double>(std::min(value, kLongestWait)));
 }
 
 /// What comes back from the service; filled by the bus's thread.
@@ -47,22 +57,31 @@ class Listener {
         std::chrono::duration<double>(steady_clock::now() - asked->second.second).count();
     changed_.notify_all();
   }
-  void expect(const std::string& id, double at, const std::string& question) {
+  void expect(const std::string& id, double at, const std::string& question, double wait) {
     const std::lock_guard lock(mutex_);
-    asked_[id] = {answers_.size(), steady_clock::now()};
+    const auto now = steady_clock::now();
+    asked_[id] = {answers_.size(), now};
     answers_.push_back({at, question, "", 0.0});
+    answers_until_ = std::max(answers_until_, now + seconds(wait));
   }
-  /// Until every question has its answer and a belief at or after `stamp_ns` came, or `until`.
-  void wait_for_rest(core::TimeNs stamp_ns, steady_clock::time_point until) {
+  /// Until a belief at or after `stamp_ns` came or `until`, and every question has its answer or had its time.
+  void wait_for_rest(core::TimeNs stamp_ns, steady_clock::time_point until, const core::Cancellation& cancellation) {
     std::unique_lock lock(mutex_);
-    changed_.wait_until(lock, until, [&] {
-      return (!beliefs_.empty() && beliefs_.back().stamp_ns >= stamp_ns) &&
-             std::all_of(answers_.begin(), answers_.end(), [](const auto& a) { return !a.answer.empty(); });
-    });
+    const auto has_beliefs = [&] { return !beliefs_.empty() && beliefs_.back().stamp_ns >= stamp_ns; };
+    const auto has_answers = [&] {
+      return std::all_of(answers_.begin(), answers_.end(), [](const auto& a) { return !a.answer.empty(); });
+    };
+    while (!cancellation.requested()) {
+      const auto now = steady_clock::now();
+      if ((has_beliefs() || now >= until) && (has_answers() || now >= answers_until_)) return;
+      changed_.wait_for(lock, kSlice);
+    }
   }
-  void wait_until(steady_clock::time_point until) {
+  void wait_until(steady_clock::time_point until, const core::Cancellation& cancellation) {
     std::unique_lock lock(mutex_);
-    changed_.wait_until(lock, until, [] { return false; });
+    while (!cancellation.requested() && steady_clock::now() < until) {
+      changed_.wait_until(lock, std::min(until, steady_clock::now() + kSlice));
+    }
   }
   void move_to(BusReplayResult& result) {
     const std::lock_guard lock(mutex_);
@@ -76,6 +95,7 @@ class Listener {
   std::vector<BeliefSummary> beliefs_;
   std::vector<BusReplayResult::Answered> answers_;
   std::map<std::string, std::pair<std::size_t, steady_clock::time_point>> asked_;
+  steady_clock::time_point answers_until_;
 };
 
 class BusPlayer {
@@ -113,13 +133,11 @@ class BusPlayer {
     return found->second;
   }
 
-  core::Status ask(std::size_t number, const TimedQuestion& question) {
+  core::Status ask(std::size_t number, double at, const TimedQuestion& question) {
     auto json = parse_or_discard(question.json);
-    if (!json.is_object())
-      return core::invalid_input("question " + std::to_string(number) + " is not a JSON object: " + question.json);
     const std::string id = "replay-" + std::to_string(core::wall_now_ns()) + "-" + std::to_string(number);
     json["id"] = id;
-    listener_.expect(id, question.at, question.json);
+    listener_.expect(id, at, question.json, seconds_to_wait(json));
     return node_.publish(questions_, interfaces::RosString{belief::json_text(json)});
   }
 
@@ -131,7 +149,7 @@ class BusPlayer {
                        std::all_of(publishers_.begin(), publishers_.end(),
                                    [&](const auto& entry) { return node_.matched_readers(entry.second) > 0; });
       if (all) return true;
-      listener_.wait_until(steady_clock::now() + std::chrono::milliseconds(20));
+      listener_.wait_until(steady_clock::now() + std::chrono::milliseconds(20), cancellation);
     }
     return false;
   }
@@ -142,6 +160,18 @@ class BusPlayer {
   DdsPublisher questions_;
   std::map<std::string, DdsPublisher> publishers_;
 };
+
+core::Status validate(const BusReplayOptions& options) {
+  PRESCENE_RETURN_IF_ERROR(belief::check_number(options.speed, kReplaySpeeds).at("speed"));
+  for (const TimedQuestion& question : options.questions) {
+    if (!(question.at >= 0.0) || !std::isfinite(question.at))
+      return core::invalid_input("the time of a question is " + core::fixed_text(question.at, 2) +
+                                 ": give seconds from 0 on");
+    if (!parse_or_discard(question.json).is_object())
+      return core::invalid_input("a question is not a JSON object: " + question.json);
+  }
+  return core::ok_status();
+}
 
 /// Robot topics only: what the recording's own service said is not said again.
 bool is_robots(const RecordedEntry& entry) {
@@ -155,6 +185,7 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
                                               const core::Cancellation& cancellation,
                                               const core::ProgressSink& progress, const core::LogSink& log,
                                               const std::function<void(const RecordedEntry&)>& on_entry) {
+  PRESCENE_RETURN_IF_ERROR(validate(options));
   Listener listener;
   interfaces::DdsOptions dds = options.dds;
   dds.node_name = "prescene_replay";
@@ -176,12 +207,13 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   }
 
   RecordingReadOptions again = options.read;
-  again.check_data = false;  // It was, just now.
+  again.check_data = options.read.salvage;  // It was just now, but what is salvaged has its loss told.
   PRESCENE_TRY(const auto reader, RecordingReader::open(path, again));
   BusReplayResult result;
   const auto start = steady_clock::now();
   std::optional<core::TimeNs> first_ns;
   core::TimeNs last_stamp_ns = 0;
+  double at = 0.0;
   std::size_t asked = 0;
   std::uint64_t entries = 0;
   const double total = static_cast<double>(reader->message_count().value_or(0));
@@ -189,12 +221,11 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
     PRESCENE_TRY(const auto entry, reader->next());
     if (!entry) break;
     if (!first_ns) first_ns = entry->message.received_ns;
-    const double at = core::seconds_of(entry->message.received_ns - *first_ns);
-    listener.wait_until(start + seconds(at / options.speed));
-    while (asked < options.questions.size() && options.questions[asked].at <= at) {
-      PRESCENE_RETURN_IF_ERROR(player.ask(asked, options.questions[asked]));
-      ++asked;
-    }
+    at = core::seconds_of(entry->message.received_ns - *first_ns);
+    listener.wait_until(start + seconds(at / options.speed), cancellation);
+    if (cancellation.requested()) break;
+    for (; asked < options.questions.size() && options.questions[asked].at <= at; ++asked)
+      PRESCENE_RETURN_IF_ERROR(player.ask(asked, options.questions[asked].at, options.questions[asked]));
     if (on_entry) on_entry(*entry);
     if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
     if (!is_robots(*entry)) continue;
@@ -205,9 +236,13 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
         std::max(last_stamp_ns, entry->message.type == "sensor_msgs/msg/Image" ? entry->message.source_ns : 0);
     ++result.messages;
   }
-  for (; asked < options.questions.size(); ++asked)
-    PRESCENE_RETURN_IF_ERROR(player.ask(asked, options.questions[asked]));
-  listener.wait_for_rest(last_stamp_ns, steady_clock::now() + seconds(options.wait_at_end));
+  for (; asked < options.questions.size() && !cancellation.requested(); ++asked) {
+    core::log(log, core::LogLevel::kWarning,
+              "the recording ends at " + core::fixed_text(at, 2) + " s, before the question for " +
+                  core::fixed_text(options.questions[asked].at, 2) + " s: it is asked now");
+    PRESCENE_RETURN_IF_ERROR(player.ask(asked, at, options.questions[asked]));
+  }
+  listener.wait_for_rest(last_stamp_ns, steady_clock::now() + seconds(options.wait_at_end), cancellation);
   node->stop_receiving();
   listener.move_to(result);
   result.loss = reader->loss_text();

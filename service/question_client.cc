@@ -3,11 +3,13 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/answering_desk.h"
@@ -19,6 +21,9 @@ namespace {
 
 using std::chrono::steady_clock;
 
+constexpr double kMostWait = 15.0;  // s, where the question has no limit
+// What a question's own limit leaves the service to end and the answer to come.
+constexpr double kMoreThanLimit = 3.0;
 constexpr std::chrono::milliseconds kAskInterval(20);
 // A service that was killed took the question with it: it is asked again after this time.
 constexpr std::chrono::seconds kAskAgain(2);
@@ -38,6 +43,18 @@ std::string new_id() {
 }
 
 }  // namespace
+
+double seconds_to_wait(const nlohmann::ordered_json& question) {
+  double wait = kMostWait;
+  if (!question.is_object()) return wait;
+  for (const nlohmann::ordered_json& asked : question) {
+    if (!asked.is_object() || !asked.contains("effort") || !asked["effort"].is_object()) continue;
+    const auto limit = asked["effort"].find("max_seconds");
+    if (limit != asked["effort"].end() && limit->is_number())
+      wait = std::max(wait, limit->get<double>() + kMoreThanLimit);
+  }
+  return std::min(wait, belief::kWallSeconds.high);
+}
 
 core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const interfaces::DdsOptions& dds,
                                                                      const core::LogSink& log) {

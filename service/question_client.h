@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
@@ -13,6 +14,10 @@
 #include "prescene/interfaces/dds/dds_node.h"
 
 namespace prescene::service {
+
+/// s to wait for the answer to a question: more than a service without a limit in the question takes (10 s, and 2 s to
+/// end), or than its `max_seconds`. At most belief::kWallSeconds.high.
+double seconds_to_wait(const nlohmann::ordered_json& question);
 
 class QuestionClient {
  public:

@@ -3,7 +3,6 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
-
 #include "verb.h"
 
 namespace prescene::service {
@@ -23,6 +22,20 @@ std::string basis(const nlohmann::ordered_json& answer) {
                      fixed_text(answer.value("wall_seconds", 0.0), 1) + " s\n";
   for (const std::string& remark : answer.value("remarks", std::vector<std::string>{})) text += remark + "\n";
   return text;
+}
+
+/// The document without pictures and other long texts: whoever wants them takes --json.
+void leave_out_long_texts(nlohmann::ordered_json& document) {
+  constexpr std::size_t kLongest = 400;
+  if (document.is_string() && document.get_ref<const std::string&>().size() > kLongest)
+    document = counted(document.get_ref<const std::string&>().size(), "byte") + ", with --json";
+  else if (document.is_structured())
+    for (nlohmann::ordered_json& part : document) leave_out_long_texts(part);
+}
+
+std::string document_text(nlohmann::ordered_json document) {
+  leave_out_long_texts(document);
+  return belief::json_text(document, 2) + "\n";
 }
 
 std::string short_form(const nlohmann::ordered_json& answer) {
@@ -54,7 +67,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
     }
     return table(rows);
   }
-  return belief::json_text(answer, 2) + "\n";
+  return document_text(answer);
 }
 
 }  // namespace
@@ -64,9 +77,9 @@ std::string answer_text(const nlohmann::ordered_json& answer) {
     const bool nothing_seen = !answer.contains("step") || answer.at("step") == 0;
     return short_form(answer) + (nothing_seen ? "no frame was seen yet: this is what the scene file says\n" : "");
   } catch (const nlohmann::ordered_json::exception&) {  // somebody else's answer, of another form
-    return belief::json_text(answer, 2) + "\n";
+    return document_text(answer);
   } catch (const std::out_of_range&) {
-    return belief::json_text(answer, 2) + "\n";
+    return document_text(answer);
   }
 }
 

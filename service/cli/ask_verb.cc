@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
@@ -12,16 +12,11 @@
 namespace prescene::service {
 namespace {
 
-// More than a service takes for a question without limits, 10 s, and the 2 s in which it ends.
-constexpr double kTimeout = 15.0;
-// What a question's own limit leaves the service to end and the answer to come.
-constexpr double kMoreThanEffort = 3.0;
-
 struct AskOptions {
   std::string kind;
   std::string object;
   std::string json;
-  double timeout = kTimeout;
+  std::optional<double> timeout;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
 };
@@ -55,25 +50,13 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
   return core::invalid_input("ask where | stability OBJECT | release OBJECT, or --question JSON");
 }
 
-/// As given, else longer than the service may take.
-double timeout_of(const AskOptions& options, const nlohmann::ordered_json& question) {
-  double timeout = options.timeout;
-  if (options.verb->count("--timeout") > 0) return timeout;
-  for (const nlohmann::ordered_json& asked : question) {
-    if (!asked.is_object() || !asked.contains("effort") || !asked["effort"].is_object()) continue;
-    const auto limit = asked["effort"].find("max_seconds");
-    if (limit != asked["effort"].end() && limit->is_number())
-      timeout = std::max(timeout, limit->get<double>() + kMoreThanEffort);
-  }
-  return std::min(timeout, belief::kWallSeconds.high);
-}
-
 core::Status run(AskOptions& options, VerbContext& context) {
   PRESCENE_TRY(const auto question, question_of(options));
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
   PRESCENE_TRY(const std::string text,
-               client->ask(belief::json_text(question), timeout_of(options, question), context.cancellation()));
+               client->ask(belief::json_text(question), options.timeout.value_or(seconds_to_wait(question)),
+                           context.cancellation()));
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
   PRESCENE_RETURN_IF_ERROR(belief::error_from_json(answer));
@@ -93,9 +76,8 @@ Verb add_ask_verb(CLI::App& app) {
   verb->add_option("--question", options->json, "Any question as JSON (docs/queries.md) instead")->check(utf8_text());
   verb->add_option(
           "--timeout", options->timeout,
-          "How long to wait for an answer, s; by itself 3 s more than a --question's max_seconds where that is longer")
-      ->check(in_range(belief::kWallSeconds))
-      ->capture_default_str();
+          "How long to wait for an answer, s; default: 15, or 3 more than a --question's max_seconds if that is longer")
+      ->check(in_range(belief::kWallSeconds));
   options->verb = verb;
   add_domain_option(*verb, options->dds);
   verb->footer("Example: prescene ask stability carton");

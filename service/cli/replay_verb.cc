@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "final_states.h"
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/service/bus_replay.h"
 #include "prescene/service/foreseen.h"
@@ -42,7 +44,8 @@ core::Result<TimedQuestion> timed_question(const std::string& text) {
   const std::size_t colon = text.find(':');
   char* end = nullptr;
   const double at = std::strtod(text.c_str(), &end);
-  if (colon == std::string::npos || end != text.c_str() + colon || !(at >= 0.0)) {
+  const bool is_time = colon != std::string::npos && end == text.c_str() + colon && at >= 0.0 && std::isfinite(at);
+  if (!is_time || !parse_or_discard(std::string_view(text).substr(colon + 1)).is_object()) {
     return core::invalid_input("--ask SECONDS:JSON, as 2.5:'{\"where\": {}}'; this is not: " + text);
   }
   return TimedQuestion{at, text.substr(colon + 1)};
@@ -63,17 +66,27 @@ void tell_unchecked(const ReplayOptions& options, const std::string& unchecked, 
   if (!unchecked.empty()) core::log(context.log(), core::LogLevel::kInfo, options.input + ": " + unchecked);
 }
 
+/// Whether every question has its answer.
+core::Status check_answers(const std::vector<BusReplayResult::Answered>& answers) {
+  for (const BusReplayResult::Answered& answered : answers) {
+    if (answered.answer.empty()) return core::unavailable("not every question was answered");
+    PRESCENE_RETURN_IF_ERROR(belief::error_from_json(parse_or_discard(answered.answer))
+                                 .at("the question at " + fixed_text(answered.at, 2) + " s"));
+  }
+  return core::ok_status();
+}
+
 core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
-  PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
-  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   for (const std::string& text : options.questions) {
     PRESCENE_TRY(TimedQuestion question, timed_question(text));
     options.bus.questions.push_back(std::move(question));
   }
+  PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
+  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
                    [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
   options.bus.read = options.read;
-  options.bus.read.check_data = false;  // It was when the input was opened.
+  options.bus.read.check_data = options.read.salvage;  // It was when the input was opened, but its loss is told here.
   TrackingScore score(input.scene());
   SessionReport report(input.scene(), settings.topics);
   ForeseenAndCame foreseen(input.scene(), settings.topics.depth);
@@ -131,11 +144,8 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
                 std::to_string(result.messages) + " messages played, " + std::to_string(result.beliefs.size()) +
                     " beliefs came back\n" + answers_text(result.answers) + foreseen_text_of(foreseen) + states.text() +
                     tracking_text(rows));
-  const bool unanswered =
-      std::any_of(result.answers.begin(), result.answers.end(), [](const auto& a) { return a.answer.empty(); });
-  if (unanswered) return core::unavailable("not every question was answered");
   if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
-  return core::ok_status();
+  return check_answers(result.answers);
 }
 
 core::Status run_here(ReplayOptions& options, VerbContext& context) {
@@ -267,7 +277,7 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_flag("--over-dds", options->over_dds,
                  "Publish the robot's messages as they were, and listen to a running `serve`");
   verb->add_option("--speed", options->bus.speed, "Over DDS: times as fast as recorded")
-      ->check(positive_number())
+      ->check(in_range(kReplaySpeeds))
       ->needs("--over-dds")
       ->capture_default_str();
   verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable")

@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <memory>
 #include <mutex>
@@ -38,6 +40,16 @@ class QuestionClientTest : public ::testing::Test {
   core::Cancellation never_;
   core::Result<std::unique_ptr<QuestionClient>> client_ = QuestionClient::create(options(), {});
 };
+
+TEST(SecondsToWait, AreMoreThanTheServiceMayTake) {
+  const auto wait = [](const char* question) { return seconds_to_wait(nlohmann::ordered_json::parse(question)); };
+  EXPECT_EQ(wait(R"({"where": {}})"), 15.0);
+  EXPECT_EQ(wait(R"({"predict": {"effort": {"max_seconds": 2}}})"), 15.0);
+  EXPECT_EQ(wait(R"({"predict": {"effort": {"max_seconds": 60}}})"), 63.0);
+  for (const char* odd : {"3", "[]", R"({"predict": 7})", R"({"predict": {"effort": {"max_seconds": "x"}}})"})
+    EXPECT_EQ(wait(odd), 15.0) << odd;
+  EXPECT_EQ(wait(R"({"predict": {"effort": {"max_seconds": 1e300}}})"), 1e6);
+}
 
 TEST_F(QuestionClientTest, RefusesWhatIsNoQuestionAtOnce) {
   EXPECT_THAT(error_of("[1]", kPatience), HasSubstr("invalid input"));

@@ -313,13 +313,17 @@ TEST(CommandLine, TwoOutputsAreTwoFiles) {
   EXPECT_FALSE(std::filesystem::exists(output));
 }
 
-TEST(CommandLine, OptionsThatWouldDoNothingAreRefused) {
+TEST(CommandLine, OptionsThatMakeNoSenseAreRefused) {
   const ScratchDir folder;
   const std::string output = (folder.path() / "run.mcap").string();
   const std::string scene = scenario("milk_on_bin");
   const std::pair<std::vector<std::string>, std::string> all[] = {
       {{"replay", scene, "--speed", "2"}, "--over-dds"},
       {{"replay", scene, "--ask", "1:{}"}, "--over-dds"},
+      {{"replay", scene, "--over-dds", "--speed", "1e-300"}, "between 0.001 and 10000"},
+      {{"replay", scene, "--over-dds", "--speed", "1e300"}, "between 0.001 and 10000"},
+      {{"replay", scene, "--over-dds", "--ask", "1:garbage"}, "--ask SECONDS:JSON"},
+      {{"replay", scene, "--over-dds", "--ask", "inf:{}"}, "--ask SECONDS:JSON"},
       {{"replay", scene, "--scene", ""}, "file name"},
       {{"record", "-o", output, "--rate", "10"}, "--simulate"},
       {{"record", "-o", output, "--simulate", scene, "--depth-topic", ""}, "depth topic has no name"},

@@ -194,6 +194,13 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
     ASSERT_EQ(asked.exit_code, 0) << asked.err;
     EXPECT_GT(parsed(asked)["stability"]["stable"]["probability"].get<double>(), 0.8) << asked.out;
     EXPECT_EQ(run_program({"ask", "stability", "nobody"}, bus_).exit_code, 2);
+    // A question that is refused, and one for a time after the recording's end.
+    const Finished refused = run_program({"replay", path("run.mcap"), "--over-dds", "--json", "--speed", "10", "--ask",
+                                          R"(1e9:{"stability": {"object": "nobody"}})"},
+                                         bus_);
+    EXPECT_EQ(refused.exit_code, 2) << refused.err;
+    EXPECT_NE(refused.err.find("it is asked now"), std::string::npos) << refused.err;
+    EXPECT_LT(parsed(refused)["answers"][0]["at"].get<double>(), 60.0) << refused.out;
     EXPECT_EQ(service.stop(SIGKILL), 128 + SIGKILL);
   }
   {
