@@ -51,7 +51,7 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, s
   PRESCENE_TRY(const InputFile file, InputFile::open(path));
   if (file.size() > max_bytes) {
     return core::resource_exhausted(path.string() + ": " + size_text(file.size()) + " are more than the limit of " +
-                                    size_text(max_bytes) + "; use a smaller file or raise the limit");
+                                    size_text(max_bytes) + "; use a smaller file");
   }
   std::vector<std::uint8_t> bytes(file.size());
   PRESCENE_RETURN_IF_ERROR(file.read(0, bytes));
