@@ -104,7 +104,7 @@ class ObjParser {
         return core::invalid_input(quote(word) + " is no corner of a face; vertices count from 1");
       }
       const auto known = static_cast<long long>(out_.mesh.vertices.size());
-      if (index < 0 && -index > known) {
+      if (index < -known) {
         return core::invalid_input("vertex " + std::to_string(index) + " counted back from the last of " +
                                    std::to_string(known) + " is none");
       }
