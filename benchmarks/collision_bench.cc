@@ -14,14 +14,14 @@
 #include <string_view>
 #include <vector>
 
-#include "prescene/benchmarks/collision_algorithms.h"
-#include "prescene/benchmarks/collision_measure.h"
-#include "prescene/benchmarks/collision_plots.h"
-#include "prescene/benchmarks/collision_tables.h"
-#include "prescene/benchmarks/collision_targets.h"
-#include "prescene/benchmarks/report.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/paths.h"
+#include "benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_measure.h"
+#include "benchmarks/collision_plots.h"
+#include "benchmarks/collision_tables.h"
+#include "benchmarks/collision_targets.h"
+#include "benchmarks/report.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/paths.h"
 
 namespace prescene::benchmarks {
 namespace {

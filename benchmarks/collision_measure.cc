@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/collision_measure.h"
+#include "benchmarks/collision_measure.h"
 
 #include <hwy/targets.h>
 
@@ -11,10 +11,10 @@
 #include <memory>
 #include <utility>
 
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/statistics.h"
 #include "prescene/core/check.h"
-#include "prescene/tests/support/brute_force.h"
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/contact_configurations.h"
 
 namespace prescene::benchmarks {
 namespace {

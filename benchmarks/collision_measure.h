@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "prescene/benchmarks/collision_algorithms.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "benchmarks/collision_algorithms.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::benchmarks {
 

@@ -2,13 +2,13 @@
 #include <algorithm>
 #include <string>
 
-#include "prescene/benchmarks/collision_algorithms.h"
-#include "prescene/benchmarks/collision_tables.h"
-#include "prescene/benchmarks/collision_targets.h"
+#include "benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_tables.h"
+#include "benchmarks/collision_targets.h"
 #include "prescene/collision/dops/boxtree.h"
 #include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -3,7 +3,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "prescene/benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_algorithms.h"
 #include "prescene/collision/distance_queries.h"
 #include "prescene/collision/dops/boxtree.h"
 #include "prescene/collision/dops/bvhlite_tree.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
 
-#include "prescene/benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_algorithms.h"
 #include "prescene/core/check.h"
-#include "prescene/tests/peers/mesh_collision.h"
+#include "tests/peers/mesh_collision.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/collision_plots.h"
+#include "benchmarks/collision_plots.h"
 
 #include <algorithm>
 #include <limits>
@@ -7,8 +7,8 @@
 #include <utility>
 #include <variant>
 
-#include "prescene/benchmarks/collision_algorithms.h"
-#include "prescene/benchmarks/collision_tables.h"
+#include "benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_tables.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "prescene/benchmarks/collision_measure.h"
-#include "prescene/benchmarks/plot.h"
+#include "benchmarks/collision_measure.h"
+#include "benchmarks/plot.h"
 
 namespace prescene::benchmarks {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "prescene/benchmarks/collision_tables.h"
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/collision_tables.h"
+#include "benchmarks/statistics.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "prescene/benchmarks/collision_targets.h"
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/collision_targets.h"
+#include "benchmarks/statistics.h"
 #include "prescene/collision/spheres/relative_uncertainty.h"
 #include "prescene/collision/spheres/scalar_sphere_queries.h"
 #include "prescene/collision/spheres/sphere_packing.h"
@@ -19,7 +19,7 @@
 #include "prescene/collision/spheres/sphere_tree.h"
 #include "prescene/collision/spheres/uncertain_sphere_queries.h"
 #include "prescene/core/check.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::benchmarks {
 namespace {

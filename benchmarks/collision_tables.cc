@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/collision_tables.h"
+#include "benchmarks/collision_tables.h"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/statistics.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <string_view>
 
-#include "prescene/benchmarks/collision_measure.h"
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/collision_measure.h"
+#include "benchmarks/report.h"
 
 namespace prescene::benchmarks {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/collision_targets.h"
+#include "benchmarks/collision_targets.h"
 
 #include <algorithm>
 #include <array>
@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "prescene/benchmarks/collision_algorithms.h"
-#include "prescene/benchmarks/collision_tables.h"
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_tables.h"
+#include "benchmarks/statistics.h"
 #include "prescene/collision/triangle_tree.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::benchmarks {
 namespace {

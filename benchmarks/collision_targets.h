@@ -2,8 +2,8 @@
 // What the collision library is meant to reach, and what it reached.
 #pragma once
 
-#include "prescene/benchmarks/collision_measure.h"
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/collision_measure.h"
+#include "benchmarks/report.h"
 
 namespace prescene::benchmarks {
 

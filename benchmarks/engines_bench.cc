@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outcome probabilities of twenty small scenes (prescene/tests/support/engine_scenes.h) by both steppers and by MuJoCo,
+// Outcome probabilities of twenty small scenes (tests/support/engine_scenes.h) by both steppers and by MuJoCo,
 // from the same uncertain starts: where do engines disagree by more than sampling explains?
 //
 //   bench_engines [--quick] [--instances=N] [--benchmark_out=PATH]
@@ -13,13 +13,13 @@
 #include <string_view>
 #include <utility>
 
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/report.h"
 #include "prescene/core/check.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 #include "prescene/simulation/uncertain/outcome_estimator.h"
-#include "prescene/tests/peers/scene_mujoco.h"
-#include "prescene/tests/support/engine_scenes.h"
+#include "tests/peers/scene_mujoco.h"
+#include "tests/support/engine_scenes.h"
 
 namespace prescene::benchmarks {
 namespace {

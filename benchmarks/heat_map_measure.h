@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "prescene/benchmarks/uncertain_measure.h"
+#include "benchmarks/uncertain_measure.h"
 
 namespace prescene::benchmarks {
 

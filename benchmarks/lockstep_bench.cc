@@ -12,13 +12,13 @@
 #include <string_view>
 #include <vector>
 
-#include "prescene/benchmarks/processor_time.h"
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/processor_time.h"
+#include "benchmarks/report.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/plot.h"
+#include "benchmarks/plot.h"
 
 #include <algorithm>
 #include <array>

@@ -14,8 +14,8 @@
 #include <string_view>
 #include <vector>
 
-#include "prescene/benchmarks/processor_time.h"
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/processor_time.h"
+#include "benchmarks/report.h"
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
 #include "prescene/geometry/primitives.h"
@@ -26,9 +26,9 @@
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/rendering/simulated_camera.h"
-#include "prescene/tests/peers/ray_packets.h"
-#include "prescene/tests/support/target_test.h"
 #include "rendering_tracking.h"
+#include "tests/peers/ray_packets.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::benchmarks {
 namespace {

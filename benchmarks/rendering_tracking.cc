@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "prescene/benchmarks/processor_time.h"
+#include "benchmarks/processor_time.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/report.h"
 
 #include <hwy/highway.h>
 #include <algorithm>

@@ -19,7 +19,7 @@
 #include <variant>
 #include <vector>
 
-#include "prescene/benchmarks/plot.h"
+#include "benchmarks/plot.h"
 #include "prescene/core/status.h"
 
 namespace prescene::benchmarks {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/tree_contacts.h"
+#include "benchmarks/tree_contacts.h"
 
 #include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "prescene/benchmarks/processor_time.h"
-#include "prescene/benchmarks/statistics.h"
+#include "benchmarks/processor_time.h"
+#include "benchmarks/statistics.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
-#include "prescene/tests/peers/bullet_world.h"
-#include "prescene/tests/support/hollow_meshes.h"
+#include "tests/peers/bullet_world.h"
+#include "tests/support/hollow_meshes.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -3,7 +3,7 @@
 // shipped with the same convex parts and with GImpact.
 #pragma once
 
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/report.h"
 
 namespace prescene::benchmarks {
 

@@ -14,13 +14,13 @@
 #include <string_view>
 #include <utility>
 
-#include "prescene/benchmarks/heat_map_measure.h"
-#include "prescene/benchmarks/report.h"
-#include "prescene/benchmarks/statistics.h"
-#include "prescene/benchmarks/tree_contacts.h"
-#include "prescene/benchmarks/uncertain_measure.h"
+#include "benchmarks/heat_map_measure.h"
+#include "benchmarks/report.h"
+#include "benchmarks/statistics.h"
+#include "benchmarks/tree_contacts.h"
+#include "benchmarks/uncertain_measure.h"
 #include "prescene/service/evaluate/cube_tosses.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/uncertain_measure.h"
+#include "benchmarks/uncertain_measure.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What estimates of outcome probabilities cost and whether their intervals hold, on the scenes of
-// prescene/tests/support/uncertain_scenes.h.
+// tests/support/uncertain_scenes.h.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 #include "prescene/simulation/uncertain/certifier.h"
 #include "prescene/simulation/uncertain/outcome_estimator.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::benchmarks {
 

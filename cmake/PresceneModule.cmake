@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# One folder a module, one library a module. A module's public headers are reached as "prescene/<folder>/<header>" through
-# an include root of its own, a folder of links in the build tree; whoever does not name the module in USES, directly or
-# through a module that does, cannot include them.
+# One folder a module, one library a module. A module's public headers lie in <folder>/include/prescene/<folder> and are
+# included as "prescene/<folder>/<header>"; whoever does not name the module in USES, directly or through a module that
+# does, cannot include them. Those of tests and benchmarks are included by their path from the project's root.
 
 # Sources that the build makes (message types): clang-tidy needs them, though nothing else of the build.
 add_custom_target(prescene_generated)
@@ -15,22 +15,8 @@ function(prescene_add_folders)
   endforeach()
 endfunction()
 
-# Links every header of `headers` into `root`/prescene/<folder>, leaving nothing else there.
-function(prescene_link_headers root folder headers)
-  file(REMOVE_RECURSE "${root}")
-  foreach(header IN LISTS headers)
-    if(NOT EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${header}")
-      message(FATAL_ERROR "${CMAKE_CURRENT_LIST_FILE}: the header ${header} is listed but does not exist.")
-    endif()
-    get_filename_component(subfolder "${header}" DIRECTORY)
-    file(MAKE_DIRECTORY "${root}/prescene/${folder}/${subfolder}")
-    file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}/${header}" "${root}/prescene/${folder}/${header}" SYMBOLIC)
-  endforeach()
-endfunction()
-
 # prescene_module(<name>
-#   FOLDER <folder>           of the sources, below the project's root; default: the current folder
-#   HEADERS <h>...            public, included as "prescene/<folder>/<h>"
+#   HEADERS <h>...            public: <folder>/include/prescene/<folder>/<h>; of tests and benchmarks <folder>/<h>
 #   SHARED_HEADERS <h>...     as HEADERS, for our modules and tests only: not installed
 #   PRIVATE_HEADERS <h>...    for this module's own sources only, included as "<h>"
 #   SOURCES <cc>...           none: a module of headers only
@@ -42,17 +28,15 @@ endfunction()
 # makes the library prescene_<name>, alias and installed name prescene::<name>, if this build is to have it
 # (PresceneParts.cmake).
 function(prescene_module name)
-  cmake_parse_arguments(PARSE_ARGV 1 M "NO_INSTALL" "FOLDER"
+  cmake_parse_arguments(PARSE_ARGV 1 M "NO_INSTALL" ""
                         "HEADERS;SHARED_HEADERS;PRIVATE_HEADERS;SOURCES;USES;PRIVATE_USES;LINKS;PRIVATE_LINKS")
   if(M_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "prescene_module(${name}): unknown arguments ${M_UNPARSED_ARGUMENTS}")
   endif()
-  if(NOT M_FOLDER)
-    file(RELATIVE_PATH M_FOLDER "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
-  endif()
+  file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   set(target prescene_${name})
 
-  if(M_FOLDER MATCHES "^(tests|benchmarks)(/|$)")
+  if(folder MATCHES "^(tests|benchmarks)(/|$)")
     prescene_test_wanted(wanted ${name} LIBRARY USES ${M_USES} ${M_PRIVATE_USES} LINKS ${M_LINKS} ${M_PRIVATE_LINKS})
   else()
     prescene_wanted(${name} wanted)
@@ -80,32 +64,41 @@ function(prescene_module name)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
   target_compile_features(${target} ${scope} cxx_std_20)
 
-  set(root "${PROJECT_BINARY_DIR}/roots/${target}")
-  set(linked ${M_HEADERS} ${M_SHARED_HEADERS})
-  prescene_link_headers("${root}" "${M_FOLDER}" "${linked}")
-  target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${root}>"
-                                                "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
+  if(folder MATCHES "^(tests|benchmarks)(/|$)")
+    set(below "${folder}")
+    target_include_directories(${target} ${scope} "${PROJECT_SOURCE_DIR}")
+  else()
+    set(below "${folder}/include/prescene/${folder}")
+    target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>")
+  endif()
+  set(shared ${M_SHARED_HEADERS})
+  list(TRANSFORM M_HEADERS PREPEND "${below}/")
+  list(TRANSFORM shared PREPEND "${below}/")
+  foreach(header IN LISTS M_HEADERS shared)
+    if(NOT EXISTS "${PROJECT_SOURCE_DIR}/${header}")
+      message(FATAL_ERROR "${CMAKE_CURRENT_LIST_FILE}: the header ${header} is listed but does not exist.")
+    endif()
+  endforeach()
 
   # For tests/examples.
-  if(M_FOLDER MATCHES "^(tests|benchmarks)(/|$)" OR NOT M_NO_INSTALL)
-    string(REGEX REPLACE "/.*" "" group "${M_FOLDER}")
-    list(TRANSFORM linked PREPEND "${name} ${M_FOLDER}/")
+  if(folder MATCHES "^(tests|benchmarks)(/|$)" OR NOT M_NO_INSTALL)
+    string(REGEX REPLACE "/.*" "" group "${folder}")
+    set(listed ${M_HEADERS} ${shared})
+    list(TRANSFORM listed PREPEND "${name} ")
     set_property(GLOBAL APPEND PROPERTY PRESCENE_HEADER_GROUPS ${group})
-    set_property(GLOBAL APPEND PROPERTY "PRESCENE_HEADERS_OF_${group}" ${linked})
+    set_property(GLOBAL APPEND PROPERTY "PRESCENE_HEADERS_OF_${group}" ${listed})
     set_property(GLOBAL APPEND PROPERTY "PRESCENE_LIBRARIES_OF_${group}" ${name})
   endif()
 
   if(NOT M_NO_INSTALL)
     set_property(GLOBAL APPEND PROPERTY PRESCENE_INSTALLED_MODULES ${name})
+    list(TRANSFORM M_HEADERS PREPEND "${PROJECT_SOURCE_DIR}/")
+    target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS "${CMAKE_CURRENT_SOURCE_DIR}/include" FILES ${M_HEADERS})
     # The file of targets that prescene-config.cmake includes for this library.
-    install(TARGETS ${target} EXPORT prescene-${name} ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT ${name})
+    install(TARGETS ${target} EXPORT prescene-${name} ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT ${name}
+            FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT ${name})
     install(EXPORT prescene-${name} FILE ${name}.cmake NAMESPACE prescene::
             DESTINATION "${PRESCENE_PACKAGE_DIR}/libraries" COMPONENT ${name})
-    foreach(header IN LISTS M_HEADERS)
-      get_filename_component(subfolder "${header}" DIRECTORY)
-      install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/prescene/${M_FOLDER}/${subfolder}"
-              COMPONENT ${name})
-    endforeach()
   endif()
 endfunction()
 

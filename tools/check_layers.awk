@@ -53,10 +53,23 @@ function check_outside(place, module, header,    i, j, n, folders, known) {
   else complain(place, "<" header "> belongs to no library named in tools/layers.txt; add an 'outside' line")
 }
 
-function check_ours(place, module, header,    other) {
-  other = module_of(substr(header, length("prescene/") + 1))
+# "prescene/<module>/<header>" is <module>/include/prescene/<module>/<header>, also where nothing was configured yet; a
+# header of tests or benchmarks is included by its path.
+function check_ours(place, module, header,    other, target) {
+  other = module_of(name_of(header))
+  target = header ~ /^prescene\// ? other "/include/" header : header
   if (other == "") complain(place, "\"" header "\" belongs to no module of tools/layers.txt")
   else if (!may_use(module, other)) complain(place, module " may not use " other " (\"" header "\")")
+  else if (!(target in is_source)) complain(place, "there is no " target " (\"" header "\")")
+}
+
+function is_ours(header) {
+  return header ~ /^(prescene|tests|benchmarks)\//
+}
+
+function name_of(header) {
+  sub(/^prescene\//, "", header)
+  return header
 }
 
 function check_relative(place, path, module, header,    folder, target, line, i) {
@@ -174,10 +187,10 @@ END {
       }
       header = substr(header, 2)
       sub(/[">].*/, "", header)
-      if (header ~ /^prescene\//) check_ours(place, module, header)
+      if (is_ours(header)) check_ours(place, module, header)
       else if (opening == "<") check_outside(place, module, header)
       else check_relative(place, path, module, header)
-      if (path ~ /^tests\// && header ~ /^prescene\//) tested[substr(header, length("prescene/") + 1)] = 1
+      if (path ~ /^tests\// && is_ours(header)) tested[name_of(header)] = 1
     }
     close(path)
   }

@@ -64,7 +64,9 @@ function without_dots(code,    place, rest, comment) {
   if (!examples) next
   if (list) { print header; next }
   if (space == "") complain("an example, but no namespace prescene::" folder)
-  includes = includes "#include \"prescene/" header "\"\n"
+  included = header
+  sub(/^.*\/include\//, "", included)
+  includes = includes "#include \"" included "\"\n"
   if (!(library in seen)) {
     seen[library] = 1
     givens = givens "#include \"" library ".h\"\n"

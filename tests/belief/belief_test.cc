@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "prescene/core/sobol.h"
-#include "prescene/tests/belief/random_values.h"
-#include "prescene/tests/support/laws.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/belief/random_values.h"
+#include "tests/support/laws.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::belief {
 namespace {

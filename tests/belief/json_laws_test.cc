@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "prescene/tests/belief/random_values.h"
-#include "prescene/tests/support/laws.h"
+#include "tests/belief/random_values.h"
+#include "tests/support/laws.h"
 
 namespace prescene::belief {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/belief/random_values.h"
+#include "tests/belief/random_values.h"
 
 #include <algorithm>
 #include <tuple>

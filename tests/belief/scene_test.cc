@@ -7,9 +7,9 @@
 
 #include "prescene/belief/body_names.h"
 #include "prescene/core/sobol.h"
-#include "prescene/tests/belief/random_values.h"
-#include "prescene/tests/support/laws.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/belief/random_values.h"
+#include "tests/support/laws.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::belief {
 namespace {

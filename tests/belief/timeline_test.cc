@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 
 #include "prescene/belief/trajectory.h"
-#include "prescene/tests/belief/random_values.h"
-#include "prescene/tests/support/laws.h"
+#include "tests/belief/random_values.h"
+#include "tests/support/laws.h"
 
 namespace prescene::belief {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/collision_tables.h"
+#include "benchmarks/collision_tables.h"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "prescene/benchmarks/collision_algorithms.h"
+#include "benchmarks/collision_algorithms.h"
 
 namespace prescene::benchmarks {
 namespace {

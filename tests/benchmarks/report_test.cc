@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/benchmarks/report.h"
+#include "benchmarks/report.h"
 
 #include <gmock/gmock.h>
 
@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "prescene/tests/support/matchers.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/matchers.h"
+#include "tests/support/paths.h"
 
 namespace prescene::benchmarks {
 namespace {

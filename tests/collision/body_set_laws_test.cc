@@ -10,10 +10,10 @@
 
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/allocations.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/generators.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::body_set_laws_test {
 namespace {

@@ -14,10 +14,10 @@
 #include "prescene/collision/triangle_pair_distance.h"
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/allocations.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/generators.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::continuous_queries_laws_test {
 namespace {

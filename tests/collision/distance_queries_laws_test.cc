@@ -15,9 +15,9 @@
 
 #include "prescene/collision/distance_queries.h"
 #include "prescene/collision/triangle_pair_distance.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/allocations.h"
+#include "tests/support/generators.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::distance_queries_laws_test {
 namespace {

@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "prescene/collision/distance_queries.h"
-#include "prescene/tests/peers/mesh_collision.h"
-#include "prescene/tests/support/brute_force.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/peers/mesh_collision.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/contact_configurations.h"
 
 namespace prescene::collision::distance_queries_reference_test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "prescene/collision/hierarchy.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::neural_gas_test {
 namespace {

@@ -15,10 +15,10 @@
 #include "prescene/collision/penetration.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/brute_force.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/support/allocations.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/contact_configurations.h"
 
 namespace prescene::collision::penetration_laws_test {
 namespace {

@@ -13,8 +13,8 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/triangle_distance.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/allocations.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::point_queries_test {
 namespace {

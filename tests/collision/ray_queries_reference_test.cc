@@ -13,8 +13,8 @@
 
 #include "prescene/collision/ray_queries.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/peers/ray_caster.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/peers/ray_caster.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::collision::ray_queries_reference_test {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "prescene/tests/support/generators.h"
+#include "tests/support/generators.h"
 
 namespace prescene::collision::transform_test {
 namespace {

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "prescene/core/random.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::collision::tree_file_test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "nasty_triangles.h"
 #include "prescene/collision/triangle_pairs.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision {
 

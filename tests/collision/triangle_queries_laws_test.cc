@@ -14,9 +14,9 @@
 #include "prescene/collision/exact_triangles.h"
 #include "prescene/collision/triangle_pair_distance.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/allocations.h"
+#include "tests/support/generators.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::triangle_queries_laws_test {
 namespace {

@@ -22,11 +22,11 @@
 #include "prescene/collision/dops/simdop_tree.h"
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/peers/mesh_collision.h"
-#include "prescene/tests/support/brute_force.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/contact_configurations.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/peers/mesh_collision.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/contact_configurations.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision::triangle_queries_reference_test {
 namespace {

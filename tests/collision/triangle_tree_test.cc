@@ -15,8 +15,8 @@
 #include "prescene/collision/triangle_queries.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/paths.h"
 
 namespace prescene::collision::triangle_tree_test {
 namespace {

@@ -31,7 +31,7 @@ struct Cup {
 END
 printf '#pragma once\n// No example.\nnamespace prescene::shelf {}\n' > shelf/empty.h
 expected='// The examples in the comments of headers, made by tools/header_examples.awk.
-#include "prescene/shelf/cup.h"
+#include "shelf/cup.h"
 #include "prescene/core/status.h"
 
 #include "do_something.h"

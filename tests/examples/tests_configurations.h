@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "prescene/collision/mesh.h"
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/support/contact_configurations.h"
 
 namespace prescene::tests::given_tests_configurations {
 

@@ -2,7 +2,7 @@
 // What the examples in the headers of tests/peers/mesh_collision.h take for granted.
 #pragma once
 
-#include "prescene/tests/peers/mesh_collision.h"
+#include "tests/peers/mesh_collision.h"
 
 namespace prescene::tests::given_tests_peers_mesh_pair {
 

@@ -10,8 +10,8 @@
 
 #include "filter_fixture.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/fake_simulator.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/fake_simulator.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::filter_tests {
 namespace {

@@ -9,7 +9,7 @@
 #include "filter_fixture.h"
 #include "prescene/filter/initialise.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::filter_tests {
 namespace {

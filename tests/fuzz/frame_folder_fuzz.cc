@@ -7,7 +7,7 @@
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/images/frame_folder.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 using namespace prescene::interfaces;  // NOLINT(google-build-using-namespace)
 

@@ -19,8 +19,8 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
-#include "prescene/tests/interfaces/ros_messages/schema_walk.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/interfaces/ros_messages/schema_walk.h"
+#include "tests/support/paths.h"
 #include "tree_kinds.h"
 
 using namespace prescene;              // NOLINT(google-build-using-namespace)

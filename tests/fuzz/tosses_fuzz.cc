@@ -9,7 +9,7 @@
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/motion_dataset.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const prescene::tests::ScratchDir kScratch;

@@ -6,8 +6,8 @@
 
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/generators.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::geometry {
 namespace {

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "prescene/core/random.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/generators.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::geometry {
 namespace {

@@ -10,7 +10,7 @@
 #include "prescene/geometry/refine.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/geometry/triangle_mesh.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/generators.h"
 
 namespace prescene::geometry::mesh_laws_test {
 namespace {

@@ -9,7 +9,7 @@
 #include "prescene/geometry/cancellable.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::geometry {
 namespace {

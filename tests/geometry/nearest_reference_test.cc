@@ -9,8 +9,8 @@
 #include "prescene/geometry/pose_error.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/allocations.h"
+#include "tests/support/generators.h"
 
 namespace prescene::geometry {
 namespace {

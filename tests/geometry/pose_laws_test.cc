@@ -5,7 +5,7 @@
 
 #include "prescene/geometry/plane.h"
 #include "prescene/geometry/pose.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/generators.h"
 
 namespace prescene::geometry {
 namespace {

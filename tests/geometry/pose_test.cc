@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "prescene/geometry/plane.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::geometry {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::geometry {
 namespace {

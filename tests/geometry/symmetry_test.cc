@@ -8,8 +8,8 @@
 
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/generators.h"
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/generators.h"
+#include "tests/support/matchers.h"
 
 namespace prescene::geometry::symmetry_test {
 namespace {

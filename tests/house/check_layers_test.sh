@@ -27,7 +27,7 @@ plant() {
   if [ -s "$copy/kept" ]; then mv "$copy/kept" "$copy/$1"; else rm -f "$copy/$1" "$copy/kept"; fi
 }
 
-plant core/check.h '#include "prescene/geometry/pose.h"' 'core may not use geometry'
+plant core/include/prescene/core/check.h '#include "prescene/geometry/pose.h"' 'core may not use geometry'
 plant geometry/planted.cc '#include "prescene/belief/scene.h"' 'geometry may not use belief'
 plant filter/planted.cc '#include "prescene/rendering/egl/egl_renderer.h"' 'filter may not use rendering/egl'
 plant tests/geometry/planted_test.cc '#include "prescene/queries/query_engine.h"' 'tests/geometry may not use queries'
@@ -37,6 +37,8 @@ plant rendering/reference/planted.cc '#include <EGL/egl.h>' 'is not for renderin
 plant core/planted.cc '#include <Eigen/Core>' 'is not for core'
 plant geometry/planted.cc '#include <boost/any.hpp>' 'belongs to no library'
 plant geometry/planted.cc '#include "../core/check.h"' 'climbs out'
+plant geometry/planted.cc '#include "prescene/core/no_such_file.h"' 'there is no core/include/prescene/core/no_such_file.h'
+plant tests/geometry/planted_test.cc '#include "tests/support/no_such_file.h"' 'there is no tests/support/no_such_file.h'
 plant geometry/planted.cc '#include "no_such_file.h"' 'is not a file beside this one'
 plant service/planted.cc 'const std::string text = json.dump();' 'is for belief/json_values.cc only'
 plant novelty/planted.cc '#include <vector>' 'lies in no folder'

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "prescene/core/check.h"
-#include "prescene/tests/peers/falling_box.h"
+#include "tests/peers/falling_box.h"
 
 namespace prescene::tests {
 namespace {

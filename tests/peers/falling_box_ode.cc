@@ -4,7 +4,7 @@
 #include <array>
 #include <mutex>
 
-#include "prescene/tests/peers/falling_box.h"
+#include "tests/peers/falling_box.h"
 
 namespace prescene::tests {
 namespace {

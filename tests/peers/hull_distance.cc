@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/peers/hull_distance.h"
+#include "tests/peers/hull_distance.h"
 
 #include <fcl/geometry/shape/convex.h>
 #include <fcl/narrowphase/collision_object.h>

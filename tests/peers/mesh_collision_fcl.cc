@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "prescene/core/check.h"
-#include "prescene/tests/peers/mesh_collision.h"
+#include "tests/peers/mesh_collision.h"
 
 namespace prescene::tests {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "prescene/tests/peers/mesh_collision.h"
+#include "tests/peers/mesh_collision.h"
 
 namespace prescene::tests {
 namespace {

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <utility>
 
-#include "prescene/tests/peers/mesh_collision.h"
+#include "tests/peers/mesh_collision.h"
 
 namespace prescene::tests {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/peers/ray_caster.h"
+#include "tests/peers/ray_caster.h"
 
 #include <embree3/rtcore.h>
 

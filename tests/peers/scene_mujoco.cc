@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/peers/scene_mujoco.h"
+#include "tests/peers/scene_mujoco.h"
 
 #include <mujoco/mujoco.h>
 

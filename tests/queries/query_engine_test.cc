@@ -10,8 +10,8 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/tests/support/paths.h"
 #include "sliding_scene.h"
+#include "tests/support/paths.h"
 
 namespace prescene::queries {
 namespace {

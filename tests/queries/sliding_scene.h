@@ -10,7 +10,7 @@
 #include "prescene/belief/belief.h"
 #include "prescene/core/random.h"
 #include "prescene/queries/query_engine.h"
-#include "prescene/tests/support/fake_simulator.h"
+#include "tests/support/fake_simulator.h"
 
 namespace prescene::tests {
 

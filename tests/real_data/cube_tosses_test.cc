@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "prescene/simulation/calibration/flight_calibration.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

@@ -13,7 +13,7 @@
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::geometry {
 namespace {

@@ -5,7 +5,7 @@
 #include "prescene/service/load_scene.h"
 #include "prescene/service/replay.h"
 #include "prescene/service/support_score.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

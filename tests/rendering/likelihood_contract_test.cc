@@ -14,8 +14,8 @@
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/rendering/simulated_camera.h"
-#include "prescene/tests/support/allocations.h"
 #include "scenes.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::rendering {
 namespace {

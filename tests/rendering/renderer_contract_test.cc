@@ -9,8 +9,8 @@
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/egl/egl_renderer.h"
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/tests/peers/ray_caster.h"
 #include "scenes.h"
+#include "tests/peers/ray_caster.h"
 
 namespace prescene::rendering::renderer_contract_test {
 namespace {

@@ -11,8 +11,8 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/target_test.h"
 #include "scenes.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::rendering {
 namespace {

@@ -8,8 +8,8 @@
 #include "prescene/service/load_scene.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/uncertain/outcome_estimator.h"
-#include "prescene/tests/support/paths.h"
 #include "recorded_scenario.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

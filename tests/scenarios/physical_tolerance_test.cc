@@ -6,8 +6,8 @@
 #include <map>
 #include <numbers>
 
-#include "prescene/tests/support/paths.h"
 #include "recorded_scenario.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

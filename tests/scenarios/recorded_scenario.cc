@@ -11,7 +11,7 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/replay.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 

@@ -13,7 +13,7 @@
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/simulated_recording.h"
 #include "prescene/service/tracking_score.h"
-#include "prescene/tests/support/pinned.h"
+#include "tests/support/pinned.h"
 
 namespace prescene::tests {
 

@@ -9,8 +9,8 @@
 #include <numeric>
 
 #include "platform.h"
-#include "prescene/tests/support/paths.h"
 #include "recorded_scenario.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

@@ -13,7 +13,7 @@
 #include "desk_fixture.h"
 #include "prescene/core/utf8.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::service {
 namespace {

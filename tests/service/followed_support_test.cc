@@ -11,7 +11,7 @@
 #include "prescene/service/replay.h"
 #include "prescene/service/session_report.h"
 #include "prescene/service/support_score.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::followed_support_test {
 namespace {

@@ -15,8 +15,8 @@
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/bus_replay.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/tests/service/robot_on_bus.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/service/robot_on_bus.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

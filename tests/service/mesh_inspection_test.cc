@@ -5,7 +5,7 @@
 
 #include "prescene/geometry/primitives.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/service/motion_units.h"
-#include "prescene/tests/support/simulated_motions.h"
+#include "tests/support/simulated_motions.h"
 
 namespace prescene::tests {
 namespace {

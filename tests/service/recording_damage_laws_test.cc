@@ -9,8 +9,8 @@
 #include "prescene/core/random.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/recording.h"
-#include "prescene/tests/service/recorded_box.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/service/recorded_box.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::recording_damage_laws_test {
 namespace {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "prescene/service/load_scene.h"
-#include "prescene/tests/service/recorded_box.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/service/recorded_box.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::replay_test {
 namespace {

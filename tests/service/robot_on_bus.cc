@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/service/robot_on_bus.h"
+#include "tests/service/robot_on_bus.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/recording.h"
 #include "prescene/service/topics.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

@@ -16,7 +16,7 @@
 #include "prescene/belief/scene.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/interfaces/ros_messages/messages.h"
-#include "prescene/tests/service/recorded_box.h"
+#include "tests/service/recorded_box.h"
 
 namespace prescene::tests {
 

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "desk_fixture.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

@@ -10,8 +10,8 @@
 #include "prescene/filter/predict.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/replay.h"
-#include "prescene/tests/service/recorded_box.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/service/recorded_box.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::tracked_physics_test {
 namespace {

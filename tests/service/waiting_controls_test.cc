@@ -7,8 +7,8 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/tracker.h"
-#include "prescene/tests/service/recorded_box.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/service/recorded_box.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::waiting_controls_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 #include <malloc.h>
 

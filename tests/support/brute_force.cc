@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/brute_force.h"
+#include "tests/support/brute_force.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/brute_force.h"
+#include "tests/support/brute_force.h"
 
 #include <gmock/gmock.h>
 
@@ -7,8 +7,8 @@
 
 #include "prescene/collision/exact_triangles.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/contact_configurations.h"
 
 namespace prescene::tests {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "prescene/tests/support/simple_scenes.h"
+#include "tests/support/simple_scenes.h"
 
 namespace prescene::tests {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/collision_meshes.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/support/contact_configurations.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/overlap_volume.h"
+#include "tests/support/overlap_volume.h"
 
 namespace prescene::tests {
 namespace {

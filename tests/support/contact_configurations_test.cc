@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/contact_configurations.h"
+#include "tests/support/contact_configurations.h"
 
 #include <gmock/gmock.h>
 
@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/overlap_volume.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/overlap_volume.h"
 
 namespace prescene::tests {
 namespace {

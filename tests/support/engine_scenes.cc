@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/engine_scenes.h"
+#include "tests/support/engine_scenes.h"
 
 #include <numbers>
 #include <utility>
 
 #include "prescene/core/check.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::tests {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/fake_simulator.h"
+#include "tests/support/fake_simulator.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/generators.h"
+#include "tests/support/generators.h"
 
 #include <numbers>
 #include <ostream>

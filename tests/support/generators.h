@@ -13,7 +13,7 @@
 #include "prescene/geometry/pose.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/triangle_mesh.h"
-#include "prescene/tests/support/laws.h"
+#include "tests/support/laws.h"
 
 namespace prescene::tests {
 

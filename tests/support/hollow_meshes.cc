@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/hollow_meshes.h"
+#include "tests/support/hollow_meshes.h"
 
 #include <cmath>
 #include <numbers>

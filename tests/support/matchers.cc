@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/matchers.h"
+#include "tests/support/matchers.h"
 
 #include <ostream>
 #include <sstream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/overlap_volume.h"
+#include "tests/support/overlap_volume.h"
 
 #include <algorithm>
 #include <cmath>

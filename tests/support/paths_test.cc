@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 #include <gtest/gtest.h>
 

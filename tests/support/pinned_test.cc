@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/pinned.h"
+#include "tests/support/pinned.h"
 
 #include <cstdlib>
 #include <fstream>
 #include <limits>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "prescene/core/check.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 

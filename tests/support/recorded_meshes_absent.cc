@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // For builds of parts that have no reader of mesh files.
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::tests {
 

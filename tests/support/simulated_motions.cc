@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/support/simulated_motions.h"
+#include "tests/support/simulated_motions.h"
 
 #include <algorithm>
 #include <cmath>

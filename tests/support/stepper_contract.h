@@ -15,8 +15,8 @@
 
 #include "prescene/belief/outcome.h"
 #include "prescene/simulation/mechanics_options.h"
-#include "prescene/tests/support/closed_forms.h"
-#include "prescene/tests/support/simple_scenes.h"
+#include "tests/support/closed_forms.h"
+#include "tests/support/simple_scenes.h"
 
 namespace prescene::tests {
 

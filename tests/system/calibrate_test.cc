@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/service/backends.h"
-#include "prescene/tests/support/simulated_motions.h"
 #include "program.h"
+#include "tests/support/simulated_motions.h"
 
 namespace prescene::tests {
 namespace {

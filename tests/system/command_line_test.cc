@@ -7,8 +7,8 @@
 
 #include "prescene/geometry/primitives.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
-#include "prescene/tests/support/paths.h"
 #include "program.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

@@ -19,9 +19,9 @@
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
-#include "prescene/tests/service/robot_on_bus.h"
-#include "prescene/tests/support/paths.h"
 #include "program.h"
+#include "tests/service/robot_on_bus.h"
+#include "tests/support/paths.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define PRESCENE_SANITIZED 1

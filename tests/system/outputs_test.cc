@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <iterator>
 
-#include "prescene/tests/support/paths.h"
 #include "program.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests::outputs_test {
 namespace {

@@ -14,7 +14,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 extern char** environ;
 

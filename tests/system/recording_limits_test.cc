@@ -8,8 +8,8 @@
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/recording.h"
 #include "prescene/service/topics.h"
-#include "prescene/tests/support/paths.h"
 #include "program.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 namespace {

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/images/png.h"
-#include "prescene/tests/support/paths.h"
 #include "program.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests::session_test {
 namespace {

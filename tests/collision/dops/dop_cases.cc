@@ -7,8 +7,8 @@
 
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/brute_force.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::collision {
 namespace {

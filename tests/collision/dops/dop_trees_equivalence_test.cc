@@ -12,9 +12,9 @@
 #include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/dop_tree.h"
 #include "prescene/collision/dops/simdop_tree.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/target_test.h"
+#include "tests/support/allocations.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/target_test.h"
 
 namespace prescene::collision {
 namespace {

@@ -8,7 +8,7 @@
 #include "dop_cases.h"
 #include "prescene/collision/dops/boxtree.h"
 #include "prescene/collision/dops/bvhlite_tree.h"
-#include "prescene/tests/support/collision_meshes.h"
+#include "tests/support/collision_meshes.h"
 
 namespace prescene::collision {
 namespace {

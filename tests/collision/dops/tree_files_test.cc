@@ -15,7 +15,7 @@
 #include "prescene/collision/tree_file_seal.h"
 #include "prescene/collision/triangle_tree.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::collision {
 namespace {

@@ -16,7 +16,7 @@
 #include "prescene/collision/spheres/static_shape_queries.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::collision::continuous_shape_queries_test {
 namespace {

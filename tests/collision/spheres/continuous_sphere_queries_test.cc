@@ -15,7 +15,7 @@
 
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::collision::continuous_sphere_queries_test {
 namespace {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::collision::distance_probability_test {
 namespace {

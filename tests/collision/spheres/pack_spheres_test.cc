@@ -10,8 +10,8 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/geometry/triangle_distance.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/generators.h"
 
 namespace prescene::collision::pack_spheres_test {
 namespace {

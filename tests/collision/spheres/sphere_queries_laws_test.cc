@@ -7,7 +7,7 @@
 
 #include "prescene/collision/spheres/sphere_queries.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/generators.h"
 
 namespace prescene::collision::sphere_queries_laws_test {
 namespace {

@@ -15,8 +15,8 @@
 #include "prescene/collision/spheres/scalar_sphere_queries.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/allocations.h"
+#include "tests/support/generators.h"
 
 namespace prescene::collision::sphere_queries_test {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "every_shape.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/allocations.h"
+#include "tests/support/generators.h"
 
 namespace prescene::collision::static_shape_queries_test {
 namespace {

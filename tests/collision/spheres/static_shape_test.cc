@@ -10,7 +10,7 @@
 #include "every_shape.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/triangle_distance.h"
-#include "prescene/tests/support/generators.h"
+#include "tests/support/generators.h"
 
 namespace prescene::collision::static_shape_test {
 namespace {

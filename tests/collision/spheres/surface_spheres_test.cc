@@ -17,8 +17,8 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/collision_meshes.h"
-#include "prescene/tests/support/hollow_meshes.h"
+#include "tests/support/collision_meshes.h"
+#include "tests/support/hollow_meshes.h"
 
 namespace prescene::collision::surface_spheres_test {
 namespace {

@@ -16,7 +16,7 @@
 #include "every_shape.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::collision::uncertain_shape_queries_test {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "prescene/core/parallel.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 #include "uncertain_settings.h"
 
 namespace prescene::collision::uncertain_sphere_queries_test {

@@ -11,7 +11,7 @@
 #include <iterator>
 #include <utility>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces::file_test {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/images/jpeg.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

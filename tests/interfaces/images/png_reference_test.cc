@@ -6,7 +6,7 @@
 #include "png_builder.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/images/png.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

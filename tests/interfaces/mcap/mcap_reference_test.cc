@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/tests/support/paths.h"
 #include "recordings.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -10,9 +10,9 @@
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/paths.h"
 #include "recordings.h"
+#include "tests/support/allocations.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 

@@ -8,7 +8,7 @@
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/mesh_files/limited_child.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

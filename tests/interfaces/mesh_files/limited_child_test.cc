@@ -16,7 +16,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

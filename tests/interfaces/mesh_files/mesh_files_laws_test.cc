@@ -7,7 +7,7 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "prescene/interfaces/mesh_files/mesh_file.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/reports/overlay.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

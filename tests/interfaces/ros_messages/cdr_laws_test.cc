@@ -5,7 +5,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
-#include "prescene/tests/interfaces/ros_messages/schema_walk.h"
+#include "tests/interfaces/ros_messages/schema_walk.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/interfaces/ros_messages/schema_walk.h"
+#include "tests/interfaces/ros_messages/schema_walk.h"
 
 #include <algorithm>
 #include <cstring>
@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "prescene/core/check.h"
-#include "prescene/tests/interfaces/ros_messages/sha256.h"
+#include "tests/interfaces/ros_messages/sha256.h"
 
 namespace prescene::tests {
 namespace {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "prescene/interfaces/ros_messages/messages.h"
-#include "prescene/tests/interfaces/ros_messages/schema_walk.h"
-#include "prescene/tests/interfaces/ros_messages/sha256.h"
+#include "tests/interfaces/ros_messages/schema_walk.h"
+#include "tests/interfaces/ros_messages/sha256.h"
 
 namespace prescene::interfaces {
 namespace {

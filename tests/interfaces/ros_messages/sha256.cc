@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/interfaces/ros_messages/sha256.h"
+#include "tests/interfaces/ros_messages/sha256.h"
 
 #include <array>
 #include <bit>

@@ -7,7 +7,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/core/spelling.h"
-#include "prescene/tests/support/laws.h"
+#include "tests/support/laws.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -4,10 +4,10 @@
 #include <fstream>
 
 #include "prescene/interfaces/scene_files/model_file.h"
-#include "prescene/tests/belief/random_values.h"
-#include "prescene/tests/interfaces/scene_files/scene_texts.h"
-#include "prescene/tests/support/laws.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/belief/random_values.h"
+#include "tests/interfaces/scene_files/scene_texts.h"
+#include "tests/support/laws.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

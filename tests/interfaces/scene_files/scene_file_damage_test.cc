@@ -10,8 +10,8 @@
 
 #include "prescene/geometry/primitives.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
-#include "prescene/tests/interfaces/scene_files/scene_texts.h"
-#include "prescene/tests/interfaces/scene_files/yaml_edits.h"
+#include "tests/interfaces/scene_files/scene_texts.h"
+#include "tests/interfaces/scene_files/yaml_edits.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -9,10 +9,10 @@
 #include <numbers>
 #include <set>
 
-#include "prescene/tests/interfaces/scene_files/scene_texts.h"
-#include "prescene/tests/interfaces/scene_files/yaml_edits.h"
-#include "prescene/tests/support/matchers.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/interfaces/scene_files/scene_texts.h"
+#include "tests/interfaces/scene_files/yaml_edits.h"
+#include "tests/support/matchers.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/interfaces/scene_files/scene_texts.h"
+#include "tests/interfaces/scene_files/scene_texts.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::tests {
 

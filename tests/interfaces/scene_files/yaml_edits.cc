@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/tests/interfaces/scene_files/yaml_edits.h"
+#include "tests/interfaces/scene_files/yaml_edits.h"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

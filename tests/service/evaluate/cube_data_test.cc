@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

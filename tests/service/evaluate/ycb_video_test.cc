@@ -10,7 +10,7 @@
 
 #include "prescene/service/evaluate/pose_auc.h"
 #include "prescene/service/evaluate/ycb_data.h"
-#include "prescene/tests/support/paths.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {

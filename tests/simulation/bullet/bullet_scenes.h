@@ -8,7 +8,7 @@
 #include "prescene/geometry/mass_properties.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
-#include "prescene/tests/support/simple_scenes.h"
+#include "tests/support/simple_scenes.h"
 
 namespace prescene::tests {
 

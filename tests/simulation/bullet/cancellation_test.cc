@@ -5,7 +5,7 @@
 #include <chrono>
 
 #include "prescene/simulation/bullet/bullet_simulator.h"
-#include "prescene/tests/support/simple_scenes.h"
+#include "tests/support/simple_scenes.h"
 
 namespace prescene::tests {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bullet_scenes.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/peers/hull_distance.h"
+#include "tests/peers/hull_distance.h"
 
 namespace prescene::tests {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "bullet_scenes.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/allocations.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::tests {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bullet_scenes.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/peers/falling_box.h"
+#include "tests/peers/falling_box.h"
 
 namespace prescene::tests {
 namespace {

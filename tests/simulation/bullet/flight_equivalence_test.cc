@@ -8,7 +8,7 @@
 
 #include "bullet_scenes.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::tests {
 namespace {

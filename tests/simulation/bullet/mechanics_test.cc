@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "bullet_scenes.h"
-#include "prescene/tests/support/closed_forms.h"
+#include "tests/support/closed_forms.h"
 
 namespace prescene::tests {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bullet_scenes.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/hollow_meshes.h"
+#include "tests/support/hollow_meshes.h"
 
 namespace prescene::tests {
 

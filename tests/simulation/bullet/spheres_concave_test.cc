@@ -6,8 +6,8 @@
 
 #include "bullet_scenes.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/allocations.h"
 #include "sphere_scenes.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::tests::spheres_concave_test {
 namespace {

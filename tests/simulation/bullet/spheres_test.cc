@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "bullet_scenes.h"
-#include "prescene/tests/support/closed_forms.h"
 #include "sphere_scenes.h"
+#include "tests/support/closed_forms.h"
 
 namespace prescene::tests::spheres_test {
 namespace {

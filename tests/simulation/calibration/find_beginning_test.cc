@@ -11,7 +11,7 @@
 #include "prescene/simulation/calibration/clearance.h"
 #include "prescene/simulation/calibration/free_fall.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
-#include "prescene/tests/support/simulated_motions.h"
+#include "tests/support/simulated_motions.h"
 
 namespace prescene::tests::find_beginning_test {
 namespace {

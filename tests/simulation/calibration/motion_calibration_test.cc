@@ -9,7 +9,7 @@
 
 #include "prescene/simulation/calibration/find_beginning.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
-#include "prescene/tests/support/simulated_motions.h"
+#include "tests/support/simulated_motions.h"
 
 namespace prescene::tests {
 namespace {

@@ -11,8 +11,8 @@
 #include "lockstep_scenes.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
-#include "prescene/tests/support/paths.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/paths.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::tests {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "lockstep_scenes.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/tests/support/allocations.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/allocations.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::tests {
 namespace {

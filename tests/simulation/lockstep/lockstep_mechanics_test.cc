@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lockstep_scenes.h"
-#include "prescene/tests/support/closed_forms.h"
+#include "tests/support/closed_forms.h"
 
 namespace prescene::tests {
 namespace {

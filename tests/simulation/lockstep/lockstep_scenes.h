@@ -9,7 +9,7 @@
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
-#include "prescene/tests/support/simple_scenes.h"
+#include "tests/support/simple_scenes.h"
 
 namespace prescene::tests {
 

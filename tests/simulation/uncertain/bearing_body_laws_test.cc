@@ -11,7 +11,7 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
-#include "prescene/tests/support/simple_scenes.h"
+#include "tests/support/simple_scenes.h"
 
 namespace prescene::simulation {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "certified_problem.h"
 #include "prescene/geometry/primitives.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::simulation {
 namespace {

@@ -9,8 +9,8 @@
 #include "prescene/collision/spheres/sphere_tree.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/uncertain/common_flight.h"
-#include "prescene/tests/support/simple_scenes.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/simple_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::tests {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/uncertain/start_distribution.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::simulation {
 namespace {

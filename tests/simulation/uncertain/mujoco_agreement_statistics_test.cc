@@ -8,8 +8,8 @@
 
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/uncertain/outcome_estimator.h"
-#include "prescene/tests/peers/scene_mujoco.h"
-#include "prescene/tests/support/engine_scenes.h"
+#include "tests/peers/scene_mujoco.h"
+#include "tests/support/engine_scenes.h"
 
 namespace prescene::tests {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/uncertain/certifier.h"
-#include "prescene/tests/support/uncertain_scenes.h"
+#include "tests/support/uncertain_scenes.h"
 
 namespace prescene::simulation::scene_nets_statistics_test {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/simulation/uncertain/outcome_estimator.h"
-#include "prescene/tests/support/fake_simulator.h"
+#include "tests/support/fake_simulator.h"
 
 namespace prescene::tests {
 
