@@ -74,7 +74,8 @@ macro(prescene_add_case target case kind)
                        ENVIRONMENT "${prescene_test_environment}" DISABLED ${_disabled}
                        SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
   if(prescene_test_resource_lock)
-    set_tests_properties("${target}:${case}" PROPERTIES RESOURCE_LOCK "${prescene_test_resource_lock}")
+    # First, so that what must wait for one another does not do so alone at the end.
+    set_tests_properties("${target}:${case}" PROPERTIES RESOURCE_LOCK "${prescene_test_resource_lock}" COST 1000)
   endif()
 endmacro()
 
