@@ -7,6 +7,16 @@
 //   PixelMixture m = model.mixture(material, {d, cosine, px});
 //   double log_r = model.log_ratio(m, z, absent, color_ratio);
 //   double drawn = model.sample(m, absent, stream);       // 0 = no return
+//
+// The formula of one pixel is written four times, which tests hold together. A new term goes into each, in this order:
+// - rendering/sensor_model.cc: the definition, in double precision, with its sampler; tests/rendering compares the two.
+// - rendering/pixel_classes.cc: what of the term does not depend on the pixel's depths, in single precision.
+// - rendering/reference/reference_likelihood.cc: the order of single-precision operations that every batch follows.
+// - rendering/simd/pose_evidence-inl.h: the same operations in lanes; tests/rendering/simd_likelihood_test.cc wants the
+//   same bits.
+// - rendering/compute/shader_pixels.cc: the same operations as a shader; tests/rendering/compute wants the same bits
+//   where the device computes exactly.
+// - docs/sensor_model.md: the equation, and where the term's figures come from.
 #pragma once
 
 #include <array>
