@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Extracts the usage examples of headers. An example is a run of comment lines whose text is indented by two spaces or
-# more; a run that begins with "- " is a list, not an example.
+# more; what follows a line that begins with "- " is a list, not an example.
 #
 # Input: lines "<library> <header>", headers below the root of the checkout. Prints a source with one function an
 # example, in namespace <that of the header>::given_<library>::<header>, where its names are looked up from the inside
@@ -46,6 +46,11 @@ function without_dots(code,    place, rest, comment) {
     if (space == "" && index(line, "namespace prescene::" folder) == 1 && match(line, /prescene[A-Za-z_:]*/))
       space = substr(line, RSTART, RLENGTH)
     text = comment_text(line)
+    if (is_comment && text ~ /^ - /) {
+      in_example = 0
+      in_list = 1
+      continue
+    }
     if (!is_comment || text !~ /^  / || text ~ /^ *$/) {
       in_example = in_list = 0
       continue
