@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "prediction_parts.h"
+#include "contact_forecast.h"
 #include "prescene/belief/body_names.h"
 
 namespace prescene::queries {

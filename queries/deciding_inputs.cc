@@ -5,7 +5,7 @@
 #include <numbers>
 #include <span>
 
-#include "prediction_parts.h"
+#include "deciding_inputs.h"
 #include "prescene/simulation/action_draws.h"
 #include "prescene/simulation/uncertain/first_order.h"
 #include "prescene/simulation/uncertain/repeated_instances.h"
@@ -160,7 +160,7 @@ std::vector<belief::DecidingInputs> deciding_inputs(const Foresight& foresight, 
       input.input = inputs[i].name;
       input.share = effect.share;
       input.standard_error = effect.standard_error;
-      for (std::size_t c = 0; c < told_classes(variable); ++c) {
+      for (std::size_t c = 0; c < reported_classes(variable); ++c) {
         if (foresight.estimate.variables[v].classes[c].probability > 0.0)
           input.effects.push_back({variable.classes[c], effect.low_fifth[c], effect.high_fifth[c]});
       }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How long a start stays one object.
-#include "prediction_parts.h"
+#include "flight_forecast.h"
 #include "prescene/belief/body_names.h"
 #include "prescene/simulation/uncertain/common_flight.h"
 

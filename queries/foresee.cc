@@ -3,10 +3,10 @@
 #include <cmath>
 #include <utility>
 
+#include "foresee.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/queries/typical_runs.h"
-#include "tasks.h"
 
 namespace prescene::queries {
 namespace {
@@ -128,6 +128,24 @@ std::optional<belief::Trajectory> run_again(const Foresight& foresight, const Pr
                                                     request, prior.stream, *context.pool, context.cancellation);
   if (run.end == belief::TrajectoryEnd::kCancelled) return std::nullopt;
   return run;
+}
+
+// The order of variables is that of simulation::variables_of.
+std::optional<std::size_t> variable_about(const belief::Scene& scene, const std::string& object) {
+  for (std::size_t g = 0; g < scene.exclusive_outcomes.size(); ++g)
+    for (const belief::Outcome& outcome : scene.exclusive_outcomes[g].outcomes)
+      if (outcome.object == object) return g;
+  for (std::size_t i = 0; i < scene.outcomes.size(); ++i)
+    if (scene.outcomes[i].object == object) return scene.exclusive_outcomes.size() + i;
+  return std::nullopt;
+}
+
+const std::string& name_of(const simulation::Variable& variable) {
+  return variable.name.empty() ? variable.classes.front() : variable.name;
+}
+
+std::size_t reported_classes(const simulation::Variable& variable) {
+  return variable.name.empty() ? 1 : variable.classes.size();
 }
 
 }  // namespace prescene::queries

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "prediction_parts.h"
+#include "model_doubts.h"
 #include "prescene/core/text.h"
 #include "prescene/simulation/uncertain/repeated_instances.h"
 
@@ -113,7 +113,7 @@ std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, con
   const double reach = core::inverse_normal_cdf(0.5 + 0.5 * confidence);
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
     const simulation::Variable& variable = foresight.variables[v];
-    for (std::size_t c = 0; c < told_classes(variable); ++c) {
+    for (std::size_t c = 0; c < reported_classes(variable); ++c) {
       double weight = 0.0, squares = 0.0, sum = 0.0, sum_squares = 0.0;
       for (std::size_t i = 0; i < before.size(); ++i) {
         if (before[i][v] < 0 || after[i][v] < 0) continue;

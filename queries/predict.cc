@@ -6,9 +6,14 @@
 #include <utility>
 
 #include "basis.h"
-#include "prediction_parts.h"
+#include "contact_forecast.h"
+#include "deciding_inputs.h"
+#include "flight_forecast.h"
+#include "model_doubts.h"
+#include "predict.h"
 #include "prescene/core/text.h"
 #include "prescene/queries/final_poses.h"
+#include "remarks.h"
 
 namespace prescene::queries {
 namespace {
@@ -66,7 +71,7 @@ std::vector<belief::OutcomeProbability> probabilities_of(const Foresight& foresi
   std::vector<belief::OutcomeProbability> all;
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
     const simulation::Variable& variable = foresight.variables[v];
-    for (std::size_t c = 0; c < told_classes(variable); ++c) {
+    for (std::size_t c = 0; c < reported_classes(variable); ++c) {
       const simulation::ClassEstimate& one = foresight.estimate.variables[v].classes[c];
       all.push_back({variable.classes[c], variable.name, one.probability, one.low, one.high});
     }
@@ -85,7 +90,7 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
   const belief::Scene& scene = *foresight.scene;
   std::vector<Candidate> candidates;
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
-    for (std::size_t c = 0; c < told_classes(foresight.variables[v]); ++c) {
+    for (std::size_t c = 0; c < reported_classes(foresight.variables[v]); ++c) {
       const double share = foresight.estimate.variables[v].classes[c].probability;
       if (share > 0.0) candidates.push_back({share, v, static_cast<int>(c)});
     }
@@ -125,7 +130,7 @@ std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
     belief::ProbabilityStage& told = history.emplace_back();
     told.instances = stage.instances;
     for (std::size_t v = 0; v < foresight.variables.size(); ++v)
-      for (std::size_t c = 0; c < told_classes(foresight.variables[v]); ++c) {
+      for (std::size_t c = 0; c < reported_classes(foresight.variables[v]); ++c) {
         const simulation::ClassEstimate& one = stage.variables[v].classes[c];
         told.outcomes.push_back({one.probability, one.low, one.high});
       }
@@ -134,24 +139,6 @@ std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
 }
 
 }  // namespace
-
-// The order of variables is that of simulation::variables_of.
-std::optional<std::size_t> variable_about(const belief::Scene& scene, const std::string& object) {
-  for (std::size_t g = 0; g < scene.exclusive_outcomes.size(); ++g)
-    for (const belief::Outcome& outcome : scene.exclusive_outcomes[g].outcomes)
-      if (outcome.object == object) return g;
-  for (std::size_t i = 0; i < scene.outcomes.size(); ++i)
-    if (scene.outcomes[i].object == object) return scene.exclusive_outcomes.size() + i;
-  return std::nullopt;
-}
-
-const std::string& name_of(const simulation::Variable& variable) {
-  return variable.name.empty() ? variable.classes.front() : variable.name;
-}
-
-std::size_t told_classes(const simulation::Variable& variable) {
-  return variable.name.empty() ? 1 : variable.classes.size();
-}
 
 core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::PredictQuery& query,
                                             const QueryContext& context) {

@@ -7,9 +7,12 @@
 #include <type_traits>
 #include <utility>
 
+#include "predict.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
-#include "tasks.h"
+#include "stability.h"
+#include "view.h"
+#include "where.h"
 
 namespace prescene::queries {
 namespace {

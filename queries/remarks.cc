@@ -4,10 +4,9 @@
 #include <cmath>
 #include <set>
 
-#include "basis.h"
-#include "prediction_parts.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
+#include "remarks.h"
 
 namespace prescene::queries {
 namespace {

@@ -3,8 +3,10 @@
 #include <utility>
 
 #include "basis.h"
+#include "foresee.h"
 #include "prescene/queries/typical_runs.h"
-#include "tasks.h"
+#include "remarks.h"
+#include "stability.h"
 
 namespace prescene::queries {
 namespace {

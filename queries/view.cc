@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "basis.h"
+#include "foresee.h"
 #include "prescene/belief/robot_motion.h"
+#include "view.h"
 
 namespace prescene::queries {
 namespace {

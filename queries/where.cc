@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Actual belief: X*_t ~ P(X_t | U_0:t-1, Z_0:t, C_0:t), as it stands in the snapshot.
-#include "tasks.h"
+#include "where.h"
 
 namespace prescene::queries {
 namespace {

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// For how long nothing can touch anything.
+#pragma once
+
+#include "foresee.h"
+#include "prescene/belief/prediction.h"
+
+namespace prescene::queries {
+
+/// For how long nothing can touch anything, into `flight`. Nothing is told when stopped, without a shape store, or
+/// where a shape can't be made of spheres. Fails when the objects can't be simulated each by itself.
+core::Status forecast_flight(const Foresight& foresight, const Prior& prior, const QueryContext& context,
+                             belief::PredictAnswer& answer);
+
+}  // namespace prescene::queries

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// What one should know before trusting the numbers, in sentences.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "prescene/belief/prediction.h"
+#include "prescene/belief/query.h"
+#include "prescene/belief/scene.h"
+
+namespace prescene::queries {
+
+/// Sentences on failed and doubtful instances, and on intervals that did not reach the tolerance.
+std::vector<std::string> remarks_of(const belief::Basis& basis, const belief::Effort& effort);
+/// Sentences about what was found.
+std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort);
+/// Actions that change nothing, or not what they seem to: of what nothing holds, or after the end.
+void remark_on_actions(const belief::Scene& scene, double duration, std::vector<std::string>& remarks);
+
+}  // namespace prescene::queries
