@@ -59,7 +59,7 @@ endif()
 # compilation goes into headers. A file-local name is therefore used once in a library, or stands in a namespace of its
 # file. The presets dev and tidy compile each source alone, so that each includes what it uses.
 option(PRESCENE_UNITY "Compile several sources as one" ON)
-set(PRESCENE_UNITY_SOURCES 8 CACHE STRING "Sources compiled as one, 0 for all of a target")
+set(PRESCENE_UNITY_SOURCES 12 CACHE STRING "Sources compiled as one, 0 for all of a target")
 
 # prescene_unity(<target>) for a target whose sources are known.
 function(prescene_unity target)
