@@ -17,7 +17,7 @@
 #include "prescene/core/check.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
-#include "prescene/simulation/uncertain/outcome_estimator.h"
+#include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "tests/peers/scene_mujoco.h"
 #include "tests/support/engine_scenes.h"
 

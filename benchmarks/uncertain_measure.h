@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "prescene/simulation/uncertain/certifier.h"
-#include "prescene/simulation/uncertain/outcome_estimator.h"
+#include "prescene/simulation/outcomes/certifier.h"
+#include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "tests/support/uncertain_scenes.h"
 
 namespace prescene::benchmarks {

@@ -6,9 +6,9 @@
 #include <span>
 
 #include "deciding_inputs.h"
-#include "prescene/simulation/action_draws.h"
-#include "prescene/simulation/uncertain/first_order.h"
-#include "prescene/simulation/uncertain/repeated_instances.h"
+#include "prescene/simulation/outcomes/first_order.h"
+#include "prescene/simulation/outcomes/repeated_instances.h"
+#include "prescene/simulation/rules/action_draws.h"
 
 namespace prescene::queries {
 namespace {

@@ -2,7 +2,7 @@
 // How long a start stays one object.
 #include "flight_forecast.h"
 #include "prescene/belief/body_names.h"
-#include "prescene/simulation/uncertain/common_flight.h"
+#include "prescene/simulation/outcomes/common_flight.h"
 
 namespace prescene::queries {
 

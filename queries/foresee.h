@@ -11,7 +11,7 @@
 #include "prescene/belief/query.h"
 #include "prescene/core/status.h"
 #include "prescene/queries/query_engine.h"
-#include "prescene/simulation/uncertain/certifier.h"
+#include "prescene/simulation/outcomes/certifier.h"
 #include "prior.h"
 
 namespace prescene::queries {

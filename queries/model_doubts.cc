@@ -5,7 +5,7 @@
 
 #include "model_doubts.h"
 #include "prescene/core/text.h"
-#include "prescene/simulation/uncertain/repeated_instances.h"
+#include "prescene/simulation/outcomes/repeated_instances.h"
 
 namespace prescene::queries {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/query.h"
-#include "prescene/simulation/uncertain/start_distribution.h"
+#include "prescene/simulation/outcomes/start_distribution.h"
 
 namespace prescene::queries {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "compiled_scene.h"
-#include "prescene/simulation/free_spin.h"
+#include "prescene/simulation/rules/free_spin.h"
 
 namespace prescene::simulation {
 

@@ -10,7 +10,7 @@
 #include "contact_log.h"
 #include "instance_world.h"
 #include "prescene/core/check.h"
-#include "prescene/simulation/mechanics_hash.h"
+#include "prescene/simulation/rules/mechanics_hash.h"
 #include "rest_detector.h"
 
 namespace prescene::simulation {

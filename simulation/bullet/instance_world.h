@@ -13,7 +13,7 @@
 #include "contact_finder.h"
 #include "contact_solver.h"
 #include "prescene/core/progress.h"
-#include "prescene/simulation/action_player.h"
+#include "prescene/simulation/rules/action_player.h"
 #include "sphere_contacts.h"
 
 namespace prescene::simulation {

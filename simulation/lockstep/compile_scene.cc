@@ -8,7 +8,7 @@
 #include "prescene/belief/validation.h"
 #include "prescene/core/hash.h"
 #include "prescene/geometry/mass_properties.h"
-#include "prescene/simulation/mechanics_hash.h"
+#include "prescene/simulation/rules/mechanics_hash.h"
 
 namespace prescene::simulation {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "lane_engine.h"
-#include "prescene/simulation/action_player.h"
-#include "prescene/simulation/byte_stream.h"
+#include "prescene/simulation/rules/action_player.h"
+#include "prescene/simulation/rules/byte_stream.h"
 
 namespace prescene::simulation {
 

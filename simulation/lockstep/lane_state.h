@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "prescene/simulation/free_spin.h"
+#include "prescene/simulation/rules/free_spin.h"
 
 namespace prescene::simulation {
 

@@ -9,7 +9,7 @@
 #include "compile_scene.h"
 #include "lane_batch.h"
 #include "prescene/core/check.h"
-#include "prescene/simulation/mechanics_hash.h"
+#include "prescene/simulation/rules/mechanics_hash.h"
 
 namespace prescene::simulation {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "prescene/service/load_scene.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
-#include "prescene/simulation/uncertain/outcome_estimator.h"
+#include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "recorded_scenario.h"
 #include "tests/support/paths.h"
 

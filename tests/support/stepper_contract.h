@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "prescene/belief/outcome.h"
-#include "prescene/simulation/mechanics_options.h"
+#include "prescene/simulation/rules/mechanics_options.h"
 #include "tests/support/closed_forms.h"
 #include "tests/support/simple_scenes.h"
 

@@ -21,7 +21,7 @@
 #include "prescene/core/progress.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/rendering/renderer.h"
-#include "prescene/simulation/mechanics_options.h"
+#include "prescene/simulation/rules/mechanics_options.h"
 #include "prescene/simulation/shape_store.h"
 #include "prescene/simulation/simulator.h"
 

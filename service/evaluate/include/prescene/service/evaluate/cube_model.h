@@ -6,7 +6,7 @@
 #include <string>
 
 #include "prescene/belief/scene.h"
-#include "prescene/simulation/mechanics_options.h"
+#include "prescene/simulation/rules/mechanics_options.h"
 
 namespace prescene::service {
 

@@ -13,7 +13,7 @@
 #include <memory>
 
 #include "prescene/core/status.h"
-#include "prescene/simulation/mechanics_options.h"
+#include "prescene/simulation/rules/mechanics_options.h"
 #include "prescene/simulation/shape_store.h"
 #include "prescene/simulation/simulator.h"
 
