@@ -12,9 +12,9 @@
 #include "prescene/core/check.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/rendering/levels_of_detail.h"
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/levels_of_detail.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 
 namespace prescene::benchmarks {
 namespace {

@@ -3,7 +3,7 @@
 // others, terms for each thing, 200 weights each.
 #pragma once
 
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 
 namespace prescene::benchmarks {
 

@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
-#include "prescene/rendering/local_surface.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/local_surface.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 
 namespace prescene::service {
 namespace {

@@ -7,7 +7,7 @@
 #include "prescene/core/text.h"
 #include "prescene/interfaces/reports/report.h"
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/heat_map_picture.h"
 
 namespace prescene::service {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "prescene/interfaces/reports/lettering.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 
 namespace prescene::service {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "object_raster.h"
 #include "prescene/core/check.h"
-#include "prescene/rendering/camera_equations.h"
-#include "prescene/rendering/near_plane.h"
-#include "prescene/rendering/pixel_classes.h"
 #include "prescene/rendering/portable_math.h"
+#include "prescene/rendering/sensor/camera_equations.h"
+#include "prescene/rendering/sensor/near_plane.h"
+#include "prescene/rendering/sensor/pixel_classes.h"
 
 namespace prescene::rendering {
 namespace {

@@ -6,9 +6,9 @@
 #include <cstdint>
 
 #include "pose_tile.h"
-#include "prescene/rendering/camera_equations.h"
-#include "prescene/rendering/likelihood_batch.h"
-#include "prescene/rendering/pixel_classes.h"
+#include "prescene/rendering/sensor/camera_equations.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
+#include "prescene/rendering/sensor/pixel_classes.h"
 
 namespace prescene::rendering {
 

@@ -6,8 +6,8 @@
 #include "cut_mesh.h"
 #include "pose_kernels.h"
 #include "prescene/core/check.h"
-#include "prescene/rendering/near_plane.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
+#include "prescene/rendering/sensor/near_plane.h"
 
 namespace prescene::rendering {
 namespace {

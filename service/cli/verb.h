@@ -17,7 +17,7 @@
 #include "prescene/core/status.h"
 #include "prescene/geometry/pose.h"
 #include "prescene/interfaces/dds/dds_node.h"
-#include "prescene/rendering/compute/likelihood_choice.h"
+#include "prescene/rendering/gpu/likelihood_choice.h"
 #include "prescene/service/tracker_settings.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's own

@@ -9,7 +9,7 @@
 
 #include "prescene/filter/segmentation.h"
 #include "prescene/interfaces/images/png.h"
-#include "prescene/rendering/local_surface.h"
+#include "prescene/rendering/sensor/local_surface.h"
 
 namespace prescene::service {
 namespace {

@@ -21,8 +21,8 @@
 #include "prescene/filter/segmentation.h"
 #include "prescene/filter/support_tracking.h"
 #include "prescene/filter/weight.h"
-#include "prescene/rendering/color_model.h"
 #include "prescene/rendering/renderer.h"
+#include "prescene/rendering/sensor/color_model.h"
 
 namespace prescene::filter::given_filter {
 

@@ -12,7 +12,7 @@
 #include "prescene/belief/scene.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/rendering/renderer.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 
 namespace prescene::filter_tests {
 

@@ -29,7 +29,7 @@ plant() {
 
 plant core/include/prescene/core/check.h '#include "prescene/geometry/pose.h"' 'core may not use geometry'
 plant geometry/planted.cc '#include "prescene/belief/scene.h"' 'geometry may not use belief'
-plant filter/planted.cc '#include "prescene/rendering/egl/egl_renderer.h"' 'filter may not use rendering/egl'
+plant filter/planted.cc '#include "prescene/rendering/gpu/egl_renderer.h"' 'filter may not use rendering/gpu'
 plant tests/geometry/planted_test.cc '#include "prescene/queries/query_engine.h"' 'tests/geometry may not use queries'
 plant belief/planted.cc '#include <btBulletDynamicsCommon.h>' 'is not for belief'
 plant filter/planted.cc '#include <dds/dds.h>' 'is not for filter'

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/rendering/color_model.h"
+#include "prescene/rendering/sensor/color_model.h"
 
 #include <gtest/gtest.h>
 

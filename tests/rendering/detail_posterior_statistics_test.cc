@@ -18,8 +18,8 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
-#include "prescene/rendering/simulated_camera.h"
 
 namespace prescene::rendering::detail_posterior_statistics_test {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "prescene/rendering/levels_of_detail.h"
+#include "prescene/rendering/sensor/levels_of_detail.h"
 
 namespace prescene::tests {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/rendering/frame_pyramid.h"
+#include "prescene/rendering/sensor/frame_pyramid.h"
 
 #include <gtest/gtest.h>
 

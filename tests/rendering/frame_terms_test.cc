@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 #include "scenes.h"
 
 namespace prescene::rendering {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/rendering/levels_of_detail.h"
+#include "prescene/rendering/sensor/levels_of_detail.h"
 
 #include <gtest/gtest.h>
 

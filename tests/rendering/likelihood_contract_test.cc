@@ -8,12 +8,12 @@
 
 #include "prescene/core/parallel.h"
 #include "prescene/geometry/sampling.h"
-#include "prescene/rendering/compute/compute_likelihood.h"
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/gpu/compute_likelihood.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
-#include "prescene/rendering/simulated_camera.h"
 #include "scenes.h"
 #include "tests/support/allocations.h"
 

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "prescene/geometry/sampling.h"
-#include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
 #include "scenes.h"
 

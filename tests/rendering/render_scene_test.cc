@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "prescene/rendering/sensor_model.h"
+#include "prescene/rendering/sensor/sensor_model.h"
 #include "scenes.h"
 
 namespace prescene::rendering {

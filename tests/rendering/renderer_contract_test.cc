@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "prescene/geometry/sampling.h"
-#include "prescene/rendering/egl/egl_renderer.h"
+#include "prescene/rendering/gpu/egl_renderer.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "scenes.h"
 #include "tests/peers/ray_caster.h"

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "prescene/rendering/sensor_model.h"
+#include "prescene/rendering/sensor/sensor_model.h"
 
 namespace prescene::rendering::sensor_model_statistics_test {
 namespace {

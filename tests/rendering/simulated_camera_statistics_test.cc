@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "scenes.h"
 
 namespace prescene::rendering {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "prescene/interfaces/images/png.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/replay.h"
 #include "prescene/service/session_report.h"

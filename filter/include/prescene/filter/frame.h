@@ -21,8 +21,8 @@
 #include "prescene/filter/render_scene.h"
 #include "prescene/filter/segmentation.h"
 #include "prescene/filter/support_surfaces.h"
-#include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/renderer.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 
 namespace prescene::filter {
 

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "prescene/belief/belief.h"
-#include "prescene/rendering/color_model.h"
+#include "prescene/rendering/sensor/color_model.h"
 
 namespace prescene::filter {
 

@@ -13,7 +13,7 @@
 
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 
 namespace prescene::filter {
 

@@ -13,7 +13,7 @@
 #include "prescene/core/random.h"
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 
 namespace prescene::filter {
 

@@ -16,7 +16,7 @@
 #include "prescene/core/parallel.h"
 #include "prescene/filter/render_scene.h"
 #include "prescene/queries/query_engine.h"
-#include "prescene/rendering/compute/likelihood_choice.h"
+#include "prescene/rendering/gpu/likelihood_choice.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/shape_store.h"

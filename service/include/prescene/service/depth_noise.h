@@ -18,7 +18,7 @@
 #include "prescene/core/status.h"
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
-#include "prescene/rendering/sensor_model.h"
+#include "prescene/rendering/sensor/sensor_model.h"
 
 namespace prescene::service {
 

@@ -9,7 +9,7 @@
 #include "prescene/belief/observation.h"
 #include "prescene/core/status.h"
 #include "prescene/filter/frame.h"
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/backends.h"
 
 namespace prescene::service {

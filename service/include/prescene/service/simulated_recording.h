@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "prescene/belief/trajectory.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/recording.h"
 #include "prescene/service/topics.h"

@@ -14,7 +14,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/filter/particle_filter.h"
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/recording.h"
 #include "prescene/service/tracker_settings.h"

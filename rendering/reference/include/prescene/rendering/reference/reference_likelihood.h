@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "prescene/rendering/likelihood_batch.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 
 namespace prescene::rendering {
 

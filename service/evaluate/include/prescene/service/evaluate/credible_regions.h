@@ -11,8 +11,8 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
-#include "prescene/rendering/likelihood_batch.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/evaluate/importance_sampling.h"
 
 namespace prescene::service {

@@ -8,9 +8,9 @@
 
 #include "prescene/core/random.h"
 #include "prescene/core/status.h"
-#include "prescene/rendering/likelihood_batch.h"
 #include "prescene/rendering/renderer.h"
-#include "prescene/rendering/simulated_camera.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
 
 namespace prescene::service {
 

@@ -15,7 +15,7 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
-#include "prescene/rendering/compute/likelihood_choice.h"
+#include "prescene/rendering/gpu/likelihood_choice.h"
 
 namespace prescene::service {
 
