@@ -6,7 +6,7 @@
 
 #include "prescene/belief/robot_motion.h"
 #include "prescene/core/check.h"
-#include "prescene/filter/learn_colors.h"
+#include "prescene/filter/operators/learn_colors.h"
 
 namespace prescene::filter {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "prescene/filter/support_tracking.h"
+#include "prescene/filter/proposals/support_tracking.h"
 #include "prescene/interfaces/reports/overlay.h"
 
 namespace prescene::service {

@@ -8,7 +8,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/robot_motion.h"
-#include "prescene/filter/frame.h"
+#include "prescene/filter/proposals/frame.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/foreseen.h"

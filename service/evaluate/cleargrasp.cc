@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "prescene/filter/segmentation.h"
+#include "prescene/filter/proposals/segmentation.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/rendering/sensor/local_surface.h"
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "prescene/core/clock.h"
-#include "prescene/filter/detection.h"
-#include "prescene/filter/pose_search.h"
+#include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/pose_search.h"
 #include "prescene/geometry/pose_error.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/reference/reference_renderer.h"

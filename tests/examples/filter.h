@@ -11,16 +11,16 @@
 #include "prescene/belief/scene.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
-#include "prescene/filter/augment.h"
-#include "prescene/filter/detection.h"
-#include "prescene/filter/frame.h"
-#include "prescene/filter/initialise.h"
-#include "prescene/filter/learn_colors.h"
+#include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/learn_colors.h"
+#include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/weight.h"
 #include "prescene/filter/particle_filter.h"
-#include "prescene/filter/predict.h"
-#include "prescene/filter/segmentation.h"
-#include "prescene/filter/support_tracking.h"
-#include "prescene/filter/weight.h"
+#include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/segmentation.h"
+#include "prescene/filter/proposals/support_tracking.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/rendering/sensor/color_model.h"
 
@@ -30,52 +30,6 @@ extern const std::shared_ptr<const belief::Scene> scene;
 extern const std::uint64_t seed;
 extern const belief::Observation observation;
 extern belief::Belief belief;
-extern belief::ObjectBelief object;
-extern const FilterFrame frame;
-extern const rendering::FrameTerms terms;
-extern const SearchTarget target;
-extern const SampledDepth sampled;
-extern const FilterTools tools;
-extern const core::RandomStream stream;
-extern core::ThreadPool pool;
-extern MeshCache meshes;
-extern const Pose X_WC, X_CO, X_WO;
-extern const std::vector<Pose> X_WG;
-extern const geometry::DepthImage known;
-extern const double dt;
-
-namespace augment_h {
-extern const rendering::PoseEvidence current;
-extern const AugmentOptions options;
-extern const WeightOptions weighting;
-extern const InitialiseOptions spread;
-}  // namespace augment_h
-
-namespace detection_h {
-extern const rendering::SupportRegion support;
-extern const std::vector<WantedModel> wanted;
-extern const DetectionOptions options;
-}  // namespace detection_h
-
-namespace frame_h {
-extern const FrameColors colors;
-extern const FrameOptions options;
-}  // namespace frame_h
-
-namespace initialise_h {
-extern const core::TimeNs stamp_ns;
-extern const InitialiseOptions options;
-}  // namespace initialise_h
-
-namespace learn_colors_h {
-extern const std::vector<WeightReport> reports;
-extern const ColorLearningOptions options;
-}  // namespace learn_colors_h
-
-namespace learned_colors_h {
-extern const rendering::ColorHistogram object_histogram, rest_histogram;
-extern const ColorLearningOptions options;
-}  // namespace learned_colors_h
 
 namespace particle_filter_h {
 extern const rendering::LikelihoodBatch& likelihood;
@@ -84,50 +38,5 @@ extern core::ThreadPool threads;
 extern const FilterSettings settings;
 extern const belief::Control control;
 }  // namespace particle_filter_h
-
-namespace pose_search_h {
-extern const rendering::LikelihoodBatch& batch;
-extern const SearchOptions options;
-}  // namespace pose_search_h
-
-namespace predict_h {
-extern const belief::Control control;
-extern const std::vector<Pose> X_WG_now;
-extern const PredictOptions options;
-extern const simulation::SimulatorFactory simulators;
-}  // namespace predict_h
-
-namespace render_scene_h {
-extern const std::unique_ptr<rendering::Renderer> renderer;
-extern const geometry::PinholeCamera camera;
-extern rendering::RenderedView images;
-extern const int x, y;
-}  // namespace render_scene_h
-
-namespace segmentation_h {
-struct Frame {
-  geometry::DepthImage depth;
-  geometry::PinholeCamera camera;
-};
-extern const Frame frame;
-extern const SegmentationOptions options;
-}  // namespace segmentation_h
-
-namespace support_tracking_h {
-extern belief::Support support;
-extern const SupportTrackingOptions options;
-extern const double gain;
-}  // namespace support_tracking_h
-
-namespace watched_renderer_h {
-extern rendering::Renderer& renderer;
-extern const geometry::PinholeCamera camera;
-extern const Pose X_CO;
-extern const SearchTarget target;
-}  // namespace watched_renderer_h
-
-namespace weight_h {
-extern const WeightOptions options;
-}
 
 }  // namespace prescene::filter::given_filter

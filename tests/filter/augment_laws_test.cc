@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is looked for beyond the belief: recovery, hidden places, exchanged twins and new objects, on frames whose truth
 // is known, and against what each promises for any frame.
-#include "prescene/filter/augment.h"
+#include "prescene/filter/operators/augment.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detection in one frame: against poses that are known, and against what its contract says of any frame.
-#include "prescene/filter/detection.h"
+#include "prescene/filter/proposals/detection.h"
 
 #include <gmock/gmock.h>
 
@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "filter_fixture.h"
-#include "prescene/filter/initialise.h"
+#include "prescene/filter/operators/initialise.h"
 
 namespace prescene::filter_tests {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "prescene/core/check.h"
-#include "prescene/filter/frame.h"
 #include "prescene/filter/particle_filter.h"
+#include "prescene/filter/proposals/frame.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "simulated_sequence.h"

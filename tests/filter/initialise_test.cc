@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/initialise.h"
+#include "prescene/filter/operators/initialise.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Colours that are learned while tracking: the law of blending, when nothing is learned, and what the belief carries.
-#include "prescene/filter/learned_colors.h"
+#include "prescene/filter/proposals/learned_colors.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "filter_fixture.h"
 #include "prescene/belief/json.h"
-#include "prescene/filter/learn_colors.h"
+#include "prescene/filter/operators/learn_colors.h"
 
 namespace prescene::filter_tests {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/predict.h"
+#include "prescene/filter/operators/predict.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/segmentation.h"
+#include "prescene/filter/proposals/segmentation.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "filter_fixture.h"
-#include "prescene/filter/initialise.h"
+#include "prescene/filter/operators/initialise.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter_tests {

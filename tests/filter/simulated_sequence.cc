@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "prescene/core/check.h"
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter_tests {

@@ -10,7 +10,7 @@
 
 #include "prescene/belief/observation.h"
 #include "prescene/belief/scene.h"
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_fixture.h"
-#include "prescene/filter/support_surfaces.h"
+#include "prescene/filter/proposals/support_surfaces.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter_tests {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A table that is seen by a camera that moves, against where it is.
-#include "prescene/filter/support_tracking.h"
+#include "prescene/filter/proposals/support_tracking.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/track_state.h"
+#include "prescene/filter/operators/track_state.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/weight.h"
+#include "prescene/filter/operators/weight.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "filter_fixture.h"
-#include "prescene/filter/initialise.h"
+#include "prescene/filter/operators/initialise.h"
 #include "prescene/geometry/sampling.h"
 #include "tests/support/matchers.h"
 

@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "prescene/filter/initialise.h"
-#include "prescene/filter/predict.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/predict.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/replay.h"
 #include "tests/service/recorded_box.h"

@@ -20,15 +20,15 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
-#include "prescene/filter/augment.h"
-#include "prescene/filter/frame.h"
-#include "prescene/filter/initialise.h"
-#include "prescene/filter/predict.h"
-#include "prescene/filter/resample.h"
-#include "prescene/filter/support_tracking.h"
-#include "prescene/filter/track_state.h"
-#include "prescene/filter/watched_renderer.h"
-#include "prescene/filter/weight.h"
+#include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/resample.h"
+#include "prescene/filter/operators/track_state.h"
+#include "prescene/filter/operators/watched_renderer.h"
+#include "prescene/filter/operators/weight.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/support_tracking.h"
 
 namespace prescene::filter {
 

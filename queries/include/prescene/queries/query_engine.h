@@ -19,7 +19,7 @@
 #include "prescene/belief/query.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/simulation/rules/mechanics_options.h"
 #include "prescene/simulation/shape_store.h"

@@ -14,7 +14,7 @@
 
 #include "prescene/belief/scene.h"
 #include "prescene/core/parallel.h"
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 #include "prescene/queries/query_engine.h"
 #include "prescene/rendering/gpu/likelihood_choice.h"
 #include "prescene/rendering/renderer.h"

@@ -8,7 +8,7 @@
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
 #include "prescene/core/status.h"
-#include "prescene/filter/frame.h"
+#include "prescene/filter/proposals/frame.h"
 #include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/backends.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "prescene/core/clock.h"
-#include "prescene/filter/support_tracking.h"
+#include "prescene/filter/proposals/support_tracking.h"
 
 namespace prescene::service {
 

@@ -10,7 +10,7 @@
 //
 // The formula of one pixel is written four times, which tests hold together. A new term goes into each, in this order:
 // - rendering/sensor/sensor_model.cc: the definition, in double precision, with its sampler; tests/rendering compares
-// the two.
+//   the two.
 // - rendering/sensor/pixel_classes.cc: what of the term does not depend on the pixel's depths, in single precision.
 // - rendering/reference/reference_likelihood.cc: the order of single-precision operations that every batch follows.
 // - rendering/simd/pose_evidence-inl.h: the same operations in lanes; tests/rendering/simd_likelihood_test.cc wants the

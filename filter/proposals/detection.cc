@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/detection.h"
+#include "prescene/filter/proposals/detection.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/frame.h"
+#include "prescene/filter/proposals/frame.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/support_tracking.h"
+#include "prescene/filter/proposals/support_tracking.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/segmentation.h"
+#include "prescene/filter/proposals/segmentation.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

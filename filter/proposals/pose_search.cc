@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/pose_search.h"
+#include "prescene/filter/proposals/pose_search.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/initialise.h"
+#include "prescene/filter/operators/initialise.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "prescene/core/check.h"
-#include "prescene/filter/support_tracking.h"
+#include "prescene/filter/proposals/support_tracking.h"
 
 namespace prescene::filter {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "prescene/belief/scene.h"
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 
 namespace prescene::filter {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/learn_colors.h"
+#include "prescene/filter/operators/learn_colors.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "prescene/filter/render_scene.h"
+#include "prescene/filter/proposals/render_scene.h"
 
 namespace prescene::filter {
 namespace {

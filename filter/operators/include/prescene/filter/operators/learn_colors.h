@@ -8,8 +8,8 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
-#include "prescene/filter/frame.h"
-#include "prescene/filter/weight.h"
+#include "prescene/filter/operators/weight.h"
+#include "prescene/filter/proposals/frame.h"
 
 namespace prescene::filter {
 

@@ -11,8 +11,8 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
-#include "prescene/filter/detection.h"
-#include "prescene/filter/frame.h"
+#include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/frame.h"
 
 namespace prescene::filter {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "prescene/belief/belief.h"
-#include "prescene/filter/frame.h"
-#include "prescene/filter/support_surfaces.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/support_surfaces.h"
 
 namespace prescene::filter {
 

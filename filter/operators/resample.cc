@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/resample.h"
+#include "prescene/filter/operators/resample.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

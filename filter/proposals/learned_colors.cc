@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/learned_colors.h"
+#include "prescene/filter/proposals/learned_colors.h"
 
 #include <algorithm>
 #include <memory>

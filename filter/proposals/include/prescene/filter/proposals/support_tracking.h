@@ -9,7 +9,7 @@
 #include <string>
 
 #include "prescene/belief/scene.h"
-#include "prescene/filter/segmentation.h"
+#include "prescene/filter/proposals/segmentation.h"
 
 namespace prescene::filter {
 

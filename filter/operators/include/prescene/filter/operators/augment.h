@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "prescene/belief/belief.h"
-#include "prescene/filter/detection.h"
-#include "prescene/filter/frame.h"
-#include "prescene/filter/initialise.h"
-#include "prescene/filter/weight.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/weight.h"
+#include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/frame.h"
 
 namespace prescene::filter {
 

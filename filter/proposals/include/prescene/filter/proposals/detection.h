@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "prescene/filter/frame.h"
-#include "prescene/filter/pose_search.h"
-#include "prescene/filter/segmentation.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/pose_search.h"
+#include "prescene/filter/proposals/segmentation.h"
 
 namespace prescene::filter {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/augment.h"
+#include "prescene/filter/operators/augment.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "prescene/belief/belief.h"
-#include "prescene/filter/weight.h"
+#include "prescene/filter/operators/weight.h"
 
 namespace prescene::filter {
 

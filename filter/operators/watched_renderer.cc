@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/watched_renderer.h"
+#include "prescene/filter/operators/watched_renderer.h"
 
 #include <utility>
 

@@ -16,11 +16,11 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
-#include "prescene/filter/learned_colors.h"
-#include "prescene/filter/pose_search.h"
-#include "prescene/filter/render_scene.h"
-#include "prescene/filter/segmentation.h"
-#include "prescene/filter/support_surfaces.h"
+#include "prescene/filter/proposals/learned_colors.h"
+#include "prescene/filter/proposals/pose_search.h"
+#include "prescene/filter/proposals/render_scene.h"
+#include "prescene/filter/proposals/segmentation.h"
+#include "prescene/filter/proposals/support_surfaces.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/rendering/sensor/likelihood_batch.h"
 

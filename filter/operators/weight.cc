@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/filter/weight.h"
+#include "prescene/filter/operators/weight.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of filter/operators take for granted.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/observation.h"
+#include "prescene/belief/scene.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/random.h"
+#include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/learn_colors.h"
+#include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/weight.h"
+#include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/segmentation.h"
+#include "prescene/filter/proposals/support_tracking.h"
+#include "prescene/rendering/renderer.h"
+#include "prescene/rendering/sensor/color_model.h"
+
+namespace prescene::filter::given_filter_operators {
+
+extern const std::shared_ptr<const belief::Scene> scene;
+extern const std::uint64_t seed;
+extern const belief::Observation observation;
+extern belief::Belief belief;
+extern belief::ObjectBelief object;
+extern const FilterFrame frame;
+extern const rendering::FrameTerms terms;
+extern const SearchTarget target;
+extern const FilterTools tools;
+extern const core::RandomStream stream;
+extern core::ThreadPool pool;
+extern const Pose X_WC, X_CO, X_WO;
+extern const geometry::DepthImage known;
+extern const double dt;
+
+namespace augment_h {
+extern const rendering::PoseEvidence current;
+extern const AugmentOptions options;
+extern const WeightOptions weighting;
+extern const InitialiseOptions spread;
+}  // namespace augment_h
+
+namespace initialise_h {
+extern const core::TimeNs stamp_ns;
+extern const InitialiseOptions options;
+}  // namespace initialise_h
+
+namespace learn_colors_h {
+extern const std::vector<WeightReport> reports;
+extern const ColorLearningOptions options;
+}  // namespace learn_colors_h
+
+namespace predict_h {
+extern const belief::Control control;
+extern const std::vector<Pose> X_WG_now;
+extern const PredictOptions options;
+extern const simulation::SimulatorFactory simulators;
+}  // namespace predict_h
+
+namespace watched_renderer_h {
+extern rendering::Renderer& renderer;
+extern const geometry::PinholeCamera camera;
+extern const Pose X_CO;
+extern const SearchTarget target;
+}  // namespace watched_renderer_h
+
+namespace weight_h {
+extern const WeightOptions options;
+}
+
+}  // namespace prescene::filter::given_filter_operators

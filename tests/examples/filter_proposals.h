@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of filter/proposals take for granted.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/observation.h"
+#include "prescene/belief/scene.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/random.h"
+#include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/segmentation.h"
+#include "prescene/filter/proposals/support_tracking.h"
+#include "prescene/rendering/renderer.h"
+#include "prescene/rendering/sensor/color_model.h"
+
+namespace prescene::filter::given_filter_proposals {
+
+extern const std::shared_ptr<const belief::Scene> scene;
+extern const belief::Observation observation;
+extern belief::Belief belief;
+extern belief::ObjectBelief object;
+extern const FilterFrame frame;
+extern const rendering::FrameTerms terms;
+extern const SearchTarget target;
+extern const SampledDepth sampled;
+extern const FilterTools tools;
+extern const core::RandomStream stream;
+extern core::ThreadPool pool;
+extern MeshCache meshes;
+extern const Pose X_WC, X_CO, X_WO;
+extern const std::vector<Pose> X_WG;
+extern const geometry::DepthImage known;
+
+namespace detection_h {
+extern const rendering::SupportRegion support;
+extern const std::vector<WantedModel> wanted;
+extern const DetectionOptions options;
+}  // namespace detection_h
+
+namespace frame_h {
+extern const FrameColors colors;
+extern const FrameOptions options;
+}  // namespace frame_h
+
+namespace learned_colors_h {
+extern const rendering::ColorHistogram object_histogram, rest_histogram;
+extern const ColorLearningOptions options;
+}  // namespace learned_colors_h
+
+namespace pose_search_h {
+extern const rendering::LikelihoodBatch& batch;
+extern const SearchOptions options;
+}  // namespace pose_search_h
+
+namespace render_scene_h {
+extern const std::unique_ptr<rendering::Renderer> renderer;
+extern const geometry::PinholeCamera camera;
+extern rendering::RenderedView images;
+extern const int x, y;
+}  // namespace render_scene_h
+
+namespace segmentation_h {
+struct Frame {
+  geometry::DepthImage depth;
+  geometry::PinholeCamera camera;
+};
+extern const Frame frame;
+extern const SegmentationOptions options;
+}  // namespace segmentation_h
+
+namespace support_tracking_h {
+extern belief::Support support;
+extern const SupportTrackingOptions options;
+extern const double gain;
+}  // namespace support_tracking_h
+
+}  // namespace prescene::filter::given_filter_proposals
