@@ -5,8 +5,8 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/service/live/question_client.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/service/question_client.h"
 #include "verb.h"
 
 namespace prescene::service {

@@ -7,8 +7,8 @@
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/service/calibration/object_calibration.h"
 #include "prescene/service/evaluate/cube_calibration.h"
-#include "prescene/service/object_calibration.h"
 #include "verb.h"
 
 namespace prescene::service {

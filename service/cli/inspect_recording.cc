@@ -6,9 +6,9 @@
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"
-#include "prescene/service/belief_overlay.h"
-#include "prescene/service/likelihood_picture.h"
-#include "prescene/service/tracker.h"
+#include "prescene/service/pictures/belief_overlay.h"
+#include "prescene/service/pictures/likelihood_picture.h"
+#include "prescene/service/tracking/tracker.h"
 
 namespace prescene::service {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "prescene/core/status.h"
-#include "prescene/service/replay_input.h"
+#include "prescene/service/recording/replay_input.h"
 #include "verb.h"
 
 namespace prescene::service {

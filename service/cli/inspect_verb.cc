@@ -8,9 +8,9 @@
 #include "inspect_recording.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/scene_files/mesh_use.h"
-#include "prescene/service/depth_noise.h"
+#include "prescene/service/calibration/depth_noise.h"
 #include "prescene/service/mesh_inspection.h"
-#include "prescene/service/prediction_report.h"
+#include "prescene/service/pictures/prediction_report.h"
 #include "verb.h"
 
 namespace prescene::service {

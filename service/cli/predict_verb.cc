@@ -10,9 +10,9 @@
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/service/backends.h"
-#include "prescene/service/heat_map_picture.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/prediction_report.h"
+#include "prescene/service/pictures/heat_map_picture.h"
+#include "prescene/service/pictures/prediction_report.h"
 #include "verb.h"
 
 namespace prescene::service {

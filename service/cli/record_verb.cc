@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/service/bus_recorder.h"
+#include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/simulated_recording.h"
+#include "prescene/service/recording/simulated_recording.h"
 #include "verb.h"
 
 namespace prescene::service {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "prescene/service/bus_replay.h"
-#include "prescene/service/foreseen.h"
-#include "prescene/service/replay.h"
-#include "prescene/service/support_score.h"
-#include "prescene/service/tracking_score.h"
+#include "prescene/service/live/bus_replay.h"
+#include "prescene/service/recording/foreseen.h"
+#include "prescene/service/recording/replay.h"
+#include "prescene/service/recording/support_score.h"
+#include "prescene/service/recording/tracking_score.h"
 
 namespace prescene::service {
 

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
-#include "prescene/service/live_service.h"
+#include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
 #include "verb.h"
 

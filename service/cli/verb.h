@@ -18,7 +18,7 @@
 #include "prescene/geometry/pose.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/rendering/gpu/likelihood_choice.h"
-#include "prescene/service/tracker_settings.h"
+#include "prescene/service/tracking/tracker_settings.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
 class App;

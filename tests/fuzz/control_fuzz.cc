@@ -7,7 +7,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/check.h"
-#include "prescene/service/waiting_controls.h"
+#include "prescene/service/tracking/waiting_controls.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace prescene;

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "prescene/core/check.h"
-#include "prescene/service/frame_assembler.h"
+#include "prescene/service/tracking/frame_assembler.h"
 
 using namespace prescene;  // NOLINT(google-build-using-namespace)
 

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "prescene/core/check.h"
-#include "prescene/service/foreseen.h"
-#include "prescene/service/recording.h"
-#include "prescene/service/simulated_recording.h"
+#include "prescene/service/recording/foreseen.h"
+#include "prescene/service/recording/simulated_recording.h"
+#include "prescene/service/tracking/recording.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/service/tracker_settings.h"
+#include "prescene/service/tracking/tracker_settings.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace prescene::service;

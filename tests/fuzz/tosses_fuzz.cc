@@ -8,7 +8,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/service/motion_dataset.h"
+#include "prescene/service/calibration/motion_dataset.h"
 #include "tests/support/paths.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "prescene/service/load_scene.h"
-#include "prescene/service/replay.h"
-#include "prescene/service/support_score.h"
+#include "prescene/service/recording/replay.h"
+#include "prescene/service/recording/support_score.h"
 #include "tests/support/paths.h"
 
 namespace prescene::service {

@@ -10,7 +10,7 @@
 #include "prescene/core/hash.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/replay.h"
+#include "prescene/service/recording/replay.h"
 #include "tests/support/paths.h"
 
 namespace prescene::tests {

@@ -11,8 +11,8 @@
 #include "prescene/belief/query.h"
 #include "prescene/belief/scene.h"
 #include "prescene/service/belief_summary.h"
-#include "prescene/service/simulated_recording.h"
-#include "prescene/service/tracking_score.h"
+#include "prescene/service/recording/simulated_recording.h"
+#include "prescene/service/recording/tracking_score.h"
 #include "tests/support/pinned.h"
 
 namespace prescene::tests {

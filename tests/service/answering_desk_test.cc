@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/answering_desk.h"
+#include "prescene/service/live/answering_desk.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -10,7 +10,7 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
-#include "prescene/service/depth_noise.h"
+#include "prescene/service/calibration/depth_noise.h"
 
 namespace prescene::service {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "prescene/service/answering_desk.h"
+#include "prescene/service/live/answering_desk.h"
 #include "prescene/service/load_scene.h"
 
 namespace prescene::tests {

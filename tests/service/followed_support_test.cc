@@ -8,9 +8,9 @@
 #include "prescene/interfaces/images/png.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/replay.h"
-#include "prescene/service/session_report.h"
-#include "prescene/service/support_score.h"
+#include "prescene/service/recording/replay.h"
+#include "prescene/service/recording/session_report.h"
+#include "prescene/service/recording/support_score.h"
 #include "tests/support/paths.h"
 
 namespace prescene::service::followed_support_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/foreseen.h"
+#include "prescene/service/recording/foreseen.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/topics.h"
+#include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {
 namespace {

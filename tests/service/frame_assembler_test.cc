@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/frame_assembler.h"
+#include "prescene/service/tracking/frame_assembler.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/heat_map_picture.h"
+#include "prescene/service/pictures/heat_map_picture.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "prescene/service/ground_density.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/pictures/ground_density.h"
 
 namespace prescene::service {
 namespace {

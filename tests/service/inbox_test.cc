@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/inbox.h"
+#include "prescene/service/live/inbox.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/live_service.h"
+#include "prescene/service/live/live_service.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
-#include "prescene/service/bus_replay.h"
+#include "prescene/service/live/bus_replay.h"
 #include "prescene/service/load_scene.h"
 #include "tests/service/robot_on_bus.h"
 #include "tests/support/paths.h"

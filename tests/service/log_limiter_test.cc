@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/log_limiter.h"
+#include "prescene/service/live/log_limiter.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/object_calibration.h"
+#include "prescene/service/calibration/object_calibration.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/scene_files/model_file.h"
-#include "prescene/service/motion_units.h"
+#include "prescene/service/calibration/motion_units.h"
 #include "tests/support/simulated_motions.h"
 
 namespace prescene::tests {

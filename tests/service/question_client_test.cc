@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/question_client.h"
+#include "prescene/service/live/question_client.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/service/topics.h"
+#include "prescene/service/tracking/topics.h"
 
 namespace prescene::service::question_client_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/recording.h"
+#include "prescene/service/tracking/recording.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
-#include "prescene/service/topics.h"
+#include "prescene/service/tracking/topics.h"
 #include "tests/support/paths.h"
 
 namespace prescene::service {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/replay.h"
+#include "prescene/service/recording/replay.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/service_health.h"
+#include "prescene/service/live/service_health.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/session_report.h"
+#include "prescene/service/recording/session_report.h"
 
 #include <gtest/gtest.h>
 

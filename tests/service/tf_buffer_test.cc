@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/tf_buffer.h"
+#include "prescene/service/tracking/tf_buffer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/topics.h"
+#include "prescene/service/tracking/topics.h"
 
 #include <gtest/gtest.h>
 

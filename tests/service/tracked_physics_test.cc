@@ -9,7 +9,7 @@
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/operators/predict.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/replay.h"
+#include "prescene/service/recording/replay.h"
 #include "tests/service/recorded_box.h"
 #include "tests/support/paths.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/tracker_settings.h"
+#include "prescene/service/tracking/tracker_settings.h"
 
 #include <gmock/gmock.h>
 

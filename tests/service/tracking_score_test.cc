@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/tracking_score.h"
+#include "prescene/service/recording/tracking_score.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/waiting_controls.h"
+#include "prescene/service/tracking/waiting_controls.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/load_scene.h"
-#include "prescene/service/tracker.h"
+#include "prescene/service/tracking/tracker.h"
 #include "tests/service/recorded_box.h"
 #include "tests/support/paths.h"
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "prescene/interfaces/dds/dds_node.h"
-#include "prescene/service/topics.h"
+#include "prescene/service/tracking/topics.h"
 
 int main(int argc, char** argv) {
   using namespace prescene;

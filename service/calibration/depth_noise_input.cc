@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "prescene/interfaces/images/frame_folder.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/calibration/depth_noise.h"
+#include "prescene/service/outside_json.h"
+#include "prescene/service/tracking/recording.h"
+#include "prescene/service/tracking/tracker_settings.h"
+
+namespace prescene::service {
+namespace {
+
+core::Status going_on(const core::Cancellation& cancellation) {
+  return cancellation.requested() ? core::cancelled("stopped on request") : core::ok_status();
+}
+
+core::Status add_folder(const std::filesystem::path& path, double metres_per_unit, const core::ProgressSink& progress,
+                        const core::Cancellation& cancellation, DepthNoiseEstimator& estimator) {
+  interfaces::FrameFolderOptions options;
+  options.metres_per_unit = metres_per_unit;
+  PRESCENE_TRY(const interfaces::FrameFolder folder, interfaces::FrameFolder::open(path, options));
+  const std::size_t count = folder.frames().size();
+  for (std::size_t i = 0; i < count && !estimator.full(); ++i) {
+    PRESCENE_RETURN_IF_ERROR(going_on(cancellation));
+    PRESCENE_TRY(const interfaces::RgbdImages images, folder.load(i));
+    PRESCENE_RETURN_IF_ERROR(estimator.add(images.depth, folder.camera()));
+    if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(count), {}, ""});
+  }
+  return core::ok_status();
+}
+
+core::Status add_recording(const std::filesystem::path& path, const core::ProgressSink& progress,
+                           const core::Cancellation& cancellation, DepthNoiseEstimator& estimator) {
+  PRESCENE_TRY(const auto reader, RecordingReader::open(path));
+  TrackerSettings settings;
+  if (!reader->info().settings.empty()) {
+    PRESCENE_TRY(settings, with_recorded({}, parse_or_discard(reader->info().settings)));
+  }
+  const double total = static_cast<double>(reader->message_count().value_or(0));
+  double done = 0.0;
+  int images = 0;
+  std::optional<geometry::PinholeCamera> camera;
+  while (!estimator.full()) {
+    PRESCENE_RETURN_IF_ERROR(going_on(cancellation));
+    PRESCENE_TRY(const auto entry, reader->next());
+    if (!entry) break;
+    if (progress && total > 0.0) progress({std::min(1.0, ++done / total), {}, ""});
+    if (entry->is_json) continue;
+    if (entry->message.topic == settings.topics.camera_info) {
+      PRESCENE_TRY(const auto info, interfaces::decode_cdr<interfaces::RosCameraInfo>(entry->message.cdr));
+      interfaces::CameraRules rules;
+      rules.rectified = settings.assembler.rectified;
+      PRESCENE_TRY(camera, interfaces::to_camera(info, rules));
+    } else if (entry->message.topic == settings.topics.depth) {
+      ++images;
+      if (!camera) continue;
+      PRESCENE_TRY(const auto message, interfaces::decode_cdr<interfaces::RosImage>(entry->message.cdr));
+      interfaces::ImageRules rules;
+      rules.mono16_is_depth = settings.assembler.mono16_is_depth;
+      PRESCENE_TRY(const geometry::DepthImage depth, interfaces::to_depth_image(message, rules));
+      PRESCENE_RETURN_IF_ERROR(estimator.add(depth, *camera));
+    }
+  }
+  if (images == 0) return core::invalid_input("no depth image on " + settings.topics.depth);
+  if (!camera) return core::invalid_input("no camera info on " + settings.topics.camera_info);
+  return core::ok_status();
+}
+
+}  // namespace
+
+core::Result<DepthNoise> depth_noise_of(const std::filesystem::path& path, double metres_per_unit,
+                                        const core::ProgressSink& progress, const core::Cancellation& cancellation) {
+  DepthNoiseEstimator estimator;
+  const core::Status added = std::filesystem::is_directory(path)
+                                 ? add_folder(path, metres_per_unit, progress, cancellation, estimator)
+                                 : add_recording(path, progress, cancellation, estimator);
+  if (!added.ok()) return added.at(path.string());
+  auto noise = estimator.finish();
+  if (!noise) return noise.status().at(path.string());
+  return noise;
+}
+
+}  // namespace prescene::service

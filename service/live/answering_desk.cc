@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/live/answering_desk.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
+
+namespace prescene::service {
+namespace {
+
+// Longer ones are refused unread.
+constexpr std::size_t kLongestQuestion = 1u << 20;
+// Where there is no room, the id is looked for in questions up to this length only: in longer ones it takes too long.
+constexpr std::size_t kLongestWithId = 4096;
+constexpr std::size_t kMostRefusalsWaiting = 256;
+// s between the last simulated instance and the end of all work on a question, at most.
+constexpr double kRestSeconds = 1.5;
+
+core::Cancellation::Clock::time_point deadline_after(double seconds) {
+  return core::Cancellation::Clock::now() +
+         std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+/// Questions without limits of their own are bounded in time, so that a robot gets its answer.
+void bound_effort(belief::Query& query, const DeskSettings& settings) {
+  const auto bound = [&settings](belief::Effort& effort) {
+    if (!effort.exact_instances)
+      effort.max_seconds = std::min(effort.max_seconds.value_or(settings.default_seconds), settings.most_seconds);
+  };
+  if (auto* predict = std::get_if<belief::PredictQuery>(&query.what)) bound(predict->effort);
+  if (auto* stability = std::get_if<belief::StabilityQuery>(&query.what)) bound(stability->effort);
+}
+
+core::Status too_many_wait(std::size_t count) {
+  return core::unavailable(std::to_string(count) + " " + kQuestionsWait + ": ask again later");
+}
+
+}  // namespace
+
+std::string error_answer(const std::string& id, const core::Status& error) {
+  nlohmann::ordered_json answer = nlohmann::ordered_json::object();
+  if (!id.empty()) answer["id"] = id;
+  answer.update(belief::error_to_json(error));
+  return belief::json_text(answer);
+}
+
+AnsweringDesk::AnsweringDesk(Backends& backends, int threads, const DeskSettings& settings,
+                             std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
+    : backends_(backends),
+      pool_(threads),
+      settings_(settings),
+      snapshot_(std::move(snapshot)),
+      on_answer_(std::move(on_answer)),
+      reader_([this] { read_questions(); }),
+      simulator_([this] { simulate_questions(); }) {}
+
+AnsweringDesk::~AnsweringDesk() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_.request();
+  }
+  read_changed_.notify_all();
+  simulate_changed_.notify_all();
+  reader_.join();
+  simulator_.join();
+}
+
+DeskCounts AnsweringDesk::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+void AnsweringDesk::ask(std::string question_json) {
+  try {
+    take(std::move(question_json));
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void AnsweringDesk::take(std::string question_json) {
+  const std::size_t bytes = std::min(question_json.size(), kLongestQuestion + 1);
+  const bool may_have_id = question_json.size() <= kLongestWithId;
+  if (question_json.size() > bytes) {  // what is longer is refused by the reader, and need not be kept
+    question_json.resize(bytes);
+    question_json.shrink_to_fit();
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (unread_.size() < settings_.max_unread && unread_bytes_ + bytes <= settings_.max_unread_bytes) {
+      unread_.push_back(std::move(question_json));
+      unread_bytes_ += bytes;
+      read_changed_.notify_one();
+      return;
+    }
+    if (!may_have_id || too_many_.size() >= kMostRefusalsWaiting) {
+      ++counts_.unanswered;
+      return;
+    }
+  }
+  std::string id = id_of(question_json);
+  const std::lock_guard lock(mutex_);
+  too_many_.push_back(std::move(id));
+  read_changed_.notify_one();
+}
+
+void AnsweringDesk::read_questions() {
+  for (bool refusals_first = false;; refusals_first = !refusals_first) {
+    std::string question, id;
+    bool is_refusal = false;
+    {
+      std::unique_lock lock(mutex_);
+      read_changed_.wait(lock, [&] { return stop_.requested() || !unread_.empty() || !too_many_.empty(); });
+      if (stop_.requested()) return;
+      is_refusal = unread_.empty() || (refusals_first && !too_many_.empty());
+      if (is_refusal) {
+        id = std::move(too_many_.front());
+        too_many_.pop_front();
+      } else {
+        question = std::move(unread_.front());
+        unread_.pop_front();
+        unread_bytes_ -= question.size();
+      }
+    }
+    if (!is_refusal) {
+      read(question);
+      continue;
+    }
+    try {
+      refuse(id, too_many_wait(settings_.max_unread));
+    } catch (const std::exception&) {
+      drop();
+    }
+  }
+}
+
+void AnsweringDesk::read(const std::string& question_json) {
+  std::string id;
+  try {
+    if (question_json.size() > kLongestQuestion)
+      return refuse("", core::resource_exhausted("the question is longer than " + std::to_string(kLongestQuestion) +
+                                                 " bytes: make it shorter"));
+    auto read = belief::query_from_json(question_json);
+    if (!read) return refuse(id_of(question_json), read.status());
+    if (std::holds_alternative<belief::WhereQuery>(read->what)) return answer(*read);
+    id = read->id;
+    bound_effort(*read, settings_);
+    const auto query = std::make_shared<const belief::Query>(*std::move(read));
+    core::Status reason;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto has_id = [&id](const auto& other) { return other && other->id == id; };
+      const auto same_id = std::find_if(waiting_.begin(), waiting_.end(), has_id);
+      const auto& other = same_id != waiting_.end() ? *same_id : in_work_;
+      if (!id.empty() && has_id(other)) {
+        if (*other == *query) {
+          ++counts_.repeated;
+          return;
+        }
+        reason = core::invalid_input("another question with the id '" + id +
+                                     "' is not answered yet: choose another id, one that no other client uses");
+      } else if (waiting_.size() < settings_.max_waiting) {
+        waiting_.push_back(query);
+        simulate_changed_.notify_one();
+        return;
+      } else {
+        reason = too_many_wait(settings_.max_waiting);
+      }
+    }
+    refuse(id, reason);
+  } catch (const std::exception&) {
+    refuse_after_exception(id, "the question could not be read");
+  }
+}
+
+void AnsweringDesk::simulate_questions() {
+  for (;;) {
+    std::shared_ptr<const belief::Query> query;
+    {
+      std::unique_lock lock(mutex_);
+      simulate_changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
+      if (stop_.requested()) return;
+      query = std::move(waiting_.front());
+      waiting_.pop_front();
+      in_work_ = query;
+    }
+    answer(*query);
+  }
+}
+
+void AnsweringDesk::answer(const belief::Query& query) {
+  const auto finish = [&] {
+    // Before the answer goes out: whoever has it may ask under the same id again.
+    const std::lock_guard lock(mutex_);
+    if (in_work_.get() == &query) in_work_.reset();
+  };
+  try {
+    const Reply reply = reply_to(query);
+    finish();
+    if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
+      return refuse(query.id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
+                                                       " MiB, more than clients take: ask for less at a time"));
+    send(reply.text, reply.is_answer ? &DeskCounts::answered : &DeskCounts::refused);
+  } catch (const std::exception&) {
+    finish();
+    refuse_after_exception(query.id, "the question could not be answered");
+  }
+}
+
+AnsweringDesk::Reply AnsweringDesk::reply_to(const belief::Query& query) {
+  queries::QueryContext context = backends_.query_context(pool_);
+  const core::Cancellation end(stop_, deadline_after(settings_.most_seconds + kRestSeconds));
+  context.cancellation = context.abandoned = &end;
+  context.simulate_until = deadline_after(settings_.most_seconds);
+  context.most_bytes = settings_.most_bytes;
+  const std::shared_ptr<const belief::Belief> belief = snapshot_();
+  // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
+  const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)
+                                                  : queries::answer(*belief, query, context);
+  return {belief::json_text(belief::to_json(answer)), answer.what.index() > 0};
+}
+
+void AnsweringDesk::refuse(const std::string& id, const core::Status& reason) {
+  try {
+    send(error_answer(id, reason), &DeskCounts::refused);
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void AnsweringDesk::refuse_after_exception(const std::string& id, const char* doing) {
+  try {
+    refuse(id, note_exception(doing));
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void AnsweringDesk::send(const std::string& answer, std::uint64_t DeskCounts::*fate) {
+  // Counted before: whoever has the answer finds it counted.
+  {
+    const std::lock_guard lock(mutex_);
+    ++(counts_.*fate);
+  }
+  try {
+    on_answer_(answer);
+  } catch (const std::exception&) {
+    {
+      const std::lock_guard lock(mutex_);
+      --(counts_.*fate);
+    }
+    drop();
+  }
+}
+
+void AnsweringDesk::drop() {
+  try {
+    static_cast<void>(note_exception("no answer could be sent"));
+  } catch (const std::exception&) {  // no memory for its text, either
+  }
+  const std::lock_guard lock(mutex_);
+  ++counts_.unanswered;
+}
+
+core::Status AnsweringDesk::note_exception(const char* doing) {
+  try {
+    throw;
+  } catch (const std::bad_alloc&) {
+    return core::resource_exhausted(std::string(doing) + ": it does not fit into the memory; ask for less");
+  } catch (const std::exception& error) {
+    {
+      const std::lock_guard lock(mutex_);
+      ++counts_.failed;
+      counts_.last_failure_ns = core::steady_now_ns();
+      counts_.last_failure = error.what();
+    }
+    return core::unavailable(std::string(doing) + ": " + error.what());
+  }
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/live/bus_recorder.h"
+
+#include <algorithm>
+
+#include "prescene/service/live/inbox.h"
+
+namespace prescene::service {
+namespace {
+
+constexpr std::chrono::milliseconds kWriteInterval(100);
+// What may wait for the disk: two seconds of images of 640 x 480 at 30 Hz.
+constexpr InboxLimit kWaitingImages{.messages = 60, .bytes = std::size_t{64} << 20};
+constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t{16} << 20};
+
+}  // namespace
+
+core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const InputTopics& topics,
+                                          const core::Cancellation& cancellation, const core::LogSink& log,
+                                          RecordingWriter& recording) {
+  Inbox inbox({{topics.depth, kWaitingImages}, {topics.color, kWaitingImages}, {topics.tf, kWaitingTransforms}});
+  PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
+  for (const BusTopic& topic : bus_topics(topics)) {
+    PRESCENE_RETURN_IF_ERROR(
+        node->subscribe(topic.name, topic.type, topic.read,
+                        [&inbox](interfaces::ReceivedMessage&& message) { inbox.put(std::move(message)); }));
+  }
+  std::uint64_t messages = 0;
+  core::TimeNs last_ns = 0;
+  while (!cancellation.requested()) {
+    for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kWriteInterval)) {
+      // Never back, so that the order by time is the order of arrival.
+      message.received_ns = last_ns = std::max(last_ns, message.received_ns);
+      PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
+      ++messages;
+    }
+  }
+  node->stop_receiving();
+  if (inbox.dropped() + node->dropped_samples() > 0) {
+    core::log(log, core::LogLevel::kWarning,
+              std::to_string(inbox.dropped() + node->dropped_samples()) +
+                  " messages were lost: the disk or the network is too slow for these topics");
+  }
+  PRESCENE_RETURN_IF_ERROR(recording.close());
+  return messages;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The live service: listens on the bus, steps the belief, publishes it, answers questions, and records what happened.
+//
+// One thread owns the belief and steps it; the bus has its own; questions are answered by two more from snapshots, so
+// that a slow question never delays a frame. The newest frame wins, and skipped ones are counted. Whatever is lost,
+// refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its rate.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "prescene/core/progress.h"
+#include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/tracking/tracker.h"
+
+namespace prescene::service {
+
+struct LiveSettings {
+  TrackerSettings tracker;
+  interfaces::DdsOptions dds;
+  DeskSettings desk;
+  double marker_rate = 5.0;  ///< Markers a second, at most.
+  double diagnostics_rate = 1.0;
+};
+
+class LiveService {
+ public:
+  /// Joins the bus. `backends` must outlive the service; `recording` may be null.
+  static core::Result<std::unique_ptr<LiveService>> create(std::shared_ptr<const belief::Scene> scene,
+                                                           const LiveSettings& settings, std::uint64_t seed,
+                                                           Backends& backends,
+                                                           std::unique_ptr<RecordingWriter> recording,
+                                                           const core::LogSink& log);
+  ~LiveService();
+
+  /// Works until cancelled, then closes the recording. A recording that fails on the way (a full disk) ends there,
+  /// while tracking goes on; the status then tells of it.
+  core::Status run(const core::Cancellation& cancellation);
+
+ private:
+  struct Impl;
+  explicit LiveService(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace prescene::service

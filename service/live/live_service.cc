@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/live/live_service.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "prescene/belief/json.h"
+#include "prescene/core/clock.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/belief_summary.h"
+#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/inbox.h"
+#include "prescene/service/live/log_limiter.h"
+#include "prescene/service/live/service_health.h"
+
+namespace prescene::service {
+namespace {
+
+using interfaces::DdsPublisher;
+using interfaces::ReceivedMessage;
+using interfaces::TopicQos;
+using std::chrono::steady_clock;
+
+// How often a stop request is looked for while nothing comes in.
+constexpr std::chrono::milliseconds kPollInterval(100);
+
+// A stop, a frame that is complete and the diagnostics wait no longer than this for a crowd of messages to be taken in.
+constexpr std::chrono::milliseconds kLongestIntake(20);
+
+// Of images the newest count; what else waits is bounded so that its intake takes some tens of milliseconds.
+std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
+  constexpr std::size_t kMiB = std::size_t{1} << 20;
+  const InboxLimit image{.messages = 4, .bytes = 64 * kMiB};
+  return {{topics.depth, image},
+          {topics.color, image},
+          {topics.camera_info, {.messages = 4, .bytes = kMiB}},
+          {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
+          {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}}};
+}
+
+/// True at most `rate` times a second.
+class RateLimit {
+ public:
+  explicit RateLimit(double rate) : interval_(std::chrono::duration<double>(1.0 / rate)) {}
+  bool due() {
+    const auto now = steady_clock::now();
+    if (last_ && now - *last_ < interval_) return false;
+    last_ = now;
+    return true;
+  }
+
+ private:
+  std::chrono::duration<double> interval_;
+  std::optional<steady_clock::time_point> last_;
+};
+
+}  // namespace
+
+struct LiveService::Impl {
+  Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings, std::unique_ptr<Tracker> a_tracker,
+       std::unique_ptr<RecordingWriter> a_recording, core::LogSink a_log)
+      : scene(std::move(a_scene)),
+        settings(a_settings),
+        tracker(std::move(a_tracker)),
+        recording(std::move(a_recording)),
+        log_limiter(std::move(a_log), {}),
+        log(log_limiter.sink()),
+        meshes(marker_meshes(*scene)),
+        inbox(inbox_limits(settings.tracker.topics)),
+        marker_limit(settings.marker_rate),
+        diagnostics_limit(settings.diagnostics_rate) {}
+
+  core::Status join_bus();
+  /// Takes in what came, in its order, and looks after frames in between.
+  void take_in(std::vector<ReceivedMessage> messages, const core::Cancellation& cancellation);
+  void take_in(ReceivedMessage& message);
+  void refuse(const core::Status& status);
+  /// Counts an exception of a library, or the end of memory: what came next may do better.
+  void note_failure(const std::string& of, const std::exception& error);
+  void record(const std::string& topic, const std::string& json);
+  /// Without one of its steps a recording can't be replayed: it ends where that can't be written.
+  void record_step(const StepRecord& step);
+  /// The recording ends here, and is an error of the run.
+  void give_up_recording(const core::Status& why);
+  /// Steps the belief if a frame is complete, records what was answered, publishes.
+  void look_after_frames();
+  /// Counts and logs a message that the middleware did not take.
+  void check_sent(const core::Status& status);
+  void publish();
+  void publish_diagnostics();
+  core::TimeNs now();
+  ServiceHealth health() const;
+  void tell_what_changed(const ServiceHealth& health);
+
+  std::shared_ptr<const belief::Scene> scene;
+  LiveSettings settings;
+  std::unique_ptr<Tracker> tracker;
+  std::unique_ptr<RecordingWriter> recording;
+  core::Status recording_status;
+  LogLimiter log_limiter;
+  core::LogSink log;
+  MarkerMeshes meshes;
+  Inbox inbox;
+  RateLimit marker_limit;
+  RateLimit diagnostics_limit;
+
+  DdsPublisher beliefs, detections, markers, diagnostics, answers;
+  std::map<std::string, DdsPublisher> poses;
+  MessageIndex next_index = 0;
+  core::TimeNs last_now_ns = 0;
+  std::uint64_t steps = 0;
+  std::uint64_t refused = 0;
+  std::uint64_t failures = 0;
+  std::atomic<std::uint64_t> unsent{0};
+  double step_seconds = 0.0;
+  std::vector<std::string> degraded;
+  std::string last_refusal;
+  std::string logged_refusal;
+  std::uint64_t not_simulated = 0;
+  std::string physics_failure;
+  const Backends* backends = nullptr;
+  std::optional<core::Stopwatch> since_frame;
+  bool was_tracking = false;
+  bool was_degraded = false;
+  bool told_why_not = false;
+  std::mutex answered_mutex;  // guards what the desk hands over to the recording
+  std::vector<std::string> answered;
+  std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
+  std::string last_failure;
+  core::TimeNs last_failure_ns = 0;
+  ServiceHealth last_reported;
+
+  // Last, so that their threads end before what they use.
+  std::unique_ptr<interfaces::DdsNode> node;
+  std::unique_ptr<AnsweringDesk> desk;
+
+  ~Impl() {
+    if (node) node->stop_receiving();  // no more questions for the desk,
+    desk.reset();                      // no more answers for the bus
+  }
+};
+
+LiveService::LiveService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LiveService::~LiveService() = default;
+
+core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<const belief::Scene> scene,
+                                                               const LiveSettings& settings, std::uint64_t seed,
+                                                               Backends& backends,
+                                                               std::unique_ptr<RecordingWriter> recording,
+                                                               const core::LogSink& log) {
+  PRESCENE_TRY(auto tracker, Tracker::create(scene, settings.tracker, seed, backends));
+  auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
+  impl->backends = &backends;
+  PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
+  Impl* raw = impl.get();
+  const auto on_answer = [raw](const std::string& answer) {  // on two threads
+    raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
+    const std::lock_guard lock(raw->answered_mutex);
+    raw->answered.push_back(answer);
+  };
+  PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
+  impl->desk = std::make_unique<AnsweringDesk>(
+      backends, std::max(1, backends.pool().threads() - 1), settings.desk, [raw] { return raw->tracker->belief(); },
+      on_answer);
+  PRESCENE_RETURN_IF_ERROR(impl->join_bus());
+  return std::unique_ptr<LiveService>(new LiveService(std::move(impl)));
+}
+
+core::Status LiveService::Impl::join_bus() {
+  PRESCENE_TRY(beliefs, node->advertise(kBeliefTopic, "std_msgs/msg/String", TopicQos::kState));
+  PRESCENE_TRY(detections, node->advertise(kDetectionsTopic, "vision_msgs/msg/Detection3DArray", TopicQos::kState));
+  PRESCENE_TRY(markers, node->advertise(kMarkersTopic, "visualization_msgs/msg/MarkerArray", TopicQos::kState));
+  PRESCENE_TRY(diagnostics,
+               node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState));
+  for (const belief::SceneObject& object : scene->objects) {
+    PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name),
+                                                     "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kState));
+  }
+  const std::function<void(ReceivedMessage &&)> deliver = [this](ReceivedMessage&& message) {
+    inbox.put(std::move(message));
+  };
+  const std::function<void(ReceivedMessage &&)> deliver_question = [this](ReceivedMessage&& message) {
+    try {
+      auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+      if (question)
+        desk->ask((*std::move(question)).data);
+      else
+        ++unreadable_questions;
+    } catch (const std::exception&) {
+      ++unreadable_questions;
+    }
+    inbox.put(std::move(message));  // for the recording; an exception of it is the node's to count
+  };
+  for (const BusTopic& topic : bus_topics(settings.tracker.topics)) {
+    if (topic.name == kAnswerTopic) continue;  // ours
+    const auto& take = topic.name == kQueryTopic ? deliver_question : deliver;
+    PRESCENE_RETURN_IF_ERROR(node->subscribe(topic.name, topic.type, topic.read, take));
+  }
+  return core::ok_status();
+}
+
+core::TimeNs LiveService::Impl::now() {
+  // Never back, so that a recording's order by time is the order of arrival.
+  last_now_ns = std::max(last_now_ns, core::steady_now_ns());
+  return last_now_ns;
+}
+
+void LiveService::Impl::refuse(const core::Status& status) {
+  ++refused;
+  last_refusal = status.message();
+  if (last_refusal == logged_refusal) return;  // a driver repeats its mistake with each frame
+  if (log_limiter.log(core::LogLevel::kWarning, "message refused: " + last_refusal)) logged_refusal = last_refusal;
+}
+
+void LiveService::Impl::note_failure(const std::string& of, const std::exception& error) {
+  ++failures;
+  last_failure = of + " was left out: " + error.what();
+  last_failure_ns = core::steady_now_ns();
+  core::log(log, core::LogLevel::kError, last_failure);
+}
+
+void LiveService::Impl::record(const std::string& topic, const std::string& json) {
+  if (!recording) return;
+  const core::Status written = recording->write_json(topic, json, last_now_ns);
+  if (!written.ok()) give_up_recording(written);
+}
+
+void LiveService::Impl::record_step(const StepRecord& step) {
+  try {
+    record(kStepTopic, belief::json_text(to_json(step)));
+  } catch (const std::exception& error) {
+    give_up_recording(core::unavailable(std::string("a step could not be recorded: ") + error.what()));
+  }
+}
+
+void LiveService::Impl::give_up_recording(const core::Status& why) {
+  recording_status = why;
+  core::log(log, core::LogLevel::kError, why.message() + "; going on without recording");
+  recording.reset();
+}
+
+void LiveService::Impl::take_in(ReceivedMessage& message) {
+  message.received_ns = std::max(message.received_ns, last_now_ns);
+  last_now_ns = message.received_ns;
+  MessageIndex index = next_index++;
+  if (recording) {
+    const auto written = recording->write(message);
+    if (written) {
+      index = *written;
+    } else {
+      give_up_recording(written.status());
+    }
+  }
+  const core::Status taken = tracker->take_in(message, index);
+  if (!taken.ok()) refuse(taken);
+}
+
+void LiveService::Impl::take_in(std::vector<ReceivedMessage> messages, const core::Cancellation& cancellation) {
+  auto look_up = steady_clock::now() + kLongestIntake;
+  for (ReceivedMessage& message : messages) {
+    if (cancellation.requested()) return;
+    try {
+      take_in(message);
+    } catch (const std::exception& error) {
+      note_failure(message.topic, error);
+    }
+    if (steady_clock::now() < look_up) continue;
+    look_after_frames();
+    look_up = steady_clock::now() + kLongestIntake;
+  }
+}
+
+void LiveService::Impl::look_after_frames() {
+  std::vector<std::string> answers_given;
+  {
+    const std::lock_guard lock(answered_mutex);
+    answers_given.swap(answered);
+  }
+  const core::TimeNs now_ns = now();
+  for (const std::string& answer : answers_given) record(kAnswerTopic, answer);
+  try {
+    if (const auto step = tracker->step(now_ns)) {
+      record_step(step->record);  // first: whatever fails below, the step was made
+      ++steps;
+      since_frame.emplace();
+      step_seconds = step->record.seconds;
+      degraded = step->record.degraded;
+      not_simulated += static_cast<std::uint64_t>(step->counters.not_simulated);
+      if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
+      publish();
+    }
+  } catch (const std::exception& error) {
+    note_failure("a frame", error);
+  }
+  if (diagnostics_limit.due()) publish_diagnostics();
+}
+
+void LiveService::Impl::check_sent(const core::Status& status) {
+  if (status.ok()) return;
+  unsent.fetch_add(1, std::memory_order_relaxed);
+  core::log(log, core::LogLevel::kWarning, status.message());
+}
+
+void LiveService::Impl::publish() {
+  const std::shared_ptr<const belief::Belief> belief = tracker->belief();
+  const BeliefSummary summary = summary_of(*belief);
+  const std::string& world = settings.tracker.assembler.world_frame;
+  const std::string json = belief::json_text(to_json(summary));
+  check_sent(node->publish(beliefs, interfaces::RosString{json}));
+  check_sent(node->publish(detections, detections_of(summary, *belief->scene, world)));
+  for (const ObjectSummary& object : summary.objects) {
+    const auto publisher = poses.find(object.name);
+    if (publisher == poses.end() || object.state == belief::TrackState::kLost) continue;
+    check_sent(node->publish(publisher->second, pose_of(object, summary.stamp_ns, world)));
+  }
+  if (marker_limit.due()) check_sent(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
+  record(kBeliefTopic, json);
+}
+
+ServiceHealth LiveService::Impl::health() const {
+  ServiceHealth health;
+  health.depth_topic = settings.tracker.topics.depth;
+  health.steps = steps;
+  health.skipped_frames = tracker->skipped_count();
+  health.refused_messages = refused;
+  health.dropped_in_inbox = inbox.dropped_by_topic();
+  const InputTopics& topics = settings.tracker.topics;
+  health.image_topics = {topics.depth, topics.color, topics.camera_info};
+  health.lost_on_bus = node->dropped_samples();
+  health.unsent = unsent.load(std::memory_order_relaxed);
+  health.unlogged = log_limiter.held_back();
+  health.tf_forgotten = tracker->tf_forgotten();
+  health.tf_late = tracker->tf_late();
+  health.waiting_controls = tracker->waiting_controls();
+  health.dropped_controls = tracker->dropped_controls();
+  health.is_recording = recording != nullptr;
+  if (!recording_status.ok()) health.recording_failure = recording_status.message();
+  health.questions = desk->counts();
+  health.unreadable_questions = unreadable_questions;
+  health.failures = failures;
+  health.last_failure = last_failure;
+  health.last_failure_ns = last_failure_ns;
+  if (since_frame) health.seconds_since_frame = since_frame->seconds();
+  health.last_step_seconds = step_seconds;
+  health.degraded = degraded;
+  health.last_skip = tracker->last_skip();
+  health.last_refusal = last_refusal;
+  health.not_simulated = not_simulated;
+  health.physics_failure = physics_failure;
+  health.steppers = backends->stepper_counts();
+  return health;
+}
+
+void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
+  if (!health.physics_failure.empty())
+    log_limiter.log_once(
+        core::LogLevel::kWarning,
+        "physics failed, so what it was to move goes on at constant velocity: " + health.physics_failure);
+  if (!health.steppers.last_reason.empty())
+    log_limiter.log_once(core::LogLevel::kWarning,
+                         "simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
+                             health.steppers.last_reason);
+  // What the log holds back is said at the next look, if it is still so then.
+  const bool tracking = is_tracking(health);
+  if (tracking && !was_tracking) {
+    if (!log_limiter.log(core::LogLevel::kInfo, "frames come: " + health_text(health))) return;
+  } else if (tracking && !health.degraded.empty() && !was_degraded) {
+    if (!log_limiter.log(core::LogLevel::kWarning, health_text(health))) return;
+  } else if (!tracking && (was_tracking || (!told_why_not && !health.last_skip.empty()))) {
+    if (!log_limiter.log(core::LogLevel::kWarning, health_text(health))) return;
+    told_why_not = !health.last_skip.empty();
+  }
+  if (tracking) told_why_not = false;
+  was_tracking = tracking;
+  was_degraded = !health.degraded.empty();
+}
+
+void LiveService::Impl::publish_diagnostics() {
+  const ServiceHealth now = health();
+  tell_what_changed(now);
+  check_sent(node->publish(
+      diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(core::wall_now_ns()), ""},
+                                                  {to_diagnostic(now, last_reported, settings.dds.node_name)}}));
+  last_reported = now;
+}
+
+core::Status LiveService::run(const core::Cancellation& cancellation) {
+  Impl& impl = *impl_;
+  core::log(impl.log, core::LogLevel::kInfo,
+            "listening in DDS domain " + std::to_string(impl.settings.dds.domain) + " for " +
+                impl.settings.tracker.topics.depth);
+  const auto turn = [&] {
+    auto until = steady_clock::now() + kPollInterval;
+    if (const auto deadline = impl.tracker->next_deadline()) {
+      until = std::min(
+          until, steady_clock::now() + std::chrono::nanoseconds(std::max<core::TimeNs>(0, *deadline - impl.now())));
+    }
+    impl.take_in(impl.inbox.take_all(until), cancellation);
+    impl.look_after_frames();
+  };
+  while (!cancellation.requested()) {
+    try {
+      turn();
+    } catch (const std::exception& error) {
+      impl.note_failure("a turn of the loop", error);
+    }
+  }
+  core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
+  return impl.recording ? impl.recording->close() : impl.recording_status;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/live/service_health.h"
+
+#include <algorithm>
+
+#include "prescene/core/text.h"
+
+namespace prescene::service {
+namespace {
+
+using interfaces::RosDiagnosticLevel;
+
+/// What failed or was lost since the start; only ever grows.
+std::uint64_t losses_of(const ServiceHealth& health) {
+  std::uint64_t sum = health.lost_on_bus + health.unsent + health.failures + health.tf_forgotten + health.tf_late +
+                      health.dropped_controls + health.unreadable_questions + health.questions.unanswered +
+                      health.questions.failed;
+  for (const auto& [topic, count] : health.dropped_in_inbox) {
+    const auto& images = health.image_topics;
+    if (std::find(images.begin(), images.end(), topic) == images.end()) sum += count;
+  }
+  return sum;
+}
+
+RosDiagnosticLevel level_of(const ServiceHealth& health, const ServiceHealth& before) {
+  if (!health.recording_failure.empty()) return RosDiagnosticLevel::kError;
+  if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
+  if (!is_tracking(health)) return RosDiagnosticLevel::kError;
+  if (losses_of(health) > losses_of(before)) return RosDiagnosticLevel::kWarn;
+  return health.degraded.empty() ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
+}
+
+std::uint64_t sum_of(const std::map<std::string, std::uint64_t>& counts) {
+  std::uint64_t sum = 0;
+  for (const auto& [topic, count] : counts) sum += count;
+  return sum;
+}
+
+/// "/camera/depth 3, /tf 12".
+std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
+  std::string text;
+  for (const auto& [topic, count] : counts) text += (text.empty() ? "" : ", ") + topic + " " + std::to_string(count);
+  return text;
+}
+
+std::string recording_text(const ServiceHealth& health) {
+  if (!health.recording_failure.empty()) return "failed: " + health.recording_failure;
+  return health.is_recording ? "on" : "off";
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : "; ") + word;
+  return text;
+}
+
+// Every member is bound to a name, so that one which is added does not compile until it is told of here.
+std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
+  const auto& [depth_topic, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics, lost_on_bus,
+               questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late, waiting_controls,
+               dropped_controls, is_recording, recording_failure, seconds_since_frame, last_step_seconds, not_simulated,
+               physics_failure, steppers, degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
+  const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
+  const auto& [lockstep, bullet_instead, last_reason] = steppers;
+  static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
+  static_cast<void>(is_recording);       // told, like its failure,
+  static_cast<void>(recording_failure);  // by recording_text()
+  const bool question_is_newer = last_failure.empty() || question_failure_ns > last_failure_ns;
+  return {{"steps", std::to_string(steps)},
+          {"depth topic", depth_topic},
+          {"skipped frames", std::to_string(skipped_frames)},
+          {"last skip", last_skip},
+          {"refused messages", std::to_string(refused_messages)},
+          {"last refusal", last_refusal},
+          {"dropped in the inbox", std::to_string(sum_of(dropped_in_inbox))},
+          {"dropped by topic", counts_text(dropped_in_inbox)},
+          {"lost on the bus", std::to_string(lost_on_bus)},
+          {"not sent", std::to_string(unsent)},
+          {"lines not logged", std::to_string(unlogged)},
+          {"transforms forgotten early", std::to_string(tf_forgotten)},
+          {"transforms too late", std::to_string(tf_late)},
+          {"controls waiting", std::to_string(waiting_controls)},
+          {"controls dropped", std::to_string(dropped_controls)},
+          {"recording", recording_text(health)},
+          {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},
+          {"last step, s", core::rounded_text(last_step_seconds)},
+          {"degraded", joined(degraded)},
+          {"questions answered", std::to_string(answered)},
+          {"questions refused", std::to_string(refused)},
+          {"questions without an answer", std::to_string(unanswered + unreadable_questions)},
+          {"questions repeated", std::to_string(repeated)},
+          {"failures", std::to_string(failures + failed)},
+          {"last failure", question_is_newer && !question_failure.empty() ? question_failure : last_failure},
+          {"particles without physics", std::to_string(not_simulated)},
+          {"last failure of physics", physics_failure},
+          {"simulators in lockstep", std::to_string(lockstep)},
+          {"simulators on Bullet instead", std::to_string(bullet_instead)},
+          {"last reason for Bullet", last_reason}};
+}
+
+}  // namespace
+
+bool is_tracking(const ServiceHealth& health) {
+  return health.seconds_since_frame && *health.seconds_since_frame <= kSilentAfter;
+}
+
+std::string health_text(const ServiceHealth& health) {
+  const std::string recording =
+      health.recording_failure.empty() ? "" : "; the recording failed: " + health.recording_failure;
+  if (is_tracking(health)) {
+    std::string text = "tracking";
+    for (const std::string& word : health.degraded) text += "; " + word;
+    return text + recording;
+  }
+  std::string text =
+      health.seconds_since_frame ? "no frame is used any more" : "waiting for frames on " + health.depth_topic;
+  if (!health.last_skip.empty()) text += "; the last one was skipped: " + health.last_skip;
+  if (!health.last_refusal.empty()) text += "; the last message refused: " + health.last_refusal;
+  return text + recording;
+}
+
+interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const ServiceHealth& before,
+                                              const std::string& hardware_id) {
+  interfaces::RosDiagnosticStatus status;
+  status.name = "prescene: tracking";
+  status.hardware_id = hardware_id;
+  status.level = static_cast<std::uint8_t>(level_of(health, before));
+  status.message = health_text(health);
+  status.values = values_of(health);
+  return status;
+}
+
+}  // namespace prescene::service

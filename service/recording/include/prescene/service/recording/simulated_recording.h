@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plays a scene as a robot with an RGB-D camera would have recorded it: simulated, rendered, with the sensor model's
+// noise.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "prescene/belief/trajectory.h"
+#include "prescene/rendering/sensor/simulated_camera.h"
+#include "prescene/service/backends.h"
+#include "prescene/service/tracking/recording.h"
+#include "prescene/service/tracking/topics.h"
+
+namespace prescene::service {
+
+struct SimulatedRecordingOptions {
+  double rate = 15.0;                                 ///< Frames a second.
+  double tf_rate = 60.0;                              ///< Poses of the robot's bodies a second.
+  core::TimeNs start_ns = 1'000'000'000'000'000'000;  ///< Stamp of the first frame.
+  double latency = 0.004;                             ///< s between the stamp of a message and its arrival.
+  InputTopics topics;
+  std::string world_frame = "world";
+  rendering::SimulatedCameraOptions camera;
+  rendering::SensorModelOptions sensor;  ///< What the scene's depth_noise holds counts more.
+};
+
+/// What the camera frame is called in simulated recordings: "<camera's name>_optical_frame".
+std::string camera_frame_of(const belief::Scene& scene);
+
+/// One instance of the scene, drawn from its distributions with `seed`, from its start to its duration (it goes on
+/// after everything has come to rest, so that the camera sees the end). Messages: latched camera pose, robot poses,
+/// camera info, depth (16UC1, millimetres) and colour (rgb8), the scene's actions as controls at their times, the truth
+/// of each frame, and in the end which of the scene's outcomes came to pass. Fails with kInvalidInput when the scene
+/// has no camera, kCancelled with what is done kept.
+core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
+                                std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
+                                const core::ProgressSink& progress, RecordingWriter& recording);
+
+/// The truth of one simulated frame, on kTruthTopic.
+struct TruthRecord {
+  core::TimeNs stamp_ns = 0;
+  struct Object {
+    std::string name;
+    geometry::Pose X_WO;
+    double visible_share = 0.0;  ///< Of the pixels that it would cover alone in this view.
+  };
+  std::vector<Object> objects;
+};
+nlohmann::ordered_json to_json(const TruthRecord& record);
+core::Result<TruthRecord> truth_from_json(const std::string& text);
+
+}  // namespace prescene::service

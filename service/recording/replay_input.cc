@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/replay_input.h"
+
+#include <nlohmann/json.hpp>
+
+#include "prescene/service/load_scene.h"
+#include "prescene/service/outside_json.h"
+
+namespace prescene::service {
+
+core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, const core::LogSink& log) {
+  ReplayInput input;
+  input.path_ = options.path;
+  if (std::filesystem::is_directory(options.path)) {
+    interfaces::FrameFolderOptions folder_options;
+    folder_options.metres_per_unit = options.metres_per_unit;
+    folder_options.frames_per_second = options.frames_per_second;
+    folder_options.first_stamp_ns = 1'000'000'000;
+    PRESCENE_TRY(input.folder_, interfaces::FrameFolder::open(options.path, folder_options));
+    if (options.scene_file.empty()) input.scene_ = unknown_scene(options.path, input.folder_->frames().front().X_WC);
+  } else {
+    PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
+    input.info_ = reader->info();
+    input.read_ = options.read;
+    // Once is enough, and chunks are checked whenever they are read; but what is salvaged has its loss told at the end.
+    input.read_.check_data = options.read.salvage;
+  }
+  if (input.scene_) return input;
+  if (!options.scene_file.empty()) {
+    PRESCENE_TRY(input.scene_, load_scene(options.scene_file, log));
+  } else if (!input.info_.scene_text.empty()) {
+    PRESCENE_TRY(input.scene_, load_scene_text(input.info_.scene_text, input.info_.scene_file, log));
+  } else {
+    return core::invalid_input(options.path.string() + " names no scene: give one with --scene FILE");
+  }
+  return input;
+}
+
+core::Result<TrackerSettings> ReplayInput::recorded_settings() const {
+  if (info_.settings.empty()) return TrackerSettings{};
+  auto recorded = with_recorded({}, parse_or_discard(info_.settings, kMostParsedJsonBytes));
+  if (!recorded) return recorded.status().at(path_.string() + ": recorded settings");
+  return recorded;
+}
+
+core::Result<ReplaySummary> ReplayInput::replay(Tracker& tracker, const core::Cancellation& cancellation,
+                                                const core::ProgressSink& progress, const StepSink& on_step,
+                                                const JsonSink& on_json) const {
+  if (folder_) return replay_folder(*folder_, tracker, cancellation, progress, on_step);
+  return replay_recording(path_, read_, tracker, cancellation, progress, on_step, on_json);
+}
+
+core::Status check_steps(const ReplaySummary& summary, const InputTopics& topics) {
+  if (summary.steps > 0) return core::ok_status();
+  if (!summary.last_skip.empty()) return core::invalid_input("no frame could be used: " + summary.last_skip);
+  if (!summary.first_refusal.empty()) return core::invalid_input("no frame could be used: " + summary.first_refusal);
+  return core::invalid_input("no depth image on " + topics.depth + ": name the recording's topics (--help)");
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/session_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "prescene/belief/json.h"
+#include "prescene/core/text.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
+#include "prescene/service/pictures/belief_overlay.h"
+
+namespace prescene::service {
+namespace {
+
+using core::fixed_text;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMaxObservations = 48;              // in memory
+constexpr std::size_t kMaxPixels = std::size_t{1} << 24;  // of all of them: 54 of 640 x 480
+constexpr std::size_t kPictures = 6;                      // on the page
+
+AssemblerSettings assembler_settings(const belief::Scene& scene) {
+  AssemblerSettings settings;
+  if (scene.camera) settings.X_WC = scene.camera->X_WC;
+  return settings;
+}
+
+belief::Timeline timeline_from(const ordered_json& json) {
+  belief::Timeline timeline;
+  constexpr belief::Relation kRelations[] = {
+      belief::Relation::kContact, belief::Relation::kSupports, belief::Relation::kInside, belief::Relation::kHolds,
+      belief::Relation::kMoving,  belief::Relation::kUpright,  belief::Relation::kFalling};
+  if (!json.is_array()) return timeline;
+  for (const ordered_json& interval : json) {
+    const std::string word = interval.value("relation", "");
+    for (const belief::Relation relation : kRelations) {
+      if (belief::to_string(relation) != word) continue;
+      timeline.push_back({relation, interval.value("subject", ""), interval.value("other", ""),
+                          interval.value("begin", 0.0), interval.value("end", 0.0)});
+    }
+  }
+  return timeline;
+}
+
+belief::OutcomeProbability outcome_from(const ordered_json& json) {
+  const auto limits = json.value("interval", std::vector<double>{0.0, 1.0});
+  return {json.value("name", ""), json.value("group", ""), json.value("probability", 0.0), limits.at(0), limits.at(1)};
+}
+
+void add_prediction(const ordered_json& predict, const belief::Scene& scene, interfaces::ReportSection& section) {
+  interfaces::OutcomeBlock outcomes;
+  outcomes.caption = std::to_string(predict.value("instances", 0)) +
+                     (predict.value("instances", 0) == 1 ? " simulated instance" : " simulated instances");
+  for (const ordered_json& outcome : predict.value("outcomes", ordered_json::array()))
+    outcomes.outcomes.push_back(outcome_from(outcome));
+  section.blocks.push_back(std::move(outcomes));
+  for (const ordered_json& poses : predict.value("final_poses", ordered_json::array())) {
+    const ordered_json& map = poses.at("heat_map");
+    interfaces::HeatMapBlock block;
+    block.caption = "Where " + poses.value("object", "") + " ends, from above";
+    block.map = {map.value("cell", 0.02), map.value("x0", 0.0), map.value("y0", 0.0),
+                 map.value("nx", 0),      map.value("ny", 0),   map.value("mass", std::vector<double>{})};
+    if (block.map.nx < 0 || block.map.ny < 0 ||
+        block.map.mass.size() != static_cast<std::size_t>(block.map.nx) * static_cast<std::size_t>(block.map.ny)) {
+      section.blocks.push_back(interfaces::TextBlock{"The heat map has not the form of docs/queries.md."});
+      continue;
+    }
+    block.outlines = interfaces::support_outlines(scene);
+    section.blocks.push_back(std::move(block));
+  }
+  for (const ordered_json& run : predict.value("typical_runs", ordered_json::array())) {
+    interfaces::TimelineBlock block;
+    const std::string group = run.value("group", "");
+    block.caption = "A typical run that ends " + (group.empty() ? "" : group + ": ") + run.value("outcome", "") + " (" +
+                    fixed_text(100.0 * run.value("share", 0.0), 0) + " %)";
+    block.timeline = timeline_from(run.value("timeline", ordered_json::array()));
+    section.blocks.push_back(std::move(block));
+  }
+}
+
+}  // namespace
+
+SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const InputTopics& topics)
+    : scene_(std::move(scene)), topics_(topics), assembler_(assembler_settings(*scene_), robot_names(*scene_)) {}
+
+void SessionReport::add(const interfaces::ReceivedMessage& message) {
+  const MessageIndex index = next_index_++;
+  // What makes no sense is told by the tracker; here it is only left out.
+  core::Status taken;
+  if (message.topic == topics_.depth) {
+    if (const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr)) {
+      taken = assembler_.add_depth(*image, index, message.received_ns);
+    }
+  } else if (message.topic == topics_.color) {
+    if (const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr)) {
+      taken = assembler_.add_color(*image, index, message.received_ns);
+    }
+  } else if (message.topic == topics_.camera_info) {
+    if (const auto info = interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage))
+      taken = assembler_.add_camera_info(*info, index);
+  } else if (message.topic == topics_.tf || message.topic == topics_.tf_static) {
+    if (const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage)) {
+      taken = assembler_.add_tf(*tf, index, message.topic == topics_.tf_static);
+    }
+  }
+  static_cast<void>(taken);
+  while (const auto frame = assembler_.take(message.received_ns)) add(frame->observation);
+}
+
+void SessionReport::add(const belief::Observation& observation) {
+  if (seen_++ % every_ != 0) return;
+  observations_.push_back(observation);
+  const auto too_many = [&] {
+    std::size_t pixels = 0;
+    for (const belief::Observation& kept : observations_) pixels += kept.frame.depth ? kept.frame.depth->size() : 0;
+    return observations_.size() > kMaxObservations || (observations_.size() > 1 && pixels > kMaxPixels);
+  };
+  while (too_many()) {
+    std::vector<belief::Observation> kept;
+    for (std::size_t i = 0; i < observations_.size(); i += 2) kept.push_back(std::move(observations_[i]));
+    observations_ = std::move(kept);
+    every_ *= 2;
+  }
+}
+
+void SessionReport::add(const BeliefSummary& summary) { summaries_[summary.stamp_ns] = summary; }
+
+interfaces::PictureBlock SessionReport::pictures(Backends& backends) const {
+  interfaces::PictureBlock block;
+  std::vector<const belief::Observation*> usable;
+  for (const belief::Observation& observation : observations_) {
+    if (summaries_.contains(observation.stamp_ns)) usable.push_back(&observation);
+  }
+  if (usable.empty()) return block;
+  const core::TimeNs first_ns = summaries_.begin()->first;
+  const std::size_t count = std::min(kPictures, usable.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const belief::Observation& observation = *usable[count > 1 ? i * (usable.size() - 1) / (count - 1) : 0];
+    auto picture = belief_overlay(*scene_, summaries_.at(observation.stamp_ns), observation, backends);
+    if (!picture) continue;
+    block.pictures.push_back(
+        {fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", *std::move(picture), false});
+  }
+  return block;
+}
+
+std::vector<interfaces::ReportBlock> SessionReport::curves() const {
+  interfaces::ChartBlock confidence{"Confidence", "time, s", "probability", {}, true};
+  interfaces::ChartBlock height{"Height of the object's origin", "time, s", "m", {}, true};
+  std::map<std::string, std::size_t> number;
+  for (const auto& [stamp_ns, summary] : summaries_) {
+    const double time = core::seconds_of(stamp_ns - summaries_.begin()->first);
+    for (const ObjectSummary& object : summary.objects) {
+      const auto [place, is_new] = number.emplace(object.name, number.size());
+      if (is_new) {
+        confidence.curves.push_back({object.name, {}});
+        height.curves.push_back({object.name, {}});
+      }
+      confidence.curves[place->second].points.emplace_back(time, object.confidence);
+      height.curves[place->second].points.emplace_back(time, object.X_WO.translation.z());
+    }
+  }
+  if (confidence.curves.empty()) return {};
+  return {std::move(confidence), std::move(height)};
+}
+
+void SessionReport::add_supports(interfaces::ReportContents& contents) const {
+  if (supports_.frames().empty()) return;
+  interfaces::TableBlock table{
+      "Each frame's own plane against that of the first frame: where nothing moves, what is left is error",
+      {"support", "frames", "measured", "median tilt, deg", "largest tilt, deg", "median height, mm",
+       "largest height, mm", "points off the plane, mm", "of its pixels, %"},
+      {}};
+  for (const SupportRow& row : supports_.rows()) {
+    table.rows.push_back({row.support, std::to_string(row.frames), std::to_string(row.measured),
+                          fixed_text(row.median_tilt * 180.0 / std::numbers::pi, 2),
+                          fixed_text(row.largest_tilt * 180.0 / std::numbers::pi, 2),
+                          fixed_text(1e3 * row.median_height, 1), fixed_text(1e3 * row.largest_height, 1),
+                          fixed_text(1e3 * row.median_rms, 1), fixed_text(100.0 * row.median_share, 0)});
+  }
+  interfaces::ChartBlock height{"Height over the first frame's plane", "time, s", "mm", {}, true};
+  interfaces::ChartBlock tilt{"Tilt against the first frame's plane", "time, s", "deg", {}, true};
+  const core::TimeNs first_ns = summaries_.empty() ? 0 : summaries_.begin()->first;
+  for (const std::vector<SupportFrame>& frames : supports_.frames()) {
+    const std::string& name = frames.front().measured.support;
+    height.curves.push_back({name, {}});
+    tilt.curves.push_back({name, {}});
+    for (const SupportFrame& frame : frames) {
+      const double time = core::seconds_of(frame.stamp_ns - first_ns);
+      height.curves.back().points.emplace_back(time, 1e3 * frame.height);
+      tilt.curves.back().points.emplace_back(time, frame.tilt * 180.0 / std::numbers::pi);
+    }
+  }
+  contents.sections.push_back({"Supports", {std::move(table), std::move(height), std::move(tilt)}});
+}
+
+void SessionReport::add_foreseen(interfaces::ReportContents& contents) const {
+  if (comparisons_.empty()) return;
+  interfaces::ReportSection section{"Foreseen, and what came", {}};
+  for (const Comparison& comparison : comparisons_) {
+    section.blocks.push_back(interfaces::TextBlock{"Asked at " + fixed_text(comparison.at, 2) +
+                                                   " s: " + comparison.question + "\n\n" + comparison.note});
+    interfaces::TableBlock table{comparison.comparable ? "" : "Not to be compared: see above",
+                                 {"outcome", "group", "foreseen", "came to pass"},
+                                 {}};
+    for (const Comparison::Row& row : comparison.rows) {
+      if (is_worth_a_row(row)) table.rows.push_back({row.outcome, row.group, foreseen_text(row), came_text(row)});
+    }
+    section.blocks.push_back(std::move(table));
+  }
+  section.blocks.push_back(interfaces::TextBlock{came_is_truth_ ? kCameByTruth : kCameByTracking});
+  contents.sections.push_back(std::move(section));
+}
+
+void SessionReport::add_answers(interfaces::ReportContents& contents) const {
+  for (const auto& [at, text] : answers_) {
+    try {
+      add_answer_section(at, parse_or_discard(text), contents);
+    } catch (const std::exception&) {  // ordered_json's, or an interval of one number
+      contents.sections.push_back({"Asked at " + fixed_text(at, 1) + " s",
+                                   {interfaces::TextBlock{"The answer has not the form of docs/queries.md."}}});
+    }
+  }
+}
+
+void SessionReport::add_answer_section(double at, const ordered_json& answer,
+                                       interfaces::ReportContents& contents) const {
+  {
+    interfaces::ReportSection section;
+    section.title = "Asked at " + fixed_text(at, 1) + " s";
+    if (!answer.is_object()) {
+      section.blocks.push_back(interfaces::TextBlock{"No answer came."});
+    } else if (const core::Status error = belief::error_from_json(answer); !error.ok()) {
+      section.blocks.push_back(interfaces::TextBlock{core::to_string(error)});
+    } else if (answer.contains("predict")) {
+      section.title += ": what happens?";
+      add_prediction(answer["predict"], *scene_, section);
+    } else if (answer.contains("stability")) {
+      const ordered_json& stability = answer["stability"];
+      section.title += ": does " + stability.value("object", "") + " stay?";
+      section.blocks.push_back(
+          interfaces::OutcomeBlock{stability.value("likely_event", ""), {outcome_from(stability.at("stable"))}});
+    } else {
+      return;  // where things are is in the pictures
+    }
+    contents.sections.push_back(std::move(section));
+  }
+}
+
+core::Status SessionReport::write(const std::filesystem::path& path, const std::vector<ObjectTrackingScore>& rows,
+                                  Backends& backends) const {
+  interfaces::ReportContents contents;
+  contents.title = scene_->name.empty() ? "Prescene" : scene_->name;
+  contents.subtitle = "What was seen, believed and answered";
+  contents.facts = {{"steps", std::to_string(summaries_.size())},
+                    {"objects", std::to_string(scene_->objects.size())},
+                    {"supports", std::to_string(scene_->supports.size())}};
+  interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures(backends)}};
+  contents.sections.push_back(std::move(seen));
+  add_foreseen(contents);
+  interfaces::ReportSection tracking{"Tracking", {}};
+  if (!rows.empty()) {
+    interfaces::TableBlock table{
+        "Against the simulated truth, over frames in which at least half of the object is visible",
+        {"object", "frames", "visible", "median error, mm", "90 %, mm", "median turn, deg", "tracked, %"},
+        {}};
+    for (const ObjectTrackingScore& row : rows) {
+      table.rows.push_back({row.object, std::to_string(row.frames), std::to_string(row.visible_frames),
+                            fixed_text(1e3 * row.median_position_error, 1), fixed_text(1e3 * row.p90_position_error, 1),
+                            fixed_text(row.median_turn_error * 180.0 / std::numbers::pi, 1),
+                            fixed_text(100.0 * row.share_tracked, 0)});
+    }
+    tracking.blocks.push_back(std::move(table));
+  }
+  for (interfaces::ReportBlock& block : curves()) tracking.blocks.push_back(std::move(block));
+  if (tracking.blocks.empty()) {
+    tracking.blocks.push_back(
+        interfaces::TextBlock{"The scene names no objects; its supports are drawn where they were found."});
+  }
+  contents.sections.push_back(std::move(tracking));
+  add_supports(contents);
+  add_answers(contents);
+  return interfaces::write_report(path, contents);
+}
+
+}  // namespace prescene::service

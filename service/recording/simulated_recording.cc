@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/simulated_recording.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "prescene/belief/json.h"
+#include "prescene/belief/robot_motion.h"
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/outside_json.h"
+#include "prescene/service/recording/foreseen.h"
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// A message that is due; the recording is written in the order of these times.
+struct Due {
+  core::TimeNs time_ns;
+  std::function<core::Status()> write;
+};
+
+class Player {
+ public:
+  Player(const belief::Scene& scene, const SimulatedRecordingOptions& options, std::uint64_t seed, Backends& backends,
+         rendering::Renderer& renderer, RecordingWriter& recording)
+      : scene_(scene),
+        options_(options),
+        backends_(backends),
+        renderer_(renderer),
+        recording_(recording),
+        camera_(rendering::SensorModel(filter::with_settings(options.sensor, scene.depth_noise)), options.camera),
+        noise_(seed, core::Purpose::kSensorNoise) {}
+
+  core::Status write_camera_pose() {
+    const interfaces::FrameTransform transform{options_.world_frame, camera_frame_of(scene_), options_.start_ns,
+                                               scene_.camera->X_WC};
+    return write(options_.topics.tf_static, "tf2_msgs/msg/TFMessage", options_.start_ns,
+                 interfaces::encode_cdr(interfaces::RosTfMessage{{interfaces::to_ros_transform(transform)}}));
+  }
+
+  core::Status write_robot(double time) {
+    interfaces::RosTfMessage message;
+    for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
+      const geometry::Pose X_WG = belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), time);
+      message.transforms.push_back(interfaces::to_ros_transform(
+          interfaces::FrameTransform{options_.world_frame, scene_.robot[body].name, stamp(time), X_WG}));
+    }
+    return write(options_.topics.tf, "tf2_msgs/msg/TFMessage", stamp(time), interfaces::encode_cdr(message));
+  }
+
+  core::Status write_control(const belief::Action& action) {
+    belief::Action now = action;
+    now.time = 0.0;  // relative to the message
+    const ordered_json json = {{"stamp_ns", stamp(action.time)},
+                               {"actions", ordered_json::array({belief::to_json(now)})}};
+    return write(kControlTopic, "std_msgs/msg/String", stamp(action.time),
+                 interfaces::encode_cdr(interfaces::RosString{belief::json_text(json)}));
+  }
+
+  core::Status write_frame(std::uint64_t number, const belief::WorldState& state) {
+    std::vector<geometry::Pose> X_WG;
+    for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
+      X_WG.push_back(belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), state.time));
+    }
+    const filter::BeliefView view =
+        filter::render_scene(scene_, state, X_WG, filter::MeshDetail::kDisplay, backends_.meshes());
+    const belief::SceneCamera& camera = *scene_.camera;
+    rendering::RenderOptions render_options;
+    render_options.normals = true;
+    rendering::RenderedView images;
+    PRESCENE_RETURN_IF_ERROR(renderer_.render(view.scene, camera.intrinsics, camera.X_WC, render_options, &images));
+    geometry::DepthImage depth;
+    geometry::ColorImage color;
+    camera_.sample(view.scene, images, nullptr, camera.intrinsics, camera.X_WC, noise_, number, &depth, &color);
+
+    const core::TimeNs stamp_ns = stamp(state.time);
+    const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ns), camera_frame_of(scene_)};
+    PRESCENE_RETURN_IF_ERROR(write(options_.topics.camera_info, "sensor_msgs/msg/CameraInfo", stamp_ns,
+                                   interfaces::encode_cdr(interfaces::to_ros_camera_info(camera.intrinsics, header))));
+    PRESCENE_RETURN_IF_ERROR(write(options_.topics.color, "sensor_msgs/msg/Image", stamp_ns,
+                                   interfaces::encode_cdr(interfaces::to_ros_image(color, header))));
+    PRESCENE_RETURN_IF_ERROR(write(options_.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
+                                   interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
+    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(state, view, images))),
+                                 stamp_ns + core::ns_of(options_.latency));
+  }
+
+  core::Status write_outcomes(const belief::Trajectory& trajectory) {
+    if (scene_.outcomes.empty() && scene_.exclusive_outcomes.empty()) return core::ok_status();
+    return recording_.write_json(kOutcomeTopic,
+                                 belief::json_text(to_json(outcomes_of(scene_, trajectory, options_.start_ns))),
+                                 stamp(trajectory.final().time) + core::ns_of(options_.latency));
+  }
+
+ private:
+  core::TimeNs stamp(double time) const { return options_.start_ns + core::ns_of(time); }
+
+  core::Status write(const std::string& topic, const std::string& type, core::TimeNs stamp_ns,
+                     std::vector<std::uint8_t> cdr) {
+    const auto written = recording_.write(
+        interfaces::ReceivedMessage{topic, type, std::move(cdr), stamp_ns, stamp_ns + core::ns_of(options_.latency)});
+    return written.status();
+  }
+
+  TruthRecord truth(const belief::WorldState& state, const filter::BeliefView& view,
+                    const rendering::RenderedView& images) {
+    TruthRecord record;
+    record.stamp_ns = stamp(state.time);
+    std::vector<int> visible(view.scene.instances.size() + 1, 0);
+    for (std::size_t i = 0; i < images.labels.size(); ++i) ++visible[images.labels.data()[i]];
+    for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+      rendering::RenderScene alone;
+      alone.instances.push_back(view.scene.instances[i]);
+      rendering::RenderedView alone_view;
+      double share = 0.0;
+      if (renderer_.render(alone, scene_.camera->intrinsics, scene_.camera->X_WC, {}, &alone_view).ok()) {
+        const auto* labels = alone_view.labels.data();
+        const auto covered =
+            std::count_if(labels, labels + alone_view.labels.size(), [](std::uint16_t l) { return l != 0; });
+        if (covered > 0) share = static_cast<double>(visible[i + 1]) / static_cast<double>(covered);
+      }
+      record.objects.push_back({scene_.objects[i].name, state.objects[i].X_WO, share});
+    }
+    return record;
+  }
+
+  const belief::Scene& scene_;
+  const SimulatedRecordingOptions& options_;
+  Backends& backends_;
+  rendering::Renderer& renderer_;
+  RecordingWriter& recording_;
+  rendering::SimulatedCamera camera_;
+  core::RandomStream noise_;
+};
+
+belief::Trajectory play(const belief::Scene& scene, const simulation::Simulator& simulator, double interval,
+                        std::uint64_t seed, core::ThreadPool& pool) {
+  core::RandomStream stream(seed, core::Purpose::kScenario);
+  std::vector<double> uniforms(static_cast<std::size_t>(belief::start_dimensions(scene)));
+  for (double& u : uniforms) u = stream.uniform();
+  const belief::WorldState start = belief::draw_start(scene, uniforms);
+  simulation::RunRequest request;
+  request.actions = scene.actions;
+  request.stop.duration = scene.duration;
+  request.stop.stop_at_rest = false;
+  request.sample_interval = interval;
+  belief::Trajectory trajectory;
+  simulator.run({&start, 1}, request, core::RandomStream(seed, core::Purpose::kAction), 0, pool, {&trajectory, 1});
+  return trajectory;
+}
+
+}  // namespace
+
+std::string camera_frame_of(const belief::Scene& scene) { return scene.camera->name + "_optical_frame"; }
+
+core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
+                                std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
+                                const core::ProgressSink& progress, RecordingWriter& recording) {
+  if (!scene.camera) {
+    return core::invalid_input("scene '" + scene.name +
+                               "' has no camera to record with: add one (docs/scene_files.md)");
+  }
+  PRESCENE_TRY(const auto simulator, backends.make_simulator(scene));
+  PRESCENE_TRY(const auto renderer, backends.make_renderer());
+  const belief::Trajectory trajectory = play(scene, *simulator, 1.0 / options.rate, seed, backends.pool());
+  Player player(scene, options, seed, backends, *renderer, recording);
+
+  std::vector<Due> due;
+  for (std::size_t i = 0; i < trajectory.states.size(); ++i) {
+    const belief::WorldState& state = trajectory.states[i];
+    due.push_back({core::ns_of(state.time), [&player, &state, i] { return player.write_frame(i, state); }});
+  }
+  const double end = trajectory.final().time;
+  if (!scene.robot.empty()) {
+    for (int i = 0; i / options.tf_rate <= end; ++i) {
+      const double time = i / options.tf_rate;
+      due.push_back({core::ns_of(time), [&player, time] { return player.write_robot(time); }});
+    }
+  }
+  for (const belief::Action& action : scene.actions) {
+    if (action.time <= end)
+      due.push_back({core::ns_of(action.time), [&player, &action] { return player.write_control(action); }});
+  }
+  std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) { return a.time_ns < b.time_ns; });
+
+  PRESCENE_RETURN_IF_ERROR(player.write_camera_pose());
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    if (cancellation.requested()) return core::cancelled("stopped on request; the frames recorded so far are kept");
+    PRESCENE_RETURN_IF_ERROR(due[i].write());
+    if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(due.size()), {}, ""});
+  }
+  return player.write_outcomes(trajectory);
+}
+
+ordered_json to_json(const TruthRecord& record) {
+  ordered_json objects = ordered_json::array();
+  for (const TruthRecord::Object& object : record.objects) {
+    objects.push_back(
+        {{"name", object.name}, {"pose", belief::to_json(object.X_WO)}, {"visible_share", object.visible_share}});
+  }
+  return {{"stamp_ns", record.stamp_ns}, {"objects", objects}};
+}
+
+core::Result<TruthRecord> truth_from_json(const std::string& text) {
+  const core::Status bad = core::data_loss("a truth record of the recording is damaged");
+  const ordered_json json = parse_or_discard(text, kMostParsedJsonBytes);
+  if (!json.is_object() || !json.contains("stamp_ns") || !json["stamp_ns"].is_number_integer() ||
+      !json.contains("objects") || !json["objects"].is_array())
+    return bad;
+  TruthRecord record;
+  record.stamp_ns = json["stamp_ns"].get<core::TimeNs>();
+  for (const ordered_json& object : json["objects"]) {
+    if (!object.is_object() || !object.contains("name") || !object["name"].is_string() || !object.contains("pose"))
+      return bad;
+    PRESCENE_TRY(const geometry::Pose X_WO, belief::pose_from_json(object["pose"]));
+    const auto share = object.find("visible_share");
+    const double visible_share = share != object.end() && share->is_number() ? share->get<double>() : 0.0;
+    record.objects.push_back({object["name"].get<std::string>(), X_WO, visible_share});
+  }
+  return record;
+}
+
+}  // namespace prescene::service

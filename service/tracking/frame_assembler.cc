@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracking/frame_assembler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "prescene/interfaces/ros_messages/conversions.h"
+
+namespace prescene::service {
+namespace {
+
+// Bounds of what waits: the newest frame wins, so more would never be used. 8 frames are 0.27 s at 30 Hz.
+constexpr std::size_t kMaxWaiting = 8;
+constexpr std::size_t kMaxColors = 8;
+// The same for large images, of all that wait: eight of 2048 x 2048, two of the largest. A depth takes 4 bytes.
+constexpr std::size_t kMaxWaitingPixels = std::size_t{1} << 25;
+constexpr std::size_t kMaxSkippedKept = 1000;
+// A stamp this much older than the last one taken means that the sender's clock was set back (a looped recording).
+// One that is ahead of it by more than this, and by more than kFastestClock times the time that went by, means that the
+// clock was set forward. Either may also be one wrong stamp: only so many frames in a row are believed, as in tf.
+constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
+constexpr core::TimeNs kFastestClock = 10;  // of a recording that is played fast
+constexpr int kTooManyToBeWrong = 3;
+
+/// Whether so many images wait that the oldest has to go.
+template <class Entries, class Image>
+bool too_many(const Entries& entries, std::size_t most, Image Entries::value_type::*image) {
+  std::size_t pixels = 0;
+  for (const auto& entry : entries) pixels += (entry.*image)->size();
+  return entries.size() > most || (entries.size() > 1 && pixels > kMaxWaitingPixels);
+}
+
+}  // namespace
+
+std::vector<std::string> robot_names(const belief::Scene& scene) {
+  std::vector<std::string> names;
+  for (const belief::KinematicBody& body : scene.robot) names.push_back(body.name);
+  return names;
+}
+
+FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies,
+                               TfBufferSettings tf_settings)
+    : settings_(std::move(settings)), robot_bodies_(std::move(robot_bodies)), tf_(tf_settings) {}
+
+core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, MessageIndex index,
+                                       core::TimeNs received_ns) {
+  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
+  std::string frame_id = settings_.camera_frame;
+  if (frame_id.empty() && !image.header.frame_id.empty()) {
+    PRESCENE_TRY(frame_id, interfaces::to_frame_id(image.header.frame_id));
+  }
+  interfaces::ImageRules rules;
+  rules.mono16_is_depth = settings_.mono16_is_depth;
+  interfaces::DepthImageReport report;
+  PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules, &report));
+
+  Waiting entry{index,
+                stamp_ns,
+                received_ns,
+                std::move(frame_id),
+                std::make_shared<geometry::DepthImage>(std::move(depth)),
+                std::move(report.warnings)};
+  if (const char* doubt = doubt_of_stamp(entry)) {
+    skip(entry, doubt);
+    return core::ok_status();
+  }
+  if (last_taken_ && stamp_ns <= last_taken_->stamp_ns) {
+    skip(entry, "not newer than the frame before it");
+    return core::ok_status();
+  }
+  const auto place = std::upper_bound(waiting_.begin(), waiting_.end(), stamp_ns,
+                                      [](core::TimeNs t, const Waiting& other) { return t < other.stamp_ns; });
+  waiting_.insert(place, std::move(entry));
+  while (too_many(waiting_, kMaxWaiting, &Waiting::depth)) {
+    skip(waiting_.front(), "too many frames wait");
+    waiting_.pop_front();
+  }
+  return core::ok_status();
+}
+
+const char* FrameAssembler::doubt_of_stamp(const Waiting& frame) {
+  if (!last_taken_) return nullptr;
+  const core::TimeNs step_ns = frame.stamp_ns - last_taken_->stamp_ns;
+  const core::TimeNs went_by_ns = std::max<core::TimeNs>(0, frame.received_ns - last_taken_->received_ns);
+  // Divided, as the product may be out of range.
+  const bool is_ahead = (step_ns - kClockJumpNs) / kFastestClock > went_by_ns;
+  ahead_in_a_row_ = is_ahead ? ahead_in_a_row_ + 1 : 0;
+  behind_in_a_row_ = step_ns < -kClockJumpNs ? behind_in_a_row_ + 1 : 0;
+  if (is_ahead && ahead_in_a_row_ < kTooManyToBeWrong)
+    return "far ahead of the frame before it: its stamp is wrong, or the sender's clock was set";
+  if (behind_in_a_row_ == 0) return nullptr;
+  if (behind_in_a_row_ < kTooManyToBeWrong)
+    return "far behind the frame before it: its stamp is wrong, or the sender's clock was set";
+  clock_jumped_back();
+  return nullptr;
+}
+
+core::Status FrameAssembler::add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs) {
+  if (!settings_.use_color) return core::ok_status();
+  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
+  PRESCENE_TRY(geometry::ColorImage color, interfaces::to_color_image(image));
+  colors_.push_back({index, stamp_ns, std::make_shared<geometry::ColorImage>(std::move(color))});
+  while (too_many(colors_, kMaxColors, &Color::image)) colors_.pop_front();
+  return core::ok_status();
+}
+
+core::Status FrameAssembler::add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index) {
+  interfaces::CameraReport report;
+  interfaces::CameraRules rules;
+  rules.rectified = settings_.rectified;
+  PRESCENE_TRY(camera_, interfaces::to_camera(info, rules, &report));
+  camera_index_ = index;
+  camera_doubts_ = std::move(report.warnings);
+  return core::ok_status();
+}
+
+core::Status FrameAssembler::add_tf(const interfaces::RosTfMessage& message, MessageIndex index, bool is_static) {
+  tf_until_ = index;
+  PRESCENE_TRY(const interfaces::FrameTransforms transforms, interfaces::to_transforms(message));
+  core::Status first_bad = transforms.rejected.empty() ? core::ok_status() : transforms.rejected.front();
+  for (const interfaces::FrameTransform& transform : transforms.accepted) {
+    core::Status added = tf_.add(transform.parent, transform.child, transform.stamp_ns, transform.X_PC, is_static);
+    if (!added.ok() && first_bad.ok()) first_bad = std::move(added);
+  }
+  return first_bad;
+}
+
+const FrameAssembler::Color* FrameAssembler::color_of(const Waiting& waiting) const {
+  const Color* best = nullptr;
+  for (const Color& color : colors_) {
+    if (!best || std::abs(color.stamp_ns - waiting.stamp_ns) < std::abs(best->stamp_ns - waiting.stamp_ns))
+      best = &color;
+  }
+  return best && std::abs(best->stamp_ns - waiting.stamp_ns) <= core::ns_of(settings_.max_stamp_difference_s) ? best
+                                                                                                              : nullptr;
+}
+
+FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool out_of_time) const {
+  if (!camera_) return {{}, "no usable camera info has come", false};
+  if (camera_->width != waiting.depth->width() || camera_->height != waiting.depth->height()) {
+    return {{},
+            "the camera info is for " + std::to_string(camera_->width) + " x " + std::to_string(camera_->height) +
+                " pixels, the depth image has " + std::to_string(waiting.depth->width()) + " x " +
+                std::to_string(waiting.depth->height()),
+            true};
+  }
+  AssembledFrame frame;
+  frame.depth = waiting.index;
+  frame.camera_info = camera_index_;
+  frame.tf_until = tf_until_;
+  frame.doubts = waiting.doubts;
+  frame.doubts.insert(frame.doubts.end(), camera_doubts_.begin(), camera_doubts_.end());
+  belief::Observation& observation = frame.observation;
+  observation.stamp_ns = waiting.stamp_ns;
+  observation.frame.depth = waiting.depth;
+  observation.frame.camera = *camera_;
+
+  // Colour helps but is not needed: a frame whose colour does not come in time goes without it.
+  if (settings_.use_color) {
+    const Color* color = color_of(waiting);
+    if (!color && !out_of_time) return {{}, "its colour image has not come", false};
+    if (color && color->image->width() == camera_->width && color->image->height() == camera_->height) {
+      observation.frame.color = color->image;
+      frame.color = color->index;
+    }
+  }
+  core::Result<geometry::Pose> X_WC =
+      waiting.frame_id.empty() ? core::Result<geometry::Pose>(core::not_found("the depth image names no frame"))
+                               : tf_.lookup(settings_.world_frame, waiting.frame_id, waiting.stamp_ns);
+  if (!X_WC && !settings_.X_WC) return {{}, X_WC.status().message(), false};
+  if (!X_WC && !out_of_time && tf_.knows(waiting.frame_id)) return {{}, X_WC.status().message(), false};
+  observation.X_WC = X_WC ? *X_WC : *settings_.X_WC;
+
+  for (const std::string& body : robot_bodies_) {
+    const core::Result<geometry::Pose> X_WG = tf_.lookup(settings_.world_frame, body, waiting.stamp_ns);
+    if (X_WG) {
+      observation.robot[body] = *X_WG;
+    } else if ((tf_.knows(body) || !last_taken_) && !out_of_time) {
+      // At the start nothing is known of a body yet: the first frame waits for it, later ones go without.
+      return {{}, X_WG.status().message(), false};
+    }
+  }
+  return {std::move(frame), "", false};
+}
+
+std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
+  for (std::size_t newest = waiting_.size(); newest > 0; --newest) {
+    const Waiting& waiting = waiting_[newest - 1];
+    const bool out_of_time = now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
+    Attempt attempt = assemble(waiting, out_of_time);
+    if (attempt.frame) {
+      last_taken_ = Taken{waiting.stamp_ns, waiting.received_ns};
+      for (std::size_t older = 0; older + 1 < newest; ++older) skip(waiting_[older], "a newer frame was ready");
+      waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(newest));
+      return std::move(attempt.frame);
+    }
+    if (attempt.hopeless || out_of_time) {
+      skip(waiting, attempt.missing);
+      waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(newest - 1));
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<core::TimeNs> FrameAssembler::next_deadline() const {
+  std::optional<core::TimeNs> deadline;
+  for (const Waiting& waiting : waiting_) {
+    const core::TimeNs mine = waiting.received_ns + core::ns_of(settings_.max_wait_s);
+    deadline = deadline ? std::min(*deadline, mine) : mine;
+  }
+  return deadline;
+}
+
+std::vector<SkippedFrame> FrameAssembler::take_skipped() {
+  const std::deque<SkippedFrame> taken = std::exchange(skipped_, {});
+  return {taken.begin(), taken.end()};
+}
+
+void FrameAssembler::skip(const Waiting& waiting, std::string reason) {
+  skipped_.push_back({waiting.index, waiting.stamp_ns, std::move(reason)});
+  if (skipped_.size() > kMaxSkippedKept) skipped_.pop_front();
+  ++skipped_count_;
+}
+
+void FrameAssembler::clock_jumped_back() {
+  for (const Waiting& waiting : waiting_) skip(waiting, "the sender's clock jumped back");
+  waiting_.clear();
+  colors_.clear();
+  tf_.forget_moving();
+  last_taken_.reset();
+  ahead_in_a_row_ = behind_in_a_row_ = 0;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Makes observations out of messages: pairs a depth image with its colour image and camera info, looks up where the
+// camera and the robot's bodies were, and skips, with a reason, what cannot be completed in time.
+//
+// The newest complete frame wins: a frame older than one already taken is skipped, never queued. The assembler reads no
+// clock; time is what its caller says, so a recording assembles to the same observations.
+//
+// A frame whose stamp is more than a second before the last one taken, or far ahead of it, is skipped: one stamp may be
+// wrong. Three such in a row mean that the sender's clock was set, and count; where it went back, what was known of the
+// moving frames of tf is forgotten.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/observation.h"
+#include "prescene/belief/scene.h"
+#include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/service/tracking/tf_buffer.h"
+
+namespace prescene::service {
+
+/// Of the bodies whose poses tf tells.
+std::vector<std::string> robot_names(const belief::Scene& scene);
+
+struct AssemblerSettings {
+  std::string world_frame = "world";
+  /// Frame of the camera; empty = the frame_id of the depth image.
+  std::string camera_frame;
+  /// The camera's pose when tf does not know it; empty = frames without tf are skipped.
+  std::optional<geometry::Pose> X_WC;
+  double max_wait_s = 0.05;               ///< How long a depth image waits for its colour image, camera info and tf.
+  double max_stamp_difference_s = 0.017;  ///< Between a depth image and its colour image.
+  bool use_color = true;
+  bool rectified = false;        ///< The images are rectified: the camera is P of the camera info instead of K.
+  bool mono16_is_depth = false;  ///< Take `mono16` depth images as millimetres.
+};
+
+/// Running number of a message in a recording (or since the start), over all topics.
+using MessageIndex = std::uint64_t;
+
+struct AssembledFrame {
+  belief::Observation observation;
+  MessageIndex depth = 0;
+  std::optional<MessageIndex> color;
+  MessageIndex camera_info = 0;
+  /// All tf messages up to this number had been taken in when the poses were looked up.
+  MessageIndex tf_until = 0;
+  std::vector<std::string> doubts;  ///< Of its depth image and camera info: an unlikely unit, a distorting lens.
+};
+
+struct SkippedFrame {
+  MessageIndex depth = 0;
+  core::TimeNs stamp_ns = 0;
+  std::string reason;
+};
+
+class FrameAssembler {
+ public:
+  /// `robot_bodies` are looked up in tf by name; a body that tf does not know is left out of the observation.
+  FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies, TfBufferSettings tf_settings = {});
+
+  /// Each takes a message with its running number and the time it came in. A message that says something impossible is
+  /// refused with a status that names the field and the remedy, and changes nothing.
+  core::Status add_depth(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns);
+  core::Status add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns);
+  core::Status add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index);
+  /// Takes every good transform of the message; the status tells of the first bad one.
+  core::Status add_tf(const interfaces::RosTfMessage& message, MessageIndex index, bool is_static);
+
+  /// The newest frame that is complete at `now_ns`; older waiting frames are skipped.
+  std::optional<AssembledFrame> take(core::TimeNs now_ns);
+  /// When take() should be asked again although nothing has come in; empty if nothing waits.
+  std::optional<core::TimeNs> next_deadline() const;
+  /// What was skipped since the last call, oldest first; of more than a thousand, the newest.
+  std::vector<SkippedFrame> take_skipped();
+  /// Why the newest of them was; "" if there are none.
+  std::string last_skip() const { return skipped_.empty() ? "" : skipped_.back().reason; }
+  /// Since the start.
+  std::uint64_t skipped_count() const { return skipped_count_; }
+  std::uint64_t tf_forgotten() const { return tf_.forgotten(); }
+  std::uint64_t tf_late() const { return tf_.late(); }
+
+ private:
+  struct Waiting {
+    MessageIndex index;
+    core::TimeNs stamp_ns;
+    core::TimeNs received_ns;
+    std::string frame_id;
+    std::shared_ptr<const geometry::DepthImage> depth;
+    std::vector<std::string> doubts;
+  };
+  struct Color {
+    MessageIndex index;
+    core::TimeNs stamp_ns;
+    std::shared_ptr<const geometry::ColorImage> image;
+  };
+  struct Attempt {
+    std::optional<AssembledFrame> frame;
+    std::string missing;  ///< What it still waits for.
+    bool hopeless = false;
+  };
+  Attempt assemble(const Waiting& waiting, bool out_of_time) const;
+  const Color* color_of(const Waiting& waiting) const;
+  /// Why a frame's stamp is not believed, or null. Counts those in a row, and follows a clock that was set.
+  const char* doubt_of_stamp(const Waiting& frame);
+  void skip(const Waiting& waiting, std::string reason);
+  void clock_jumped_back();
+
+  AssemblerSettings settings_;
+  std::vector<std::string> robot_bodies_;
+  TfBuffer tf_;
+  MessageIndex tf_until_ = 0;
+  std::deque<Waiting> waiting_;  // ascending stamps
+  std::deque<Color> colors_;     // newest last, bounded
+  std::optional<geometry::PinholeCamera> camera_;
+  MessageIndex camera_index_ = 0;
+  std::vector<std::string> camera_doubts_;
+  struct Taken {
+    core::TimeNs stamp_ns;
+    core::TimeNs received_ns;
+  };
+  std::optional<Taken> last_taken_;
+  int ahead_in_a_row_ = 0;            // frames whose stamps are far ahead of the last one taken, ...
+  int behind_in_a_row_ = 0;           // ... or before it
+  std::deque<SkippedFrame> skipped_;  // not taken yet, bounded
+  std::uint64_t skipped_count_ = 0;
+};
+
+}  // namespace prescene::service

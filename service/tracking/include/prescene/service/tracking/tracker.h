@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// One scene, tracked: messages go in, beliefs come out. The live service and the replay of a recording both drive it;
+// it reads no clock and owns no thread, so that both come to the same bits.
+//
+//   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings, seed, backends));
+//   PRESCENE_RETURN_IF_ERROR(tracker->take_in(message, index));
+//   while (auto step = tracker->step(now_ns)) ... *step, *tracker->belief()
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/filter/particle_filter.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
+#include "prescene/service/backends.h"
+#include "prescene/service/tracking/recording.h"
+#include "prescene/service/tracking/tracker_settings.h"
+#include "prescene/service/tracking/waiting_controls.h"
+
+namespace prescene::service {
+
+/// One belief step as it happened.
+struct TrackerStep {
+  StepRecord record;
+  filter::StepCounters counters;
+  std::string physics_failure;  ///< As in filter::StepResult.
+  filter::HashTrace trace;
+  std::vector<filter::SupportMeasurement> supports;
+  belief::Observation observation;
+};
+
+/// Not thread-safe but for belief().
+class Tracker {
+ public:
+  /// `backends` must outlive the tracker.
+  static core::Result<std::unique_ptr<Tracker>> create(std::shared_ptr<const belief::Scene> scene,
+                                                       const TrackerSettings& settings, std::uint64_t seed,
+                                                       Backends& backends);
+
+  /// Takes in one message of the robot; topics that nobody listens to are ignored. Numbers ascend. A message that says
+  /// something impossible is refused, and named with its topic; nothing else is lost by it.
+  core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
+  /// One belief step with the newest frame that is complete at `now_ns`; empty if there is none. Where the sender's
+  /// clock went back (a recording is played again) the belief starts anew. Controls wait for the first step that they
+  /// can act in, which is the second of a belief. Where it ends in an exception nothing is changed but that the frame
+  /// is gone.
+  std::optional<TrackerStep> step(core::TimeNs now_ns);
+  /// When step() should be tried again although nothing came in.
+  std::optional<core::TimeNs> next_deadline() const { return assembler_.next_deadline(); }
+
+  /// Frames that were not used, since the start, and why the newest since the last step was not ("" = none was).
+  std::uint64_t skipped_count() const { return assembler_.skipped_count(); }
+  std::string last_skip() const { return assembler_.last_skip(); }
+  /// Transforms that tf's buffer forgot early for want of room, since the start.
+  std::uint64_t tf_forgotten() const { return assembler_.tf_forgotten(); }
+  std::uint64_t tf_late() const { return assembler_.tf_late(); }
+  /// Actions of controls that wait for a frame, and those that were dropped since the start, as in WaitingControls.
+  std::size_t waiting_controls() const { return controls_.count(); }
+  std::uint64_t dropped_controls() const { return controls_.dropped(); }
+
+  /// The newest belief; a snapshot that never changes. Safe from any thread.
+  std::shared_ptr<const belief::Belief> belief() const;
+  const TrackerSettings& settings() const { return settings_; }
+
+ private:
+  Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
+          Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
+          std::unique_ptr<rendering::LikelihoodBatch> likelihood);
+
+  TrackerSettings settings_;
+  std::unique_ptr<rendering::Renderer> renderer_;
+  std::unique_ptr<rendering::LikelihoodBatch> likelihood_;
+  filter::ParticleFilter filter_;
+  FrameAssembler assembler_;
+  MessageIndex last_index_ = 0;
+  WaitingControls controls_;
+  std::shared_ptr<const belief::Scene> scene_;  // as given
+  mutable std::mutex mutex_;                    // guards belief_
+  std::shared_ptr<const belief::Belief> belief_;
+};
+
+}  // namespace prescene::service

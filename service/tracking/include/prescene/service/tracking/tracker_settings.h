@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tracker may be told, and its form in recordings.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "prescene/core/status.h"
+#include "prescene/filter/particle_filter.h"
+#include "prescene/service/tracking/frame_assembler.h"
+#include "prescene/service/tracking/topics.h"
+
+namespace prescene::service {
+
+struct TrackerSettings {
+  InputTopics topics;
+  AssemblerSettings assembler;
+  TfBufferSettings tf;
+  filter::FilterSettings filter;
+};
+
+/// Topics, assembler and tf: all that decides which frames are seen from where. The filter's settings are those of the
+/// program's version.
+nlohmann::ordered_json to_json(const TrackerSettings& settings);
+/// The settings with what `json` says; kInvalidInput naming the key for a value of another type, a camera pose that is
+/// none, or a number that is not finite. Unknown keys are ignored: a later version may have written them.
+core::Result<TrackerSettings> with_recorded(TrackerSettings settings, const nlohmann::ordered_json& json);
+
+}  // namespace prescene::service

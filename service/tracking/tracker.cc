@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracking/tracker.h"
+
+#include <algorithm>
+#include <iterator>
+#include <type_traits>
+#include <utility>
+
+#include "prescene/core/hash.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+
+namespace prescene::service {
+namespace {
+
+core::Status check_type(const interfaces::ReceivedMessage& message, const char* type) {
+  if (message.type == type) return core::ok_status();
+  return core::invalid_input("carries " + message.type + ", expected " + type +
+                             ": correct the topic's name in the settings");
+}
+
+template <class Message>
+core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const char* type) {
+  PRESCENE_RETURN_IF_ERROR(check_type(message, type));
+  const bool large = std::is_same_v<Message, interfaces::RosImage>;
+  return interfaces::decode_cdr<Message>(message.cdr, large ? interfaces::CdrLimits{} : interfaces::kSmallMessage);
+}
+
+/// Frames do not wait for the colour of a topic that nobody named.
+TrackerSettings settled(TrackerSettings settings) {
+  settings.assembler.use_color = settings.assembler.use_color && !settings.topics.color.empty();
+  return settings;
+}
+
+std::vector<std::string> degraded_words(const filter::StepResult& result) {
+  std::vector<std::string> words;
+  if (result.degraded != 0) words.push_back(filter::degraded_text(result.degraded));
+  if (!result.frame_status.ok()) words.push_back(result.frame_status.message());
+  if (!result.physics_failure.empty()) words.push_back(result.physics_failure);
+  if (!result.rendering_failure.ok()) words.push_back(result.rendering_failure.message());
+  return words;
+}
+
+}  // namespace
+
+core::Result<std::unique_ptr<Tracker>> Tracker::create(std::shared_ptr<const belief::Scene> scene,
+                                                       const TrackerSettings& settings, std::uint64_t seed,
+                                                       Backends& backends) {
+  PRESCENE_RETURN_IF_ERROR(validate(*scene));
+  PRESCENE_TRY(auto renderer, backends.make_renderer());
+  PRESCENE_TRY(auto likelihood, backends.make_likelihood());
+  return std::unique_ptr<Tracker>(
+      new Tracker(std::move(scene), settings, seed, backends, std::move(renderer), std::move(likelihood)));
+}
+
+Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
+                 Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
+                 std::unique_ptr<rendering::LikelihoodBatch> likelihood)
+    : settings_(settled(settings)),
+      renderer_(std::move(renderer)),
+      likelihood_(std::move(likelihood)),
+      filter_(*likelihood_, *renderer_, backends.pool(), settings.filter, backends.simulator_factory()),
+      assembler_(settings_.assembler, robot_names(*scene), settings.tf),
+      scene_(std::move(scene)),
+      belief_(std::make_shared<belief::Belief>(filter_.start(scene_, seed))) {}
+
+std::shared_ptr<const belief::Belief> Tracker::belief() const {
+  const std::lock_guard lock(mutex_);
+  return belief_;
+}
+
+core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, MessageIndex index) {
+  last_index_ = index;
+  const InputTopics& topics = settings_.topics;
+  const auto take = [&]() -> core::Status {
+    if (message.topic == topics.depth) {
+      PRESCENE_TRY(const auto image, decoded<interfaces::RosImage>(message, "sensor_msgs/msg/Image"));
+      return assembler_.add_depth(image, index, message.received_ns);
+    }
+    if (message.topic == topics.color) {
+      PRESCENE_TRY(const auto image, decoded<interfaces::RosImage>(message, "sensor_msgs/msg/Image"));
+      return assembler_.add_color(image, index, message.received_ns);
+    }
+    if (message.topic == topics.camera_info) {
+      PRESCENE_TRY(const auto info, decoded<interfaces::RosCameraInfo>(message, "sensor_msgs/msg/CameraInfo"));
+      return assembler_.add_camera_info(info, index);
+    }
+    if (message.topic == topics.tf || message.topic == topics.tf_static) {
+      PRESCENE_TRY(const auto tf, decoded<interfaces::RosTfMessage>(message, "tf2_msgs/msg/TFMessage"));
+      return assembler_.add_tf(tf, index, message.topic == topics.tf_static);
+    }
+    if (message.topic == kControlTopic) {
+      PRESCENE_RETURN_IF_ERROR(check_type(message, "std_msgs/msg/String"));
+      return controls_.take_in(message, belief_->step > 0 ? std::optional(belief_->stamp_ns) : std::nullopt);
+    }
+    return core::ok_status();
+  };
+  return take().at(message.topic);
+}
+
+std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
+  std::optional<AssembledFrame> frame = assembler_.take(now_ns);
+  if (!frame) return std::nullopt;
+  const core::Stopwatch watch;
+  const core::TimeNs stamp_ns = frame->observation.stamp_ns;
+  const bool clock_went_back = belief_->step > 0 && stamp_ns <= belief_->stamp_ns;
+  // What is known only changes at the end, all at once.
+  std::shared_ptr<const belief::Belief> before = belief_;
+  WaitingControls controls = controls_;
+  if (clock_went_back) {  // Nothing is known of the time between.
+    before = std::make_shared<const belief::Belief>(filter_.start(scene_, belief_->seed));
+    controls.begin_again();
+  }
+  // The first frame of a belief predicts nothing, so that no control could act.
+  const bool predicts = before->step > 0;
+  filter::StepResult result = filter_.step(
+      *before, frame->observation,
+      predicts ? controls.due(before->stamp_ns, stamp_ns) : belief::Control{before->stamp_ns, stamp_ns, {}});
+  if (predicts) controls.forget_due(stamp_ns);
+  if (!predicts && result.belief.step > 0) controls.begin_at(stamp_ns);
+
+  TrackerStep step;
+  step.record.after = last_index_;
+  step.record.now_ns = now_ns;
+  step.record.stamp_ns = stamp_ns;
+  step.record.depth = frame->depth;
+  step.record.color = frame->color;
+  step.record.camera_info = frame->camera_info;
+  step.record.tf_until = frame->tf_until;
+  step.record.skipped = assembler_.take_skipped();
+  step.record.degraded = degraded_words(result);
+  std::ranges::move(frame->doubts, std::back_inserter(step.record.degraded));
+  if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
+  if (const std::uint64_t dropped = controls.dropped() - controls_.dropped(); dropped > 0)
+    step.record.degraded.push_back(std::to_string(dropped) +
+                                   " actions of controls were dropped: they were stamped by another clock");
+  step.record.step = result.belief.step;
+  step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
+  step.counters = result.counters;
+  step.physics_failure = std::move(result.physics_failure);
+  step.trace = std::move(result.trace);
+  step.supports = std::move(result.supports);
+  step.observation = std::move(frame->observation);
+  {
+    auto next = std::make_shared<const belief::Belief>(std::move(result.belief));
+    const std::lock_guard lock(mutex_);
+    belief_ = std::move(next);
+  }
+  controls_ = std::move(controls);
+  step.record.seconds = watch.seconds();
+  return step;
+}
+
+}  // namespace prescene::service

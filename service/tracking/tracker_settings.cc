@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracking/tracker_settings.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "prescene/belief/json.h"
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+
+core::Status wrong(const std::string& key, const std::string& needed) {
+  return core::invalid_input(key + ": " + needed + " is needed");
+}
+
+core::Status read_value(const ordered_json& json, const std::string& key, std::string& value) {
+  if (!json.is_string()) return wrong(key, "a text");
+  value = json.get<std::string>();
+  return core::ok_status();
+}
+
+core::Status read_value(const ordered_json& json, const std::string& key, bool& value) {
+  if (!json.is_boolean()) return wrong(key, "true or false");
+  value = json.get<bool>();
+  return core::ok_status();
+}
+
+core::Status read_value(const ordered_json& json, const std::string& key, double& value) {
+  if (!json.is_number() || !std::isfinite(json.get<double>()) || json.get<double>() < 0.0)
+    return wrong(key, "a number of 0 or more");
+  value = json.get<double>();
+  return core::ok_status();
+}
+
+core::Status read_value(const ordered_json& json, const std::string& key, int& value) {
+  if (!json.is_number_integer() || json.get<std::int64_t>() < 1 || json.get<std::int64_t>() > 1'000'000)
+    return wrong(key, "a whole number of 1 to 1000000");
+  value = json.get<int>();
+  return core::ok_status();
+}
+
+core::Status read_value(const ordered_json& json, const std::string& key, std::optional<geometry::Pose>& value) {
+  value.reset();
+  if (json.is_null()) return core::ok_status();
+  auto pose = belief::pose_from_json(json);
+  if (!pose) return pose.status().at(key);
+  value = *pose;
+  return core::ok_status();
+}
+
+ordered_json value_json(const std::optional<geometry::Pose>& pose) {
+  return pose ? belief::to_json(*pose) : ordered_json();
+}
+template <class Value>
+ordered_json value_json(const Value& value) {
+  return value;
+}
+
+/// Calls visit(key, value) for each setting that recordings hold; `settings` may be const.
+template <class Settings, class Visit>
+void for_each_setting(Settings& settings, const Visit& visit) {
+  visit("depth_topic", settings.topics.depth);
+  visit("color_topic", settings.topics.color);
+  visit("camera_info_topic", settings.topics.camera_info);
+  visit("tf_topic", settings.topics.tf);
+  visit("tf_static_topic", settings.topics.tf_static);
+  visit("world_frame", settings.assembler.world_frame);
+  visit("camera_frame", settings.assembler.camera_frame);
+  visit("X_WC", settings.assembler.X_WC);
+  visit("max_wait_s", settings.assembler.max_wait_s);
+  visit("max_stamp_difference_s", settings.assembler.max_stamp_difference_s);
+  visit("use_color", settings.assembler.use_color);
+  visit("rectified", settings.assembler.rectified);
+  visit("mono16_is_depth", settings.assembler.mono16_is_depth);
+  visit("tf_history_s", settings.tf.history_s);
+  visit("tf_max_frames", settings.tf.max_frames);
+  visit("tf_max_samples", settings.tf.max_samples);
+  visit("tf_max_extrapolation_s", settings.tf.max_extrapolation_s);
+}
+
+}  // namespace
+
+ordered_json to_json(const TrackerSettings& settings) {
+  ordered_json json = ordered_json::object();
+  for_each_setting(settings, [&](const char* key, const auto& value) { json[key] = value_json(value); });
+  return json;
+}
+
+core::Result<TrackerSettings> with_recorded(TrackerSettings settings, const ordered_json& json) {
+  if (!json.is_object()) return core::invalid_input("an object is needed");
+  core::Status first_bad;
+  for_each_setting(settings, [&](const char* key, auto& value) {
+    const auto found = json.find(key);
+    if (found != json.end() && first_bad.ok()) first_bad = read_value(*found, key, value);
+  });
+  PRESCENE_RETURN_IF_ERROR(first_bad);
+  return settings;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/tracking/waiting_controls.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "prescene/belief/json.h"
+#include "prescene/core/text.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
+#include "prescene/service/tracking/recording.h"
+
+namespace prescene::service {
+namespace {
+
+// More than a robot does between two frames; a sender in a loop must not fill the memory.
+constexpr std::size_t kMaxControls = 1000;
+
+// A stamp that is further ahead is by another clock than the frames', or the camera has stood still for so long.
+constexpr core::TimeNs kFarthestAheadNs = 60'000'000'000;
+
+// The end of ROS's 32 bit seconds.
+constexpr core::TimeNs kLatestStamp = (core::TimeNs{1} << 31) * 1'000'000'000;
+
+core::TimeNs sent_in_time_of_frames(core::TimeNs sent_ns, core::TimeNs frame_ns) {
+  return std::abs(sent_ns - frame_ns) <= kSameClockNs ? sent_ns : frame_ns;
+}
+
+}  // namespace
+
+core::Result<ParsedControl> parse_control(const std::string& text) {
+  const auto json = parse_or_discard(text);
+  if (!json.is_object() || !json.contains("actions") || !json["actions"].is_array()) {
+    return core::invalid_input("a control is {\"stamp_ns\": n, \"actions\": [...]}, this one is not");
+  }
+  ParsedControl control;
+  if (json.contains("stamp_ns")) {
+    if (!json["stamp_ns"].is_number_integer())
+      return core::invalid_input("stamp_ns: not a whole number of nanoseconds");
+    control.stamp_ns = json["stamp_ns"].get<core::TimeNs>();
+    if (*control.stamp_ns < 0 || *control.stamp_ns > kLatestStamp)
+      return core::invalid_input("stamp_ns: a time from 1970 to 2038 is needed, as in ROS headers");
+  }
+  for (const auto& value : json["actions"]) {
+    PRESCENE_TRY(belief::Action action, belief::action_from_json(value));
+    // An hour bounds what is plausible, and keeps the sum in range.
+    if (!(std::abs(action.time) <= 3600.0))
+      return core::invalid_input("time: actions start within an hour of their control");
+    control.actions.emplace_back(core::ns_of(action.time), std::move(action));
+  }
+  return control;
+}
+
+core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message,
+                                      std::optional<core::TimeNs> newest_frame_ns) {
+  PRESCENE_TRY(const auto text, interfaces::decode_cdr<interfaces::RosString>(message.cdr, interfaces::kSmallMessage));
+  PRESCENE_TRY(ParsedControl control, parse_control(text.data));
+  if (control.stamp_ns && newest_frame_ns && *control.stamp_ns - *newest_frame_ns > kFarthestAheadNs) {
+    const auto seconds = [](core::TimeNs time_ns) { return core::fixed_text(core::seconds_of(time_ns), 3) + " s"; };
+    return core::invalid_input("stamp_ns: " + seconds(*control.stamp_ns) + " is more than " +
+                               seconds(kFarthestAheadNs) + " after the newest frame's stamp, " +
+                               seconds(*newest_frame_ns) +
+                               ": stamp controls by the clock of the frames, or leave stamp_ns out");
+  }
+  if (waiting_.size() + control.actions.size() > kMaxControls) {
+    return core::resource_exhausted("more than " + std::to_string(kMaxControls) +
+                                    " actions wait for a frame: send fewer");
+  }
+  const bool says_when = message.source_ns > 0 && message.source_ns < kLatestRecordedNs;
+  const core::TimeNs sent_ns = says_when ? message.source_ns : message.received_ns;
+  const core::TimeNs base_ns = control.stamp_ns
+                                   ? *control.stamp_ns
+                                   : (newest_frame_ns ? sent_in_time_of_frames(sent_ns, *newest_frame_ns) : sent_ns);
+  waiting_.reserve(waiting_.size() + control.actions.size());
+  for (auto& [after_ns, action] : control.actions) {
+    waiting_.push_back({base_ns + after_ns, after_ns, control.stamp_ns, sent_ns, std::move(action)});
+  }
+  sort();
+  return core::ok_status();
+}
+
+void WaitingControls::sort() {
+  std::stable_sort(waiting_.begin(), waiting_.end(),
+                   [](const Waiting& a, const Waiting& b) { return a.due_ns < b.due_ns; });
+}
+
+void WaitingControls::begin_at(core::TimeNs first_frame_ns) {
+  dropped_ += std::erase_if(waiting_, [&](const Waiting& waiting) {
+    return waiting.stamp_ns && *waiting.stamp_ns - first_frame_ns > kFarthestAheadNs;
+  });
+  for (Waiting& waiting : waiting_) {
+    if (waiting.stamp_ns) continue;
+    waiting.due_ns = sent_in_time_of_frames(waiting.sent_ns, first_frame_ns) + waiting.after_ns;
+  }
+  sort();
+}
+
+void WaitingControls::begin_again() {
+  for (Waiting& waiting : waiting_)
+    if (!waiting.stamp_ns) waiting.due_ns = waiting.sent_ns + waiting.after_ns;
+  sort();
+}
+
+belief::Control WaitingControls::due(core::TimeNs begin_ns, core::TimeNs end_ns) const {
+  belief::Control control{begin_ns, end_ns, {}};
+  for (const Waiting& waiting : waiting_) {
+    if (waiting.due_ns > end_ns) break;
+    control.actions.push_back(waiting.action);
+    control.actions.back().time = std::max(0.0, core::seconds_of(waiting.due_ns - begin_ns));
+  }
+  return control;
+}
+
+void WaitingControls::forget_due(core::TimeNs end_ns) {
+  std::erase_if(waiting_, [&](const Waiting& waiting) { return waiting.due_ns <= end_ns; });
+}
+
+std::vector<std::pair<core::TimeNs, belief::Action>> WaitingControls::all() const {
+  std::vector<std::pair<core::TimeNs, belief::Action>> all;
+  for (const Waiting& waiting : waiting_) all.emplace_back(waiting.due_ns, waiting.action);
+  return all;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of service/recording take for granted.
+#pragma once
+
+#include "prescene/core/log.h"
+#include "prescene/core/progress.h"
+#include "prescene/service/backends.h"
+#include "prescene/service/recording/replay_input.h"
+#include "prescene/service/tracking/tracker.h"
+#include "prescene/service/tracking/tracker_settings.h"
+
+namespace prescene::service::given_service_recording {
+
+extern const core::LogSink log;
+extern Backends backends;
+extern const TrackerSettings settings;
+
+namespace replay_input_h {
+extern const core::Cancellation cancellation;
+extern const core::ProgressSink progress;
+extern const StepSink on_step;
+extern const JsonSink on_json;
+}  // namespace replay_input_h
+
+}  // namespace prescene::service::given_service_recording
