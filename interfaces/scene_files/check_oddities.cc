@@ -22,7 +22,7 @@ void warn_of_mass_ratios(const LocatedValue& objects, const belief::Scene& scene
                   "it has more than " + core::rounded_text(belief::kGreatestMassRatio) + " times the mass of " +
                       interfaces::quote(lightest->name) + ", " + core::rounded_text(mass(object)) + " and " +
                       core::rounded_text(mass(*lightest)) + " kg",
-                  "trust no outcome in which it rests on that (docs/simulation.md, Limits)");
+                  "trust no outcome in which it rests on that (docs/reference/simulation.md, Limits)");
   }
 }
 

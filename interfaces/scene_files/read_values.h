@@ -45,7 +45,7 @@ geometry::Quaterniond read_rotation(const LocatedValue& value, Problems& problem
 geometry::Pose read_pose(const LocatedValue& value, Problems& problems);
 /// The same from the keys of a map that has others, too.
 geometry::Pose read_pose_keys(Binder& binder);
-/// {position, rotation, normal: {...}}, {samples: [...]}: see docs/scene_files.md.
+/// {position, rotation, normal: {...}}, {samples: [...]}: see docs/reference/scene_files.md.
 belief::PoseDistribution read_pose_distribution(const LocatedValue& value, Problems& problems);
 /// [r, g, b] between 0 and 1, or "#rrggbb".
 belief::Color read_color(const LocatedValue& value, Problems& problems);

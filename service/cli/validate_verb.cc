@@ -71,7 +71,7 @@ Verb add_validate_verb(CLI::App& app) {
   auto* verb =
       app.add_subcommand("validate", "Check scene and model files: every mistake with its line and the remedy");
   auto files = std::make_shared<std::vector<std::string>>();
-  verb->add_option("FILE", *files, "Scene or model files (docs/scene_files.md)")->required();
+  verb->add_option("FILE", *files, "Scene or model files (docs/reference/scene_files.md)")->required();
   verb->footer("Example: prescene validate scenarios/milk_on_bin.yaml");
   return {verb, [files](VerbContext& context) -> core::Status {
             nlohmann::ordered_json documents = nlohmann::ordered_json::array();

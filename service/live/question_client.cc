@@ -118,7 +118,7 @@ class QuestionClient::Waiting {
 core::Result<std::string> QuestionClient::ask(const std::string& question_json, double timeout,
                                               const core::Cancellation& cancellation) {
   auto question = parse_or_discard(question_json);
-  if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/queries.md)");
+  if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/reference/queries.md)");
   if (question.contains("id") && !question["id"].is_string())
     return core::invalid_input("id: a question's id is a text, in quotes; leave it out to have one made");
   if (!question.contains("id") || question["id"] == "") question["id"] = new_id();

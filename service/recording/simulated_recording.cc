@@ -164,7 +164,7 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
                                 const core::ProgressSink& progress, RecordingWriter& recording) {
   if (!scene.camera) {
     return core::invalid_input("scene '" + scene.name +
-                               "' has no camera to record with: add one (docs/scene_files.md)");
+                               "' has no camera to record with: add one (docs/reference/scene_files.md)");
   }
   PRESCENE_TRY(const auto simulator, backends.make_simulator(scene));
   PRESCENE_TRY(const auto renderer, backends.make_renderer());

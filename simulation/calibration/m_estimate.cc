@@ -95,7 +95,7 @@ Step step_from(const VectorXd& u, const PointResponse& response, const Neighbour
   const VectorXd slope = slopes.colwise().mean().transpose();
   const MatrixXd centred = slopes.rowwise() - slope.transpose();
   // No freedom is taken off for the parameters: jumps of the simulation, which the trials see as slopes, widen the
-  // spread of the slopes by as much (docs/calibration.md has the count).
+  // spread of the slopes by as much (docs/reference/calibration.md has the count).
   MatrixXd B = centred.transpose() * centred / (cases * (cases - 1.0));
   B *= std::pow(student_factor(cases - 1.0), 2);
   B.diagonal().array() += 1e-12 * B.trace() + 1e-300;

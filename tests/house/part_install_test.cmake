@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the component `collision` of this build into a folder of its own, looks what is there, and builds and runs the
-# program of docs/collision.md against it, with every package hidden that the library is said to do without.
+# program of docs/reference/collision.md against it, with every package hidden that the library is said to do without.
 cmake_minimum_required(VERSION 3.25)
 set(work "${PRESCENE_BUILD_DIR}/part_install_test")
 file(REMOVE_RECURSE "${work}")

@@ -567,7 +567,7 @@ TEST(View, WhoseLikeliestStateFailedIsAnError) {
 
 TEST(Documentation, ItsQuestionsAreUnderstood) {
   std::ifstream page(tests::source_dir() / "docs" / "queries.md");
-  ASSERT_TRUE(page) << "docs/queries.md is missing";
+  ASSERT_TRUE(page) << "docs/reference/queries.md is missing";
   const std::string text{std::istreambuf_iterator<char>(page), {}};
   // Blocks marked `json` that begin with an id and a task are questions, but for those with a step: answers.
   int questions = 0;

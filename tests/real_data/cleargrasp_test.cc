@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The transparent material on real frames of transparent things (docs/accuracy.md).
+// The transparent material on real frames of transparent things (docs/studies/accuracy.md).
 #include "prescene/service/evaluate/cleargrasp.h"
 
 #include <gtest/gtest.h>

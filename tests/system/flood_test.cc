@@ -3,7 +3,7 @@
 // reader that has stopped, a wall clock that is set. It stays up, keeps answering, tells what it lost and keeps its log
 // short.
 //
-// The flood lasts PRESCENE_FLOOD_SECONDS (default 4; 30 for the figures of docs/ros2.md).
+// The flood lasts PRESCENE_FLOOD_SECONDS (default 4; 30 for the figures of docs/reference/ros2.md).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

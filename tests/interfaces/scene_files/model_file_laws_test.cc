@@ -115,7 +115,7 @@ TEST(ModelFileLaws, WhatIsWrittenIsReadBackToTheBit) {
 }
 
 TEST(ModelFile, OfThePageIsReadAndOverriddenByAScene) {
-  const std::string page = tests::text_of_file("docs/scene_files.md");
+  const std::string page = tests::text_of_file("docs/reference/scene_files.md");
   const tests::ScratchDir folder;
   std::ofstream(folder.path() / "mug.yaml") << tests::code_blocks(page, "yaml model file");
   const std::string scene_text =

@@ -47,7 +47,7 @@ belief::PoseDistribution pose_of(const std::string& pose) {
 }
 
 TEST(SceneFile, OfThePageHasAllThatThePageSays) {
-  const Scene scene = scene_of(tests::code_blocks(tests::text_of_file("docs/scene_files.md"), "yaml"));
+  const Scene scene = scene_of(tests::code_blocks(tests::text_of_file("docs/reference/scene_files.md"), "yaml"));
   EXPECT_EQ(scene.models.size(), 9U);
   EXPECT_EQ(scene.supports.size(), 4U);
   EXPECT_EQ(scene.robot.size(), 2U);
@@ -60,7 +60,7 @@ TEST(SceneFile, OfThePageHasAllThatThePageSays) {
 
 // What `unknown` in each map is answered with lists the keys that the map knows; each has to stand on the page.
 TEST(SceneFile, ThePageNamesEveryKey) {
-  const std::string page = tests::text_of_file("docs/scene_files.md");
+  const std::string page = tests::text_of_file("docs/reference/scene_files.md");
   const std::string text = tests::code_blocks(page, "yaml");
   std::set<std::string> known;
   for (const tests::YamlKey& key : tests::all_keys(*parse_yaml(text, "page.yaml"))) {

@@ -41,7 +41,7 @@ std::vector<SceneText> scene_texts() {
     const std::string file = "scenarios/" + entry.path().filename().string();
     texts.push_back({entry.path().stem().string(), file, text_of_file(file)});
   }
-  texts.push_back({"page", "page.yaml", code_blocks(text_of_file("docs/scene_files.md"), "yaml")});
+  texts.push_back({"page", "page.yaml", code_blocks(text_of_file("docs/reference/scene_files.md"), "yaml")});
   std::sort(texts.begin(), texts.end(), [](const SceneText& a, const SceneText& b) { return a.name < b.name; });
   return texts;
 }

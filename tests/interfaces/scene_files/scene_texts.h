@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene files that tests read: all of scenarios/ and the one that docs/scene_files.md is made of.
+// The scene files that tests read: all of scenarios/ and the one that docs/reference/scene_files.md is made of.
 #pragma once
 
 #include <ostream>

@@ -101,7 +101,7 @@ TEST_F(MotionCalibrationTest, RecoversFrictionsAndRestitution) {
   const double truth[] = {0.22, 0.16, 0.3};
   for (std::size_t i = 0; i < 3; ++i) {
     const CalibratedParameter& p = found->parameters[i];
-    // Four errors: what 90 % intervals promise is counted in docs/calibration.md.
+    // Four errors: what 90 % intervals promise is counted in docs/reference/calibration.md.
     EXPECT_NEAR(p.value, truth[i], 4.0 * p.standard_error) << to_string(p.parameter);
     EXPECT_LT(p.left_of_prior, 0.3) << to_string(p.parameter);
   }

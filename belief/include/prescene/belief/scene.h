@@ -68,7 +68,7 @@ struct SceneCamera {
 };
 
 /// The depth camera's noise where it was measured; what is empty is the sensor model's default
-/// (docs/sensor_model.md).
+/// (docs/reference/sensor_model.md).
 struct DepthNoiseSettings {
   std::optional<double> sigma_per_depth_squared;           ///< 1/m, > 0 and at most 1: sigma = s d^2, seen frontally.
   std::optional<double> incidence_knee;                    ///< Cosine, [0, 1), below which sigma grows.

@@ -8,7 +8,7 @@
 //   if (!answer.error.ok()) ...
 //
 // Four questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
-// what will the camera see (observation anticipation). docs/queries.md says what the answers mean.
+// what will the camera see (observation anticipation). docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>

@@ -93,7 +93,7 @@ struct SurfaceMaterial {
 
   friend bool operator==(const SurfaceMaterial&, const SurfaceMaterial&) = default;
 
-  /// Shares measured on opaque household objects (docs/sensor_model.md).
+  /// Shares measured on opaque household objects (docs/reference/sensor_model.md).
   static SurfaceMaterial opaque(const geometry::Rgb& color = {180, 180, 180});
   /// Glass and clear plastic: mostly the depth behind it or none.
   static SurfaceMaterial transparent(const geometry::Rgb& color = {210, 225, 230});

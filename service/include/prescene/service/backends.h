@@ -24,7 +24,7 @@
 
 namespace prescene::service {
 
-/// Who simulates (docs/simulation.md).
+/// Who simulates (docs/reference/simulation.md).
 enum class Stepper {
   kBullet,
   kAutomatic,  ///< In lockstep where scene and actions allow it, else Bullet, which is counted (StepperCounts).

@@ -19,7 +19,7 @@ namespace prescene::rendering {
 struct FramePyramidOptions {
   int coarsest_width = 80;  ///< Of the first level, as FrameTermsOptions::target_width; each next is twice as wide ...
   int finest_width = 640;   ///< ... up to this one, at most the frame's own.
-  /// Reduced pixels that are enough for an object; more gain little (docs/sensor_model.md).
+  /// Reduced pixels that are enough for an object; more gain little (docs/reference/sensor_model.md).
   double enough_pixels = 100.0;
   TemperingOptions tempering;
 };

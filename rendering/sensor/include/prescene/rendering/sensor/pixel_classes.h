@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sensor model as batches use it: what of a pixel's mixture does not depend on its depths, in single precision
-// (docs/sensor_model.md). Batches that follow the same operations give the same bits.
+// (docs/reference/sensor_model.md). Batches that follow the same operations give the same bits.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A folder of recorded motions of one object: scene.yaml describes it and what it falls or slides on, tosses.csv holds
-// the poses that a tracker saw. docs/calibration.md is the page for who makes one.
+// the poses that a tracker saw. docs/reference/calibration.md is the page for who makes one.
 #pragma once
 
 #include <filesystem>

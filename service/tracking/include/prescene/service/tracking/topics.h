@@ -26,7 +26,7 @@ core::Status validate(const InputTopics& topics);
 
 // Our own topics. JSON is carried by std_msgs/String, so that `ros2 topic pub` and `echo` can speak it.
 inline constexpr const char* kControlTopic = "/prescene/control";  ///< in: {"actions": [...]}, what the robot does
-inline constexpr const char* kQueryTopic = "/prescene/query";      ///< in: docs/queries.md
+inline constexpr const char* kQueryTopic = "/prescene/query";      ///< in: docs/reference/queries.md
 inline constexpr const char* kAnswerTopic = "/prescene/answer";    ///< out
 inline constexpr const char* kBeliefTopic = "/prescene/belief";    ///< out: states and estimates as JSON
 inline constexpr const char* kDetectionsTopic = "/prescene/detections";  ///< out: vision_msgs/Detection3DArray

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The simulator on Bullet 3.24 in double precision: its rigid bodies and sequential impulse solver, with contact
 // finding and contact rows that keep true sizes, lose no restitution and rub in the direction of the slip.
-// docs/simulation.md says what differs from plain Bullet and what was measured.
+// docs/reference/simulation.md says what differs from plain Bullet and what was measured.
 //
 //   ShapeStore shapes(hacd_decomposer());
 //   PRESCENE_TRY(auto simulator, make_bullet_simulator(scene, shapes, BulletOptions{}));

@@ -4,7 +4,7 @@
 // Potential and kinetic energy of all bodies together never grow, so no centre of mass gets higher than its share of
 // them lifts it. Compared with the least heights that ways to another answer pass: tipping over an edge of the body or
 // of what it stands on, climbing over a rim. What has fallen off the edge of everything is decided by where it lands.
-// docs/uncertain_physics.md has the conditions; they are conservative where they can be and audited where not.
+// docs/studies/uncertain_physics.md has the conditions; they are conservative where they can be and audited where not.
 //
 //   const auto certifier = make_certifier(scene, variables, request);   // null: nothing that it understands
 //   options.certifier = certifier.get();                                // of estimate_outcomes

@@ -10,7 +10,7 @@ namespace prescene::simulation {
 
 struct MechanicsOptions {
   /// Length of a step, s, in [1e-5, 0.02]. Free flight is exact at any step; impacts and friction are better at 1/1000
-  /// (real cube tosses: see docs/accuracy.md), some four times as dear as 1/240.
+  /// (real cube tosses: see docs/studies/accuracy.md), some four times as dear as 1/240.
   double step = 1.0 / 240.0;
   /// Most iterations of the contact solver a step, in [1, 1000]; it stops earlier once nothing changes.
   int solver_iterations = 60;
