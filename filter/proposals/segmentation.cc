@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/polygon.h"
 
 namespace prescene::filter {
 namespace {
@@ -89,27 +90,6 @@ std::vector<std::uint8_t> eroded_inliers(const SampledDepth& sampled, const geom
   return eroded;
 }
 
-double cross(const Vector2d& o, const Vector2d& a, const Vector2d& b) {
-  return (a.x() - o.x()) * (b.y() - o.y()) - (a.y() - o.y()) * (b.x() - o.x());
-}
-
-/// Andrew's monotone chain; counter-clockwise.
-std::vector<Vector2d> hull_of(std::vector<Vector2d> points) {
-  std::sort(points.begin(), points.end(),
-            [](const Vector2d& a, const Vector2d& b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
-  if (points.size() < 3) return points;
-  std::vector<Vector2d> hull;
-  const auto extend = [&](const Vector2d& p, std::size_t floor) {
-    while (hull.size() >= floor + 2 && cross(hull[hull.size() - 2], hull.back(), p) <= 0.0) hull.pop_back();
-    hull.push_back(p);
-  };
-  for (const Vector2d& p : points) extend(p, 0);
-  const std::size_t lower = hull.size() - 1;
-  for (auto p = points.rbegin() + 1; p != points.rend(); ++p) extend(*p, lower);
-  hull.pop_back();
-  return hull;
-}
-
 }  // namespace
 
 geometry::Plane fit_plane(std::span<const Vector3d> points) {
@@ -176,7 +156,7 @@ std::vector<Vector3d> convex_outline(const geometry::Plane& plane, std::span<con
   std::vector<Vector2d> flat;
   Vector2d centre = Vector2d::Zero();
   for (const Vector3d& p : points) flat.emplace_back(x_axis.dot(p), y_axis.dot(p));
-  std::vector<Vector2d> hull = hull_of(std::move(flat));
+  const std::vector<Vector2d> hull = geometry::convex_polygon(std::move(flat));
   for (const Vector2d& p : hull) centre += p / static_cast<double>(hull.size());
   std::vector<Vector3d> outline;
   for (const Vector2d& p : hull) {

@@ -5,36 +5,13 @@
 
 #include "html_text.h"
 #include "prediction_sections.h"
+#include "prescene/geometry/polygon.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/reports/overlay.h"
 #include "prescene/interfaces/reports/report.h"
 
 namespace prescene::interfaces {
 namespace {
-
-using Corner = std::pair<double, double>;
-
-/// Corners of the convex hull, counter-clockwise [Andrew 1979].
-std::vector<Corner> convex_outline(std::vector<Corner> points) {
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
-  if (points.size() < 3) return points;
-  const auto turns_left = [](const Corner& a, const Corner& b, const Corner& c) {
-    return (b.first - a.first) * (c.second - a.second) - (b.second - a.second) * (c.first - a.first) > 0.0;
-  };
-  std::vector<Corner> hull;
-  const auto run = [&](auto begin, auto end) {
-    const std::size_t kept = hull.size();
-    for (auto it = begin; it != end; ++it) {
-      while (hull.size() >= kept + 2 && !turns_left(hull[hull.size() - 2], hull.back(), *it)) hull.pop_back();
-      hull.push_back(*it);
-    }
-    hull.pop_back();
-  };
-  run(points.begin(), points.end());
-  run(points.rbegin(), points.rend());
-  return hull;
-}
 
 std::vector<ReportSection> sections_of(const belief::PredictAnswer& answer, const belief::Scene& scene) {
   return prediction_sections(answer, scene);
@@ -106,23 +83,23 @@ std::vector<HeatMapBlock::Outline> support_outlines(const belief::Scene& scene) 
     // Shape by shape and part by part, so that separate walls are seen as walls.
     for (const belief::CollisionShape& shape : support.collision) {
       for (const geometry::TriangleMesh& part : geometry::connected_components(belief::collision_mesh({shape}))) {
-        std::vector<Corner> points;
+        std::vector<geometry::Vector2d> points;
         for (const geometry::Vector3d& p_SQ : part.vertices) {
           const geometry::Vector3d p_WQ = support.X_WS * p_SQ;
-          points.push_back({p_WQ.x(), p_WQ.y()});
+          points.push_back(p_WQ.head<2>());
         }
-        outlines.push_back({support.name, convex_outline(std::move(points))});
+        outlines.push_back({support.name, geometry::convex_polygon(std::move(points))});
       }
     }
     if (!support.hollow) continue;
-    std::vector<Corner> corners;
+    std::vector<geometry::Vector2d> corners;
     for (int i = 0; i < 8; ++i) {
       const geometry::Vector3d sign(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0);
       const geometry::Vector3d p_WQ =
           support.X_WS * (support.hollow->X_OV * geometry::Vector3d(0.5 * sign.cwiseProduct(support.hollow->size)));
-      corners.push_back({p_WQ.x(), p_WQ.y()});
+      corners.push_back(p_WQ.head<2>());
     }
-    outlines.push_back({support.name + " (inside)", convex_outline(std::move(corners))});
+    outlines.push_back({support.name + " (inside)", geometry::convex_polygon(std::move(corners))});
   }
   return outlines;
 }

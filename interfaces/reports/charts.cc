@@ -306,7 +306,7 @@ std::string heat_map_svg(const HeatMapBlock& block) {
          png_data_uri(heat_map_picture(map)) + "\"/>\n";
   for (const HeatMapBlock::Outline& outline : block.outlines) {
     std::string points;
-    for (const auto& [px, py] : outline.corners) points += number(x(px)) + "," + number(y(py)) + " ";
+    for (const Eigen::Vector2d& p : outline.corners) points += number(x(p.x())) + "," + number(y(p.y())) + " ";
     out +=
         "<polygon points=\"" + points + "\" class=\"outline\"><title>" + escaped(outline.name) + "</title></polygon>\n";
   }

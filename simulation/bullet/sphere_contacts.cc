@@ -2,12 +2,14 @@
 #include "sphere_contacts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "prescene/collision/point_queries.h"
+#include "prescene/geometry/polygon.h"
 #include "sphere_patch.h"
-#include "support_polygon.h"
 
 namespace prescene::simulation {
 namespace {
@@ -87,22 +89,26 @@ std::size_t SphereContactFinder::take_support_polygon(std::size_t first, double 
     const Vector3d to = point.position - from.position;
     flat_.push_back({{x_axis.dot(to), y_axis.dot(to)}, i, 0.0});
   }
-  SupportPolygon<kMostBearing> polygon;
-  polygon.add(Vector2d::Zero());
+  std::array<Vector2d, kMostBearing> places = {Vector2d::Zero()};
+  std::array<Vector2d, 2 * kMostBearing> corners = {Vector2d::Zero()};
+  std::span<const Vector2d> polygon(corners.data(), 1);
   take(first, contacts);
   std::size_t taken = 1;
   for (; taken < kMostBearing; ++taken) {
     const Flat* outermost = nullptr;
     double most = kSamePlace;
     // What is inside of the polygon stays there.
-    std::erase_if(flat_, [&](Flat& flat) { return !((flat.outside = polygon.distance(flat.place)) > kSamePlace); });
+    std::erase_if(flat_, [&](Flat& flat) {
+      return !((flat.outside = geometry::distance_outside(polygon, flat.place)) > kSamePlace);
+    });
     for (const Flat& flat : flat_) {
       if (flat.outside <= most * (1.0 + 1e-6)) continue;
       most = flat.outside;
       outermost = &flat;
     }
     if (!outermost) break;
-    polygon.add(outermost->place);
+    places[taken] = outermost->place;
+    polygon = {corners.data(), geometry::convex_polygon(std::span(places).first(taken + 1), corners)};
     take(outermost->index, contacts);
   }
   return taken;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
+#include "prescene/geometry/polygon.h"
 #include "prescene/geometry/triangle_mesh.h"
 
 namespace prescene::geometry::given_geometry {
@@ -13,5 +15,10 @@ extern const TriangleMesh mesh, coarse;
 namespace dense_solvers_h {
 extern const Eigen::MatrixXd covariance;
 }  // namespace dense_solvers_h
+
+namespace polygon_h {
+extern const std::vector<Vector2d> points;
+extern const Vector2d p;
+}  // namespace polygon_h
 
 }  // namespace prescene::geometry::given_geometry

@@ -235,9 +235,9 @@ TEST(SupportOutlines, AreWhatSupportsCoverAndTheirHollows) {
   const auto area = [](const HeatMapBlock::Outline& outline) {
     double sum = 0.0;
     for (std::size_t i = 0; i < outline.corners.size(); ++i) {
-      const auto& [x0, y0] = outline.corners[i];
-      const auto& [x1, y1] = outline.corners[(i + 1) % outline.corners.size()];
-      sum += 0.5 * (x0 * y1 - x1 * y0);
+      const Eigen::Vector2d& a = outline.corners[i];
+      const Eigen::Vector2d& b = outline.corners[(i + 1) % outline.corners.size()];
+      sum += 0.5 * (a.x() * b.y() - b.x() * a.y());
     }
     return sum;
   };

@@ -83,7 +83,7 @@ struct TimelineBlock {
 struct HeatMapBlock {
   struct Outline {
     std::string name;
-    std::vector<std::pair<double, double>> corners;  ///< x, y in W, m; closed.
+    std::vector<Eigen::Vector2d> corners;  ///< x, y in W, m; closed.
   };
   std::string caption;
   belief::HeatMap map;
