@@ -27,13 +27,6 @@ Part convex_part(std::unique_ptr<ConvexCore> core, const Pose& X_OS) {
   return part;
 }
 
-bool collides_as_spheres(const std::vector<belief::CollisionShape>& shapes) {
-  return std::any_of(shapes.begin(), shapes.end(), [](const belief::CollisionShape& shape) {
-    const auto* mesh = std::get_if<belief::MeshShape>(&shape);
-    return mesh && mesh->use == belief::MeshUse::kSpheres;
-  });
-}
-
 /// What the shapes of all bodies are made with.
 struct ShapeMaker {
   ShapeStore& shapes;
@@ -85,10 +78,7 @@ core::Result<CompiledBody> compile_body(const std::string& name, const std::vect
                                         const belief::ContactProperties& contact, bool fixed, const ShapeMaker& maker) {
   CompiledBody body;
   body.name = name;
-  body.friction = belief::mean(contact.friction);
-  body.impact_friction = contact.impact_friction ? belief::mean(*contact.impact_friction) : body.friction;
-  body.restitution = belief::mean(contact.restitution);
-  body.rolling_arm = contact.rolling_friction;
+  body.surface = mean_coefficients(contact);
   const double rounding = std::max(maker.options.edge_rounding, contact.edge_radius);
   for (std::size_t i = 0; i < collision.size(); ++i) {
     const core::Status status = add_shape(collision[i], fixed, rounding, maker, body);

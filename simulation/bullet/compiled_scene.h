@@ -12,6 +12,7 @@
 #include "convex_core.h"
 #include "prescene/belief/scene.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/rules/contact_rules.h"
 #include "prescene/simulation/shape_store.h"
 
 namespace prescene::simulation {
@@ -28,11 +29,8 @@ struct Part {
 struct CompiledBody {
   std::string name;
   std::vector<Part> parts;
-  double radius = 0.0;    ///< Farthest point of a part from O, m.
-  double friction = 0.0;  ///< Of supports and robot bodies; objects bring theirs.
-  double impact_friction = 0.0;
-  double restitution = 0.0;
-  double rolling_arm = 0.0;
+  double radius = 0.0;                       ///< Farthest point of a part from O, m.
+  SurfaceCoefficients surface;               ///< Objects bring theirs, but for the rolling arm.
   Pose X_WO;                                 ///< Of supports.
   Vector3d unit_moments = Vector3d::Ones();  ///< Of objects: principal moments for 1 kg, m^2.
   Matrix3d R_OP = Matrix3d::Identity();      ///< Of objects: principal axes.

@@ -8,15 +8,11 @@
 #include <limits>
 
 #include "prescene/core/parallel.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
 namespace {
 
-// Features whose plane is steeper than this against the contact normal are not clipped: their points would be far apart
-// along it, and the nearest point says it all.
-constexpr double kSteepest = 0.2;
-// A nearest point this much (m) closer than every clipped one is a contact of its own.
-constexpr double kSameGap = 1e-7;
 // Contact points of a surface nearer to each other than this (m) are one: triangles share their edges.
 constexpr double kSamePoint = 1e-4;
 // Barycentric coordinate below which a nearest point lies on the triangle's edge.
@@ -184,7 +180,7 @@ void ContactFinder::clip_features(const ConvexCore& a, const Frame& X_WA, const 
   const bool reference_is_a = align_a > align_b + 1e-6;
   const Feature& reference = reference_is_a ? feature_a_ : feature_b_;
   const double steep = reference.normal.dot(normal);
-  if (std::abs(steep) < kSteepest) return;
+  if (std::abs(steep) < kSteepestFeature) return;
   const Feature& clipped =
       clip_to_polygon(steep > 0.0 ? normal : Vector3d(-normal), reference, reference_is_a ? feature_b_ : feature_a_);
   for (int i = 0; i < clipped.count; ++i) {

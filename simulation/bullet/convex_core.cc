@@ -6,20 +6,17 @@
 #include <numbers>
 
 #include "prescene/core/check.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
 namespace {
 
-// A core keeps at least half of the shape's thickness: GJK needs a body, not a point, to find normals at its corners.
-constexpr double kLargestShare = 0.5;
 constexpr int kCapPoints = 12;
 // Tilt (rad) up to which a cap counts as flat: 12 points then miss the lowest one by less than 4e-5 of the radius.
 constexpr double kFlatCap = 1e-3;
 
 // std::hypot is too slow here.
 double hypotenuse(double x, double y) { return std::sqrt(x * x + y * y); }
-
-double core_radius(double rounding, double thinnest) { return std::min(rounding, kLargestShare * thinnest); }
 
 }  // namespace
 
@@ -44,14 +41,14 @@ std::unique_ptr<ConvexCore> ConvexCore::from_primitive(const geometry::Primitive
     }
     std::unique_ptr<ConvexCore> operator()(const geometry::BoxShape& b) const {
       std::unique_ptr<ConvexCore> core(new ConvexCore(Kind::kBox));
-      core->radius_ = core_radius(rounding, 0.5 * b.size.minCoeff());
+      core->radius_ = rounded_edge(rounding, 0.5 * b.size.minCoeff());
       core->half_ = 0.5 * b.size - Vector3d::Constant(core->radius_);
       core->set_bounds(-0.5 * b.size, 0.5 * b.size);
       return core;
     }
     std::unique_ptr<ConvexCore> operator()(const geometry::Cylinder& c) const {
       std::unique_ptr<ConvexCore> core(new ConvexCore(Kind::kCylinder));
-      core->radius_ = core_radius(rounding, std::min(c.radius, 0.5 * c.length));
+      core->radius_ = rounded_edge(rounding, std::min(c.radius, 0.5 * c.length));
       const double z = 0.5 * c.length - core->radius_;
       core->half_ = {c.radius - core->radius_, z, -z};
       core->set_bounds({-c.radius, -c.radius, -0.5 * c.length}, {c.radius, c.radius, 0.5 * c.length});
@@ -70,7 +67,7 @@ std::unique_ptr<ConvexCore> ConvexCore::from_primitive(const geometry::Primitive
       // Radius of the largest ball inside bounds the rounding; moving base and side inwards by r gives a similar cone.
       const double slant = std::hypot(c.radius, c.length);
       const double inner = c.radius * c.length / (slant + c.radius);
-      const double r = core_radius(rounding, inner);
+      const double r = rounded_edge(rounding, inner);
       core->radius_ = r;
       const double bottom = -0.5 * c.length + r;
       const double top = 0.5 * c.length - r * slant / c.radius;
@@ -85,7 +82,7 @@ std::unique_ptr<ConvexCore> ConvexCore::from_primitive(const geometry::Primitive
 
 std::unique_ptr<ConvexCore> ConvexCore::from_polytope(const ConvexPolytope& polytope, double rounding) {
   std::unique_ptr<ConvexCore> core(new ConvexCore(Kind::kPolytope));
-  core->radius_ = core_radius(rounding, polytope.inner_radius());
+  core->radius_ = rounded_edge(rounding, polytope.inner_radius());
   if (std::optional<ConvexPolytope> smaller = inset(polytope, core->radius_)) {
     core->polytope_ = std::move(*smaller);
   } else {

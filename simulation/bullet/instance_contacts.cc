@@ -116,18 +116,16 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
   if (points_.empty()) return;
   const Moving& ma = moving_[static_cast<std::size_t>(a)];
   const Moving& mb = moving_[static_cast<std::size_t>(b)];
-  const CompiledBody& body_a = compiled(a);
-  const CompiledBody& body_b = compiled(b);
-  const auto friction = [&](int body, const CompiledBody& c) {
-    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.friction : c.friction;
+  const auto surface_of = [&](int body) {
+    SurfaceCoefficients surface = compiled(body).surface;
+    if (body >= scene_->object_count) return surface;
+    const auto& drawn = objects_[static_cast<std::size_t>(body)].physical;
+    surface.friction = drawn.friction;
+    surface.impact_friction = drawn.impact_friction;
+    surface.restitution = drawn.restitution;
+    return surface;
   };
-  const auto impact_friction = [&](int body, const CompiledBody& c) {
-    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.impact_friction
-                                       : c.impact_friction;
-  };
-  const auto restitution = [&](int body, const CompiledBody& c) {
-    return body < scene_->object_count ? objects_[static_cast<std::size_t>(body)].physical.restitution : c.restitution;
-  };
+  const SurfaceCoefficients pair = pair_of(surface_of(a), surface_of(b));
   const std::uint64_t key = (static_cast<std::uint64_t>(a) << 48) | (static_cast<std::uint64_t>(b) << 32) |
                             (static_cast<std::uint64_t>(part_a & 0xffffu) << 16) | (part_b & 0xffffu);
   // A contact moves on its bodies by what they slide in a step.
@@ -139,10 +137,10 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
     c.position = point.position;
     c.normal = point.normal;
     c.gap = point.gap;
-    c.friction = friction(a, body_a) * friction(b, body_b);
-    c.impact_friction = impact_friction(a, body_a) * impact_friction(b, body_b);
-    c.restitution = restitution(a, body_a) * restitution(b, body_b);
-    c.rolling_arm = std::max(body_a.rolling_arm, body_b.rolling_arm);
+    c.friction = pair.friction;
+    c.impact_friction = pair.impact_friction;
+    c.restitution = pair.restitution;
+    c.rolling_arm = pair.rolling_arm;
     c.speed_before = point.normal.dot(ma.velocity_before + ma.spin.cross(point.position - ma.p_WCm) -
                                       mb.velocity_before - mb.spin.cross(point.position - mb.p_WCm)) +
                      point.turning;

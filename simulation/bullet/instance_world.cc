@@ -10,8 +10,6 @@
 namespace prescene::simulation {
 namespace {
 
-// Speeds beyond this (m/s, rad/s) are a simulation that blew up.
-constexpr double kLargestSpeed = 1e4;
 constexpr std::size_t kTypicalContacts = 64;
 
 std::unique_ptr<btRigidBody> make_rigid_body() {
@@ -85,7 +83,7 @@ void InstanceWorld::reset(const belief::WorldState& start, const std::vector<bel
     part.box_half_size = part.core->box_half_size();
     body.parts.push_back(std::move(part));
     body.radius = player_.pusher_radius(i);
-    body.friction = body.impact_friction = 0.5;
+    body.surface = kPusherSurface;
     pushers_.push_back(std::move(body));
   }
   const auto count = static_cast<std::size_t>(body_count());

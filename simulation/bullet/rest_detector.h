@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether an instance is at rest: everything has been calm for the rest rule's time, nothing merely balances, and what
-// stands firmly does not creep down a slope.
-//
-// Balance is tested twice. An object that only fixed bodies touch is stable when the vertical through its centre of
-// mass passes inside the polygon of its contacts, a nudge's reach or more from every side. All others (balanced on an
-// edge or tip, round, leaning, stacked) are nudged: in a copy of the instance each is turned by a small angle about
-// horizontal axes in turn, and a short simulation shows whether it comes back (or merely rolls), or turns away and
-// sinks.
+// Whether an instance is at rest: everything has been calm for the rest rule's time, and stays so by the tests of
+// simulation/rules/rest.h.
 #pragma once
 
 #include <vector>
 
 #include "instance_world.h"
 #include "prescene/core/progress.h"
+#include "prescene/geometry/polygon.h"
 
 namespace prescene::simulation {
 
@@ -37,6 +32,7 @@ class RestDetector {
   bool stable_ = false;
   std::vector<std::uint8_t> saved_;
   std::vector<Before> before_;
+  std::vector<geometry::Vector2d> points_, corners_;
 };
 
 }  // namespace prescene::simulation

@@ -8,6 +8,7 @@
 #include "prescene/belief/validation.h"
 #include "prescene/core/hash.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/simulation/rules/contact_rules.h"
 #include "prescene/simulation/rules/mechanics_hash.h"
 
 namespace prescene::simulation {
@@ -28,14 +29,13 @@ core::Status check_count(const std::string& what, std::size_t count, std::size_t
 }
 
 /// What contacts take from a part's body; objects bring frictions and restitution with each start.
-PartId part_id(int number, const belief::ContactProperties& contact) {
+PartId part_id(int number, const SurfaceCoefficients& surface) {
   PartId id;
   id.number = number;
-  id.friction = static_cast<Real>(belief::mean(contact.friction));
-  id.impact_friction =
-      contact.impact_friction ? static_cast<Real>(belief::mean(*contact.impact_friction)) : id.friction;
-  id.restitution = static_cast<Real>(belief::mean(contact.restitution));
-  id.rolling_arm = static_cast<Real>(contact.rolling_friction);
+  id.friction = static_cast<Real>(surface.friction);
+  id.impact_friction = static_cast<Real>(surface.impact_friction);
+  id.restitution = static_cast<Real>(surface.restitution);
+  id.rolling_arm = static_cast<Real>(surface.rolling_arm);
   return id;
 }
 
@@ -119,7 +119,8 @@ core::Status Compiler::add_supports() {
     const Pose X_LS{support.X_WS.rotation, support.X_WS.translation - origin};
     std::vector<ConvexPart> parts;
     PRESCENE_RETURN_IF_ERROR(add_parts(support.name, support.collision, support.contact, X_LS, parts));
-    add_fixed(part_id(supports_begin() + static_cast<int>(i), support.contact), std::move(parts), lanes_);
+    add_fixed(part_id(supports_begin() + static_cast<int>(i), mean_coefficients(support.contact)), std::move(parts),
+              lanes_);
   }
   return check_count("the supports have", lanes_.fixed.size(), kMostFixed);
 }
@@ -141,7 +142,7 @@ core::Status Compiler::add_objects() {
     const Pose X_PO{R_OP.conjugate(), Vector3d::Zero()};
     PRESCENE_RETURN_IF_ERROR(add_parts(object.name, model.collision, model.contact, X_PO, body.parts));
     PRESCENE_RETURN_IF_ERROR(check_count(object.name + " has", body.parts.size(), kMostParts));
-    add_body(part_id(static_cast<int>(i), model.contact), std::move(body), lanes_);
+    add_body(part_id(static_cast<int>(i), mean_coefficients(model.contact)), std::move(body), lanes_);
   }
   lanes_.objects = static_cast<int>(scene_.objects.size());
   return core::ok_status();
@@ -159,7 +160,7 @@ core::Status Compiler::add_robot() {
     LaneBody body;
     PRESCENE_RETURN_IF_ERROR(add_parts(robot.name, robot.collision, robot.contact, Pose{}, body.parts));
     PRESCENE_RETURN_IF_ERROR(check_count(robot.name + " has", body.parts.size(), kMostParts));
-    add_body(part_id(robot_begin() + static_cast<int>(i), robot.contact), std::move(body), lanes_);
+    add_body(part_id(robot_begin() + static_cast<int>(i), mean_coefficients(robot.contact)), std::move(body), lanes_);
   }
   return core::ok_status();
 }
@@ -196,18 +197,12 @@ std::shared_ptr<const CompiledLockstep> with_pushers(const CompiledLockstep& com
                                                      const std::vector<double>& radii) {
   auto more = std::make_shared<CompiledLockstep>(compiled);
   more->pushers = radii;
-  // As Bullet's stepper has them.
-  belief::ContactProperties contact;
-  contact.friction = belief::FixedScalar{0.5};
-  contact.restitution = belief::FixedScalar{0.0};
-  contact.impact_friction.reset();
-  contact.rolling_friction = 0.0;
   for (std::size_t i = 0; i < radii.size(); ++i) {
     LaneBody body;
     body.parts.push_back(convex_part(geometry::Sphere{radii[i]}, compiled.options.edge_rounding));
     const std::size_t number =
         compiled.scene.objects.size() + compiled.scene.supports.size() + compiled.scene.robot.size() + i;
-    add_body(part_id(static_cast<int>(number), contact), std::move(body), more->lanes);
+    add_body(part_id(static_cast<int>(number), kPusherSurface), std::move(body), more->lanes);
   }
   return more;
 }

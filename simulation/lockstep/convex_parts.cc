@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/simulation/rules/contact_rules.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -11,10 +13,6 @@ using geometry::Matrix3d;
 using geometry::Pose;
 
 constexpr std::size_t kMostVertices = 64;
-// As in Bullet's stepper: a core keeps at least half of the shape's thickness.
-constexpr double kLargestShare = 0.5;
-
-double core_radius(double rounding, double thinnest) { return std::min(rounding, kLargestShare * thinnest); }
 
 /// Where a body's parts go: from the frame that shapes are given in to that of the lanes.
 struct Placement {
@@ -36,13 +34,13 @@ ConvexPart primitive_part(const geometry::Primitive& primitive, const Placement&
   if (const auto* box = std::get_if<geometry::BoxShape>(&primitive)) {
     part.kind = CoreKind::kBox;
     half = 0.5 * box->size;
-    part.radius = core_radius(rounding, half.minCoeff());
+    part.radius = rounded_edge(rounding, half.minCoeff());
     part.half = plain(Vector3d(half - Vector3d::Constant(part.radius)));
     part.ball = half.norm();
   } else if (const auto* cylinder = std::get_if<geometry::Cylinder>(&primitive)) {
     part.kind = CoreKind::kCylinder;
     half = {cylinder->radius, cylinder->radius, 0.5 * cylinder->length};
-    part.radius = core_radius(rounding, std::min(half.x(), half.z()));
+    part.radius = rounded_edge(rounding, std::min(half.x(), half.z()));
     part.half = {half.x() - part.radius, half.x() - part.radius, half.z() - part.radius};
     part.ball = std::sqrt(half.x() * half.x() + half.z() * half.z());
   } else if (const auto* capsule = std::get_if<geometry::Capsule>(&primitive)) {
@@ -56,7 +54,7 @@ ConvexPart primitive_part(const geometry::Primitive& primitive, const Placement&
     part.kind = CoreKind::kCone;
     // A ball inside of it bounds the rounding; base and side moved inwards by the same length leave a similar cone.
     const double slant = std::hypot(cone.radius, cone.length);
-    part.radius = core_radius(rounding, cone.radius * cone.length / (slant + cone.radius));
+    part.radius = rounded_edge(rounding, cone.radius * cone.length / (slant + cone.radius));
     const double base = -0.5 * cone.length + part.radius;
     const double tip = 0.5 * cone.length - part.radius * slant / cone.radius;
     part.half = {(tip - base) * cone.radius / cone.length, tip, base};
@@ -72,7 +70,7 @@ ConvexPart primitive_part(const geometry::Primitive& primitive, const Placement&
 core::Result<ConvexPart> hull_part(const ConvexPolytope& hull, const Placement& X, double rounding) {
   ConvexPart part;
   part.kind = CoreKind::kHull;
-  part.radius = core_radius(rounding, hull.inner_radius());
+  part.radius = rounded_edge(rounding, hull.inner_radius());
   ConvexPolytope core = hull;
   if (std::optional<ConvexPolytope> smaller = inset(hull, part.radius)) {
     core = std::move(*smaller);

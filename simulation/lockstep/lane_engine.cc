@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/simulation/rules/contact_rules.h"
+
 namespace prescene::simulation {
 namespace {
 
 using geometry::Pose;
 using geometry::Quaterniond;
-
-// Speeds beyond this (m/s, rad/s) are a simulation that blew up.
-constexpr double kLargestSpeed = 1e4;
 
 Vector3d vector_at(const Rows<3>& rows, int at) {
   return {static_cast<double>(rows[0][at]), static_cast<double>(rows[1][at]), static_cast<double>(rows[2][at])};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether calm objects merely balance: the tests of Bullet's stepper (simulation/bullet/rest_detector.h), which take
-// several steps here, one with each of the other slots'.
+// Whether calm objects merely balance: the tests of simulation/rules/rest.h, which take several steps here, one with
+// each of the other slots'.
 #pragma once
 
 #include "lane_engine.h"

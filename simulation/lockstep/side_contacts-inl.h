@@ -11,14 +11,10 @@
 #include "core_sides-inl.h"
 #include "lane_math-inl.h"
 #include "lane_state.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
-
-// Sides that are steeper than this against the normal are not cut: their points are far apart along it.
-constexpr double kSteepest = 0.2;
-// m: a nearest point this much closer than all others is a contact of its own.
-constexpr double kSameGap = 1e-7;
 
 /// What a vector of pairs needs of its objects and their opposite parts, B.
 struct NearLanes {
@@ -98,7 +94,7 @@ inline void cut_sides(const NearPair& pair, const Side& a, const Side& b, M want
   const V one = set<V>(1.0);
   const Vec3<V>& n = pair.normal;
   const V steep_b = dot(b.normal, n);
-  const auto cut = hn::And(wanted, hn::Ge(hn::Abs(steep_b), set<V>(kSteepest)));
+  const auto cut = hn::And(wanted, hn::Ge(hn::Abs(steep_b), set<V>(kSteepestFeature)));
   if (a.most < 2 || hn::AllFalse(D(), cut)) return;
 
   // The object's corners, moved along n into b's plane, against b's sides.
@@ -150,7 +146,8 @@ inline void cut_sides(const NearPair& pair, const Side& a, const Side& b, M want
   }
   // b's corners, moved into the plane of the object's side.
   const V steep_a = dot(a.normal, n);
-  const auto area = hn::And(cut, hn::And(hn::Gt(a.count, set<V>(2.0)), hn::Ge(hn::Abs(steep_a), set<V>(kSteepest))));
+  const auto area =
+      hn::And(cut, hn::And(hn::Gt(a.count, set<V>(2.0)), hn::Ge(hn::Abs(steep_a), set<V>(kSteepestFeature))));
   if (hn::AllFalse(D(), area)) return;
   const V scale_a = one / select(area, steep_a, one);
   const Vec3<V> axis = select(hn::Gt(steep_a, zero), n, neg(n));
@@ -172,7 +169,7 @@ inline void cut_line(const NearPair& pair, const Side& a, const Side& b, M wante
   const V one = set<V>(1.0);
   const Vec3<V>& n = pair.normal;
   const V steep = dot(a.normal, n);
-  auto cut = hn::And(wanted, hn::Ge(hn::Abs(steep), set<V>(kSteepest)));
+  auto cut = hn::And(wanted, hn::Ge(hn::Abs(steep), set<V>(kSteepestFeature)));
   if (hn::AllFalse(D(), cut)) return;
   const Vec3<V> axis = select(hn::Gt(steep, zero), n, neg(n));
   const Vec3<V> along = b.corner[1] - b.corner[0];

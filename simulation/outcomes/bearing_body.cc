@@ -81,13 +81,6 @@ core::Result<double> depth_in(const geometry::TriangleMesh& mesh, const Vector3d
 
 }  // namespace
 
-bool collides_as_spheres(const std::vector<belief::CollisionShape>& shapes) {
-  return std::any_of(shapes.begin(), shapes.end(), [](const belief::CollisionShape& shape) {
-    const auto* mesh = std::get_if<belief::MeshShape>(&shape);
-    return mesh && mesh->use == belief::MeshUse::kSpheres;
-  });
-}
-
 std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape>& shapes, const ConvexPolytope& hull,
                                         const Vector3d& center_of_mass_O, ShapeStore& store) {
   BearingBody body;

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "prescene/simulation/outcomes/bearing_body.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
 namespace {

@@ -109,9 +109,10 @@ constexpr std::size_t least_recordings(std::size_t free_parameters) { return fre
 
 /// Minimum of the mean kernel score of the poses at the checkpoints (see recording_scores()), in the metric
 /// sqrt(|dp|^2 + (rg turn)^2) with the radius of gyration rg: an evolution strategy finds the valley, m_estimate() its
-/// ground and the errors. Of 90 % intervals, value +- 1.645 errors, on simulated tosses see docs/calibration.md. The
-/// scene has one object and no actions. The same bits for any number of threads. Fails with kInvalidInput where the
-/// recordings cannot be used (named) and as the factory does, with kCancelled when stopped.
+/// ground and the errors. Of 90 % intervals, value +- 1.645 errors, on simulated tosses see
+/// docs/reference/calibration.md. The scene has one object and no actions. The same bits for any number of threads.
+/// Fails with kInvalidInput where the recordings cannot be used (named) and as the factory does, with kCancelled when
+/// stopped.
 core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMotion>& motions,
                                                   const belief::Scene& scene, const MotionPrior& prior,
                                                   const SimulatorFactory& make_simulator,

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A simulator for many instances of one scene in which one to four rigid bodies meet each other, fixed surroundings and
 // what a robot moves: 8 to 16 instances at once in the lanes of vectors. Physics as in prescene/simulation/bullet
-// (docs/simulation.md), restated; what a scene has beyond it the factory refuses, so that callers take that simulator.
+// (docs/reference/simulation.md), restated; what a scene has beyond it the factory refuses, so that callers take that
+// simulator.
 //
 //   PRESCENE_TRY(auto simulator, make_lockstep_simulator(scene, shapes, LockstepOptions{}));
 //

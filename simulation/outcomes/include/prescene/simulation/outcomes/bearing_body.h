@@ -21,9 +21,6 @@ struct BearingBody {
   double inner_radius = 0.0;
 };
 
-/// Whether spheres stand for a shape's surface.
-bool collides_as_spheres(const std::vector<belief::CollisionShape>& shapes);
-
 /// `hull` is that of all `shapes`, in O. The polytope is the hull with its faces moved inwards, as little as will do.
 /// Nothing when that is more than a millimetre, or the spheres can't be made.
 std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape>& shapes, const ConvexPolytope& hull,
