@@ -7,7 +7,7 @@
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/calibration/depth_noise.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
 namespace prescene::service {

@@ -27,7 +27,7 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
       return core::invalid_input("'" + options.kind + "' and --question are two questions: leave one of them out");
     auto question = belief::parse_json(options.json);
     if (!question) return question.status().at("--question");
-    if (!question->is_object()) return core::invalid_input("--question: not a JSON object (docs/queries.md)");
+    if (!question->is_object()) return core::invalid_input("--question: not a JSON object (docs/reference/queries.md)");
     return question;
   }
   const auto needs_object = [&]() -> core::Status {
@@ -73,7 +73,8 @@ Verb add_ask_verb(CLI::App& app) {
                    "where: poses and confidence; stability: does it stay; release: what if it is let go")
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene")->check(utf8_text());
-  verb->add_option("--question", options->json, "Any question as JSON (docs/queries.md) instead")->check(utf8_text());
+  verb->add_option("--question", options->json, "Any question as JSON (docs/reference/queries.md) instead")
+      ->check(utf8_text());
   verb->add_option(
           "--timeout", options->timeout,
           "How long to wait for an answer, s; default: 15, or 3 more than a --question's max_seconds if that is longer")

@@ -133,7 +133,8 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
 
 Verb add_evaluate_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
-      "evaluate", "Figures on real data, and of the likelihood's calibration on simulated frames (docs/accuracy.md)");
+      "evaluate",
+      "Figures on real data, and of the likelihood's calibration on simulated frames (docs/studies/accuracy.md)");
   auto options = std::make_shared<EvaluateOptions>();
   verb->add_option("NAME", options->name,
                    "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "

@@ -83,7 +83,7 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
   }
   std::string text = table(rows) + "\n";
   if (predicted.outcomes.empty()) {
-    text = "The scene names no outcomes to judge (docs/scene_files.md); mean final positions:\n";
+    text = "The scene names no outcomes to judge (docs/reference/scene_files.md); mean final positions:\n";
     for (const belief::FinalPoses& poses : predicted.final_poses) {
       const geometry::Vector3d& p = poses.mean_position;
       text += "  " + poses.object + ": " + fixed_text(p.x(), 3) + " " + fixed_text(p.y(), 3) + " " +
@@ -188,7 +188,7 @@ core::Status run(const PredictOptions& options, VerbContext& context) {
 Verb add_predict_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("predict", "What happens in a scene: probabilities of its outcomes, with intervals");
   auto options = std::make_shared<PredictOptions>();
-  verb->add_option("SCENE", options->scene, "Scene file (docs/scene_files.md)")->required();
+  verb->add_option("SCENE", options->scene, "Scene file (docs/reference/scene_files.md)")->required();
   verb->add_option("--tolerance", options->effort.tolerance, "Half width of the intervals to reach")
       ->check(in_range(belief::kTolerances))
       ->capture_default_str();
@@ -220,10 +220,11 @@ Verb add_predict_verb(CLI::App& app) {
   verb->add_option("--heat-map", options->heat_map, "Write a PNG picture of where objects end")->check(file_name());
   verb->add_option("--duration", options->duration, "Longest simulated time, s, instead of the scene's")
       ->check(in_range(belief::kDurations));
-  verb->add_option("--stepper", options->stepper,
-                   "Who simulates. lockstep: many instances at once, 3 to 7 times faster, but not every scene "
-                   "(docs/simulation.md says which; others are refused). bullet: every scene. automatic: lockstep "
-                   "where it can, else bullet, and the answer says why")
+  verb->add_option(
+          "--stepper", options->stepper,
+          "Who simulates. lockstep: many instances at once, 3 to 7 times faster, but not every scene "
+          "(docs/reference/simulation.md says which; others are refused). bullet: every scene. automatic: lockstep "
+          "where it can, else bullet, and the answer says why")
       ->check(CLI::IsMember({"automatic", "bullet", "lockstep"}))
       ->capture_default_str();
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")

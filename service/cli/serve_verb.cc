@@ -44,7 +44,8 @@ core::Status run(ServeOptions& options, VerbContext& context) {
 Verb add_serve_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("serve", "Track a scene live: listen on DDS, publish the belief, answer questions");
   auto options = std::make_shared<ServeOptions>();
-  verb->add_option("--scene", options->scene, "Scene file: models, supports, robot, objects (docs/scene_files.md)")
+  verb->add_option("--scene", options->scene,
+                   "Scene file: models, supports, robot, objects (docs/reference/scene_files.md)")
       ->required();
   verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)")
       ->check(file_name());
@@ -61,7 +62,7 @@ Verb add_serve_verb(CLI::App& app) {
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;
   verb->footer(
-      "Runs until Ctrl-C. Topics: docs/ros2.md\n"
+      "Runs until Ctrl-C. Topics: docs/reference/ros2.md\n"
       "Example: prescene serve --scene scenarios/milk_on_bin.yaml");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

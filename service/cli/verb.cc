@@ -25,7 +25,7 @@
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 
 namespace prescene::service {
 namespace {

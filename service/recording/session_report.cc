@@ -66,7 +66,7 @@ void add_prediction(const ordered_json& predict, const belief::Scene& scene, int
                  map.value("nx", 0),      map.value("ny", 0),   map.value("mass", std::vector<double>{})};
     if (block.map.nx < 0 || block.map.ny < 0 ||
         block.map.mass.size() != static_cast<std::size_t>(block.map.nx) * static_cast<std::size_t>(block.map.ny)) {
-      section.blocks.push_back(interfaces::TextBlock{"The heat map has not the form of docs/queries.md."});
+      section.blocks.push_back(interfaces::TextBlock{"The heat map has not the form of docs/reference/queries.md."});
       continue;
     }
     block.outlines = interfaces::support_outlines(scene);
@@ -221,8 +221,9 @@ void SessionReport::add_answers(interfaces::ReportContents& contents) const {
     try {
       add_answer_section(at, parse_or_discard(text), contents);
     } catch (const std::exception&) {  // ordered_json's, or an interval of one number
-      contents.sections.push_back({"Asked at " + fixed_text(at, 1) + " s",
-                                   {interfaces::TextBlock{"The answer has not the form of docs/queries.md."}}});
+      contents.sections.push_back(
+          {"Asked at " + fixed_text(at, 1) + " s",
+           {interfaces::TextBlock{"The answer has not the form of docs/reference/queries.md."}}});
     }
   }
 }

@@ -9,7 +9,7 @@
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/tracking/step_record.h"
 
 namespace prescene::service {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "prescene/core/check.h"
 #include "prescene/service/recording/foreseen.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/recording/simulated_recording.h"
-#include "prescene/service/tracking/recording.h"
 
 namespace {
 

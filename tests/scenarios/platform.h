@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the bits of a result depend on besides sources, input and seed: docs/determinism.md promises none elsewhere.
+// What the bits of a result depend on besides sources, input and seed: docs/reference/determinism.md promises none
+// elsewhere.
 #pragma once
 
 #include <string>

@@ -7,8 +7,8 @@
 
 #include "prescene/core/status.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/recording/simulated_recording.h"
-#include "prescene/service/tracking/recording.h"
 
 namespace prescene::tests {
 

@@ -8,7 +8,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/interfaces/bytes/file.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 #include "tests/service/recorded_box.h"
 #include "tests/support/paths.h"
 

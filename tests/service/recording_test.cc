@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 
 #include <gtest/gtest.h>
 

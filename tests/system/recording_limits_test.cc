@@ -6,7 +6,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/topics.h"
 #include "program.h"
 #include "tests/support/paths.h"

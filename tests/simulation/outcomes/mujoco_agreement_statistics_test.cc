@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Uncertain starts, run here and by MuJoCo: outcome probabilities agree within sampling where nothing but mechanics
-// decides. The benchmark `engines` compares all twenty scenes; docs/uncertain_physics.md tells where they disagree.
+// decides. The benchmark `engines` compares all twenty scenes; docs/studies/uncertain_physics.md tells where they
+// disagree.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -22,7 +22,8 @@ struct MeshInspectionOptions {
   interfaces::MeshReadOptions read;
   double density = 500.0;            ///< kg/m^3: about that of filled household packages.
   double symmetry_tolerance = 0.02;  ///< Of the surface, as a share of the mesh's radius.
-  /// What the mesh is to collide as in a model made of it; else a scene goes by its shape (docs/scene_files.md).
+  /// What the mesh is to collide as in a model made of it; else a scene goes by its shape
+  /// (docs/reference/scene_files.md).
   std::optional<belief::MeshUse> use;
   core::ProgressSink progress;  ///< May be empty. `read.cancellation` stops all steps.
 };
@@ -49,10 +50,10 @@ struct MeshInspection {
 core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, const MeshInspectionOptions& options);
 
 nlohmann::ordered_json to_json(const MeshInspection& inspection);
-/// A model file that scene files can name (docs/scene_files.md): the mesh, mass properties and symmetry, with remarks
-/// as comments. `model_path` is where it will lie: the mesh is named relative to it. Fails with kInvalidInput for a
-/// flat mesh, and where a scene could not use the model (of 100 m, say). The file says what the mesh collides as only
-/// where the options do.
+/// A model file that scene files can name (docs/reference/scene_files.md): the mesh, mass properties and symmetry, with
+/// remarks as comments. `model_path` is where it will lie: the mesh is named relative to it. Fails with kInvalidInput
+/// for a flat mesh, and where a scene could not use the model (of 100 m, say). The file says what the mesh collides as
+/// only where the options do.
 core::Result<interfaces::ModelFile> model_file(const MeshInspection& inspection, const MeshInspectionOptions& options,
                                                const std::filesystem::path& model_path);
 /// "none", "continuous about z, both ways round", "4 turns about z", ...

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scene files: YAML that a person writes, read into a belief::Scene. docs/scene_files.md is the page for who writes
-// them.
+// Scene files: YAML that a person writes, read into a belief::Scene. docs/reference/scene_files.md is the page for who
+// writes them.
 //
 //   SceneFileOptions options;
 //   options.read_mesh = read_mesh;                        // how meshes are read; see MeshReader

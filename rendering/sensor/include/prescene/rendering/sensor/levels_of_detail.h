@@ -26,7 +26,8 @@ struct DetailLevel {
   double error = 0.0;  ///< m: no point of this surface is further from the original one, nor the other way round.
 };
 
-/// How far a surface may be off for poses to be weighed as by the original: what that costs is in docs/rendering.md.
+/// How far a surface may be off for poses to be weighed as by the original: what that costs is in
+/// docs/reference/rendering.md.
 struct DetailLimits {
   double pixels = 0.1;   ///< Of the reduced image: how far outlines may be off.
   double sigmas = 0.15;  ///< Of a hit's standard deviation at that depth (SensorModel::hit_sigma).

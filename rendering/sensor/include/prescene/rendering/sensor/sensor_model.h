@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a depth camera returns at one pixel, given what is there: one model with two faces. The likelihood asks for its
-// density as a ratio against "the object is not there"; the simulated camera samples from it. docs/sensor_model.md has
-// the equations and where the figures come from.
+// density as a ratio against "the object is not there"; the simulated camera samples from it.
+// docs/reference/sensor_model.md has the equations and where the figures come from.
 //
 //   SensorModel model;                                    // options with defaults
 //   PixelMixture m = model.mixture(material, {d, cosine, px});
@@ -17,7 +17,7 @@
 //   same bits.
 // - rendering/gpu/shader_pixels.cc: the same operations as a shader; tests/rendering/gpu wants the same bits
 //   where the device computes exactly.
-// - docs/sensor_model.md: the equation, and where the term's figures come from.
+// - docs/reference/sensor_model.md: the equation, and where the term's figures come from.
 #pragma once
 
 #include <array>

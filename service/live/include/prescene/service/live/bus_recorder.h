@@ -4,7 +4,7 @@
 
 #include "prescene/core/log.h"
 #include "prescene/core/progress.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {

@@ -12,7 +12,7 @@
 #include "prescene/core/log.h"
 #include "prescene/core/progress.h"
 #include "prescene/service/belief_summary.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 
 namespace prescene::service {
 

@@ -12,6 +12,7 @@
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/service/live/answering_desk.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/tracker.h"
 
 namespace prescene::service {

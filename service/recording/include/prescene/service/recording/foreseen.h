@@ -12,7 +12,7 @@
 
 #include "prescene/belief/trajectory.h"
 #include "prescene/service/belief_summary.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/topics.h"
 #include "prescene/service/tracking/waiting_controls.h"
 

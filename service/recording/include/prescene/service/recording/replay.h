@@ -14,6 +14,7 @@
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/images/frame_folder.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/tracker.h"
 
 namespace prescene::service {

@@ -13,8 +13,8 @@
 
 #include "prescene/core/log.h"
 #include "prescene/interfaces/images/frame_folder.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/recording/replay.h"
-#include "prescene/service/tracking/recording.h"
 
 namespace prescene::service {
 

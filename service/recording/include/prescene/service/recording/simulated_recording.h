@@ -9,7 +9,7 @@
 #include "prescene/belief/trajectory.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/backends.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {

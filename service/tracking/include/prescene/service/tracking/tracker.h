@@ -16,7 +16,7 @@
 #include "prescene/filter/particle_filter.h"
 #include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/backends.h"
-#include "prescene/service/tracking/recording.h"
+#include "prescene/service/tracking/step_record.h"
 #include "prescene/service/tracking/tracker_settings.h"
 #include "prescene/service/tracking/waiting_controls.h"
 
