@@ -11,6 +11,7 @@
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 
 namespace prescene::belief {
 namespace {
@@ -75,37 +76,37 @@ std::vector<Action> actions_from(JsonObject& fields) {
   return actions;
 }
 
-struct TellWord {
+struct DetailWord {
   const char* word;
   bool PredictDetail::*field;
 };
-constexpr std::array<TellWord, 6> kTellWords{{{"final_poses", &PredictDetail::final_poses},
-                                              {"typical_runs", &PredictDetail::typical_runs},
-                                              {"inputs", &PredictDetail::inputs},
-                                              {"contacts", &PredictDetail::contacts},
-                                              {"chaos", &PredictDetail::chaos},
-                                              {"model_error", &PredictDetail::model_error}}};
+constexpr std::array<DetailWord, 6> kDetailWords{{{"final_poses", &PredictDetail::final_poses},
+                                                  {"typical_runs", &PredictDetail::typical_runs},
+                                                  {"inputs", &PredictDetail::inputs},
+                                                  {"contacts", &PredictDetail::contacts},
+                                                  {"chaos", &PredictDetail::chaos},
+                                                  {"model_error", &PredictDetail::model_error}}};
 
-Json tell_json(const PredictDetail& tell) {
+Json detail_json(const PredictDetail& detail) {
   Json json = Json::array();
-  for (const TellWord& word : kTellWords)
-    if (tell.*word.field) json.push_back(word.word);
+  for (const DetailWord& word : kDetailWords)
+    if (detail.*word.field) json.push_back(word.word);
   return json;
 }
 
-PredictDetail tell_from(const JsonAt& at) {
-  PredictDetail tell;
-  for (const TellWord& word : kTellWords) tell.*word.field = false;
+PredictDetail detail_from(const JsonAt& at) {
+  PredictDetail detail;
+  for (const DetailWord& word : kDetailWords) detail.*word.field = false;
   for (const JsonAt& item : at.items()) {
     const std::string asked = item.text();
-    const auto found =
-        std::find_if(kTellWords.begin(), kTellWords.end(), [&](const TellWord& word) { return asked == word.word; });
-    if (found == kTellWords.end())
+    const auto found = std::find_if(kDetailWords.begin(), kDetailWords.end(),
+                                    [&](const DetailWord& word) { return asked == word.word; });
+    if (found == kDetailWords.end())
       item.fail("one of final_poses, typical_runs, inputs, contacts, chaos, model_error is needed");
     else
-      tell.*found->field = true;
+      detail.*found->field = true;
   }
-  return tell;
+  return detail;
 }
 
 struct QueryJson {
@@ -123,14 +124,14 @@ struct QueryJson {
               {"exclusive_outcomes", std::move(groups)}};
     if (predict.duration) json["duration"] = *predict.duration;
     json["effort"] = effort_json(predict.effort);
-    json["tell"] = tell_json(predict.tell);
-    if (predict.tell.paths > 0) json["paths"] = predict.tell.paths;
+    json["detail"] = detail_json(predict.detail);
+    if (predict.detail.paths > 0) json["paths"] = predict.detail.paths;
     return json;
   }
   Json operator()(const StabilityQuery& stability) const {
     return {{"object", stability.object},
             {"max_move", stability.max_move},
-            {"max_turn", stability.max_turn},
+            {"max_turn_deg", geometry::exact_degrees(stability.max_turn)},
             {"duration", stability.duration},
             {"effort", effort_json(stability.effort)}};
   }
@@ -144,14 +145,12 @@ const std::vector<std::string> kTasks{"where", "predict", "stability", "view"};
 PredictQuery predict_from(JsonObject& fields) {
   PredictQuery predict;
   predict.actions = actions_from(fields);
-  if (const auto at = fields.find("outcomes"))
-    for (const JsonAt& item : at->items()) predict.outcomes.push_back(outcome_from(item));
-  if (const auto at = fields.find("exclusive_outcomes"))
-    for (const JsonAt& item : at->items()) predict.exclusive_outcomes.push_back(exclusive_from(item));
+  if (const auto at = fields.find("outcomes")) predict.outcomes = outcomes_from(*at, "");
+  if (const auto at = fields.find("exclusive_outcomes")) predict.exclusive_outcomes = groups_from(*at);
   predict.duration = read_number(fields, "duration", kDurations);
   if (const auto at = fields.find("effort")) predict.effort = effort_from(*at);
-  if (const auto at = fields.find("tell")) predict.tell = tell_from(*at);
-  if (const auto at = fields.find("paths")) predict.tell.paths = static_cast<int>(at->integer(0, kMostPaths));
+  if (const auto at = fields.find("detail")) predict.detail = detail_from(*at);
+  if (const auto at = fields.find("paths")) predict.detail.paths = static_cast<int>(at->integer(0, kMostPaths));
   return predict;
 }
 
@@ -159,7 +158,8 @@ StabilityQuery stability_from(JsonObject& fields) {
   StabilityQuery stability;
   if (const auto at = fields.require("object")) stability.object = at->text();
   read_number(fields, "max_move", kMoves, stability.max_move);
-  read_number(fields, "max_turn", kTurns, stability.max_turn);
+  if (const auto degrees = read_number(fields, "max_turn_deg", kTurnsDeg))
+    stability.max_turn = geometry::kDegree * *degrees;
   read_number(fields, "duration", kDurations, stability.duration);
   if (const auto at = fields.find("effort")) stability.effort = effort_from(*at);
   return stability;

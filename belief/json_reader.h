@@ -34,6 +34,13 @@ class JsonErrors {
   core::Status status_;
 };
 
+/// Keys come from outside: only what is printable and short goes into a message.
+inline std::string printable_key(const std::string& key) {
+  std::string shown;
+  for (const char c : key.substr(0, 40)) shown += c >= ' ' && c <= '~' ? c : '?';
+  return shown;
+}
+
 /// A JSON value with its path.
 struct JsonAt {
   const Json& value;
@@ -155,11 +162,8 @@ class JsonObject {
   const JsonAt& at() const { return at_; }
 
  private:
-  // Keys come from outside: only what is printable and short goes into a message.
   std::string path_of(const std::string& key) const {
-    std::string shown;
-    for (const char c : key.substr(0, 40)) shown += c >= ' ' && c <= '~' ? c : '?';
-    return at_.path.empty() ? shown : at_.path + "." + shown;
+    return at_.path.empty() ? printable_key(key) : at_.path + "." + printable_key(key);
   }
 
   const JsonAt at_;

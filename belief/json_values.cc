@@ -38,9 +38,9 @@ core::Status check_structure(std::string_view text) {
   return {};
 }
 
-Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 }  // namespace
+
+Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json vector_json(const Vector3d& vector) {
   return Json::array({number_json(vector.x()), number_json(vector.y()), number_json(vector.z())});
@@ -49,6 +49,27 @@ Json vector_json(const Vector3d& vector) {
 Vector3d vector_from(const JsonAt& at) {
   const std::vector<double> numbers = at.numbers(3);
   return {numbers[0], numbers[1], numbers[2]};
+}
+
+Json axis_json(const Vector3d& axis) {
+  for (int i = 0; i < 3; ++i)
+    if (std::abs(axis[i]) == 1.0) return std::string(axis[i] < 0.0 ? "-" : "") + "xyz"[i];
+  return vector_json(axis);
+}
+
+// Directions are made unit vectors; those that are already keep their bits.
+Vector3d axis_from(const JsonAt& at) {
+  static const std::vector<std::pair<std::string, Vector3d>> kAxes{
+      {"x", Vector3d::UnitX()},   {"-x", -Vector3d::UnitX()}, {"y", Vector3d::UnitY()},
+      {"-y", -Vector3d::UnitY()}, {"z", Vector3d::UnitZ()},   {"-z", -Vector3d::UnitZ()}};
+  if (at.value.is_string()) return at.word(kAxes);
+  const Vector3d direction = vector_from(at);
+  const double length = direction.norm();
+  if (!(length > 1e-9)) {
+    at.fail("a direction of some length is needed");
+    return Vector3d::UnitZ();
+  }
+  return std::abs(length - 1.0) < 1e-9 ? direction : Vector3d(direction / length);
 }
 
 Json matrix_json(const Eigen::MatrixXd& matrix) {
@@ -114,76 +135,20 @@ Json vector_distribution_json(const Vector3Distribution& distribution) {
 }
 
 Vector3Distribution vector_distribution_from(const JsonAt& at) {
+  if (at.value.is_object()) {
+    JsonObject object(at);
+    const auto uniform = object.require("uniform");
+    if (!uniform) return Vector3Distribution::fixed(Vector3d::Zero());
+    JsonObject box(*uniform);
+    const auto from_at = box.require("from"), to_at = box.require("to");
+    if (!from_at || !to_at) return Vector3Distribution::fixed(Vector3d::Zero());
+    const Vector3d from = vector_from(*from_at), to = vector_from(*to_at);
+    if ((from.array() > to.array()).any()) uniform->fail("the box runs backwards: give the lower corner as 'from'");
+    return {UniformScalar{from.x(), to.x()}, UniformScalar{from.y(), to.y()}, UniformScalar{from.z(), to.z()}};
+  }
   const std::vector<JsonAt> items = at.items(3);
   if (items.size() != 3) return Vector3Distribution::fixed(Vector3d::Zero());
   return {scalar_from(items[0]), scalar_from(items[1]), scalar_from(items[2])};
-}
-
-Json to_json(const Pose& pose) {
-  const geometry::Quaterniond& q = pose.rotation;
-  return {{"position", vector_json(pose.translation)},
-          {"rotation", {number_json(q.w()), number_json(q.x()), number_json(q.y()), number_json(q.z())}}};
-}
-
-Pose pose_from(const JsonAt& at) {
-  Pose pose;
-  JsonObject object(at);
-  if (const auto position = object.require("position")) pose.translation = vector_from(*position);
-  if (const auto rotation = object.find("rotation")) {
-    const std::vector<double> q = rotation->numbers(4);
-    const geometry::Quaterniond read(q[0], q[1], q[2], q[3]);
-    const double error = std::abs(read.norm() - 1.0);
-    if (error > 0.01)
-      rotation->fail("a unit quaternion [w, x, y, z] is needed");
-    else  // what we wrote comes back as the same bits; what a person rounded is made a unit quaternion
-      pose.rotation = error < 1e-9 ? read : read.normalized();
-  }
-  return pose;
-}
-
-Json pose_distribution_json(const PoseDistribution& distribution) {
-  if (const auto* fixed = std::get_if<FixedPose>(&distribution)) return to_json(fixed->X_WO);
-  if (const auto* normal = std::get_if<NormalPose>(&distribution))
-    return {{"normal", {{"mean", to_json(normal->mean)}, {"covariance", matrix_json(normal->covariance)}}}};
-  if (const auto* box = std::get_if<BoxPose>(&distribution)) {
-    const geometry::Quaterniond& q = box->rotation;
-    return {{"box",
-             {{"position", vector_distribution_json(box->position)},
-              {"rotation", {q.w(), q.x(), q.y(), q.z()}},
-              {"any_rotation", box->any_rotation}}}};
-  }
-  Json samples = Json::array();
-  for (const Pose& sample : std::get<SampledPose>(distribution).samples) samples.push_back(to_json(sample));
-  return {{"samples", std::move(samples)}};
-}
-
-PoseDistribution pose_distribution_from(const JsonAt& at) {
-  if (at.value.is_object() && at.value.contains("position")) return FixedPose{pose_from(at)};
-  JsonObject object(at);
-  const auto form = object.one_of({"normal", "box", "samples", "position"});
-  if (!form) return FixedPose{};
-  if (form->first == "samples") {
-    SampledPose sampled;
-    for (const JsonAt& item : form->second.items()) sampled.samples.push_back(pose_from(item));
-    if (sampled.samples.empty()) form->second.fail("at least one sample is needed");
-    return sampled;
-  }
-  JsonObject fields(form->second);
-  if (form->first == "normal") {
-    NormalPose normal;
-    if (const auto mean = fields.require("mean")) normal.mean = pose_from(*mean);
-    if (const auto covariance = fields.require("covariance")) normal.covariance = matrix_from(*covariance, 6);
-    return normal;
-  }
-  BoxPose box;
-  if (const auto position = fields.require("position")) box.position = vector_distribution_from(*position);
-  if (const auto rotation = fields.find("rotation")) {
-    // By way of a pose, for the same checks.
-    const Json pose{{"position", {0, 0, 0}}, {"rotation", rotation->value}};
-    box.rotation = pose_from({pose, form->second.path, at.errors}).rotation;
-  }
-  if (const auto any = fields.find("any_rotation")) box.any_rotation = any->boolean();
-  return box;
 }
 
 Json to_json(const Twist& twist) {
@@ -195,19 +160,6 @@ Twist twist_from(const JsonAt& at) {
   JsonObject object(at);
   if (const auto angular = object.require("angular")) twist.angular = vector_from(*angular);
   if (const auto linear = object.require("linear")) twist.linear = vector_from(*linear);
-  return twist;
-}
-
-Json twist_distribution_json(const TwistDistribution& distribution) {
-  return {{"angular", vector_distribution_json(distribution.angular)},
-          {"linear", vector_distribution_json(distribution.linear)}};
-}
-
-TwistDistribution twist_distribution_from(const JsonAt& at) {
-  TwistDistribution twist;
-  JsonObject object(at);
-  if (const auto angular = object.find("angular")) twist.angular = vector_distribution_from(*angular);
-  if (const auto linear = object.find("linear")) twist.linear = vector_distribution_from(*linear);
   return twist;
 }
 
@@ -252,13 +204,6 @@ core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes) {
   } catch (const std::exception&) {
     return core::invalid_input("this is not JSON that can be read: check for numbers that are too large");
   }
-}
-
-core::Result<Pose> pose_from_json(const Json& value) {
-  JsonErrors errors;
-  const Pose pose = pose_from({value, "", errors});
-  if (!errors.ok()) return errors.status();
-  return pose;
 }
 
 }  // namespace prescene::belief

@@ -17,12 +17,17 @@ Json scalar_json(const ScalarDistribution& distribution);
 ScalarDistribution scalar_from(const JsonAt& at);
 Json vector_distribution_json(const Vector3Distribution& distribution);
 Vector3Distribution vector_distribution_from(const JsonAt& at);
+/// "x", "-x", ... or [x, y, z] of any length, which is made a unit vector.
+Json axis_json(const Vector3d& axis);
+Vector3d axis_from(const JsonAt& at);
+/// null where it is not finite.
+Json number_json(double value);
+/// The keys `position` and `rotation`, both of which may be absent.
+void read_pose(JsonObject& fields, Pose& pose);
 Pose pose_from(const JsonAt& at);
 Json pose_distribution_json(const PoseDistribution& distribution);
 PoseDistribution pose_distribution_from(const JsonAt& at);
 Twist twist_from(const JsonAt& at);
-Json twist_distribution_json(const TwistDistribution& distribution);
-TwistDistribution twist_distribution_from(const JsonAt& at);
 
 const std::vector<std::pair<std::string, MotionMode>>& motion_mode_words();
 const std::vector<std::pair<std::string, TrackState>>& track_state_words();
@@ -35,8 +40,10 @@ std::string word_of(const std::vector<std::pair<std::string, Enum>>& words, Enum
 }
 
 Action action_from(const JsonAt& at);
-Outcome outcome_from(const JsonAt& at);
-ExclusiveOutcomes exclusive_from(const JsonAt& at);
+/// Of a list of outcomes with their names, or a map from names, as in scene files; `object` is judged where an outcome
+/// names none, "" = the only one of the scene (complete_outcome()).
+std::vector<Outcome> outcomes_from(const JsonAt& at, const std::string& object);
+std::vector<ExclusiveOutcomes> groups_from(const JsonAt& at);
 Json exclusive_json(const ExclusiveOutcomes& group);
 struct Basis;
 struct OutcomeProbability;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "prescene/belief/body_names.h"
+#include "prescene/belief/scene.h"
 #include "prescene/belief/trajectory.h"
 #include "prescene/core/check.h"
 
@@ -125,6 +126,30 @@ ExclusiveOutcomes which_face_up(const std::string& name, const std::string& obje
     faces.outcomes.push_back({kFaces[static_cast<std::size_t>(face)], object, {Condition{FaceUp{axis_O}}}});
   }
   return faces;
+}
+
+core::Status complete_outcome(const Scene& scene, Outcome& outcome) {
+  if (outcome.object.empty()) {
+    if (scene.objects.size() != 1)
+      return core::invalid_input(outcome.name + ": the key 'object' is missing: name the object that is judged");
+    outcome.object = scene.objects[0].name;
+  }
+  for (Condition& condition : outcome.all_of) {
+    auto* inside = std::get_if<InsideVolume>(&condition.predicate);
+    if (!inside || inside->hollow_of.empty()) continue;
+    const std::optional<int> index = find_support(scene, inside->hollow_of);
+    if (!index)
+      return core::not_found(outcome.name + ": there is no support '" + inside->hollow_of +
+                             "': name one of the scene's, or give a box {position, size}");
+    const Support& support = scene.supports[static_cast<std::size_t>(*index)];
+    if (!support.hollow)
+      return core::invalid_input(outcome.name + ": '" + inside->hollow_of +
+                                 "' has no hollow: name another support, or give a box {position, size}");
+    inside->X_WV = support.X_WS * support.hollow->X_OV;
+    inside->size = support.hollow->size;
+    inside->hollow_of.clear();
+  }
+  return core::ok_status();
 }
 
 bool needs_states_along_the_way(const Outcome& outcome) {

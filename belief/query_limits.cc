@@ -56,8 +56,8 @@ struct QueryCheck {
     }
     PRESCENE_RETURN_IF_ERROR(judged.check());
     if (predict.duration) PRESCENE_RETURN_IF_ERROR(check_number(*predict.duration, kDurations).at("duration"));
-    if (predict.tell.paths < 0 || predict.tell.paths > kMostPaths)
-      return core::invalid_input("paths: " + std::to_string(predict.tell.paths) + " is out of range: give 0 to " +
+    if (predict.detail.paths < 0 || predict.detail.paths > kMostPaths)
+      return core::invalid_input("paths: " + std::to_string(predict.detail.paths) + " is out of range: give 0 to " +
                                  std::to_string(kMostPaths));
     return validate(predict.effort);
   }

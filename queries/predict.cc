@@ -143,15 +143,15 @@ std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
 core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::PredictQuery& query,
                                             const QueryContext& context) {
   const belief::Scene& own = *prior.scene;
-  const belief::PredictDetail& tell = query.tell;
+  const belief::PredictDetail& wanted = query.detail;
   const bool use_own_outcomes = query.outcomes.empty() && query.exclusive_outcomes.empty();
   PRESCENE_TRY(auto scene, with_question(own, query.actions.empty() && !prior.seen ? own.actions : query.actions,
                                          use_own_outcomes ? own.outcomes : query.outcomes,
                                          use_own_outcomes ? own.exclusive_outcomes : query.exclusive_outcomes));
   if (scene->objects.empty()) return core::not_found("there is no object whose future could be told");
   ForesightDetail detail;
-  detail.to_rest = tell.final_poses || tell.typical_runs || tell.contacts || tell.paths > 0;
-  detail.keep_contacts = tell.contacts;
+  detail.to_rest = wanted.final_poses || wanted.typical_runs || wanted.contacts || wanted.paths > 0;
+  detail.keep_contacts = wanted.contacts;
   PRESCENE_TRY(const Foresight foresight,
                foresee(prior, std::move(scene), query.duration.value_or(own.duration), query.effort, context, detail));
 
@@ -167,7 +167,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   const auto work_out = [&](bool asked, const char* part, const auto& work) {
     if (asked && (abandoned() || !work())) missing.emplace_back(part);
   };
-  work_out(tell.final_poses, "final_poses", [&] {
+  work_out(wanted.final_poses, "final_poses", [&] {
     for (std::size_t object : objects) {
       if (abandoned()) return false;
       belief::FinalPoses poses = final_poses_of(foresight, object, *context.pool);
@@ -176,33 +176,33 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
     }
     return true;
   });
-  work_out(tell.typical_runs, "typical_runs", [&] {
+  work_out(wanted.typical_runs, "typical_runs", [&] {
     bool complete = true;
     answer.typical_runs = typical_runs_of(foresight, prior, context, complete);
     return complete;
   });
-  work_out(tell.inputs, "inputs", [&] {
+  work_out(wanted.inputs, "inputs", [&] {
     answer.inputs = deciding_inputs(foresight, prior, context);
     return !abandoned();
   });
-  work_out(tell.contacts, "contacts",
+  work_out(wanted.contacts, "contacts",
            [&] { return forecast_contacts(foresight, query.effort.confidence, context.abandoned, answer); });
   core::Status flight;
-  work_out(tell.contacts, "flight", [&] {
+  work_out(wanted.contacts, "flight", [&] {
     flight = forecast_flight(foresight, prior, context, answer);
     return answer.flight || !stopped();
   });
-  work_out(tell.paths > 0, "paths", [&] {
+  work_out(wanted.paths > 0, "paths", [&] {
     bool complete = true;
-    answer.paths = paths_of(foresight, prior, tell.paths, objects, context, complete);
+    answer.paths = paths_of(foresight, prior, wanted.paths, objects, context, complete);
     return complete;
   });
-  work_out(tell.chaos, "chaos", [&] {
+  work_out(wanted.chaos, "chaos", [&] {
     answer.chaos = check_for_chaos(foresight, prior, query.effort.confidence, context);
     return !answer.chaos.empty() || !stopped();
   });
   core::Status model_status;
-  work_out(tell.model_error, "model_error", [&] {
+  work_out(wanted.model_error, "model_error", [&] {
     auto error = model_error(foresight, prior, query.effort.confidence, context);
     if (!error) {
       model_status = error.status();

@@ -108,6 +108,9 @@ core::Result<std::shared_ptr<const belief::Scene>> with_question(const belief::S
   asked->actions = std::move(actions);
   asked->outcomes = std::move(outcomes);
   asked->exclusive_outcomes = std::move(exclusive);
+  for (belief::Outcome& outcome : asked->outcomes) PRESCENE_RETURN_IF_ERROR(belief::complete_outcome(*asked, outcome));
+  for (belief::ExclusiveOutcomes& group : asked->exclusive_outcomes)
+    for (belief::Outcome& outcome : group.outcomes) PRESCENE_RETURN_IF_ERROR(belief::complete_outcome(*asked, outcome));
   PRESCENE_RETURN_IF_ERROR(belief::validate(*asked));
   return std::shared_ptr<const belief::Scene>(std::move(asked));
 }

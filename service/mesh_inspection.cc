@@ -241,7 +241,7 @@ ordered_json to_json(const MeshInspection& found) {
   ordered_json poses = ordered_json::array();
   for (const geometry::RestingPose& pose : found.resting_poses) {
     const geometry::Quaterniond& R = pose.R_WB;
-    poses.push_back({{"rotation", {R.w(), R.x(), R.y(), R.z()}},
+    poses.push_back({{"rotation", {{"quaternion_wxyz", {R.w(), R.x(), R.y(), R.z()}}}},
                      {"height", pose.height},
                      {"tip_angle_deg", pose.tip_angle * geometry::kDegreesPerRadian},
                      {"probability", pose.probability}});

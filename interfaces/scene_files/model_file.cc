@@ -44,8 +44,9 @@ std::string text_of(const ScalarDistribution& distribution) {
 
 std::string text_of(const belief::Vector3Distribution& v) { return list({text_of(v.x), text_of(v.y), text_of(v.z)}); }
 
-std::string text_of(const geometry::Quaterniond& q) {
-  return list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())});
+std::string rotation_text(const geometry::Quaterniond& q) {
+  return "{quaternion_wxyz: " + list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())}) +
+         "}";
 }
 
 std::string text_of(const geometry::Matrix3d& m) {
@@ -68,7 +69,7 @@ std::string text_of(const geometry::SymmetryGroup& group) {
       return "{axis: " + text_of(axis) + ", order: " + std::to_string(order) + center + "}";
   std::string rotations;
   for (const geometry::Quaterniond& rotation : group.rotations)
-    rotations.append(rotations.empty() ? "" : ", ").append(text_of(rotation));
+    rotations.append(rotations.empty() ? "" : ", ").append(rotation_text(rotation));
   return "{rotations: [" + rotations + "]" + center + "}";
 }
 
@@ -179,7 +180,7 @@ std::string model_yaml(const ModelFile& file) {
   if (model.learn_colors) line("learn_colors", "true");
   if (model.hollow)
     line("hollow", "{size: " + text_of(model.hollow->size) + ", position: " + text_of(model.hollow->X_OV.translation) +
-                       ", rotation: {quaternion: " + text_of(model.hollow->X_OV.rotation) + "}}");
+                       ", rotation: " + rotation_text(model.hollow->X_OV.rotation) + "}");
   return text;
 }
 

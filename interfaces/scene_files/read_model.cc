@@ -61,11 +61,12 @@ bool is_group(const std::vector<geometry::Quaterniond>& rotations) {
 SymmetryGroup read_rotations(const LocatedValue& value, Problems& problems) {
   SymmetryGroup group;
   if (value.kind != LocatedValue::Kind::kList || value.items.empty() || value.items.size() > 64) {
-    report_type(value, problems, "give a list of 1 to 64 unit quaternions [w, x, y, z], without the identity");
+    report_type(value, problems,
+                "give a list of 1 to 64 rotations {quaternion_wxyz: [w, x, y, z]}, without the identity");
     return group;
   }
   const std::size_t before = problems.errors().size();
-  for (const LocatedValue& item : value.items) group.rotations.push_back(read_quaternion(item, problems));
+  for (const LocatedValue& item : value.items) group.rotations.push_back(read_rotation(item, problems));
   if (problems.errors().size() == before && !is_group(group.rotations))
     problems.add(value.place, value.path, "the rotations are no group", "add the product of any two of them");
   return group;

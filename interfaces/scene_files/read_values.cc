@@ -229,35 +229,43 @@ Vector3d read_axis(const LocatedValue& value, Problems& problems) {
   return std::abs(axis.norm() - 1.0) < 1e-12 ? axis : Vector3d(axis.normalized());
 }
 
-Quaterniond read_quaternion(const LocatedValue& value, Problems& problems) {
-  constexpr const char* kRemedy = "give a unit quaternion [w, x, y, z]";
-  const auto q = read_numbers(value, problems, 4, {-2.0, 2.0, kRemedy});
+namespace {
+
+constexpr const char* kRotationForms =
+    "give {quaternion_wxyz: [w, x, y, z]}, {quaternion_xyzw: [x, y, z, w]} as in ROS, {euler_deg: [roll, pitch, yaw]} "
+    "or {axis_angle_deg: [x, y, z, angle]}";
+
+/// Of length 1 within what rounding by hand does; made a unit quaternion.
+Quaterniond read_quaternion(const LocatedValue& value, Problems& problems, bool real_part_first) {
+  const char* remedy =
+      real_part_first ? "give a unit quaternion [w, x, y, z]" : "give a unit quaternion [x, y, z, w], as in ROS";
+  const auto q = read_numbers(value, problems, 4, {-2.0, 2.0, remedy});
   if (!q) return Quaterniond::Identity();
-  const Quaterniond rotation((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
+  const Quaterniond rotation = real_part_first ? Quaterniond((*q)[0], (*q)[1], (*q)[2], (*q)[3])
+                                               : Quaterniond((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
   // Hand-written digits are rounded to about three places; more is a mistake (order, sign, a missing number).
   const double error = std::abs(rotation.norm() - 1.0);
   if (error > 0.01) {
-    problems.add(value.place, value.path, "the quaternion has length " + core::rounded_text(rotation.norm()), kRemedy);
+    problems.add(value.place, value.path, "the quaternion has length " + core::rounded_text(rotation.norm()), remedy);
     return Quaterniond::Identity();
   }
   return error < 1e-9 ? rotation : rotation.normalized();  // what we wrote ourselves keeps its bits
 }
 
+}  // namespace
+
 Quaterniond read_rotation(const LocatedValue& value, Problems& problems) {
+  if (value.kind == LocatedValue::Kind::kList) {
+    problems.add(value.place, value.path, "a list does not say which number is the real part", kRotationForms);
+    return Quaterniond::Identity();
+  }
   Binder binder(value, problems);
   std::string which;
-  const LocatedValue* form = binder.one_of(
-      {"quaternion", "euler_deg", "axis_angle_deg"},
-      "give {quaternion: [w, x, y, z]}, {euler_deg: [roll, pitch, yaw]} or {axis_angle_deg: [x, y, z, angle]}", false,
-      &which);
+  const LocatedValue* form = binder.one_of({"quaternion_wxyz", "quaternion_xyzw", "euler_deg", "axis_angle_deg"},
+                                           kRotationForms, false, &which);
   if (!form) return Quaterniond::Identity();
-  if (which == "quaternion") return read_quaternion(*form, problems);
-  if (which == "euler_deg") {
-    const Vector3d angles = geometry::kDegree * read_vector(*form, problems, kAngleDeg);
-    return Quaterniond(Eigen::AngleAxisd(angles.z(), Vector3d::UnitZ()) *
-                       Eigen::AngleAxisd(angles.y(), Vector3d::UnitY()) *
-                       Eigen::AngleAxisd(angles.x(), Vector3d::UnitX()));
-  }
+  if (which == "euler_deg") return geometry::rotation_from_euler_deg(read_vector(*form, problems, kAngleDeg));
+  if (which != "axis_angle_deg") return read_quaternion(*form, problems, which == "quaternion_wxyz");
   const auto numbers = read_numbers(*form, problems, 4, {-36000.0, 36000.0, "give [x, y, z, angle in degrees]"});
   if (!numbers) return Quaterniond::Identity();
   const Vector3d axis((*numbers)[0], (*numbers)[1], (*numbers)[2]);

@@ -37,9 +37,8 @@ belief::Vector3Distribution read_vector_distribution(const LocatedValue& value, 
 geometry::Vector3d read_vector(const LocatedValue& value, Problems& problems, const NumberRange& range);
 /// x, -x, y, ... or a vector of any length, which is made a unit vector.
 geometry::Vector3d read_axis(const LocatedValue& value, Problems& problems);
-/// [w, x, y, z] of length 1 within what rounding by hand does; made a unit quaternion.
-geometry::Quaterniond read_quaternion(const LocatedValue& value, Problems& problems);
-/// {quaternion: [w, x, y, z]}, {euler_deg: [roll, pitch, yaw]}, {axis_angle_deg: [x, y, z, angle]}.
+/// {quaternion_wxyz: [w, x, y, z]}, {quaternion_xyzw: [x, y, z, w]}, {euler_deg: [roll, pitch, yaw]}, {axis_angle_deg:
+/// [x, y, z, angle]}. A quaternion has length 1 within what rounding by hand does.
 geometry::Quaterniond read_rotation(const LocatedValue& value, Problems& problems);
 /// {position, rotation} in numbers; both may be absent.
 geometry::Pose read_pose(const LocatedValue& value, Problems& problems);

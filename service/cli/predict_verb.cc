@@ -127,18 +127,18 @@ std::optional<double> seconds_of(const std::string& text) {
 
 /// What is printed and drawn decides what is asked for; what is not shown is not worked out.
 belief::PredictDetail detail_of(const PredictOptions& options, bool json) {
-  belief::PredictDetail tell;
+  belief::PredictDetail detail;
   const bool pictures = !options.report.empty() || !options.heat_map.empty();
   const bool full = (json && !options.outcomes_only) || pictures;
-  tell.final_poses = tell.typical_runs = full;
-  tell.inputs = true;
-  tell.contacts = full;
+  detail.final_poses = detail.typical_runs = full;
+  detail.inputs = true;
+  detail.contacts = full;
   // These take more instances than the estimate itself does, so a limit on time leaves them out.
   const bool unlimited = options.max_seconds <= 0.0 && options.budget.empty();
-  tell.chaos = unlimited || options.model_error;
-  tell.model_error = options.model_error;
-  tell.paths = pictures ? 48 : 0;
-  return tell;
+  detail.chaos = unlimited || options.model_error;
+  detail.model_error = options.model_error;
+  detail.paths = pictures ? 48 : 0;
+  return detail;
 }
 
 core::Status run(const PredictOptions& options, VerbContext& context) {
@@ -159,9 +159,9 @@ core::Status run(const PredictOptions& options, VerbContext& context) {
   if (options.max_seconds > 0.0) question.effort.max_seconds = options.max_seconds;
   if (!options.budget.empty()) question.effort.max_seconds = seconds_of(options.budget);
   if (options.duration > 0.0) question.duration = options.duration;
-  question.tell = detail_of(options, context.options().json);
+  question.detail = detail_of(options, context.options().json);
   // Without outcomes, where things end is the answer.
-  if (scene->outcomes.empty() && scene->exclusive_outcomes.empty()) question.tell.final_poses = true;
+  if (scene->outcomes.empty() && scene->exclusive_outcomes.empty()) question.detail.final_poses = true;
   queries::QueryContext query_context = backends.query_context(context.pool());
   query_context.cancellation = &context.cancellation();
   query_context.progress = context.progress("predicting");

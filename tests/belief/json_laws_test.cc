@@ -135,7 +135,8 @@ TEST(QueryFromJson, FillsInWhatIsNotSaid) {
   expected.object = "cup";
   EXPECT_EQ(std::get<StabilityQuery>(query->what), expected);
   EXPECT_EQ(query->id, "");
-  const auto faces = query_from_json(R"({"predict": {"exclusive_outcomes": [{"name": "up", "face_up": "cup"}]}})");
+  const auto faces =
+      query_from_json(R"({"predict": {"exclusive_outcomes": [{"name": "up", "object": "cup", "face_up": true}]}})");
   ASSERT_TRUE(faces.ok());
   EXPECT_EQ(std::get<PredictQuery>(faces->what).exclusive_outcomes[0], which_face_up("up", "cup"));
 }

@@ -93,7 +93,7 @@ TEST(QueryLimits, SoAreCountsAndLengths) {
   const auto groups = [](int count) {
     std::string text = R"({"predict": {"exclusive_outcomes": [)";
     for (int i = 0; i < count; ++i)
-      text += (i > 0 ? ",{\"name\":\"g" : "{\"name\":\"g") + std::to_string(i) + R"(","face_up":"o"})";
+      text += (i > 0 ? ",{\"name\":\"g" : "{\"name\":\"g") + std::to_string(i) + R"(","object":"o","face_up":true})";
     return text + "]}}";
   };
   EXPECT_TRUE(query_from_json(groups(40)).ok());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "prescene/geometry/angles.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::tests {
@@ -62,7 +63,10 @@ PoseDistribution random_pose_distribution(RandomStream& stream) {
     }
     case 2: {
       Vector3Distribution position = random_vector_distribution(stream);
-      return BoxPose{std::move(position), geometry::uniform_rotation(stream), random_below(stream, 2) == 1};
+      // Something varies, else it would be a fixed pose; where any rotation may be, there is no other.
+      if (dimensions(position) == 0) position.x = UniformScalar{0.0, 1.0};
+      if (random_below(stream, 2) == 1) return BoxPose{std::move(position), geometry::Quaterniond::Identity(), true};
+      return BoxPose{std::move(position), geometry::uniform_rotation(stream), false};
     }
     default: {
       SampledPose sampled;
@@ -92,7 +96,8 @@ Action random_action(RandomStream& stream) {
       break;
     }
     case 3:
-      action.what = Pour{"block", geometry::uniform_direction(stream), stream.uniform(-3.0, 3.0), duration};
+      action.what = Pour{"block", geometry::uniform_direction(stream),
+                         geometry::kDegree * stream.uniform(-170.0, 170.0), duration};
       break;
     case 4:
       action.what = Grasp{"block", "hand"};
@@ -114,7 +119,7 @@ Predicate random_predicate(RandomStream& stream) {
       return RestingOn{random_below(stream, 2) == 1 ? "table" : "ball"};
     case 2: {
       const Vector3d axis = geometry::uniform_direction(stream);
-      return UprightWithin{axis, stream.uniform(0.1, 2.5)};
+      return UprightWithin{axis, geometry::kDegree * stream.uniform(5.0, 145.0)};
     }
     case 3: {
       const double sign = random_below(stream, 2) == 1 ? 1.0 : -1.0;
@@ -125,7 +130,7 @@ Predicate random_predicate(RandomStream& stream) {
     case 5:
       return MovedMoreThan{stream.uniform(0.0, 2.0)};
     case 6:
-      return TurnedMoreThan{stream.uniform(0.0, 3.0)};
+      return TurnedMoreThan{geometry::kDegree * stream.uniform(0.0, 170.0)};
     case 7:
       return Touched{random_below(stream, 2) == 1 ? "table" : "hand"};
     default:
@@ -137,7 +142,9 @@ Outcome random_outcome(RandomStream& stream, const std::string& name) {
   Outcome outcome{name, "block", {}};
   for (int i = random_below(stream, 2); i >= 0; --i) {
     Condition condition{random_predicate(stream), When::kAtEnd, false};
-    condition.when = static_cast<When>(random_below(stream, 3));
+    // Touched is about any time.
+    const bool touched = std::holds_alternative<Touched>(condition.predicate);
+    condition.when = static_cast<When>(random_below(stream, touched ? 2 : 3));
     condition.negated = random_below(stream, 2) == 1;
     outcome.all_of.push_back(condition);
   }
@@ -171,7 +178,8 @@ Query random_query(RandomStream& stream) {
     }
     case 2: {
       const double move = stream.uniform(0.001, 0.1);
-      query.what = StabilityQuery{"block", move, stream.uniform(0.01, 1.0), stream.uniform(0.1, 9.0), effort};
+      query.what = StabilityQuery{"block", move, geometry::kDegree * stream.uniform(1.0, 60.0),
+                                  stream.uniform(0.1, 9.0), effort};
       break;
     }
     default: {

@@ -48,7 +48,7 @@ belief::FinalPoses final_poses(const std::shared_ptr<const belief::Scene>& scene
     return simulation::make_bullet_simulator(asked, shapes, {});
   };
   belief::PredictQuery query;
-  query.tell.typical_runs = false;
+  query.detail.typical_runs = false;
   query.effort.exact_instances = instances;
   const belief::Answer answer = queries::answer(scene, 1, {"", query}, context);
   EXPECT_TRUE(answer.error.ok()) << answer.error.message();

@@ -27,7 +27,7 @@ using tests::sliding_scene;
 
 PredictQuery asking(const std::function<void(belief::PredictDetail&)>& what, int instances = 1024) {
   PredictQuery query;
-  what(query.tell);
+  what(query.detail);
   query.effort.exact_instances = instances;
   return query;
 }
@@ -49,7 +49,7 @@ const belief::DecidingInputs& about(const PredictAnswer& answer, const std::stri
 TEST(DecidingInputs, TheFrictionDecidesWhetherTheCartonSlides) {
   core::ThreadPool pool(2);
   const PredictAnswer answer = predicted(queries::answer(
-      sliding_scene(), 1, {"", asking([](auto& tell) { tell.inputs = true; })}, context_with(slide, pool)));
+      sliding_scene(), 1, {"", asking([](auto& detail) { detail.inputs = true; })}, context_with(slide, pool)));
   const belief::DecidingInputs& end = about(answer, "end");
   ASSERT_GE(end.inputs.size(), 3u);  // friction, two positions, one turn
   EXPECT_EQ(end.inputs[0].input, "carton: friction");
@@ -83,7 +83,7 @@ TEST(DecidingInputs, AHeadingThatMayBeAnyDecidesAloneWhereNothingElseIsOpen) {
       return end;
     };
     const PredictAnswer answer = predicted(queries::answer(
-        scene, 1, {"", asking([](auto& tell) { tell.inputs = true; })}, context_with(by_heading, pool)));
+        scene, 1, {"", asking([](auto& detail) { detail.inputs = true; })}, context_with(by_heading, pool)));
     const belief::DecidingInputs& end = about(answer, "end");
     ASSERT_EQ(end.inputs.size(), 1u) << spread;
     EXPECT_THAT(end.inputs[0].input, HasSubstr(spread > 1.0 ? "heading" : "turn about z"));
@@ -106,7 +106,7 @@ TEST(DecidingInputs, WhatActionsDrawCountsToo) {
     return end;
   };
   const PredictAnswer answer = predicted(
-      queries::answer(scene, 1, {"", asking([](auto& tell) { tell.inputs = true; })}, context_with(by_push, pool)));
+      queries::answer(scene, 1, {"", asking([](auto& detail) { detail.inputs = true; })}, context_with(by_push, pool)));
   EXPECT_EQ(about(answer, "end").inputs[0].input, "push: sideways");
   EXPECT_GT(about(answer, "end").inputs[0].share, 0.85);
 }
@@ -114,7 +114,7 @@ TEST(DecidingInputs, WhatActionsDrawCountsToo) {
 TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
   core::ThreadPool pool(2);
   QueryContext context = context_with(slide, pool);
-  const auto all = asking([](auto& tell) { tell.model_error = true; });
+  const auto all = asking([](auto& detail) { detail.model_error = true; });
 
   std::vector<double> factors;
   // With longer steps things slide more easily, so that the probability shifts by a known amount.
@@ -158,7 +158,7 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
 
 TEST(Chaos, IsToldApartFromABoundary) {
   core::ThreadPool pool(2);
-  const auto ask = asking([](auto& tell) { tell.chaos = true; });
+  const auto ask = asking([](auto& detail) { detail.chaos = true; });
   const PredictAnswer smooth = predicted(queries::answer(sliding_scene(), 1, {"", ask}, context_with(slide, pool)));
   ASSERT_EQ(smooth.chaos.size(), 2u);
   EXPECT_EQ(smooth.chaos[0].about, "end");
@@ -217,8 +217,8 @@ QueryContext touching(double failing, core::ThreadPool& pool) {
 
 TEST(Contacts, TellWhoTouchesWhenAndHowHard) {
   core::ThreadPool pool(1);
-  const PredictAnswer answer = predicted(
-      queries::answer(sliding_scene(), 1, {"", asking([](auto& tell) { tell.contacts = true; })}, touching(0.0, pool)));
+  const PredictAnswer answer = predicted(queries::answer(
+      sliding_scene(), 1, {"", asking([](auto& detail) { detail.contacts = true; })}, touching(0.0, pool)));
   ASSERT_EQ(answer.contacts.size(), 2u);
   const belief::ContactForecast &table = answer.contacts[0], &cup = answer.contacts[1];
   EXPECT_EQ(table.first + " " + table.second, "carton table");
@@ -254,8 +254,8 @@ TEST(Flight, SaysWhyItIsNotTold) {
     if (made++ > 0) return core::unsupported("carton: can't fly");  // the scene can be simulated, its objects alone not
     return make(scene, step_factor);
   };
-  const PredictAnswer answer =
-      predicted(queries::answer(sliding_scene(), 1, {"", asking([](auto& tell) { tell.contacts = true; })}, context));
+  const PredictAnswer answer = predicted(
+      queries::answer(sliding_scene(), 1, {"", asking([](auto& detail) { detail.contacts = true; })}, context));
   EXPECT_FALSE(answer.flight.has_value());
   EXPECT_THAT(answer.remarks, testing::Contains(HasSubstr("carton: can't fly")));
 }
@@ -300,23 +300,23 @@ TEST(Remarks, SayThatSomethingLeftTheWorld) {
 }
 
 TEST(Tell, IsReadFromJsonAndWrittenBack) {
-  const auto query = belief::query_from_json(R"({"predict": {"tell": ["inputs", "contacts"], "paths": 12}})");
+  const auto query = belief::query_from_json(R"({"predict": {"detail": ["inputs", "contacts"], "paths": 12}})");
   ASSERT_TRUE(query.ok());
-  const auto& tell = std::get<PredictQuery>(query->what).tell;
-  EXPECT_TRUE(tell.inputs && tell.contacts && !tell.final_poses && !tell.typical_runs && !tell.chaos);
-  EXPECT_EQ(tell.paths, 12);
+  const auto& detail = std::get<PredictQuery>(query->what).detail;
+  EXPECT_TRUE(detail.inputs && detail.contacts && !detail.final_poses && !detail.typical_runs && !detail.chaos);
+  EXPECT_EQ(detail.paths, 12);
   const auto again = belief::query_from_json(belief::to_json(*query).dump());
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(*again, *query);
-  const auto wrong = belief::query_from_json(R"({"predict": {"tell": ["input"]}})");
+  const auto wrong = belief::query_from_json(R"({"predict": {"detail": ["input"]}})");
   ASSERT_FALSE(wrong.ok());
-  EXPECT_THAT(core::to_string(wrong.status()), HasSubstr("predict.tell[0]"));
+  EXPECT_THAT(core::to_string(wrong.status()), HasSubstr("predict.detail[0]"));
 }
 
 TEST(Paths, BeginWhereThingsAreLetGo) {
   core::ThreadPool pool(1);
   const PredictAnswer answer = predicted(queries::answer(
-      sliding_scene(), 1, {"", asking([](auto& tell) { tell.paths = 20; })}, context_with(slide, pool)));
+      sliding_scene(), 1, {"", asking([](auto& detail) { detail.paths = 20; })}, context_with(slide, pool)));
   ASSERT_EQ(answer.paths.size(), 40u);  // two objects are asked about
   for (const belief::ObjectPath& path : answer.paths) {
     EXPECT_GT(path.points.size(), 30u);

@@ -236,7 +236,7 @@ TEST(Predict, WhatIsAbandonedTellsTheProbabilitiesAndWhatIsMissing) {
   QueryContext context = context_with(slide, pool);
   context.abandoned = &abandoned;
   PredictQuery query;
-  query.tell = {true, true, true, true, true, true, 3};
+  query.detail = {true, true, true, true, true, true, 3};
   const Answer answer = queries::answer(sliding_scene(), 1, {"", query}, context);
   const auto& predicted = std::get<PredictAnswer>(answer.what);
   EXPECT_EQ(predicted.outcomes.size(), 3u);
@@ -303,8 +303,8 @@ TEST(Predict, AVeryLargeAnswersDensityIsThatOfItsFirstInstances) {
   const auto carton_of = [&](int instances) {
     PredictQuery query;
     query.effort.exact_instances = instances;
-    query.tell = {};
-    query.tell.typical_runs = false;
+    query.detail = {};
+    query.detail.typical_runs = false;
     const Answer answer = queries::answer(two_hypotheses(), {"", query}, context_with(slide, pool));
     return std::get<PredictAnswer>(answer.what).final_poses.at(0);
   };
@@ -327,7 +327,7 @@ TEST(Predict, PathsOfALongDurationStayFewEnoughToBeTold) {
   PredictQuery query;
   query.duration = 3600.0;
   query.effort.exact_instances = 256;
-  query.tell = {false, false, false, false, false, false, 1000};
+  query.detail = {false, false, false, false, false, false, 1000};
   const Answer answer = queries::answer(sliding_scene(), 1, {"", query}, context_with(slide, pool));
   const auto& predicted = std::get<PredictAnswer>(answer.what);
   std::size_t points = 0;
@@ -566,7 +566,7 @@ TEST(View, WhoseLikeliestStateFailedIsAnError) {
 }
 
 TEST(Documentation, ItsQuestionsAreUnderstood) {
-  std::ifstream page(tests::source_dir() / "docs" / "queries.md");
+  std::ifstream page(tests::source_dir() / "docs" / "reference" / "queries.md");
   ASSERT_TRUE(page) << "docs/reference/queries.md is missing";
   const std::string text{std::istreambuf_iterator<char>(page), {}};
   // Blocks marked `json` that begin with an id and a task are questions, but for those with a step: answers.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Damaged and extreme questions at a desk: each is answered or refused, one after the other, and what they leave behind
-// answers a good question as before. That none takes for ever is watched by a patience that is far beyond a question's
-// time, so that a failure names the question; what a question may take is DeskSettings::most_seconds and 2 s more.
+// Damaged and extreme questions at a worker: each is answered or refused, one after the other, and what they leave
+// behind answers a good question as before. That none takes for ever is watched by a patience that is far beyond a
+// question's time, so that a failure names the question; what a question may take is QueryWorkerSettings::most_seconds
+// and 2 s more.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -9,17 +10,17 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "desk_fixture.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/random.h"
 #include "prescene/core/utf8.h"
 #include "prescene/service/outside_json.h"
+#include "query_worker_fixture.h"
 
 namespace prescene::service {
 namespace {
 
-using tests::Desk;
+using tests::WorkerUnderTest;
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kPatience(60);
@@ -52,35 +53,33 @@ const std::vector<std::string>& good_questions() {
   static const std::vector<std::string> kQuestions = {
       R"({"id": "1", "where": {"object": "box"}})",
       R"({"id": "2", "where": {}})",
-      R"({"id": "3", "stability": {"object": "box", "max_move": 0.01, "max_turn": 0.0873, "duration": 0.5,
+      R"({"id": "3", "stability": {"object": "box", "max_move": 0.01, "max_turn_deg": 5, "duration": 0.5,
           "effort": {"tolerance": 0.1, "confidence": 0.9, "max_instances": 64, "max_seconds": 0.05}}})",
       R"({"id": "4", "view": {"actions": [], "time": 0.0}})",
-      R"({"id": "5", "predict": {"effort": {"exact_instances": 64}, "tell": ["inputs", "chaos"], "duration": 0.5}})",
+      R"({"id": "5", "predict": {"effort": {"exact_instances": 64}, "detail": ["inputs", "chaos"], "duration": 0.5}})",
       R"({"id": "6", "predict": {
           "actions": [{"time": 0.0, "push": {"from": [0.5, 0, 0.35], "to": [0, 0, 0.35], "duration": 0.5, "radius": 0.02,
                        "lateral_error": {"normal": [0, 0.01], "min": -0.02, "max": 0.02}}},
                       {"time": 0.1, "grasp": {"object": "ball", "hand": "hand"}},
                       {"time": 0.2, "transport": {"object": "ball", "duration": 0.2,
-                       "X_WO": {"box": {"position": [{"uniform": [0, 0.1]}, 0, {"samples": [0.5, 0.6]}],
-                                        "any_rotation": true}}}},
+                       "pose": {"position": [{"uniform": [0, 0.1]}, 0, {"samples": [0.5, 0.6]}], "rotation": "any"}}},
                       {"time": 0.4, "release": {"object": "ball", "retreat": [0, 0, 0.1], "retreat_duration": 0.1,
-                       "disturbance": {"linear": [0, 0, {"normal": [0, 0.1]}], "angular": [0, 0, 0]}}}],
-          "outcomes": [{"name": "touches", "object": "box", "all_of": [{"touched": {"other": "ball"}, "when": "ever"}]},
-                       {"name": "in", "object": "ball", "all_of": [{"inside_volume": {
-                          "X_WV": {"position": [0, 0, 0.1], "rotation": [1, 0, 0, 0]}, "size": [0.2, 0.2, 0.2]}}]}],
-          "exclusive_outcomes": [{"name": "up", "face_up": "box"},
+                       "velocity": [0, 0, {"normal": [0, 0.1]}], "angular_velocity": [0, 0, 0]}}],
+          "outcomes": [{"name": "touches", "object": "box", "touched": "ball", "when": "ever"},
+                       {"name": "in", "object": "ball", "all_of": [{"inside": {"position": [0, 0, 0.1],
+                          "rotation": {"quaternion_wxyz": [1, 0, 0, 0]}, "size": [0.2, 0.2, 0.2]}}]}],
+          "exclusive_outcomes": [{"name": "up", "object": "box", "face_up": true},
                                  {"name": "where", "outcomes": [{"name": "floor", "object": "box",
-                                  "all_of": [{"resting_on": {"support": "floor"}},
-                                             {"upright_within": {"max_angle": 0.3}, "negated": true}]}]}],
-          "duration": 0.5, "tell": ["final_poses", "typical_runs", "inputs", "contacts", "chaos", "model_error"],
+                                  "resting_on": "floor", "not": {"upright": {"within_deg": 15}}}]}],
+          "duration": 0.5, "detail": ["final_poses", "typical_runs", "inputs", "contacts", "chaos", "model_error"],
           "paths": 3, "effort": {"max_instances": 64, "max_seconds": 0.05}}})",
       R"({"id": "7", "predict": {"actions": [
-          {"time": 0, "pour": {"container": "box", "axis_W": [0, 1, 0], "angle": 1.0, "duration": 0.2}},
-          {"time": 0.3, "place": {"object": "ball", "duration": 0.2, "X_WO": {"normal": {
-            "mean": {"position": [0, 0, 0.4], "rotation": [1, 0, 0, 0]},
-            "covariance": [[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],
+          {"time": 0, "pour": {"container": "box", "axis": "y", "angle_deg": 60, "duration": 0.2}},
+          {"time": 0.3, "place": {"object": "ball", "duration": 0.2, "pose": {
+            "position": [0, 0, 0.4], "rotation": {"quaternion_xyzw": [0, 0, 0, 1]},
+            "normal": {"covariance": [[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],
                            [0,0,0,1e-4,0,0],[0,0,0,0,1e-4,0],[0,0,0,0,0,1e-4]]}}}}],
-          "duration": 0.5, "tell": ["contacts"], "effort": {"max_instances": 64}}})"};
+          "duration": 0.5, "detail": ["contacts"], "effort": {"max_instances": 64}}})"};
   return kQuestions;
 }
 
@@ -187,12 +186,11 @@ std::vector<std::string> extreme_questions() {
     }
     return text + "]";
   };
-  const std::string all = R"("tell": ["final_poses", "typical_runs", "inputs", "contacts", "chaos", "model_error"])";
-  const std::string falls = R"({"name": "o#", "object": "box", "all_of": [{"below_height": {"height": 0.2}}]})";
+  const std::string all = R"("detail": ["final_poses", "typical_runs", "inputs", "contacts", "chaos", "model_error"])";
+  const std::string falls = R"({"name": "o#", "object": "box", "below": 0.2})";
   const std::string volume =
-      R"({"name": "o#", "object": "ball", "all_of": [{"inside_volume": {"X_WV": {"position": [0, 0, 0.#]}, "size": [2, 2, 2]}}]})";
-  const std::string ever =
-      R"({"name": "o#", "object": "box", "all_of": [{"touched": {"other": "ball"}, "when": "ever"}]})";
+      R"({"name": "o#", "object": "ball", "inside": {"position": [0, 0, 0.#], "size": [2, 2, 2]}})";
+  const std::string ever = R"({"name": "o#", "object": "box", "touched": "ball", "when": "ever"})";
   const std::string push =
       R"({"time": 0, "push": {"from": [-1e4, 0, 0.35], "to": [1e4, 0, 0.35], "duration": 1e-3, "radius": 1e6}})";
   return {predict(R"("effort": {"confidence": 0.9999999999999999})"),
@@ -205,28 +203,29 @@ std::vector<std::string> extreme_questions() {
           predict(R"("duration": 3600, "outcomes": )" + repeated(ever, 1)),
           predict(R"("duration": 3600, "outcomes": )" + repeated(ever, 256)),
           predict(R"("duration": 1e-4, )" + all),
-          predict(R"("exclusive_outcomes": )" + repeated(R"({"name": "g#", "face_up": "box"})", 15000)),
-          predict(R"("exclusive_outcomes": )" + repeated(R"({"name": "g#", "face_up": "box"})", 42) + ", " + all),
+          predict(R"("exclusive_outcomes": )" + repeated(R"({"name": "g#", "object": "box", "face_up": true})", 15000)),
+          predict(R"("exclusive_outcomes": )" + repeated(R"({"name": "g#", "object": "box", "face_up": true})", 42) +
+                  ", " + all),
           predict(R"("outcomes": )" + repeated(falls, 256) + ", " + all),
-          predict(R"("tell": [], "outcomes": )" + repeated(volume, 256)),
+          predict(R"("detail": [], "outcomes": )" + repeated(volume, 256)),
           predict(R"("exclusive_outcomes": [{"name": "g", "outcomes": )" + repeated(falls, 15000) + "}]"),
-          predict(R"("outcomes": [{"name": "o", "object": "box", "all_of": )" +
-                  repeated(R"({"below_height": {"height": 0.#}})", 15000) + "}]"),
+          predict(R"("outcomes": [{"name": "o", "object": "box", "all_of": )" + repeated(R"({"below": 0.#})", 15000) +
+                  "}]"),
           predict(R"("actions": )" + repeated(push, 256)),
           predict(R"("actions": )" + repeated(push, 5000)),
           predict(R"("actions": [{"time": 1e300, "grasp": {"object": "box", "hand": "hand"}}])"),
           predict(R"("actions": [{"time": 0, "grasp": {"object": "box", "hand": "hand"}},
                  {"time": 0, "release": {"object": "box", "retreat": [1e4, 1e4, 1e4], "retreat_duration": 1e-300,
-                 "disturbance": {"linear": [1e4, {"uniform": [-1e4, 1e4]}, 0], "angular": [1e4, -1e4, 1e4]}}}], )" +
+                 "velocity": [1e4, {"uniform": [-1e4, 1e4]}, 0], "angular_velocity": [1e4, -1e4, 1e4]}}], )" +
                   all),
-          predict(R"("actions": [{"time": 0, "place": {"object": "box", "duration": 1e-300, "X_WO": {"normal": {
-                 "mean": {"position": [1e4, 1e4, 1e4], "rotation": [1, 0, 0, 0]}, "covariance": )" +
+          predict(R"("actions": [{"time": 0, "place": {"object": "box", "duration": 1e-300, "pose": {
+                 "position": [1e4, 1e4, 1e4], "normal": {"covariance": )" +
                   repeated("[1e8,1e8,1e8,1e8,1e8,1e8]", 6) + "}}}}], " + all),
-          predict(R"("actions": [{"time": 0, "pour": {"container": "box", "axis_W": [1e-8, 0, 0], "angle": 100,
+          predict(R"("actions": [{"time": 0, "pour": {"container": "box", "axis": [1e-8, 0, 0], "angle_deg": 100,
                  "duration": 1e-9}}], )" +
                   all),
-          R"({"id": "x", "stability": {"object": "ball", "max_move": 1000, "max_turn": 3.2, "duration": 3600}})",
-          R"({"id": "x", "stability": {"object": "ball", "max_move": 1e-6, "max_turn": 1e-6, "duration": 3600}})",
+          R"({"id": "x", "stability": {"object": "ball", "max_move": 1000, "max_turn_deg": 180, "duration": 3600}})",
+          R"({"id": "x", "stability": {"object": "ball", "max_move": 1e-6, "max_turn_deg": 1e-4, "duration": 3600}})",
           R"({"id": "x", "view": {"time": 3600}})",
           R"({"id": "x", "view": {"time": 1e-5, "actions": )" + repeated(push, 256) + "}}",
           "{\"id\": \"x\", " + repeated("\"k#\": 0", 80000).substr(1)};
@@ -240,8 +239,8 @@ double peak_gigabytes() {
 
 class QuestionFlood : public testing::Test {
  protected:
-  static DeskSettings settings(double seconds) {
-    DeskSettings settings;
+  static QueryWorkerSettings settings(double seconds) {
+    QueryWorkerSettings settings;
     settings.default_seconds = settings.most_seconds = seconds;
     settings.most_bytes = std::size_t{128} << 20;
     return settings;
@@ -264,11 +263,11 @@ class QuestionFlood : public testing::Test {
   }
 
   /// Every one gets its answer, and every answer is a JSON object in UTF-8.
-  void throw_at(Desk& desk, const std::vector<std::string>& questions) {
+  void throw_at(WorkerUnderTest& worker, const std::vector<std::string>& questions) {
     for (const std::string& question : questions) {
       const core::Stopwatch watch;
-      desk.ask(question);
-      const std::vector<std::string> answers = desk.answers(++answered_, kPatience);
+      worker.ask(question);
+      const std::vector<std::string> answers = worker.answers(++answered_, kPatience);
       ASSERT_EQ(answers.size(), answered_)
           << "no answer in " << kPatience.count() << " s: " << question.substr(0, 2000);
       if (watch.seconds() > slowest_) {
@@ -283,8 +282,8 @@ class QuestionFlood : public testing::Test {
     RecordProperty("slowest_seconds", std::to_string(slowest_));
     RecordProperty("slowest_question", slowest_question_);
     RecordProperty("peak_gigabytes", std::to_string(peak_gigabytes()));
-    EXPECT_EQ(desk.counts().failed, 0u) << desk.counts().last_failure;
-    EXPECT_EQ(desk.counts().answered + desk.counts().refused, answered_);
+    EXPECT_EQ(worker.counts().failed, 0u) << worker.counts().last_failure;
+    EXPECT_EQ(worker.counts().answered + worker.counts().refused, answered_);
   }
 
   std::size_t answered_ = 0;
@@ -293,28 +292,28 @@ class QuestionFlood : public testing::Test {
 };
 
 TEST_F(QuestionFlood, GoodQuestionsAreAnswered) {
-  Desk desk(settings(5.0), tracked());
-  throw_at(desk, good_questions());
-  EXPECT_EQ(desk.counts().answered, good_questions().size()) << desk.answers(answered_).back();
+  WorkerUnderTest worker(settings(5.0), tracked());
+  throw_at(worker, good_questions());
+  EXPECT_EQ(worker.counts().answered, good_questions().size()) << worker.answers(answered_).back();
 }
 
 TEST_F(QuestionFlood, ThreeThousandDamagedQuestionsAreAnsweredOrRefused) {
-  Desk desk(settings(0.02), tracked());
+  WorkerUnderTest worker(settings(0.02), tracked());
   Damage damage(core::RandomStream(20, core::Purpose::kTest));
   std::vector<std::string> questions;
   for (std::size_t i = 0; i < 3000; ++i) questions.push_back(damage(good_questions()[i % good_questions().size()]));
-  throw_at(desk, questions);
-  EXPECT_GT(desk.counts().answered, 100u);
-  EXPECT_GT(desk.counts().refused, 100u);
+  throw_at(worker, questions);
+  EXPECT_GT(worker.counts().answered, 100u);
+  EXPECT_GT(worker.counts().refused, 100u);
 }
 
 TEST_F(QuestionFlood, ExtremeQuestionsAreAnsweredOrRefused) {
-  Desk desk(settings(0.3), tracked());
+  WorkerUnderTest worker(settings(0.3), tracked());
   const std::vector<std::string> questions = extreme_questions();
   EXPECT_EQ(questions.size(), 27u);
-  throw_at(desk, questions);
-  throw_at(desk, {good_questions()[0]});
-  EXPECT_THAT(desk.answers(answered_).back(), testing::HasSubstr("covariance"));
+  throw_at(worker, questions);
+  throw_at(worker, {good_questions()[0]});
+  EXPECT_THAT(worker.answers(answered_).back(), testing::HasSubstr("covariance"));
 }
 
 }  // namespace

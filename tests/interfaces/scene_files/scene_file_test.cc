@@ -112,7 +112,7 @@ TEST(SceneFile, ReadsPosesInEveryForm) {
   EXPECT_THAT(rotation("{euler_deg: [90, 0, 90]}") * Vector3d(0, 1, 0), tests::is_near(Vector3d(0, 0, 1), 1e-12))
       << "roll about the fixed x comes first";
   EXPECT_THAT(rotation("{axis_angle_deg: [0, 2, 0, 90]}") * x, tests::is_near(Vector3d(0, 0, -1), 1e-12));
-  EXPECT_THAT(rotation("{quaternion: [0.7071, 0, 0, 0.7071]}") * x, tests::is_near(Vector3d(0, 1, 0), 1e-12));
+  EXPECT_THAT(rotation("{quaternion_wxyz: [0.7071, 0, 0, 0.7071]}") * x, tests::is_near(Vector3d(0, 1, 0), 1e-12));
 
   const auto normal = std::get<belief::NormalPose>(
       pose_of("{position: [1, 0, 0], normal: {position: [0.1, 0.2, 0], rotation_deg: 2}}"));
@@ -263,8 +263,9 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
   EXPECT_THAT(error_of(small("", "    mass: 0\n")), HasSubstr("more than 0"));
   EXPECT_THAT(error_of(small("", "    inertia: [1, 1, 3]\n")), HasSubstr("no body has this inertia"));
   EXPECT_THAT(error_of(small("", "    symmetry: {axis: z}\n")), HasSubstr("the turns about the axis are missing"));
-  EXPECT_THAT(error_of(small("", "    symmetry: {rotations: [[0.707, 0, 0, 0.707]]}\n")), HasSubstr("no group"));
-  EXPECT_THAT(error_of(small("", "", "    pose: {rotation: {quaternion: [1, 1, 0, 0]}}\n")),
+  EXPECT_THAT(error_of(small("", "    symmetry: {rotations: [{quaternion_wxyz: [0.707, 0, 0, 0.707]}]}\n")),
+              HasSubstr("no group"));
+  EXPECT_THAT(error_of(small("", "", "    pose: {rotation: {quaternion_wxyz: [1, 1, 0, 0]}}\n")),
               HasSubstr("has length 1.41"));
   EXPECT_THAT(error_of(small("", "", "    pose: {position: [{uniform: [0, 1]}, 0, 0], normal: {position: 1}}\n")),
               HasSubstr("as its mean"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON forms of the belief's values: poses as {"position": [x,y,z], "rotation": [w,x,y,z]}, enums as lower-case words,
-// field names as in the structs. Reading is strict: unknown keys and wrong types fail with the path of the place.
+// JSON forms of the belief's values: poses as {"position": [x, y, z], "rotation": {"quaternion_wxyz": [w, x, y, z]}},
+// enums as lower-case words, actions and outcomes with the keys of scene files, else names as in the structs. Reading
+// is strict: unknown keys and wrong types fail with the path of the place.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -41,7 +42,8 @@ std::string json_text(const nlohmann::ordered_json& document, int indent = -1);
 core::Result<nlohmann::ordered_json> parse_json(std::string_view text, std::size_t max_bytes = 16u << 20);
 /// {"id": "...", "where": {...}} or "predict", "stability", "view".
 core::Result<Query> query_from_json(std::string_view text);
-/// {"position": [x, y, z], "rotation": [w, x, y, z]}; the rotation is normalised, zero or not finite is an error.
+/// {"position": [x, y, z], "rotation": {"quaternion_wxyz": [w, x, y, z]}}, or another form of rotation of scene files.
+/// The rotation is normalised; zero or not finite is an error.
 core::Result<Pose> pose_from_json(const nlohmann::ordered_json& value);
 core::Result<Action> action_from_json(const nlohmann::ordered_json& value);
 core::Result<Outcome> outcome_from_json(const nlohmann::ordered_json& value);

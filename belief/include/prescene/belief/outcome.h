@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "prescene/belief/distribution.h"
+#include "prescene/core/status.h"
 
 namespace prescene::belief {
 
@@ -23,6 +24,8 @@ struct InsideVolume {
   Pose X_WV;      ///< Centre of the box.
   Vector3d size;  ///< Full edges, m.
   bool whole = false;
+  /// The support whose hollow the box is; "" = the box stands by itself. Until complete_outcome() the box is not known.
+  std::string hollow_of = {};
   friend bool operator==(const InsideVolume&, const InsideVolume&) = default;
 };
 /// In contact with the named support (or object, or robot body), from above, and not moving.
@@ -73,7 +76,7 @@ struct Condition {
 };
 struct Outcome {
   std::string name;
-  std::string object;             ///< Whose trajectory is judged.
+  std::string object;             ///< Whose trajectory is judged; "" until complete_outcome().
   std::vector<Condition> all_of;  ///< At least one.
   friend bool operator==(const Outcome&, const Outcome&) = default;
 };
@@ -90,6 +93,11 @@ ExclusiveOutcomes which_face_up(const std::string& name, const std::string& obje
 /// Slower than this (m/s of the origin, rad/s) is not moving: what creep and the last rocking of a resting body reach.
 inline constexpr double kMovingSpeed = 0.02;
 inline constexpr double kMovingTurn = 0.2;
+
+/// Fills in what only the scene says of an outcome that came from outside: the object where none is named and the scene
+/// has just one, and the boxes of volumes that are named by a support's hollow. kNotFound naming a support that the
+/// scene lacks, kInvalidInput a support without a hollow or an outcome without an object.
+core::Status complete_outcome(const Scene& scene, Outcome& outcome);
 
 /// Whether judging needs states between the first and the last: simulators keep these only when asked to.
 bool needs_states_along_the_way(const Outcome& outcome);

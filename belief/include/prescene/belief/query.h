@@ -29,7 +29,7 @@ struct WhereQuery {
   std::optional<std::string> object;  ///< Empty: all.
   friend bool operator==(const WhereQuery&, const WhereQuery&) = default;
 };
-/// What a prediction is to tell besides probabilities. Where none of what needs places of rest or whole runs is asked
+/// What a prediction reports besides probabilities. Where none of what needs places of rest or whole runs is asked
 /// for (final poses, typical runs, contacts, paths), instances end as soon as their outcome is decided.
 struct PredictDetail {
   bool final_poses = true;
@@ -48,7 +48,7 @@ struct PredictQuery {
   std::vector<ExclusiveOutcomes> exclusive_outcomes;
   std::optional<double> duration;  ///< Empty: the scene's.
   Effort effort;
-  PredictDetail tell;
+  PredictDetail detail;
   friend bool operator==(const PredictQuery&, const PredictQuery&) = default;
 };
 /// Does it stay as it is (released now, if it is held)?

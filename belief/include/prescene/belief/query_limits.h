@@ -25,6 +25,8 @@ inline constexpr ScalarRange kDurations{1e-12, 3600.0, "give seconds above 0 and
 inline constexpr ScalarRange kViewTimes{0.0, 3600.0, "give seconds between 0 and 3600"};
 inline constexpr ScalarRange kMoves{1e-6, 1e3, "give metres between 1e-06 and 1000"};
 inline constexpr ScalarRange kTurns{1e-6, 3.2, "give radians between 1e-06 and 3.2"};
+/// The same in degrees, for JSON.
+inline constexpr ScalarRange kTurnsDeg{6e-5, 183.0, "give degrees between 6e-05 and 183"};
 inline constexpr int kMostPaths = 1000;
 inline constexpr std::size_t kMostActions = 256;
 /// Of single outcomes and of all groups' together; every one is judged in every instance.
