@@ -13,7 +13,7 @@
 #include "prescene/service/calibration/motion_units.h"
 #include "prescene/simulation/calibration/find_beginning.h"
 #include "prescene/simulation/calibration/free_fall.h"
-#include "prescene/simulation/calibration/keep_untold.h"
+#include "prescene/simulation/calibration/keep_prior.h"
 #include "prescene/simulation/calibration/sliding_fit.h"
 
 namespace prescene::service {
@@ -199,8 +199,8 @@ void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
   for (const simulation::CalibratedParameter& p : found->motion.parameters) {
     if (p.left_of_prior < kLittle) continue;
     found->remarks.push_back("these recordings say " +
-                             std::string(p.left_of_prior >= simulation::kUntold ? "nothing" : "little") + " about " +
-                             words(p.parameter) + ": " + what_tells(p.parameter));
+                             std::string(p.left_of_prior >= simulation::kUnidentifiable ? "nothing" : "little") +
+                             " about " + words(p.parameter) + ": " + what_tells(p.parameter));
   }
   for (const simulation::CalibratedParameter& p : found->motion.parameters) {
     const bool friction = p.parameter == simulation::MotionParameter::kFriction ||
@@ -307,14 +307,14 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
     const double flown = prior[place_of(p.parameter)].deviation;
     if (found.flight && flown < before.deviation)
       p.standard_error = simulation::error_of_shared_frames(flown, p.standard_error);
-    if (p.standard_error >= simulation::kUntold * before.deviation) {
+    if (p.standard_error >= simulation::kUnidentifiable * before.deviation) {
       p.value = before.mean;
       p.standard_error = before.deviation;
     }
     p.left_of_prior = p.standard_error / before.deviation;
   }
   if (std::ranges::all_of(found.motion.parameters, [](const simulation::CalibratedParameter& p) {
-        return p.left_of_prior >= simulation::kUntold;
+        return p.left_of_prior >= simulation::kUnidentifiable;
       }))
     return core::invalid_input(
         dataset.table_file().string() +

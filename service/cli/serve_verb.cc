@@ -49,11 +49,11 @@ Verb add_serve_verb(CLI::App& app) {
       ->required();
   verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)")
       ->check(file_name());
-  verb->add_option("--question-seconds", options->settings.desk.default_seconds,
+  verb->add_option("--question-seconds", options->settings.worker.default_seconds,
                    "Time that a question without limits of its own may take, s")
       ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();
-  verb->add_option("--most-question-seconds", options->settings.desk.most_seconds,
+  verb->add_option("--most-question-seconds", options->settings.worker.most_seconds,
                    "Time that any question may take, s; they are answered one after the other")
       ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();

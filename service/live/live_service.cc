@@ -14,9 +14,9 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
-#include "prescene/service/live/answering_desk.h"
 #include "prescene/service/live/inbox.h"
 #include "prescene/service/live/log_limiter.h"
+#include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
 
 namespace prescene::service {
@@ -129,7 +129,7 @@ struct LiveService::Impl {
   bool was_tracking = false;
   bool was_degraded = false;
   bool told_why_not = false;
-  std::mutex answered_mutex;  // guards what the desk hands over to the recording
+  std::mutex answered_mutex;  // guards what the worker hands over to the recording
   std::vector<std::string> answered;
   std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
   std::string last_failure;
@@ -138,11 +138,11 @@ struct LiveService::Impl {
 
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
-  std::unique_ptr<AnsweringDesk> desk;
+  std::unique_ptr<QueryWorker> worker;
 
   ~Impl() {
-    if (node) node->stop_receiving();  // no more questions for the desk,
-    desk.reset();                      // no more answers for the bus
+    if (node) node->stop_receiving();  // no more questions for the worker,
+    worker.reset();                    // no more answers for the bus
   }
 };
 
@@ -165,8 +165,8 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
     raw->answered.push_back(answer);
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
-  impl->desk = std::make_unique<AnsweringDesk>(
-      backends, std::max(1, backends.pool().threads() - 1), settings.desk, [raw] { return raw->tracker->belief(); },
+  impl->worker = std::make_unique<QueryWorker>(
+      backends, std::max(1, backends.pool().threads() - 1), settings.worker, [raw] { return raw->tracker->belief(); },
       on_answer);
   PRESCENE_RETURN_IF_ERROR(impl->join_bus());
   return std::unique_ptr<LiveService>(new LiveService(std::move(impl)));
@@ -189,7 +189,7 @@ core::Status LiveService::Impl::join_bus() {
     try {
       auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
       if (question)
-        desk->ask((*std::move(question)).data);
+        worker->ask((*std::move(question)).data);
       else
         ++unreadable_questions;
     } catch (const std::exception&) {
@@ -341,7 +341,7 @@ ServiceHealth LiveService::Impl::health() const {
   health.dropped_controls = tracker->dropped_controls();
   health.is_recording = recording != nullptr;
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
-  health.questions = desk->counts();
+  health.questions = worker->counts();
   health.unreadable_questions = unreadable_questions;
   health.failures = failures;
   health.last_failure = last_failure;

@@ -12,7 +12,7 @@
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
-#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/query_worker.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/topics.h"
 

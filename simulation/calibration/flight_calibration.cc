@@ -17,7 +17,7 @@
 #include "observed_flight.h"
 #include "prescene/core/order_statistics.h"
 #include "prescene/geometry/dense_solvers.h"
-#include "prescene/simulation/calibration/keep_untold.h"
+#include "prescene/simulation/calibration/keep_prior.h"
 
 namespace prescene::simulation {
 namespace {
@@ -86,7 +86,7 @@ class FlightFit {
     mean.segment<3>(3) = prior_.gravity_W;
     Eigen::VectorXd values = Eigen::Map<const Parameters>(values_.data());
     Eigen::MatrixXd errors = covariance();
-    keep_untold(mean, deviations_, &values, &errors);
+    keep_prior(mean, deviations_, &values, &errors);
     FlightCalibration found;
     found.center_of_mass = values.head<3>();
     found.gravity_W = values.segment<3>(3);

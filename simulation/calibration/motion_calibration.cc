@@ -15,7 +15,7 @@
 #include "motion_judge.h"
 #include "prescene/belief/validation.h"
 #include "prescene/simulation/calibration/evolution_search.h"
-#include "prescene/simulation/calibration/keep_untold.h"
+#include "prescene/simulation/calibration/keep_prior.h"
 #include "varied_parameters.h"
 
 namespace prescene::simulation {
@@ -126,16 +126,16 @@ std::vector<CalibratedParameter> told(const Estimate& estimate, const VariedPara
     if (is_center(static_cast<MotionParameter>(k))) least = least_center_error(position_noise);
     covariance(i, i) = std::max(covariance(i, i), least * least);
   }
-  keep_untold(mean, deviation, &value, &covariance);
+  keep_prior(mean, deviation, &value, &covariance);
   std::vector<CalibratedParameter> all;
   const std::vector<EstimatedParameter> estimated = varied.estimated({});
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto place = static_cast<std::size_t>(i);
     const double error = std::sqrt(covariance(i, i));
     // What is told hardly more than that may end beyond what can be.
-    const bool untold = error >= kUntold * deviation[i];
+    const bool unidentifiable = error >= kUnidentifiable * deviation[i];
     all.push_back({static_cast<MotionParameter>(varied.free()[place]),
-                   untold ? value[i] : std::clamp(value[i], estimated[place].low, estimated[place].high), error,
+                   unidentifiable ? value[i] : std::clamp(value[i], estimated[place].low, estimated[place].high), error,
                    error / deviation[i]});
   }
   return all;
@@ -185,10 +185,10 @@ belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCali
   const double infinity = std::numeric_limits<double>::infinity();
   const belief::ContactProperties before = model.contact;
   for (const CalibratedParameter& p : found.parameters) {
-    const bool untold = p.left_of_prior >= kUntold;
+    const bool unidentifiable = p.left_of_prior >= kUnidentifiable;
     const auto fitted = [&](const ScalarDistribution& prior, double low, double high) {
       // A distribution that nothing is told of stays what it is, whatever its form.
-      if (untold && belief::variance(prior) > 0.0) return prior;
+      if (unidentifiable && belief::variance(prior) > 0.0) return prior;
       return ScalarDistribution(belief::NormalScalar{p.value, p.standard_error, low, high});
     };
     switch (p.parameter) {
@@ -202,10 +202,11 @@ belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCali
         model.contact.restitution = fitted(before.restitution, 0.0, 1.0);
         break;
       case MotionParameter::kInertiaSize:
-        if (!untold) model.unit_inertia *= std::exp(p.value);
+        if (!unidentifiable) model.unit_inertia *= std::exp(p.value);
         break;
       case MotionParameter::kEdgeRadius:
-        if (!untold) model.contact.edge_radius = std::clamp(p.value, 0.0, belief::thinnest_half(model.collision));
+        if (!unidentifiable)
+          model.contact.edge_radius = std::clamp(p.value, 0.0, belief::thinnest_half(model.collision));
         break;
       case MotionParameter::kCenterOfMassX:
         model.center_of_mass.x = fitted(model.center_of_mass.x, -infinity, infinity);

@@ -97,9 +97,9 @@ TEST(MeshInspection, HollowThingsKeepTheirHollowUnlessSomebodyChoosesOtherwise) 
     EXPECT_TRUE(model.ok()) << model.status().message();
     return std::get<belief::MeshShape>(model->collision[0]).use;
   };
-  std::string untold, chosen, spheres;
-  EXPECT_EQ(use_of({}, &untold), belief::MeshUse::kSpheres);
-  EXPECT_THAT(untold, testing::HasSubstr("76 % of its convex hull is hollow: in a scene it collides as spheres"));
+  std::string by_default, chosen, spheres;
+  EXPECT_EQ(use_of({}, &by_default), belief::MeshUse::kSpheres);
+  EXPECT_THAT(by_default, testing::HasSubstr("76 % of its convex hull is hollow: in a scene it collides as spheres"));
   EXPECT_EQ(use_of(belief::MeshUse::kConvexHull, &chosen), belief::MeshUse::kConvexHull);
   EXPECT_THAT(chosen, testing::HasSubstr("with use: convex_hull nothing gets into that"));
   EXPECT_EQ(use_of(belief::MeshUse::kSpheres, &spheres), belief::MeshUse::kSpheres);

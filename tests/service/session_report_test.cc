@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "desk_fixture.h"
+#include "query_worker_fixture.h"
 #include "tests/support/paths.h"
 
 namespace prescene::service {

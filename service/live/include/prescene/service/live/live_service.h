@@ -11,7 +11,7 @@
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/dds/dds_node.h"
-#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/query_worker.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/tracker.h"
 
@@ -20,7 +20,7 @@ namespace prescene::service {
 struct LiveSettings {
   TrackerSettings tracker;
   interfaces::DdsOptions dds;
-  DeskSettings desk;
+  QueryWorkerSettings worker;
   double marker_rate = 5.0;  ///< Markers a second, at most.
   double diagnostics_rate = 1.0;
 };

@@ -11,7 +11,7 @@
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/backends.h"
-#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/query_worker.h"
 
 namespace prescene::service {
 
@@ -28,7 +28,7 @@ struct ServiceHealth {
   /// Of whose messages the newest is all that counts: dropping others is no loss.
   std::vector<std::string> image_topics;
   std::uint64_t lost_on_bus = 0;  ///< Samples that reached this process and were never read.
-  DeskCounts questions;
+  QueryCounts questions;
   std::uint64_t unreadable_questions = 0;  ///< Messages on the topic of questions that hold no text.
   std::uint64_t unsent = 0;          ///< Messages of ours that the middleware did not take: a reader does not keep up.
   std::uint64_t failures = 0;        ///< Messages and frames that ended in an exception and were left out.

@@ -100,8 +100,8 @@ double least_center_error(double position_noise);
 /// be off for the same reason, such as noise of frames that both use, instead of independently. Between `after` and
 /// sqrt(2) times that. Takes 0 < after; returns `after` where it is not less than `before`.
 double error_of_shared_frames(double before, double after);
-/// A copy of the model with the values as means and the errors as deviations; what is untold stays as it is, plain
-/// numbers with the prior's deviation.
+/// A copy of the model with the values as means and the errors as deviations; what is unidentifiable stays as it is,
+/// plain numbers with the prior's deviation.
 belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCalibration& found);
 
 /// Least number of recordings for so many free parameters.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/simulation/calibration/keep_untold.h"
+#include "prescene/simulation/calibration/keep_prior.h"
 
 #include <cmath>
 #include <vector>
@@ -23,23 +23,23 @@ void set_error(MatrixXd* covariance, Index i, double deviation) {
 
 }  // namespace
 
-void keep_untold(const VectorXd& prior_mean, const VectorXd& prior_deviation, VectorXd* value, MatrixXd* covariance) {
-  std::vector<Index> untold;
+void keep_prior(const VectorXd& prior_mean, const VectorXd& prior_deviation, VectorXd* value, MatrixXd* covariance) {
+  std::vector<Index> unidentifiable;
   for (Index i = 0; i < value->size(); ++i)
-    if (!(std::sqrt((*covariance)(i, i)) < kUntold * prior_deviation[i])) untold.push_back(i);
-  if (untold.empty()) return;
-  const auto count = static_cast<Index>(untold.size());
+    if (!(std::sqrt((*covariance)(i, i)) < kUnidentifiable * prior_deviation[i])) unidentifiable.push_back(i);
+  if (unidentifiable.empty()) return;
+  const auto count = static_cast<Index>(unidentifiable.size());
   VectorXd back(count);
   MatrixXd own(count, count);
   MatrixXd across(value->size(), count);
   for (Index a = 0; a < count; ++a) {
-    const Index i = untold[static_cast<std::size_t>(a)];
+    const Index i = unidentifiable[static_cast<std::size_t>(a)];
     back[a] = prior_mean[i] - (*value)[i];
     across.col(a) = covariance->col(i);
-    for (Index b = 0; b < count; ++b) own(a, b) = (*covariance)(i, untold[static_cast<std::size_t>(b)]);
+    for (Index b = 0; b < count; ++b) own(a, b) = (*covariance)(i, unidentifiable[static_cast<std::size_t>(b)]);
   }
   *value += across * geometry::solve_symmetric(own, back);
-  for (const Index i : untold) {
+  for (const Index i : unidentifiable) {
     (*value)[i] = prior_mean[i];
     set_error(covariance, i, prior_deviation[i]);
   }

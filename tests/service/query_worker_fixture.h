@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A desk over a belief of one box, whose answers are kept.
+// A worker over a belief of one box, whose answers are kept.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/query_worker.h"
 #include "prescene/service/load_scene.h"
 
 namespace prescene::tests {
@@ -47,15 +47,16 @@ inline std::shared_ptr<belief::Belief> belief_of(const char* scene_text) {
 }
 
 /// Keeps the answers and waits for them.
-class Desk {
+class WorkerUnderTest {
  public:
   using Snapshot = std::function<std::shared_ptr<const belief::Belief>()>;
 
   /// `before` is called with each answer before it is kept.
-  explicit Desk(const service::DeskSettings& settings, std::shared_ptr<const belief::Belief> belief = {},
-                const Snapshot& snapshot = {}, const service::AnswerSink& before = {})
+  explicit WorkerUnderTest(const service::QueryWorkerSettings& settings,
+                           std::shared_ptr<const belief::Belief> belief = {}, const Snapshot& snapshot = {},
+                           const service::AnswerSink& before = {})
       : pool_(2), backends_(pool_), belief_(belief ? std::move(belief) : belief_of(kBoxScene)) {
-    desk_ = std::make_unique<service::AnsweringDesk>(
+    worker_ = std::make_unique<service::QueryWorker>(
         backends_, 1, settings, snapshot ? snapshot : [this] { return belief_; },
         [this, before](const std::string& answer) {
           if (before) before(answer);
@@ -65,11 +66,11 @@ class Desk {
         });
   }
 
-  void ask(const std::string& question) { desk_->ask(question); }
+  void ask(const std::string& question) { worker_->ask(question); }
   /// All of them before any answer that comes meanwhile can be handed over; `then` is called before it can, too.
   void ask_at_once(const std::vector<std::string>& questions, const std::function<void()>& then = {}) {
     const std::lock_guard lock(mutex_);
-    for (const std::string& question : questions) desk_->ask(question);
+    for (const std::string& question : questions) worker_->ask(question);
     if (then) then();
   }
   std::vector<std::string> answers(std::size_t count) {
@@ -83,7 +84,7 @@ class Desk {
     changed_.wait_for(lock, patience, [&] { return answers_.size() >= count; });
     return answers_;
   }
-  service::DeskCounts counts() const { return desk_->counts(); }
+  service::QueryCounts counts() const { return worker_->counts(); }
 
  private:
   core::ThreadPool pool_;
@@ -92,7 +93,7 @@ class Desk {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::string> answers_;
-  std::unique_ptr<service::AnsweringDesk> desk_;  // last: its threads end first
+  std::unique_ptr<service::QueryWorker> worker_;  // last: its threads end first
 };
 
 }  // namespace prescene::tests

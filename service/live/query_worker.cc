@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/query_worker.h"
 
 #include <algorithm>
 #include <exception>
@@ -29,7 +29,7 @@ core::Cancellation::Clock::time_point deadline_after(double seconds) {
 }
 
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
-void bound_effort(belief::Query& query, const DeskSettings& settings) {
+void bound_effort(belief::Query& query, const QueryWorkerSettings& settings) {
   const auto bound = [&settings](belief::Effort& effort) {
     if (!effort.exact_instances)
       effort.max_seconds = std::min(effort.max_seconds.value_or(settings.default_seconds), settings.most_seconds);
@@ -51,8 +51,8 @@ std::string error_answer(const std::string& id, const core::Status& error) {
   return belief::json_text(answer);
 }
 
-AnsweringDesk::AnsweringDesk(Backends& backends, int threads, const DeskSettings& settings,
-                             std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
+QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
+                         std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
     : backends_(backends),
       pool_(threads),
       settings_(settings),
@@ -61,7 +61,7 @@ AnsweringDesk::AnsweringDesk(Backends& backends, int threads, const DeskSettings
       reader_([this] { read_questions(); }),
       simulator_([this] { simulate_questions(); }) {}
 
-AnsweringDesk::~AnsweringDesk() {
+QueryWorker::~QueryWorker() {
   {
     const std::lock_guard lock(mutex_);
     stop_.request();
@@ -72,12 +72,12 @@ AnsweringDesk::~AnsweringDesk() {
   simulator_.join();
 }
 
-DeskCounts AnsweringDesk::counts() const {
+QueryCounts QueryWorker::counts() const {
   const std::lock_guard lock(mutex_);
   return counts_;
 }
 
-void AnsweringDesk::ask(std::string question_json) {
+void QueryWorker::ask(std::string question_json) {
   try {
     take(std::move(question_json));
   } catch (const std::exception&) {
@@ -85,7 +85,7 @@ void AnsweringDesk::ask(std::string question_json) {
   }
 }
 
-void AnsweringDesk::take(std::string question_json) {
+void QueryWorker::take(std::string question_json) {
   const std::size_t bytes = std::min(question_json.size(), kLongestQuestion + 1);
   const bool may_have_id = question_json.size() <= kLongestWithId;
   if (question_json.size() > bytes) {  // what is longer is refused by the reader, and need not be kept
@@ -111,7 +111,7 @@ void AnsweringDesk::take(std::string question_json) {
   read_changed_.notify_one();
 }
 
-void AnsweringDesk::read_questions() {
+void QueryWorker::read_questions() {
   for (bool refusals_first = false;; refusals_first = !refusals_first) {
     std::string question, id;
     bool is_refusal = false;
@@ -141,7 +141,7 @@ void AnsweringDesk::read_questions() {
   }
 }
 
-void AnsweringDesk::read(const std::string& question_json) {
+void QueryWorker::read(const std::string& question_json) {
   std::string id;
   try {
     if (question_json.size() > kLongestQuestion)
@@ -180,7 +180,7 @@ void AnsweringDesk::read(const std::string& question_json) {
   }
 }
 
-void AnsweringDesk::simulate_questions() {
+void QueryWorker::simulate_questions() {
   for (;;) {
     std::shared_ptr<const belief::Query> query;
     {
@@ -195,7 +195,7 @@ void AnsweringDesk::simulate_questions() {
   }
 }
 
-void AnsweringDesk::answer(const belief::Query& query) {
+void QueryWorker::answer(const belief::Query& query) {
   const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
     const std::lock_guard lock(mutex_);
@@ -207,14 +207,14 @@ void AnsweringDesk::answer(const belief::Query& query) {
     if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
       return refuse(query.id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
                                                        " MiB, more than clients take: ask for less at a time"));
-    send(reply.text, reply.is_answer ? &DeskCounts::answered : &DeskCounts::refused);
+    send(reply.text, reply.is_answer ? &QueryCounts::answered : &QueryCounts::refused);
   } catch (const std::exception&) {
     finish();
     refuse_after_exception(query.id, "the question could not be answered");
   }
 }
 
-AnsweringDesk::Reply AnsweringDesk::reply_to(const belief::Query& query) {
+QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query) {
   queries::QueryContext context = backends_.query_context(pool_);
   const core::Cancellation end(stop_, deadline_after(settings_.most_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
@@ -227,15 +227,15 @@ AnsweringDesk::Reply AnsweringDesk::reply_to(const belief::Query& query) {
   return {belief::json_text(belief::to_json(answer)), answer.what.index() > 0};
 }
 
-void AnsweringDesk::refuse(const std::string& id, const core::Status& reason) {
+void QueryWorker::refuse(const std::string& id, const core::Status& reason) {
   try {
-    send(error_answer(id, reason), &DeskCounts::refused);
+    send(error_answer(id, reason), &QueryCounts::refused);
   } catch (const std::exception&) {
     drop();
   }
 }
 
-void AnsweringDesk::refuse_after_exception(const std::string& id, const char* doing) {
+void QueryWorker::refuse_after_exception(const std::string& id, const char* doing) {
   try {
     refuse(id, note_exception(doing));
   } catch (const std::exception&) {
@@ -243,7 +243,7 @@ void AnsweringDesk::refuse_after_exception(const std::string& id, const char* do
   }
 }
 
-void AnsweringDesk::send(const std::string& answer, std::uint64_t DeskCounts::*fate) {
+void QueryWorker::send(const std::string& answer, std::uint64_t QueryCounts::*fate) {
   // Counted before: whoever has the answer finds it counted.
   {
     const std::lock_guard lock(mutex_);
@@ -260,7 +260,7 @@ void AnsweringDesk::send(const std::string& answer, std::uint64_t DeskCounts::*f
   }
 }
 
-void AnsweringDesk::drop() {
+void QueryWorker::drop() {
   try {
     static_cast<void>(note_exception("no answer could be sent"));
   } catch (const std::exception&) {  // no memory for its text, either
@@ -269,7 +269,7 @@ void AnsweringDesk::drop() {
   ++counts_.unanswered;
 }
 
-core::Status AnsweringDesk::note_exception(const char* doing) {
+core::Status QueryWorker::note_exception(const char* doing) {
   try {
     throw;
   } catch (const std::bad_alloc&) {

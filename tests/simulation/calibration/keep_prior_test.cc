@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/simulation/calibration/keep_untold.h"
+#include "prescene/simulation/calibration/keep_prior.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using simulation::keep_untold;
+using simulation::keep_prior;
 
 VectorXd vector(double a, double b, double c) {
   VectorXd v(3);
@@ -19,26 +19,26 @@ VectorXd vector(double a, double b, double c) {
   return v;
 }
 
-TEST(KeepUntold, LeavesWhatIsTold) {
+TEST(KeepPrior, LeavesWhatIsTold) {
   const MatrixXd before = vector(0.04, 0.01, 0.5).asDiagonal();
   VectorXd value = vector(1.0, 2.0, 3.0);
   MatrixXd covariance = before;
-  keep_untold(vector(0.0, 0.0, 0.0), vector(1.0, 1.0, 1.0), &value, &covariance);
+  keep_prior(vector(0.0, 0.0, 0.0), vector(1.0, 1.0, 1.0), &value, &covariance);
   EXPECT_EQ(value, vector(1.0, 2.0, 3.0));
   EXPECT_EQ(covariance, before);
 }
 
-TEST(KeepUntold, GivesPriorsBackToTheBit) {
+TEST(KeepPrior, GivesPriorsBackToTheBit) {
   VectorXd value = vector(1.0, 0.13, 3.0);
   MatrixXd covariance = vector(0.04, 0.0225 * 1.08, 0.99).asDiagonal();
-  keep_untold(vector(0.1, 0.7, -0.3), vector(1.0, 0.15, 1.0), &value, &covariance);
+  keep_prior(vector(0.1, 0.7, -0.3), vector(1.0, 0.15, 1.0), &value, &covariance);
   EXPECT_EQ(value, vector(1.0, 0.7, -0.3));
   EXPECT_EQ(std::sqrt(covariance(1, 1)), 0.15);
   EXPECT_EQ(std::sqrt(covariance(2, 2)), 1.0);
   EXPECT_EQ(covariance(0, 0), 0.04);
 }
 
-TEST(KeepUntold, OthersMoveAsIfItHadBeenKnown) {
+TEST(KeepPrior, OthersMoveAsIfItHadBeenKnown) {
   // Two measurements of sums, one of them next to nothing of b: the estimate with b at its prior's mean is the one of
   // least squares in which b is that.
   MatrixXd A(4, 3);
@@ -51,7 +51,7 @@ TEST(KeepUntold, OthersMoveAsIfItHadBeenKnown) {
   VectorXd value = covariance * A.transpose() * y;
   ASSERT_GT(std::sqrt(covariance(1, 1)), 0.9);
   const double error = std::sqrt(covariance(0, 0));
-  keep_untold(prior_mean, deviation, &value, &covariance);
+  keep_prior(prior_mean, deviation, &value, &covariance);
   EXPECT_EQ(value[1], 0.0);
   MatrixXd rest(4, 2);
   rest << A.col(0), A.col(2);

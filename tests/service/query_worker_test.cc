@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/live/answering_desk.h"
+#include "prescene/service/live/query_worker.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,23 +10,23 @@
 #include <stdexcept>
 #include <thread>
 
-#include "desk_fixture.h"
 #include "prescene/core/utf8.h"
 #include "prescene/service/outside_json.h"
+#include "query_worker_fixture.h"
 #include "tests/support/allocations.h"
 
 namespace prescene::service {
 namespace {
 
 using ::testing::HasSubstr;
-using tests::Desk;
+using tests::WorkerUnderTest;
 
-/// Goes on until the desk's limit, or for ever where there is none.
+/// Goes on until the worker's limit, or for ever where there is none.
 constexpr const char* kLong = R"({"id": "long", "predict": {"effort": {"exact_instances": 4000000}}})";
 
 /// The long question is not refused for its memory.
-DeskSettings limited_to(double most_seconds) {
-  DeskSettings settings;
+QueryWorkerSettings limited_to(double most_seconds) {
+  QueryWorkerSettings settings;
   settings.most_seconds = most_seconds;
   settings.most_bytes = std::size_t{1} << 40;
   return settings;
@@ -40,11 +40,11 @@ nlohmann::ordered_json without_times(const std::string& answer) {
   return document;
 }
 
-TEST(AnsweringDesk, NoQuestionKeepsTheOthersWaitingForEver) {
-  Desk desk(limited_to(0.2));
-  desk.ask(kLong);
-  desk.ask(R"({"id": "short", "stability": {"object": "box"}})");
-  const std::vector<std::string> answers = desk.answers(2);
+TEST(QueryWorker, NoQuestionKeepsTheOthersWaitingForEver) {
+  WorkerUnderTest worker(limited_to(0.2));
+  worker.ask(kLong);
+  worker.ask(R"({"id": "short", "stability": {"object": "box"}})");
+  const std::vector<std::string> answers = worker.answers(2);
   EXPECT_EQ(id_of(answers[0]), "long");
   const auto cut = parse_or_discard(answers[0]);
   if (cut.contains("predict")) {
@@ -54,105 +54,105 @@ TEST(AnsweringDesk, NoQuestionKeepsTheOthersWaitingForEver) {
   EXPECT_TRUE(answers[1].find("stable") != std::string::npos);
 }
 
-TEST(AnsweringDesk, WhereIsAnsweredWhileAnotherQuestionIsSimulatedForEver) {
-  Desk desk(limited_to(1e5));
-  desk.ask(kLong);
-  for (int i = 0; i < 20; ++i) desk.ask(R"({"id": "w)" + std::to_string(i) + R"(", "where": {}})");
-  const std::vector<std::string> answers = desk.answers(20);
+TEST(QueryWorker, WhereIsAnsweredWhileAnotherQuestionIsSimulatedForEver) {
+  WorkerUnderTest worker(limited_to(1e5));
+  worker.ask(kLong);
+  for (int i = 0; i < 20; ++i) worker.ask(R"({"id": "w)" + std::to_string(i) + R"(", "where": {}})");
+  const std::vector<std::string> answers = worker.answers(20);
   for (std::size_t i = 0; i < answers.size(); ++i) EXPECT_EQ(id_of(answers[i]), "w" + std::to_string(i));
-  EXPECT_EQ(desk.counts().answered, 20u);
-  // Here the desk is torn down: the question under way ends with it.
+  EXPECT_EQ(worker.counts().answered, 20u);
+  // Here the worker is torn down: the question under way ends with it.
 }
 
-TEST(AnsweringDesk, AnswersAreThoseOfADeskThatIsAskedNothingElse) {
+TEST(QueryWorker, AnswersAreThoseOfAWorkerThatIsAskedNothingElse) {
   const auto ask = [](bool others) {
-    Desk desk(limited_to(1e5));
+    WorkerUnderTest worker(limited_to(1e5));
     std::vector<std::string> questions;
     if (others) questions.assign(10, R"({"where": {}})");
     questions.push_back(R"({"id": "q", "predict": {"effort": {"exact_instances": 100}}})");
     if (others) questions.insert(questions.end(), 10, R"({"where": {"object": "box"}})");
-    desk.ask_at_once(questions);
-    for (const std::string& answer : desk.answers(questions.size()))
+    worker.ask_at_once(questions);
+    for (const std::string& answer : worker.answers(questions.size()))
       if (id_of(answer) == "q") return without_times(answer);
     return nlohmann::ordered_json();
   };
   EXPECT_EQ(ask(false), ask(true));
 }
 
-TEST(AnsweringDesk, QuestionsThatFindNoRoomAreRefusedOrCounted) {
-  DeskSettings settings = limited_to(1e5);
+TEST(QueryWorker, QuestionsThatFindNoRoomAreRefusedOrCounted) {
+  QueryWorkerSettings settings = limited_to(1e5);
   settings.max_waiting = 2;
   settings.max_unread = 4;
-  Desk desk(settings);
-  desk.ask(kLong);
+  WorkerUnderTest worker(settings);
+  worker.ask(kLong);
   constexpr std::uint64_t kAsked = 3000;
   std::vector<std::string> flood;
   for (std::uint64_t i = 1; i < kAsked; ++i)
     flood.push_back(R"({"id": ")" + std::to_string(i) + R"(", "stability": {"object": "box"}})");
-  desk.ask_at_once(flood);
+  worker.ask_at_once(flood);
   // One is simulated and two wait, or, where the flood came before the first one was taken, one more finds no room;
   // every other is refused or counted.
-  while (desk.counts().refused + desk.counts().unanswered < kAsked - 3) std::this_thread::yield();
-  const DeskCounts counts = desk.counts();
+  while (worker.counts().refused + worker.counts().unanswered < kAsked - 3) std::this_thread::yield();
+  const QueryCounts counts = worker.counts();
   EXPECT_EQ(counts.answered, 0u);
   EXPECT_LE(counts.refused + counts.unanswered, kAsked - 2);
   EXPECT_GT(counts.refused, 0u);
-  for (const std::string& answer : desk.answers(counts.refused)) {
+  for (const std::string& answer : worker.answers(counts.refused)) {
     EXPECT_THAT(answer, HasSubstr(kQuestionsWait));
     EXPECT_NE(id_of(answer), "");
   }
 }
 
-TEST(AnsweringDesk, LongQuestionsDoNotFillTheMemoryBeforeTheyAreRead) {
-  Desk desk({});
+TEST(QueryWorker, LongQuestionsDoNotFillTheMemoryBeforeTheyAreRead) {
+  WorkerUnderTest worker({});
   const std::string huge = R"({"id": "h", "where": {"object": ")" + std::string(std::size_t{30} << 20, 'x') + "\"}}";
-  for (int i = 0; i < 3; ++i) desk.ask(huge);
-  for (const std::string& answer : desk.answers(3)) EXPECT_THAT(answer, HasSubstr("longer than 1048576 bytes"));
-  EXPECT_EQ(desk.counts().refused, 3u);
+  for (int i = 0; i < 3; ++i) worker.ask(huge);
+  for (const std::string& answer : worker.answers(3)) EXPECT_THAT(answer, HasSubstr("longer than 1048576 bytes"));
+  EXPECT_EQ(worker.counts().refused, 3u);
 }
 
-TEST(AnsweringDesk, OfALongQuestionThatWaitsItsBeginningIsKeptOnly) {
-  Desk desk({});
+TEST(QueryWorker, OfALongQuestionThatWaitsItsBeginningIsKeptOnly) {
+  WorkerUnderTest worker({});
   const std::string huge(std::size_t{30} << 20, 'x');
   const std::vector<std::string> questions(3, huge);
   const std::uint64_t before = tests::heap_bytes();  // 0 under sanitizers
   std::uint64_t waiting = 0;
-  desk.ask_at_once(questions, [&] { waiting = tests::heap_bytes(); });
-  desk.answers(3);
+  worker.ask_at_once(questions, [&] { waiting = tests::heap_bytes(); });
+  worker.answers(3);
   EXPECT_LT(waiting, before + huge.size());
 }
 
-TEST(AnsweringDesk, AnExceptionEndsNeitherThread) {
+TEST(QueryWorker, AnExceptionEndsNeitherThread) {
   std::atomic<bool> broken{true};
   const auto belief = tests::belief_of(tests::kBoxScene);
-  Desk desk(limited_to(0.2), belief, [&]() -> std::shared_ptr<const belief::Belief> {
+  WorkerUnderTest worker(limited_to(0.2), belief, [&]() -> std::shared_ptr<const belief::Belief> {
     if (broken) throw std::runtime_error("the belief is not there");
     return belief;
   });
   const std::vector<std::string> questions = {R"({"id": "a", "where": {}})",
                                               R"({"id": "b", "stability": {"object": "box"}})"};
-  for (const std::string& question : questions) desk.ask(question);
-  for (const std::string& answer : desk.answers(2)) EXPECT_THAT(answer, HasSubstr("the belief is not there"));
-  EXPECT_EQ(desk.counts().failed, 2u);
-  EXPECT_EQ(desk.counts().last_failure, "the belief is not there");
+  for (const std::string& question : questions) worker.ask(question);
+  for (const std::string& answer : worker.answers(2)) EXPECT_THAT(answer, HasSubstr("the belief is not there"));
+  EXPECT_EQ(worker.counts().failed, 2u);
+  EXPECT_EQ(worker.counts().last_failure, "the belief is not there");
   broken = false;
-  for (const std::string& question : questions) desk.ask(question);
-  desk.answers(4);
-  EXPECT_EQ(desk.counts().answered, 2u);
+  for (const std::string& question : questions) worker.ask(question);
+  worker.answers(4);
+  EXPECT_EQ(worker.counts().answered, 2u);
 }
 
 /// Of questions that neither wait nor are worked on.
-std::uint64_t settled(const DeskCounts& counts) {
+std::uint64_t settled(const QueryCounts& counts) {
   return counts.answered + counts.refused + counts.unanswered + counts.repeated;
 }
 
-TEST(AnsweringDesk, EachQuestionIsCountedOnceWhateverBecomesOfIt) {
+TEST(QueryWorker, EachQuestionIsCountedOnceWhateverBecomesOfIt) {
   // What is not handed over, for want of memory or by a bug, is told by its id.
   const auto before = [](const std::string& answer) {
     if (id_of(answer).starts_with("memory")) throw std::bad_alloc();
     if (id_of(answer).starts_with("bug")) throw std::runtime_error("the bus is gone");
   };
-  Desk desk(limited_to(0.05), {}, {}, before);
+  WorkerUnderTest worker(limited_to(0.05), {}, {}, before);
   const std::vector<std::string> questions = {R"({"id": "good", "where": {}})",
                                               R"({"id": "memory 1", "where": {}})",
                                               R"({"id": "bug 1", "where": {}})",
@@ -161,12 +161,12 @@ TEST(AnsweringDesk, EachQuestionIsCountedOnceWhateverBecomesOfIt) {
                                               R"({"id": "bug 2", "wher": {}})",
                                               R"({"id": "bug 3", "stability": {"object": "box"}})",
                                               "not JSON"};
-  for (const std::string& question : questions) desk.ask(question);
-  while (settled(desk.counts()) < questions.size()) std::this_thread::yield();
+  for (const std::string& question : questions) worker.ask(question);
+  while (settled(worker.counts()) < questions.size()) std::this_thread::yield();
   // The last one may just be on its way.
-  ASSERT_EQ(desk.answers(3).size(), 3u);
-  while (desk.counts().unanswered < 5) std::this_thread::yield();
-  const DeskCounts counts = desk.counts();
+  ASSERT_EQ(worker.answers(3).size(), 3u);
+  while (worker.counts().unanswered < 5) std::this_thread::yield();
+  const QueryCounts counts = worker.counts();
   EXPECT_EQ(counts.answered, 1u);
   EXPECT_EQ(counts.refused, 2u);
   EXPECT_EQ(counts.unanswered, 5u);
@@ -176,65 +176,66 @@ TEST(AnsweringDesk, EachQuestionIsCountedOnceWhateverBecomesOfIt) {
   EXPECT_GT(counts.last_failure_ns, 0);
 }
 
-TEST(AnsweringDesk, WhereMemoryEndsAQuestionIsRefusedAndNoBugCounted) {
-  Desk desk(limited_to(0.05), {}, []() -> std::shared_ptr<const belief::Belief> { throw std::bad_alloc(); });
-  desk.ask(R"({"id": "a", "where": {}})");
-  desk.ask(R"({"id": "b", "stability": {"object": "box"}})");
-  for (const std::string& answer : desk.answers(2)) EXPECT_THAT(answer, HasSubstr("resource_exhausted"));
-  EXPECT_EQ(desk.counts().refused, 2u);
-  EXPECT_EQ(desk.counts().failed, 0u);
+TEST(QueryWorker, WhereMemoryEndsAQuestionIsRefusedAndNoBugCounted) {
+  WorkerUnderTest worker(limited_to(0.05), {},
+                         []() -> std::shared_ptr<const belief::Belief> { throw std::bad_alloc(); });
+  worker.ask(R"({"id": "a", "where": {}})");
+  worker.ask(R"({"id": "b", "stability": {"object": "box"}})");
+  for (const std::string& answer : worker.answers(2)) EXPECT_THAT(answer, HasSubstr("resource_exhausted"));
+  EXPECT_EQ(worker.counts().refused, 2u);
+  EXPECT_EQ(worker.counts().failed, 0u);
 }
 
-TEST(AnsweringDesk, AnotherQuestionWithAnIdThatWaitsIsRefused) {
-  Desk desk(limited_to(1e5));
-  desk.ask(kLong);
-  desk.ask(R"({"id": "a", "stability": {"object": "box"}})");
-  desk.ask(R"({"id": "a", "stability": {"object": "box", "max_move": 0.5}})");
-  EXPECT_THAT(desk.answers(1).back(), HasSubstr("choose another id"));
-  desk.ask(R"({"id": "long", "stability": {"object": "box"}})");
-  EXPECT_THAT(desk.answers(2).back(), HasSubstr("choose another id"));
-  desk.ask(R"({"stability": {"max_move": 0.01, "object": "box"}, "id": "a"})");  // the same again
-  desk.ask(kLong);
-  while (desk.counts().repeated < 2) std::this_thread::yield();
-  EXPECT_EQ(desk.counts().refused, 2u);
+TEST(QueryWorker, AnotherQuestionWithAnIdThatWaitsIsRefused) {
+  WorkerUnderTest worker(limited_to(1e5));
+  worker.ask(kLong);
+  worker.ask(R"({"id": "a", "stability": {"object": "box"}})");
+  worker.ask(R"({"id": "a", "stability": {"object": "box", "max_move": 0.5}})");
+  EXPECT_THAT(worker.answers(1).back(), HasSubstr("choose another id"));
+  worker.ask(R"({"id": "long", "stability": {"object": "box"}})");
+  EXPECT_THAT(worker.answers(2).back(), HasSubstr("choose another id"));
+  worker.ask(R"({"stability": {"max_move": 0.01, "object": "box"}, "id": "a"})");  // the same again
+  worker.ask(kLong);
+  while (worker.counts().repeated < 2) std::this_thread::yield();
+  EXPECT_EQ(worker.counts().refused, 2u);
 }
 
-TEST(AnsweringDesk, AnIdThatIsNotUtf8IsRefusedAndTheAnswerIsText) {
-  Desk desk({});
-  desk.ask("{\"id\": \"\xff\", \"where\": {}}");
-  const std::vector<std::string> answers = desk.answers(1);
+TEST(QueryWorker, AnIdThatIsNotUtf8IsRefusedAndTheAnswerIsText) {
+  WorkerUnderTest worker({});
+  worker.ask("{\"id\": \"\xff\", \"where\": {}}");
+  const std::vector<std::string> answers = worker.answers(1);
   EXPECT_THAT(answers[0], HasSubstr("not JSON"));
   EXPECT_TRUE(core::is_utf8(answers[0]));
 }
 
-TEST(AnsweringDesk, BeforeTheFirstFrameTheSceneFileAnswers) {
-  Desk desk({});
-  desk.ask(R"({"id": "1", "where": {}})");
-  const auto answer = parse_or_discard(desk.answers(1).front());
+TEST(QueryWorker, BeforeTheFirstFrameTheSceneFileAnswers) {
+  WorkerUnderTest worker({});
+  worker.ask(R"({"id": "1", "where": {}})");
+  const auto answer = parse_or_discard(worker.answers(1).front());
   const auto covariance = answer.at("where").at("items").at(0).at("estimate").at("covariance");
   // The belief's single particle knows no turn; the scene says that any is possible.
   EXPECT_GT(covariance.at(0).at(0).get<double>(), 0.1) << answer.dump();
 }
 
-TEST(AnsweringDesk, AQuestionThatIsAskedAgainWhileItWaitsIsAnsweredOnce) {
-  Desk desk(limited_to(0.2));
+TEST(QueryWorker, AQuestionThatIsAskedAgainWhileItWaitsIsAnsweredOnce) {
+  WorkerUnderTest worker(limited_to(0.2));
   std::vector<std::string> questions = {kLong};
   questions.insert(questions.end(), 40, R"({"id": "a", "stability": {"object": "box"}})");
   questions.push_back(R"({"id": "last", "stability": {"object": "box"}})");
-  desk.ask_at_once(questions);
-  const std::vector<std::string> answers = desk.answers(3);
+  worker.ask_at_once(questions);
+  const std::vector<std::string> answers = worker.answers(3);
   ASSERT_EQ(answers.size(), 3u);
   EXPECT_EQ(id_of(answers[0]), "long");
   EXPECT_EQ(id_of(answers[1]), "a");
   EXPECT_EQ(id_of(answers[2]), "last");
 }
 
-TEST(AnsweringDesk, AQuestionThatIsNotUnderstoodIsAnsweredWithTheReason) {
-  Desk desk({});
-  desk.ask("{");
-  desk.ask(R"({"id": "deep", "where": )" + std::string(100000, '[') + std::string(100000, ']') + "}");
-  desk.ask(R"({"id": "b", "wher": {}})");
-  const std::vector<std::string> answers = desk.answers(3);
+TEST(QueryWorker, AQuestionThatIsNotUnderstoodIsAnsweredWithTheReason) {
+  WorkerUnderTest worker({});
+  worker.ask("{");
+  worker.ask(R"({"id": "deep", "where": )" + std::string(100000, '[') + std::string(100000, ']') + "}");
+  worker.ask(R"({"id": "b", "wher": {}})");
+  const std::vector<std::string> answers = worker.answers(3);
   EXPECT_THAT(answers[0], HasSubstr("not JSON"));
   EXPECT_THAT(answers[1], HasSubstr("nested deeper"));
   EXPECT_EQ(id_of(answers[2]), "b");

@@ -22,7 +22,7 @@
 
 namespace prescene::service {
 
-struct DeskSettings {
+struct QueryWorkerSettings {
   std::size_t max_waiting = 16;  ///< That have to be simulated; more are answered with an error at once.
   std::size_t max_unread = 64;   ///< Come, but not looked at yet; more are answered with an error.
   std::size_t max_unread_bytes = 4u << 20;
@@ -34,7 +34,7 @@ struct DeskSettings {
 
 /// What became of the questions since the start. Each that was asked and neither waits nor is worked on counts as
 /// answered, refused, unanswered or repeated, once.
-struct DeskCounts {
+struct QueryCounts {
   std::uint64_t answered = 0;  ///< As asked.
   std::uint64_t refused = 0;   ///< Answered with an error: not understood, not possible, or too many waited.
   /// Dropped without an answer: so many came that not even an error could be sent, or the answer could not be handed
@@ -46,25 +46,25 @@ struct DeskCounts {
   std::uint64_t failed = 0;
   std::string last_failure;          ///< What the last of these exceptions said, and when, as of
   core::TimeNs last_failure_ns = 0;  ///< core::steady_now_ns().
-  friend bool operator==(const DeskCounts&, const DeskCounts&) = default;
+  friend bool operator==(const QueryCounts&, const QueryCounts&) = default;
 };
 
 /// In the error of a question that came when too many waited.
 inline constexpr const char* kQuestionsWait = "questions wait already";
 
-/// The answer's text as JSON. Called on the desk's threads, on both at once.
+/// The answer's text as JSON. Called on the worker's threads, on both at once.
 using AnswerSink = std::function<void(const std::string& answer)>;
 
-class AnsweringDesk {
+class QueryWorker {
  public:
   /// `threads` of its own for simulating; `snapshot` gives the belief to ask, from any thread. All must outlive the
-  /// desk.
-  AnsweringDesk(Backends& backends, int threads, const DeskSettings& settings,
-                std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer);
+  /// worker.
+  QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
+              std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer);
   /// Stops what is being answered and drops what waits.
-  ~AnsweringDesk();
-  AnsweringDesk(const AnsweringDesk&) = delete;
-  AnsweringDesk& operator=(const AnsweringDesk&) = delete;
+  ~QueryWorker();
+  QueryWorker(const QueryWorker&) = delete;
+  QueryWorker& operator=(const QueryWorker&) = delete;
 
   /// Takes a question; returns at once, from any thread. One that is not understood or comes when too many wait gets an
   /// answer that says so. A question that waits to be simulated, or is being simulated, is not taken again: clients ask
@@ -72,7 +72,7 @@ class AnsweringDesk {
   /// for its own. No exception leaves it.
   void ask(std::string question_json);
 
-  DeskCounts counts() const;
+  QueryCounts counts() const;
 
  private:
   // No exception leaves these.
@@ -89,7 +89,7 @@ class AnsweringDesk {
   /// In a handler, of an exception while `doing`.
   void refuse_after_exception(const std::string& id, const char* doing);
   /// Counts the question as `fate`, and as unanswered where the answer can't be handed over.
-  void send(const std::string& answer, std::uint64_t DeskCounts::*fate);
+  void send(const std::string& answer, std::uint64_t QueryCounts::*fate);
   /// In a handler: the question got no answer, because of the exception.
   void drop();
   Reply reply_to(const belief::Query& query);
@@ -100,7 +100,7 @@ class AnsweringDesk {
 
   Backends& backends_;
   core::ThreadPool pool_;
-  DeskSettings settings_;
+  QueryWorkerSettings settings_;
   std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
   AnswerSink on_answer_;
   core::Cancellation stop_;
@@ -112,7 +112,7 @@ class AnsweringDesk {
   std::deque<std::string> too_many_;  // ids of questions that found no room
   std::deque<std::shared_ptr<const belief::Query>> waiting_;
   std::shared_ptr<const belief::Query> in_work_;  // null: none
-  DeskCounts counts_;
+  QueryCounts counts_;
 
   std::thread reader_, simulator_;  // last: they use all above
 };
