@@ -115,113 +115,139 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   }
 }
 
-void ParticleFilter::first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result) {
+struct ParticleFilter::FrameStep {
+  const FilterFrame& frame;
+  const belief::Observation& observation;
+  StepResult& result;
+  // By object.
+  std::vector<geometry::DepthImage> depths = {};  ///< What others may be hidden by.
+  std::vector<WeightReport> reports = {};
+
+  Belief& belief() const { return result.belief; }
+  const Particle& heaviest(std::size_t object) const {
+    return belief::heaviest(result.belief.objects[object].particles);
+  }
+};
+
+SearchTarget ParticleFilter::target_in(const FrameStep& step, std::size_t object) const {
+  return target_of(step.belief().objects[object], *step.belief().scene, step.frame, tools_);
+}
+
+geometry::DepthImage ParticleFilter::depth_in(const FrameStep& step, std::size_t object) const {
+  return depth_of(target_in(step, object), step.frame.X_CW * step.heaviest(object).X_WO, step.frame.terms.camera,
+                  *tools_.renderer);
+}
+
+rendering::FrameTerms ParticleFilter::terms_in(const FrameStep& step, std::size_t object,
+                                               const SearchTarget& target) const {
+  std::vector<const geometry::DepthImage*> others;
+  for (std::size_t j = 0; j < step.depths.size(); ++j)
+    if (j != object && hides_others(step.belief().objects[j])) others.push_back(&step.depths[j]);
+  const Pose X_CO = step.frame.X_CW * step.heaviest(object).X_WO;
+  return terms_for_object(step.frame, others, X_CO * target.centre(), static_cast<double>(target.mesh->radius));
+}
+
+void ParticleFilter::first_look(FrameStep& step) {
+  StepResult& result = step.result;
   const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0);
-  const FindReport report = find_in_frame(frame, observation, settings_.initialise, tools_, stream, result.belief);
+  const FindReport report =
+      find_in_frame(step.frame, step.observation, settings_.initialise, tools_, stream, result.belief);
   result.counters.looked_for = report.looked_for;
   result.counters.found = report.found;
   if (report.no_support) result.degraded |= kNoSupportFound;
   if (report.found < report.looked_for) result.degraded |= kObjectsMissing;
 }
 
-rendering::FrameTerms ParticleFilter::terms_of(const FilterFrame& frame, const Belief& belief, std::size_t object,
-                                               const SearchTarget& target,
-                                               const std::vector<geometry::DepthImage>& depths) const {
-  std::vector<const geometry::DepthImage*> others;
-  for (std::size_t j = 0; j < depths.size(); ++j)
-    if (j != object && hides_others(belief.objects[j])) others.push_back(&depths[j]);
-  const Pose X_CO = frame.X_CW * belief::heaviest(belief.objects[object].particles).X_WO;
-  return terms_for_object(frame, others, X_CO * target.centre(), static_cast<double>(target.mesh->radius));
-}
-
-void ParticleFilter::weigh_all(const FilterFrame& frame, double dt, StepResult& result,
-                               std::vector<geometry::DepthImage>& depths, std::vector<WeightReport>& reports) {
-  Belief& belief = result.belief;
+void ParticleFilter::weigh_all(FrameStep& step, double dt) {
+  const FilterFrame& frame = step.frame;
+  StepResult& result = step.result;
+  Belief& belief = step.belief();
   const core::RandomStream stream(belief.seed, core::Purpose::kProposal);
+  step.depths.clear();
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) step.depths.push_back(depth_in(step, i));
+  step.reports.resize(belief.objects.size());
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
-    const SearchTarget target = target_of(belief.objects[i], *belief.scene, frame, tools_);
-    const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
-    reports[i] = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
-                        stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
-                        {.supports = frame.surfaces.get(), .was_unseen = object.state == TrackState::kUnseen});
-    if (reports[i].all_impossible) result.degraded |= kImpossibleWeights;
-    for (const ParticleWeight& particle : reports[i].particles) result.counters.hidden_particles += particle.hidden;
-    update_track(reports[i], frame.stamp_ns, settings_.track, object);
-    depths[i] =
-        depth_of(target, frame.X_CW * belief::heaviest(object.particles).X_WO, frame.terms.camera, *tools_.renderer);
+    const SearchTarget target = target_in(step, i);
+    const rendering::FrameTerms terms = terms_in(step, i, target);
+    WeightReport& report = step.reports[i];
+    report = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
+                    stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
+                    {.supports = frame.surfaces.get(), .was_unseen = object.state == TrackState::kUnseen});
+    if (report.all_impossible) result.degraded |= kImpossibleWeights;
+    for (const ParticleWeight& particle : report.particles) result.counters.hidden_particles += particle.hidden;
+    update_track(report, frame.stamp_ns, settings_.track, object);
+    step.depths[i] = depth_in(step, i);
   }
 }
 
-void ParticleFilter::exchange_all(const FilterFrame& frame, StepResult& result,
-                                  std::vector<geometry::DepthImage>& depths, std::vector<WeightReport>& reports) {
-  Belief& belief = result.belief;
+void ParticleFilter::exchange_all(FrameStep& step) {
+  const FilterFrame& frame = step.frame;
+  Belief& belief = step.belief();
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    const SearchTarget target = target_of(belief.objects[i], *belief.scene, frame, tools_);
+    const SearchTarget target = target_in(step, i);
     if (target.color_model < 0) continue;
     for (std::size_t j = i + 1; j < belief.objects.size(); ++j) {
-      const SearchTarget other = target_of(belief.objects[j], *belief.scene, frame, tools_);
+      const SearchTarget other = target_in(step, j);
       if (other.color_model < 0 || other.color_model == target.color_model || other.mesh != target.mesh) continue;
-      const Particle& first = belief::heaviest(belief.objects[i].particles);
-      const Particle& second = belief::heaviest(belief.objects[j].particles);
+      const Particle& first = step.heaviest(i);
+      const Particle& second = step.heaviest(j);
       if (first.mode == belief::MotionMode::kHeld || second.mode == belief::MotionMode::kHeld) continue;
-      const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
-      const rendering::FrameTerms other_terms = terms_of(frame, belief, j, other, depths);
+      const rendering::FrameTerms terms = terms_in(step, i, target);
+      const rendering::FrameTerms other_terms = terms_in(step, j, other);
       if (!are_exchanged({&terms, &other_terms}, {&target, &other}, {frame.X_CW * first.X_WO, frame.X_CW * second.X_WO},
                          settings_.augment, tools_))
         continue;
       exchange(belief.objects[i], belief.objects[j]);
-      std::swap(depths[i], depths[j]);
-      std::swap(reports[i], reports[j]);
-      ++result.counters.exchanges;
+      std::swap(step.depths[i], step.depths[j]);
+      std::swap(step.reports[i], step.reports[j]);
+      ++step.result.counters.exchanges;
     }
   }
 }
 
-void ParticleFilter::recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports, StepResult& result,
-                                 std::vector<geometry::DepthImage>& depths) {
-  Belief& belief = result.belief;
+void ParticleFilter::recover_all(FrameStep& step) {
+  const FilterFrame& frame = step.frame;
+  StepCounters& counters = step.result.counters;
+  Belief& belief = step.belief();
   const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
     const bool look = wants_recovery(settings_.augment, object, belief.step + i);
     if (!look && object.frames_refuted == 0) continue;
-    const SearchTarget target = target_of(belief.objects[i], *belief.scene, frame, tools_);
-    const rendering::FrameTerms terms = terms_of(frame, belief, i, target, depths);
-    const WeightReport& report = reports[i];
+    const SearchTarget target = target_in(step, i);
+    const rendering::FrameTerms terms = terms_in(step, i, target);
+    const WeightReport& report = step.reports[i];
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
-    result.counters.recoveries_tried += look ? 1 : 0;
+    counters.recoveries_tried += look ? 1 : 0;
     if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
                           tools_, mine, object)) {
       if (object.frames_refuted > 0) {
-        result.counters.hidden_proposed +=
-            propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment, settings_.weight,
-                           settings_.initialise, tools_, mine, object);
+        counters.hidden_proposed += propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment,
+                                                   settings_.weight, settings_.initialise, tools_, mine, object);
       }
       continue;
     }
-    ++result.counters.recoveries;
+    ++counters.recoveries;
     if (object.state != TrackState::kTracked) object.state = TrackState::kDoubtful;  // the next frame decides
     object.existence = std::max(object.existence, 0.5);
     object.frames_unseen = 0;
     object.frames_refuted = 0;
-    depths[i] =
-        depth_of(target, frame.X_CW * belief::heaviest(object.particles).X_WO, frame.terms.camera, *tools_.renderer);
+    step.depths[i] = depth_in(step, i);
   }
 }
 
-void ParticleFilter::look_for_more(const FilterFrame& frame, const belief::Observation& observation,
-                                   const std::vector<geometry::DepthImage>& depths, StepResult& result) {
+void ParticleFilter::look_for_more(FrameStep& step) {
   const AugmentOptions& options = settings_.augment;
-  if (!options.new_objects || result.belief.step % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0)
-    return;
-  geometry::DepthImage known = frame.robot;
-  for (std::size_t i = 0; i < depths.size(); ++i)
-    if (hides_others(result.belief.objects[i])) merge_nearest(depths[i], &known);
-  const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, result.belief.step);
-  result.counters.new_objects =
-      filter::new_objects(frame, observation, known, options, settings_.initialise, tools_, stream, result.belief);
+  Belief& belief = step.belief();
+  if (!options.new_objects || belief.step % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0) return;
+  geometry::DepthImage known = step.frame.robot;
+  for (std::size_t i = 0; i < step.depths.size(); ++i)
+    if (hides_others(belief.objects[i])) merge_nearest(step.depths[i], &known);
+  const core::RandomStream stream(belief.seed, core::Purpose::kDetection, belief.step);
+  step.result.counters.new_objects =
+      filter::new_objects(step.frame, step.observation, known, options, settings_.initialise, tools_, stream, belief);
 }
 
 StepResult ParticleFilter::step(const Belief& previous, const belief::Observation& observation,
@@ -274,19 +300,14 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
     return result;
   }
   belief.X_WC = observation.X_WC;
-  if (first) first_look(frame, observation, result);
+  FrameStep current{frame, observation, result};
+  if (first) first_look(current);
   note("initialise", result);
 
-  std::vector<geometry::DepthImage> depths;
-  for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    depths.push_back(depth_of(target_of(belief.objects[i], *belief.scene, frame, tools_),
-                              frame.X_CW * belief::heaviest(belief.objects[i].particles).X_WO, frame.terms.camera,
-                              *tools_.renderer));
-  std::vector<WeightReport> reports(belief.objects.size());
-  weigh_all(frame, first ? settings_.max_gap : dt, result, depths, reports);
+  weigh_all(current, first ? settings_.max_gap : dt);
   note("weight", result);
-  exchange_all(frame, result, depths, reports);
-  learn_colors(frame, observation, reports, settings_.frame.colors, tools_, belief);
+  exchange_all(current);
+  learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
 
   const core::RandomStream stream(belief.seed, core::Purpose::kResample);
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
@@ -294,8 +315,8 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
                                           belief.objects[i].particles);
   note("filter", result);
 
-  if (settings_.recover) recover_all(frame, reports, result, depths);
-  look_for_more(frame, observation, depths, result);
+  if (settings_.recover) recover_all(current);
+  look_for_more(current);
   number_islands(settings_.island_gap, meshes_, belief);
   note_failed_rendering(result);
   note("augment", result);

@@ -106,19 +106,20 @@ class ParticleFilter {
   StepResult step(const belief::Belief& belief, const belief::Observation& observation, const belief::Control& control);
 
  private:
+  /// What the operators of one step share.
+  struct FrameStep;
+
   void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result) const;
-  void first_look(const FilterFrame& frame, const belief::Observation& observation, StepResult& result);
-  void weigh_all(const FilterFrame& frame, double dt, StepResult& result, std::vector<geometry::DepthImage>& depths,
-                 std::vector<WeightReport>& reports);
-  void recover_all(const FilterFrame& frame, const std::vector<WeightReport>& reports, StepResult& result,
-                   std::vector<geometry::DepthImage>& depths);
-  void exchange_all(const FilterFrame& frame, StepResult& result, std::vector<geometry::DepthImage>& depths,
-                    std::vector<WeightReport>& reports);
-  void look_for_more(const FilterFrame& frame, const belief::Observation& observation,
-                     const std::vector<geometry::DepthImage>& depths, StepResult& result);
-  rendering::FrameTerms terms_of(const FilterFrame& frame, const belief::Belief& belief, std::size_t object,
-                                 const SearchTarget& target, const std::vector<geometry::DepthImage>& depths) const;
+  void first_look(FrameStep& step);
+  void weigh_all(FrameStep& step, double dt);
+  void recover_all(FrameStep& step);
+  void exchange_all(FrameStep& step);
+  void look_for_more(FrameStep& step);
+  SearchTarget target_in(const FrameStep& step, std::size_t object) const;
+  /// As its heaviest particle is seen.
+  geometry::DepthImage depth_in(const FrameStep& step, std::size_t object) const;
+  rendering::FrameTerms terms_in(const FrameStep& step, std::size_t object, const SearchTarget& target) const;
 
   FilterSettings settings_;
   simulation::SimulatorFactory simulators_;
