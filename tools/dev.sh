@@ -17,7 +17,7 @@ usage: ./dev VERB
   lint [FILE]...               format, layer and clang-tidy checks
   format [FILE]...             format the sources in place
   fuzz [TARGET] [SECONDS]      run libFuzzer on one target or all, 60 s each
-  docs                         check the links and file names in README.md and docs/
+  docs                         check the links and file names in README.md and docs/; make the API reference in build/docs
   bless REASON                 accept the current scenario results as the new pinned ones
   trace-diff A B               name the first difference of two step traces
 
@@ -224,7 +224,18 @@ fuzz_one() {
 
 # ---------------------------------------------------------------------------------------------------- docs, bless
 
-verb_docs() { timed "check the documents" tools/check_docs; }
+# The configuration and the folders of public headers, which Doxygen makes its pages of.
+api_pages() {
+  mkdir -p build/docs
+  { cat docs/Doxyfile; find ./* -path ./build -prune -o -type d -path '*/include/prescene' -print | sed 's/^/INPUT += /'; } | doxygen -
+}
+
+verb_docs() {
+  verb_setup docs
+  timed "check the documents" tools/check_docs
+  timed "make the API reference" api_pages
+  say "API reference in build/docs/html/index.html"
+}
 
 verb_bless() {
   local reason="$*"

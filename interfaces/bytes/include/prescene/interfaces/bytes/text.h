@@ -8,7 +8,7 @@
 
 namespace prescene::interfaces {
 
-/// 'text' in single quotes: bytes outside printable ASCII as \xNN, quotes and backslashes escaped, "..." after
+/// 'text' in single quotes: bytes outside printable ASCII as `\xNN`, quotes and backslashes escaped, "..." after
 /// `max_characters` of the text.
 std::string quote(std::string_view text, std::size_t max_characters = 64);
 

@@ -60,14 +60,14 @@ core::Result<geometry::LabelImage> read_png_label(const std::filesystem::path& p
 // zlib.
 
 std::vector<std::uint8_t> encode_png(ColorView image);
-std::vector<std::uint8_t> encode_png(Gray8View image);
-std::vector<std::uint8_t> encode_png(Gray16View image);
+std::vector<std::uint8_t> encode_png(geometry::ImageView<const std::uint8_t> image);
+std::vector<std::uint8_t> encode_png(geometry::ImageView<const std::uint16_t> image);
 /// 16-bit grey, rounded to the nearest unit; missing depth and what does not fit below 65535 units become 0.
 std::vector<std::uint8_t> encode_png_depth(geometry::ImageView<const float> depth, double metres_per_unit);
 
 core::Status write_png(const std::filesystem::path& path, ColorView image);
-core::Status write_png(const std::filesystem::path& path, Gray8View image);
-core::Status write_png(const std::filesystem::path& path, Gray16View image);
+core::Status write_png(const std::filesystem::path& path, geometry::ImageView<const std::uint8_t> image);
+core::Status write_png(const std::filesystem::path& path, geometry::ImageView<const std::uint16_t> image);
 core::Status write_png_depth(const std::filesystem::path& path, geometry::ImageView<const float> depth,
                              double metres_per_unit);
 
