@@ -49,7 +49,7 @@ geometry::Quaterniond rotation_from(const JsonAt& at) {
 
 /// Standard deviations: one number for all axes, or three.
 Vector3d deviations_from(const JsonAt& at) {
-  const Vector3d deviations = at.value.is_array() ? vector_from(at) : Vector3d(Vector3d::Constant(at.number()));
+  Vector3d deviations = at.value.is_array() ? vector_from(at) : Vector3d(Vector3d::Constant(at.number()));
   if (!(deviations.array() >= 0.0).all()) at.fail("a standard deviation is negative");
   return deviations;
 }

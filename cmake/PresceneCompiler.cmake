@@ -57,7 +57,7 @@ endif()
 
 # Several sources of a library or a test program are compiled as one, which halves what a build costs: half of each
 # compilation goes into headers. A file-local name is therefore used once in a library, or stands in a namespace of its
-# file. The presets dev and tidy compile each source alone, so that each includes what it uses.
+# file. The preset dev compiles each source alone, which shows that each includes what it uses.
 option(PRESCENE_UNITY "Compile several sources as one" ON)
 set(PRESCENE_UNITY_SOURCES 12 CACHE STRING "Sources compiled as one, 0 for all of a target")
 

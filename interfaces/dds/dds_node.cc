@@ -79,7 +79,7 @@ struct DdsNode::Impl {
     dds_entity_t reader = 0;
     std::atomic<std::uint64_t> arrived{0};  // samples that the middleware offered to the reader's history
     std::uint64_t taken = 0;                // of them, those that the node's thread took; touched by it alone
-    std::uint64_t told_overwritten = 0;     // of them, those counted as dropped already
+    std::uint64_t reported_overwritten = 0;     // of them, those counted as dropped already
     bool has_more = false;                  // something may wait; touched by the node's thread alone
   };
   struct Publication {
@@ -192,9 +192,9 @@ void DdsNode::Impl::deliver(Subscription& subscription, const ddsi_serdata* samp
 // Cyclone's own count of lost samples leaves out those that newer ones push out of the reader's history.
 void DdsNode::Impl::count_losses(Subscription& subscription, std::uint64_t arrived) {
   const std::uint64_t overwritten = arrived > subscription.taken ? arrived - subscription.taken : 0;
-  if (overwritten <= subscription.told_overwritten) return;
-  dropped.fetch_add(overwritten - subscription.told_overwritten, std::memory_order_relaxed);
-  subscription.told_overwritten = overwritten;
+  if (overwritten <= subscription.reported_overwritten) return;
+  dropped.fetch_add(overwritten - subscription.reported_overwritten, std::memory_order_relaxed);
+  subscription.reported_overwritten = overwritten;
 }
 
 core::Result<dds_entity_t> DdsNode::Impl::make_topic(const std::string& topic, const std::string& type) const {

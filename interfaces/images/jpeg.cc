@@ -69,8 +69,7 @@ class JpegDecoder {
     if (error_code_ == JERR_CONVERSION_NOTIMPL) {
       return core::unsupported("is a JPEG in a colour space that can't be made RGB (CMYK?); convert it to RGB");
     }
-    if (error_code_ == JERR_NO_SOI)
-      return core::invalid_input("is no JPEG (its first bytes are others); give a JPEG file");
+    if (error_code_ == JERR_NO_SOI) return core::invalid_input("not a JPEG file (bad signature); give a JPEG file");
     return core::data_loss("is a broken or cut JPEG: " + quote(message_.data()) + "; copy or write the file again");
   }
 
@@ -195,7 +194,7 @@ std::vector<std::uint8_t> encode_jpeg(ColorView image, int quality) {
 Result<ColorImage> decode_color(std::span<const std::uint8_t> bytes, const ImageLimits& limits) {
   if (starts_like_png(bytes)) return decode_png_color(bytes, limits);
   if (bytes.size() >= 2 && bytes[0] == 0xff && bytes[1] == 0xd8) return decode_jpeg(bytes, limits);
-  return core::invalid_input("is neither a PNG nor a JPEG (its first bytes are others); convert it to one");
+  return core::invalid_input("neither a PNG nor a JPEG file (bad signature); convert it to one");
 }
 
 Result<ColorImage> read_color(const std::filesystem::path& path, const ImageLimits& limits) {

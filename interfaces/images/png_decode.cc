@@ -51,7 +51,7 @@ Result<PngHeader> parse_header(std::span<const std::uint8_t> bytes, const ImageL
   const std::size_t compared = std::min(bytes.size(), kStart.size());
   if (compared == 0) return core::data_loss("is empty; write the PNG again");
   if (std::memcmp(bytes.data(), kStart.data(), compared) != 0) {
-    return core::invalid_input("is no PNG (its first bytes are others); give a PNG file");
+    return core::invalid_input("not a PNG file (bad signature); give a PNG file");
   }
   ByteReader in(bytes, std::endian::big);
   in.take(kStart.size());

@@ -61,7 +61,7 @@ class LayoutFinder {
     const auto available = static_cast<std::size_t>(std::min<std::uint64_t>(source_.size(), kMagicBytes));
     PRESCENE_TRY(const std::span<const std::uint8_t> magic, source_.peek(0, available));
     if (!std::equal(magic.begin(), magic.end(), records::kMagic.begin())) {
-      return core::invalid_input(source_.name() + ": is no MCAP file (its first bytes are others); give a recording");
+      return core::invalid_input(source_.name() + ": not an MCAP file (bad signature); give a recording");
     }
     if (available < kMagicBytes) return nothing_readable();
     position_ = kMagicBytes;

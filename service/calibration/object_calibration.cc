@@ -215,8 +215,8 @@ void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
                                 std::string("--max-evaluations"));
   if (!found->motion.estimate_settled)
     found->remarks.emplace_back(
-        "the estimate did not settle: errors may be too small; record more, or --keep what is "
-        "hardly told");
+        "the estimate did not settle: errors may be too small; record more, or --keep what the "
+        "recordings cannot identify");
   if (found->motion.start_noise > kPoorFit) {
     found->remarks.push_back("the fit is poor: recordings differ from what the model does as if their starts were " +
                              core::fixed_text(found->motion.start_noise, 0) +

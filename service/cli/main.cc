@@ -53,7 +53,7 @@ prescene::core::Status run(const prescene::service::Verb& verb, prescene::servic
   try {
     return verb.run(context);
   } catch (const std::bad_alloc&) {
-    return prescene::core::unavailable("the memory is used up: give smaller images, meshes or limits");
+    return prescene::core::unavailable("out of memory: give smaller images, meshes or limits");
   } catch (const std::system_error& error) {
     if (error.code() == std::errc::resource_unavailable_try_again)
       return prescene::core::unavailable("no more threads can be made: give a smaller --threads, or raise `ulimit -u`");
@@ -134,7 +134,7 @@ int main(int argc, char** argv) {
   using namespace prescene;
   open_standard_streams();
   CLI::App app(
-      "Prescene keeps a belief about the objects in front of a robot and looks ahead of it.\n"
+      "Tracks known objects with an RGB-D camera and predicts, with probabilities, what happens next.\n"
       "Exit codes: 0 = done, 1 = could not do it, 2 = bad arguments or bad input.");
   app.name("prescene");
   app.set_version_flag("--version", PRESCENE_VERSION);

@@ -128,7 +128,7 @@ struct LiveService::Impl {
   std::optional<core::Stopwatch> since_frame;
   bool was_tracking = false;
   bool was_degraded = false;
-  bool told_why_not = false;
+  bool reported_why_not = false;
   std::mutex answered_mutex;  // guards what the worker hands over to the recording
   std::vector<std::string> answered;
   std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
@@ -372,11 +372,11 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
     if (!log_limiter.log(core::LogLevel::kInfo, "frames come: " + health_text(health))) return;
   } else if (tracking && !health.degraded.empty() && !was_degraded) {
     if (!log_limiter.log(core::LogLevel::kWarning, health_text(health))) return;
-  } else if (!tracking && (was_tracking || (!told_why_not && !health.last_skip.empty()))) {
+  } else if (!tracking && (was_tracking || (!reported_why_not && !health.last_skip.empty()))) {
     if (!log_limiter.log(core::LogLevel::kWarning, health_text(health))) return;
-    told_why_not = !health.last_skip.empty();
+    reported_why_not = !health.last_skip.empty();
   }
-  if (tracking) told_why_not = false;
+  if (tracking) reported_why_not = false;
   was_tracking = tracking;
   was_degraded = !health.degraded.empty();
 }

@@ -201,7 +201,7 @@ int part_height(const HeatMapLegend& legend) { return kTitle + kPanelHeight + 28
 
 core::Result<ColorImage> heat_map_picture(const belief::Scene& scene, const belief::PredictAnswer& answer,
                                           Backends& backends) {
-  if (answer.final_poses.empty()) return core::not_found("there is no object whose end could be painted");
+  if (answer.final_poses.empty()) return core::not_found("no final poses to draw");
   std::vector<const belief::FinalPoses*> told;
   for (const belief::FinalPoses& poses : answer.final_poses) {
     // Of things that surely stay there is nothing to see, unless they are all.

@@ -273,7 +273,7 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     PRESCENE_TRY(estimate,
                  m_estimate(estimated, judge.observations(), simulate,
                             stream.at(static_cast<std::uint64_t>(turn), kTrialDraws), options.estimate, refined));
-    // What is hardly told may end beyond what can be.
+    // What the recordings hardly identify may end beyond what can be.
     for (std::size_t i = 0; i < estimated.size(); ++i) {
       double& value = estimate.value[static_cast<Eigen::Index>(i)];
       value = std::clamp(value, estimated[i].low, estimated[i].high);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How bodies turn that nothing twists (prescene/simulation/rules/free_spin.h), in lanes.
+// Torque-free rotation (prescene/simulation/rules/free_spin.h), in lanes.
 #if defined(PRESCENE_SIMULATION_LANE_SPIN_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef PRESCENE_SIMULATION_LANE_SPIN_INL_H_
 #undef PRESCENE_SIMULATION_LANE_SPIN_INL_H_

@@ -45,7 +45,7 @@ TEST(Color, GoesByTheFirstBytesNotTheName) {
   ASSERT_TRUE(write_file(dir.path() / "b.png", encode_jpeg(std::as_const(image).view())).ok());
   EXPECT_TRUE(read_color(dir.path() / "b.png").ok());
   ASSERT_TRUE(write_file(dir.path() / "c.png", "BM").ok());
-  EXPECT_THAT(read_color(dir.path() / "c.png").status().message(), HasSubstr("c.png: is neither a PNG nor a JPEG"));
+  EXPECT_THAT(read_color(dir.path() / "c.png").status().message(), HasSubstr("c.png: neither a PNG nor a JPEG"));
 }
 
 }  // namespace

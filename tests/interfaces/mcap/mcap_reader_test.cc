@@ -76,7 +76,7 @@ TEST(McapReader, SaysWhatCannotBeOpened) {
   ASSERT_TRUE(write_file(scratch.path() / "a.mcap", "not a recording").ok());
   const auto other = McapReader::open(scratch.path() / "a.mcap").status();
   EXPECT_EQ(other.code(), StatusCode::kInvalidInput);
-  EXPECT_THAT(other.message(), HasSubstr("a.mcap: is no MCAP file"));
+  EXPECT_THAT(other.message(), HasSubstr("a.mcap: not an MCAP file"));
   ASSERT_TRUE(write_file(scratch.path() / "a.mcap", "").ok());
   EXPECT_THAT(McapReader::open(scratch.path() / "a.mcap").status().message(),
               HasSubstr("ends before the first message"));

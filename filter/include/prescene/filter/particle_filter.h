@@ -41,9 +41,9 @@ struct FilterSettings {
   ResampleOptions resample;
   TrackStateOptions track;
   SupportTrackingOptions supports;
-  ColorModels colors;    ///< By model name; what an object's colours were learned to be (frame.colors) counts more.
-  bool recover = true;   ///< Look for objects that are not tracked.
-  double max_gap = 1.0;  ///< s; a longer pause between frames is predicted as one of this length.
+  ColorModels colors;   ///< By model name; what an object's colours were learned to be (frame.colors) takes precedence.
+  bool recover = true;  ///< Look for objects that are not tracked.
+  double max_gap = 1.0;       ///< s; a longer pause between frames is predicted as one of this length.
   double island_gap = 0.005;  ///< m; objects nearer than this form an island.
 };
 

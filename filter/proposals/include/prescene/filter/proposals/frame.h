@@ -35,7 +35,7 @@ struct FilterTools {
 
 struct FrameOptions {
   rendering::FrameTermsOptions terms;
-  rendering::SensorModelOptions sensor;  ///< What the scene's depth_noise holds counts more.
+  rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
   ColorLearningOptions colors;
 };
 
@@ -71,7 +71,7 @@ using ColorModels = std::map<std::string, rendering::ColorModel>;
 /// What things look like; what is named by neither is known by depth only.
 struct FrameColors {
   ColorModels of_models;   ///< By the name of the object model.
-  ColorModels of_objects;  ///< By the name of the object; counts more than its model's.
+  ColorModels of_objects;  ///< By the name of the object; takes precedence over its model's.
 };
 
 /// Fails with kInvalidInput when the frame's sizes don't fit its camera, a pose is not finite, or there is no depth.

@@ -22,7 +22,7 @@ struct SimulatedRecordingOptions {
   InputTopics topics;
   std::string world_frame = "world";
   rendering::SimulatedCameraOptions camera;
-  rendering::SensorModelOptions sensor;  ///< What the scene's depth_noise holds counts more.
+  rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
 };
 
 /// What the camera frame is called in simulated recordings: "<camera's name>_optical_frame".

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a body turns that nothing twists: for steppers of any precision.
+// Torque-free rotation of a rigid body, for steppers of any precision.
 #pragma once
 
 #include <Eigen/Core>
