@@ -77,10 +77,10 @@ struct DdsNode::Impl {
     std::string type;
     std::function<void(ReceivedMessage&&)> on_message;
     dds_entity_t reader = 0;
-    std::atomic<std::uint64_t> arrived{0};  // samples that the middleware offered to the reader's history
-    std::uint64_t taken = 0;                // of them, those that the node's thread took; touched by it alone
-    std::uint64_t reported_overwritten = 0;     // of them, those counted as dropped already
-    bool has_more = false;                  // something may wait; touched by the node's thread alone
+    std::atomic<std::uint64_t> arrived{0};   // samples that the middleware offered to the reader's history
+    std::uint64_t taken = 0;                 // of them, those that the node's thread took; touched by it alone
+    std::uint64_t reported_overwritten = 0;  // of them, those counted as dropped already
+    bool has_more = false;                   // something may wait; touched by the node's thread alone
   };
   struct Publication {
     std::string topic;
