@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "prescene/core/check.h"
 
@@ -39,6 +40,30 @@ SymmetryGroup SymmetryGroup::cuboid(const Vector3d& p_BoC) {
   SymmetryGroup group;
   group.rotations = {Quaterniond(0, 1, 0, 0), Quaterniond(0, 0, 1, 0), Quaterniond(0, 0, 0, 1)};
   group.p_BoC = p_BoC;
+  return group;
+}
+
+SymmetryGroup SymmetryGroup::cube(const Vector3d& p_BoC) {
+  SymmetryGroup group;
+  group.p_BoC = p_BoC;
+  const double half = std::sqrt(0.5);
+  // Quarter and half turns about x, y and z, ...
+  for (int axis = 0; axis < 3; ++axis)
+    for (const auto& [w, v] : {std::pair(half, half), std::pair(0.0, 1.0), std::pair(half, -half)}) {
+      Quaterniond turn_about(w, 0.0, 0.0, 0.0);
+      turn_about.vec()[axis] = v;
+      group.rotations.push_back(turn_about);
+    }
+  // ... third turns about the diagonals of the cube, ...
+  for (const double x : {0.5, -0.5})
+    for (const double y : {0.5, -0.5})
+      for (const double z : {0.5, -0.5}) group.rotations.emplace_back(0.5, x, y, z);
+  // ... and half turns about those of its faces.
+  for (const double sign : {1.0, -1.0}) {
+    group.rotations.emplace_back(0.0, half, sign * half, 0.0);
+    group.rotations.emplace_back(0.0, half, 0.0, sign * half);
+    group.rotations.emplace_back(0.0, 0.0, half, sign * half);
+  }
   return group;
 }
 

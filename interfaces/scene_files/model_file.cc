@@ -63,6 +63,8 @@ std::string text_of(const geometry::SymmetryGroup& group) {
            center + "}";
   if (geometry::SymmetryGroup::cuboid(group.p_BoC) == group)
     return center.empty() ? "cuboid" : "{cuboid: true" + center + "}";
+  if (geometry::SymmetryGroup::cube(group.p_BoC) == group)
+    return center.empty() ? "cube" : "{cube: true" + center + "}";
   const auto order = static_cast<int>(group.rotations.size()) + 1;
   for (const Vector3d& axis : {Vector3d(Vector3d::UnitX()), Vector3d(Vector3d::UnitY()), Vector3d(Vector3d::UnitZ())})
     if (geometry::SymmetryGroup::cyclic(axis, order, group.p_BoC) == group)

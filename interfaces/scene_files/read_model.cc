@@ -93,8 +93,9 @@ SymmetryGroup read_turns(Binder& binder, const LocatedValue& axis_at, const Vect
 
 SymmetryGroup read_symmetry(const LocatedValue& value, Problems& problems) {
   if (value.kind == LocatedValue::Kind::kScalar) {
-    const auto word = read_word(value, problems, {"none", "cuboid", "ball"});
+    const auto word = read_word(value, problems, {"none", "cuboid", "ball", "cube"});
     if (word == 2) return SymmetryGroup::every_rotation();
+    if (word == 3) return SymmetryGroup::cube();
     return word == 1 ? SymmetryGroup::cuboid() : SymmetryGroup::none();
   }
   Binder binder(value, problems);
@@ -102,15 +103,16 @@ SymmetryGroup read_symmetry(const LocatedValue& value, Problems& problems) {
   if (const LocatedValue* at = binder.find("center")) center = read_vector(*at, problems, kPosition);
   std::string which;
   const LocatedValue* form =
-      binder.one_of({"axis", "cuboid", "ball", "rotations"},
-                    "give none, cuboid, ball, {axis: z, order: 4} or {axis: z, continuous: true}", false, &which);
+      binder.one_of({"axis", "cuboid", "cube", "ball", "rotations"},
+                    "give none, cuboid, cube, ball, {axis: z, order: 4} or {axis: z, continuous: true}", false, &which);
   for (const char* key : {"continuous", "flip", "order"})
     if (which == "axis" || !form) binder.note_known(key);
   if (!form) return {};
   if (which == "axis") return read_turns(binder, *form, center);
-  if (which == "cuboid" || which == "ball") {
+  if (which == "cuboid" || which == "cube" || which == "ball") {
     if (!read_bool(*form, problems).value_or(true)) return SymmetryGroup::none();
-    return which == "ball" ? SymmetryGroup::every_rotation(center) : SymmetryGroup::cuboid(center);
+    if (which == "ball") return SymmetryGroup::every_rotation(center);
+    return which == "cube" ? SymmetryGroup::cube(center) : SymmetryGroup::cuboid(center);
   }
   SymmetryGroup group = read_rotations(*form, problems);
   group.p_BoC = center;

@@ -29,6 +29,7 @@ std::vector<SymmetryGroup> groups() {
           SymmetryGroup::continuous(axis, false, kCentre),
           SymmetryGroup::continuous(axis, true, kCentre),
           SymmetryGroup::cuboid(kCentre),
+          SymmetryGroup::cube(kCentre),
           SymmetryGroup::every_rotation(kCentre)};
 }
 
@@ -40,6 +41,19 @@ Pose member(const SymmetryGroup& group, core::RandomStream& stream) {
     r = group.rotations[pick - 1];
   if (group.axis) r = r * exp_rotation(stream.uniform(0.0, 2.0 * kPi) * *group.axis);
   return {r, group.p_BoC - r * group.p_BoC};
+}
+
+TEST(Symmetry, OfACubeAreTheRotationsThatPermuteTheAxes) {
+  const SymmetryGroup cube = SymmetryGroup::cube();
+  ASSERT_EQ(cube.rotations.size(), 23u);
+  std::vector<Quaterniond> all = cube.rotations;
+  all.push_back(Quaterniond::Identity());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const geometry::Matrix3d R = all[i].toRotationMatrix();
+    // Entries are 0 and +-1: each axis goes to an axis.
+    EXPECT_LT((R.cwiseAbs() - R.cwiseAbs().array().round().matrix()).norm(), 1e-12) << i;
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GT(angle_between(all[i], all[j]), 1.0) << i << " " << j;
+  }
 }
 
 TEST(SymmetryLaws, EquivalentPosesAreAtAngleZero) {

@@ -34,13 +34,15 @@ SymmetryGroup random_symmetry(RandomStream& stream) {
   const geometry::Vector3d center =
       tests::random_below(stream, 2) == 1 ? tests::random_vector(stream, 0.1) : geometry::Vector3d(0, 0, 0);
   const geometry::Vector3d axis = geometry::Vector3d::Unit(tests::random_below(stream, 3));
-  switch (tests::random_below(stream, 6)) {
+  switch (tests::random_below(stream, 7)) {
     case 0:
       return SymmetryGroup::none();
     case 1:
       return SymmetryGroup::cuboid(center);
     case 2:
       return SymmetryGroup::every_rotation(center);
+    case 5:
+      return SymmetryGroup::cube(center);
     case 3:
       return SymmetryGroup::cyclic(axis, 2 + tests::random_below(stream, 7), center);
     case 4: {

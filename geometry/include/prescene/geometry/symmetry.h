@@ -26,6 +26,8 @@ struct SymmetryGroup {
   static SymmetryGroup continuous(const Vector3d& axis, bool flip, const Vector3d& p_BoC = Vector3d::Zero());
   /// The four rotations of a cuboid of three different edges.
   static SymmetryGroup cuboid(const Vector3d& p_BoC = Vector3d::Zero());
+  /// The 24 rotations of a cube whose faces are across the axes of the body's frame.
+  static SymmetryGroup cube(const Vector3d& p_BoC = Vector3d::Zero());
   /// Every rotation about p_BoC.
   static SymmetryGroup every_rotation(const Vector3d& p_BoC = Vector3d::Zero());
 
