@@ -9,13 +9,16 @@
 #include "prescene/core/check.h"
 #include "prescene/core/hash.h"
 #include "prescene/core/random.h"
+#include "prescene/geometry/angles.h"
 
 namespace prescene::belief {
 namespace {
 
 using geometry::Matrix3d;
 
-constexpr double kHereDistance = 0.02;  // m: what "is where the mean says" means in ObjectEstimate::confidence
+// What "is where the mean says" means in ObjectEstimate::confidence.
+constexpr double kHereDistance = 0.02;                   // m
+constexpr double kHereAngle = 15.0 * geometry::kDegree;  // rad
 
 // Inverse of the right Jacobian of the rotation exponential: log(exp(phi) exp(e)) = phi + J e for small e.
 Matrix3d inverse_right_jacobian(const Vector3d& phi) {
@@ -65,6 +68,37 @@ double probability_within(const Vector3d& m, const Matrix3d& S, double radius) {
   return core::normal_cdf((std::cbrt(y / h) - 1.0 + 2.0 / (9.0 * h)) / std::sqrt(2.0 / (9.0 * h)));
 }
 
+// The particles as the equivalents that are nearest to the heaviest one, with their covariances.
+std::vector<Particle> aligned(const std::vector<Particle>& particles, const geometry::SymmetryGroup& symmetry) {
+  if (symmetry.trivial()) return particles;
+  std::vector<Particle> result = particles;
+  const Pose X_WR = heaviest(particles).X_WO;
+  for (Particle& particle : result) {
+    const Pose X_equal = geometry::closest_equivalent(particle.X_WO, X_WR, symmetry);
+    const geometry::Quaterniond S = particle.X_WO.rotation.conjugate() * X_equal.rotation;
+    // An error e of the body's rotation is S^T e of the equivalent's, and moves its origin if C is not the origin.
+    const Vector3d p_BoC_moved = symmetry.p_BoC - S * symmetry.p_BoC;
+    Matrix6d to_equal = Matrix6d::Identity();
+    to_equal.topLeftCorner<3, 3>() = S.toRotationMatrix().transpose();
+    to_equal.bottomLeftCorner<3, 3>() =
+        -(particle.X_WO.rotation.toRotationMatrix() * geometry::cross_matrix(p_BoC_moved));
+    particle.covariance.topLeftCorner<6, 6>() =
+        to_equal * Matrix6d(particle.covariance.topLeftCorner<6, 6>()) * to_equal.transpose();
+    particle.X_WO = X_equal;
+  }
+  return result;
+}
+
+// Probability that a particle's rotation is that of the mean within kHereAngle, up to turns that symmetry allows.
+double probability_of_rotation(const Particle& particle, const Pose& X_mean, const geometry::SymmetryGroup& symmetry) {
+  if (symmetry.ball) return 1.0;
+  Matrix3d across = Matrix3d::Identity();
+  if (symmetry.axis) across -= *symmetry.axis * symmetry.axis->transpose();
+  const Vector3d error = across * geometry::box_minus(particle.X_WO, X_mean).head<3>();
+  const Matrix3d spread = across * particle.covariance.topLeftCorner<3, 3>() * across;
+  return std::min(1.0, probability_within(error, spread, kHereAngle));
+}
+
 MotionMode likeliest_motion(const std::vector<Particle>& particles) {
   std::array<double, 3> mass{};
   for (const Particle& particle : particles)
@@ -82,8 +116,9 @@ std::size_t chosen(const ObjectBelief& object, double u) {
   return object.particles.size() - 1;
 }
 
-ObjectState state_of(const Particle& particle, const Eigen::Matrix<double, 12, 1>& d) {
-  ObjectState state{particle.X_WO, particle.V_WO, particle.mode, particle.physical};
+ObjectState state_of(const Particle& particle, const PhysicalParameters& physical,
+                     const Eigen::Matrix<double, 12, 1>& d) {
+  ObjectState state{particle.X_WO, particle.V_WO, particle.mode, physical};
   if (!d.isZero(0.0)) state.X_WO = geometry::box_plus(particle.X_WO, d.head<6>());
   state.V_WO.angular += d.segment<3>(6);
   state.V_WO.linear += d.segment<3>(9);
@@ -105,11 +140,43 @@ void hash_particle(core::Hasher& hasher, const Particle& particle) {
   hash_vector(hasher, particle.V_WO.angular.data(), 3);
   hash_vector(hasher, particle.V_WO.linear.data(), 3);
   hash_vector(hasher, particle.covariance.data(), particle.covariance.size());
-  hasher.value(particle.mode).value(particle.physical.mass);
-  hash_vector(hasher, particle.physical.center_of_mass.data(), 3);
-  hasher.value(particle.physical.friction)
-      .value(particle.physical.impact_friction)
-      .value(particle.physical.restitution);
+  hasher.value(particle.mode);
+}
+
+// Nothing where nothing was learned.
+void hash_physics(core::Hasher& hasher, const PhysicalBelief& physics) {
+  if (!physics.draws) return;
+  hasher.value(physics.lessons).value(physics.learned_ns).value(physics.cell);
+  for (const PhysicalDraw& draw : *physics.draws) {
+    hasher.value(draw.log_weight);
+    for (const double u : draw.uniforms) hasher.value(u);
+  }
+}
+
+void hash_twist(core::Hasher& hasher, const Twist& twist) {
+  hash_vector(hasher, twist.angular.data(), 3);
+  hash_vector(hasher, twist.linear.data(), 3);
+}
+
+void hash_motion(core::Hasher& hasher, const MotionRecord& motion) {
+  hasher.value(motion.still_frames).value(motion.place_judged).value(motion.held).value(motion.episodes_unexplained);
+  hash_pose(hasher, motion.X_still);
+  const auto hash_samples = [&](const std::vector<MotionSample>& samples) {
+    for (const MotionSample& sample : samples) {
+      hasher.value(sample.stamp_ns);
+      hash_pose(hasher, sample.X_WO);
+      hash_vector(hasher, sample.deviation.data(), sample.deviation.size());
+      for (const Pose& pose : sample.robot) hash_pose(hasher, pose);
+    }
+  };
+  hash_samples(motion.recent);
+  if (!motion.episode) return;
+  const MotionEpisode& episode = *motion.episode;
+  hasher.value(episode.kind).value(episode.closed).value(episode.probed);
+  hash_twist(hasher, episode.V_start);
+  for (const Pose& pose : episode.others) hash_pose(hasher, pose);
+  for (const double value : episode.log_likelihoods) hasher.value(value);
+  hash_samples(episode.samples);
 }
 
 // Nothing where nothing was learned.
@@ -155,27 +222,33 @@ std::string to_string(MotionMode mode) {
 bool operator==(const Belief& a, const Belief& b) {
   const bool same_scene = a.scene == b.scene || (a.scene && b.scene && *a.scene == *b.scene);
   return same_scene && a.step == b.step && a.seed == b.seed && a.stamp_ns == b.stamp_ns && a.objects == b.objects &&
-         a.robot == b.robot && a.X_WC == b.X_WC;
+         a.robot == b.robot && a.X_WC == b.X_WC && a.lowest_seen == b.lowest_seen;
 }
 
-ObjectEstimate estimate(const ObjectBelief& object) {
+ObjectEstimate estimate(const ObjectBelief& object, const geometry::SymmetryGroup& symmetry) {
   ObjectEstimate estimate;
-  const Particle& best = heaviest(object.particles);
+  const std::vector<Particle> particles = aligned(object.particles, symmetry);
+  const Particle& best = heaviest(particles);
   estimate.mode = best.X_WO;
-  estimate.mean = weighted_mean(object.particles, best.X_WO);
-  estimate.covariance = mixture_covariance(object.particles, estimate.mean);
-  estimate.motion = likeliest_motion(object.particles);
-  estimate.effective_sample_size = effective_sample_size(object.particles);
+  estimate.mean = weighted_mean(particles, best.X_WO);
+  estimate.covariance = mixture_covariance(particles, estimate.mean);
+  estimate.motion = likeliest_motion(particles);
+  estimate.effective_sample_size = effective_sample_size(particles);
   double here = 0.0;
-  for (const Particle& particle : object.particles) {
+  for (const Particle& particle : particles) {
     const double weight = std::exp(particle.log_weight);
     estimate.twist.angular += weight * particle.V_WO.angular;
     estimate.twist.linear += weight * particle.V_WO.linear;
-    here += weight * probability_within(particle.X_WO.translation - estimate.mean.translation,
-                                        particle.covariance.block<3, 3>(3, 3), kHereDistance);
+    here += weight * probability_of_rotation(particle, estimate.mean, symmetry) *
+            probability_within(particle.X_WO.translation - estimate.mean.translation,
+                               particle.covariance.block<3, 3>(3, 3), kHereDistance);
   }
   estimate.confidence = object.state == TrackState::kLost ? 0.0 : object.existence * std::min(here, 1.0);
   return estimate;
+}
+
+ObjectEstimate estimate(const Belief& belief, const ObjectBelief& object) {
+  return estimate(object, model_of(belief, object).symmetry);
 }
 
 std::optional<int> find_object(const Belief& belief, const std::string& name) {
@@ -218,22 +291,30 @@ bool normalize(std::vector<Particle>& particles) {
   return true;
 }
 
+const ObjectModel& model_of(const Belief& belief, const ObjectBelief& object) {
+  PRESCENE_CHECK(belief.scene != nullptr && object.model >= 0 && object.model < std::ssize(belief.scene->models));
+  return belief.scene->models[static_cast<std::size_t>(object.model)];
+}
+
 WorldState most_likely_state(const Belief& belief) {
   WorldState state;
-  for (const ObjectBelief& object : belief.objects)
-    state.objects.push_back(state_of(heaviest(object.particles), Eigen::Matrix<double, 12, 1>::Zero()));
+  for (const ObjectBelief& object : belief.objects) {
+    const PhysicalParameters physical = PhysicalSampler(model_of(belief, object), object.physics).mean();
+    state.objects.push_back(state_of(heaviest(object.particles), physical, Eigen::Matrix<double, 12, 1>::Zero()));
+  }
   return state;
 }
 
 BeliefSampler::BeliefSampler(const Belief& belief) {
   for (const ObjectBelief& object : belief.objects) {
     PRESCENE_CHECK(!object.particles.empty());
-    Prepared prepared{&object, {}};
+    Prepared prepared{&object, PhysicalSampler(model_of(belief, object), object.physics), {}};
     for (const Particle& particle : object.particles) {
       prepared.roots.push_back(covariance_square_root(particle.covariance));
       prepared.rank = std::max(prepared.rank, prepared.roots.back().cols());
     }
-    dimensions_ += (object.particles.size() > 1 ? 1 : 0) + static_cast<int>(prepared.rank);
+    dimensions_ +=
+        (object.particles.size() > 1 ? 1 : 0) + prepared.physics.dimensions() + static_cast<int>(prepared.rank);
     largest_rank_ = std::max(largest_rank_, prepared.rank);
     objects_.push_back(std::move(prepared));
   }
@@ -245,6 +326,12 @@ WorldState BeliefSampler::draw(std::span<const double> uniforms) const {
   std::vector<std::size_t> particles;
   for (const Prepared& object : objects_)
     particles.push_back(object.roots.size() > 1 ? chosen(*object.belief, uniforms[next++]) : 0);
+  std::vector<PhysicalParameters> physical;
+  for (const Prepared& object : objects_) {
+    const auto count = static_cast<std::size_t>(object.physics.dimensions());
+    physical.push_back(object.physics.draw(uniforms.subspan(next, count)));
+    next += count;
+  }
   std::vector<Eigen::Matrix<double, 12, 1>> errors(objects_.size(), Eigen::Matrix<double, 12, 1>::Zero());
   for (Eigen::Index column = 0; column < largest_rank_; ++column) {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -256,7 +343,7 @@ WorldState BeliefSampler::draw(std::span<const double> uniforms) const {
   }
   WorldState state;
   for (std::size_t i = 0; i < objects_.size(); ++i)
-    state.objects.push_back(state_of(objects_[i].belief->particles[particles[i]], errors[i]));
+    state.objects.push_back(state_of(objects_[i].belief->particles[particles[i]], physical[i], errors[i]));
   return state;
 }
 
@@ -270,10 +357,13 @@ std::uint64_t content_hash(const Belief& belief) {
     hasher.value(object.last_seen_ns).value(object.island).value(object.particles.size());
     for (const Particle& particle : object.particles) hash_particle(hasher, particle);
     hash_colors(hasher, object.colors);
+    hash_physics(hasher, object.physics);
+    hash_motion(hasher, object.motion);
   }
   hasher.value(belief.robot.size());
   for (const Pose& pose : belief.robot) hash_pose(hasher, pose);
   hash_pose(hasher, belief.X_WC);
+  if (belief.lowest_seen) hasher.value(*belief.lowest_seen);
   return hasher.digest();
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON of states, trajectories and beliefs; beliefs both ways.
+#include "json_motion.h"
 #include "json_values.h"
 #include "prescene/belief/body_names.h"
 #include "prescene/belief/json.h"
@@ -18,20 +19,6 @@ Json physical_json(const PhysicalParameters& physical) {
           {"restitution", physical.restitution}};
 }
 
-PhysicalParameters physical_from(const JsonAt& at) {
-  PhysicalParameters physical;
-  JsonObject fields(at);
-  const auto read = [&](const char* key, double& to) {
-    if (const auto number = fields.require(key)) to = number->number();
-  };
-  read("mass", physical.mass);
-  if (const auto center = fields.require("center_of_mass")) physical.center_of_mass = vector_from(*center);
-  read("friction", physical.friction);
-  read("impact_friction", physical.impact_friction);
-  read("restitution", physical.restitution);
-  return physical;
-}
-
 Json particle_json(const Particle& particle) {
   Json json;
   json["log_weight"] = std::isfinite(particle.log_weight) ? Json(particle.log_weight) : Json(nullptr);
@@ -39,7 +26,6 @@ Json particle_json(const Particle& particle) {
   json["V_WO"] = to_json(particle.V_WO);
   json["covariance"] = matrix_json(particle.covariance);
   json["mode"] = to_string(particle.mode);
-  json["physical"] = physical_json(particle.physical);
   return json;
 }
 
@@ -52,7 +38,6 @@ Particle particle_from(const JsonAt& at) {
   if (const auto twist = fields.require("V_WO")) particle.V_WO = twist_from(*twist);
   if (const auto covariance = fields.require("covariance")) particle.covariance = matrix_from(*covariance, 12);
   if (const auto mode = fields.require("mode")) particle.mode = mode->word(motion_mode_words());
-  if (const auto physical = fields.require("physical")) particle.physical = physical_from(*physical);
   return particle;
 }
 
@@ -111,6 +96,12 @@ ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
   if (const auto island = fields.require("island"))
     object.island = static_cast<int>(island->integer(0, std::numeric_limits<int>::max()));
   if (const auto colors = fields.find("colors")) object.colors = colors_from(*colors);
+  if (const auto physics = fields.find("physics")) {
+    const auto model = static_cast<std::size_t>(object.model);
+    const int dimensions = model < scene.models.size() ? physical_dimensions(scene.models[model]) : 0;
+    object.physics = physics_from(*physics, dimensions);
+  }
+  if (const auto motion = fields.require("motion")) object.motion = motion_from(*motion);
   return object;
 }
 
@@ -189,6 +180,8 @@ Json to_json(const ObjectBelief& object) {
             {"last_seen_ns", object.last_seen_ns},
             {"island", object.island}};
   if (object.colors.shares) json["colors"] = colors_json(object.colors);
+  if (object.physics.draws) json["physics"] = physics_json(object.physics);
+  json["motion"] = motion_json(object.motion);
   return json;
 }
 
@@ -196,8 +189,10 @@ Json to_json(const Belief& belief) {
   Json objects = Json::array(), robot = Json::array();
   for (const ObjectBelief& object : belief.objects) objects.push_back(to_json(object));
   for (const Pose& pose : belief.robot) robot.push_back(to_json(pose));
-  return {{"step", belief.step},           {"seed", belief.seed},       {"stamp_ns", belief.stamp_ns},
-          {"objects", std::move(objects)}, {"robot", std::move(robot)}, {"X_WC", to_json(belief.X_WC)}};
+  Json json{{"step", belief.step},           {"seed", belief.seed},       {"stamp_ns", belief.stamp_ns},
+            {"objects", std::move(objects)}, {"robot", std::move(robot)}, {"X_WC", to_json(belief.X_WC)}};
+  if (belief.lowest_seen) json["lowest_seen"] = *belief.lowest_seen;
+  return json;
 }
 
 core::Result<Belief> belief_from_json(const Json& value, std::shared_ptr<const Scene> scene) {
@@ -218,6 +213,7 @@ core::Result<Belief> belief_from_json(const Json& value, std::shared_ptr<const S
     if (const auto robot = fields.require("robot"))
       for (const JsonAt& item : robot->items()) belief.robot.push_back(pose_from(item));
     if (const auto camera = fields.require("X_WC")) belief.X_WC = pose_from(*camera);
+    if (const auto lowest = fields.find("lowest_seen")) belief.lowest_seen = lowest->number();
   }
   if (!errors.ok()) return errors.status();
   return belief;

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "json_motion.h"
 #include "json_values.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
@@ -201,7 +202,10 @@ struct AnswerJson {
                        {"model", item.model},
                        {"estimate", estimate_json(item.estimate)},
                        {"state", to_string(item.state)},
-                       {"existence", item.existence}});
+                       {"existence", item.existence},
+                       {"parameters", to_json(item.parameters)},
+                       {"lessons", item.lessons},
+                       {"learned_ns", item.learned_ns}});
     return {{"items", std::move(items)}};
   }
   Json operator()(const PredictAnswer& predict) const { return prediction_json(predict); }

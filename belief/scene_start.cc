@@ -5,6 +5,7 @@
 #include <functional>
 #include <numeric>
 
+#include "prescene/belief/physical_belief.h"
 #include "prescene/belief/scene.h"
 #include "prescene/core/check.h"
 
@@ -98,12 +99,7 @@ WorldState mean_start(const Scene& scene) {
     to.X_WO = mean(object.pose);
     to.V_WO = mean(object.twist);
     to.mode = start_mode(object);
-    to.physical.mass = mean(model.mass);
-    to.physical.center_of_mass = mean(model.center_of_mass);
-    to.physical.friction = mean(model.contact.friction);
-    to.physical.impact_friction =
-        model.contact.impact_friction ? mean(*model.contact.impact_friction) : to.physical.friction;
-    to.physical.restitution = mean(model.contact.restitution);
+    to.physical = mean_physical(model);
     state.objects.push_back(to);
   }
   return state;

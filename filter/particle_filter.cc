@@ -29,6 +29,20 @@ void note(const char* stage, StepResult& result) {
   result.trace.emplace_back(stage, belief::content_hash(result.belief));
 }
 
+/// Height of the lowest surface of a frame, against gravity from W's origin: that above which 98 % of the measured
+/// points lie, as some single ones are always wrong.
+std::optional<double> lowest_surface(const SampledDepth& sampled, const Pose& X_WC, const Vector3d& gravity_W) {
+  if (!(gravity_W.norm() > 0.0)) return std::nullopt;
+  const Vector3d up_W = -gravity_W.normalized();
+  std::vector<double> heights;
+  for (std::size_t i = 0; i < sampled.points_C.size(); ++i)
+    if (sampled.depth.data()[i] > 0.0F) heights.push_back(up_W.dot(X_WC * sampled.points_C[i]));
+  if (heights.empty()) return std::nullopt;
+  const auto at = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
+  std::nth_element(heights.begin(), at, heights.end());
+  return *at;
+}
+
 /// Of the scene's robot bodies. A scene's timeline runs on another clock than the frames: a body that is not named
 /// stands where it was last, or where its timeline begins.
 std::vector<Pose> robot_poses(const Belief& belief, const belief::Observation& observation, std::uint32_t* degraded) {
@@ -59,7 +73,8 @@ std::string degraded_text(std::uint32_t bits) {
                                                                 {kImpossibleWeights, "impossible weights"},
                                                                 {kRobotPoseAssumed, "robot pose assumed"},
                                                                 {kPhysicsFailed, "physics failed"},
-                                                                {kRenderingFailed, "rendering failed"}};
+                                                                {kRenderingFailed, "rendering failed"},
+                                                                {kLearningFailed, "learning failed"}};
   std::string text;
   for (const auto& [bit, name] : kNames) {
     if ((bits & bit) == 0) continue;
@@ -102,6 +117,8 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   }
   const SampledDepth sampled =
       sample_depth(*observation.frame.depth, observation.frame.camera, settings_.initialise.detection.segmentation);
+  if (const auto lowest = lowest_surface(sampled, observation.X_WC, belief.scene->gravity_W))
+    belief.lowest_seen = std::min(*lowest, belief.lowest_seen.value_or(*lowest));
   for (std::size_t i = 0; i < belief.scene->supports.size(); ++i) {
     auto measured = measure_support(sampled, observation.X_WC, belief.scene->supports[i], settings_.supports);
     if (!measured) continue;
@@ -308,6 +325,12 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("weight", result);
   exchange_all(current);
   learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
+  LearnReport learned = learn_physics(belief, settings_.learn_physics, simulators_, search_.threads());
+  result.counters.physics_runs = learned.runs;
+  result.counters.physics_lessons = learned.lessons;
+  result.counters.physics_unexplained = learned.unexplained;
+  if (!learned.failure.empty()) result.degraded |= kLearningFailed;
+  result.learning_failure = std::move(learned.failure);
 
   const core::RandomStream stream(belief.seed, core::Purpose::kResample);
   for (std::size_t i = 0; i < belief.objects.size(); ++i)

@@ -22,8 +22,10 @@ core::Result<belief::WhereAnswer> where(const belief::Belief& belief, const beli
   for (const belief::ObjectBelief& object : belief.objects) {
     known += (known.empty() ? "" : ", ") + object.name;
     if (!is_asked(query, object.name) || object.particles.empty()) continue;
-    answer.items.push_back({object.name, belief.scene->models[static_cast<std::size_t>(object.model)].name,
-                            belief::estimate(object), object.state, object.existence});
+    const belief::ObjectModel& model = belief::model_of(belief, object);
+    answer.items.push_back({object.name, model.name, belief::estimate(belief, object), object.state, object.existence,
+                            belief::parameter_estimates(model, object.physics), object.physics.lessons,
+                            object.physics.learned_ns});
   }
   if (query.object && answer.items.empty()) return no_such(*query.object, known);
   return answer;
@@ -41,7 +43,8 @@ core::Result<belief::WhereAnswer> where(const belief::Scene& scene, const belief
     estimate.twist = belief::mean(object.twist);
     estimate.motion = object.held_by ? belief::MotionMode::kHeld : belief::MotionMode::kMoving;
     // Nothing has been seen: the priors are all that there is.
-    answer.items.push_back({object.name, scene.model_of(object).name, estimate, belief::TrackState::kUnseen, 1.0});
+    answer.items.push_back({object.name, scene.model_of(object).name, estimate, belief::TrackState::kUnseen, 1.0,
+                            belief::parameter_estimates(scene.model_of(object), {})});
   }
   if (query.object && answer.items.empty()) return no_such(*query.object, known);
   return answer;

@@ -76,10 +76,12 @@ core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
 BeliefSummary summary_of(const belief::Belief& belief) {
   BeliefSummary summary{belief.step, belief.stamp_ns, {}};
   for (const belief::ObjectBelief& object : belief.objects) {
-    const belief::ObjectEstimate estimate = belief::estimate(object);
-    summary.objects.push_back({object.name, belief.scene->models[static_cast<std::size_t>(object.model)].name,
-                               object.state, estimate.confidence, object.existence, estimate.mean, estimate.covariance,
-                               estimate.twist, object.evidence_per_pixel, object.visible_share});
+    const belief::ObjectEstimate estimate = belief::estimate(belief, object);
+    const belief::ObjectModel& model = belief::model_of(belief, object);
+    summary.objects.push_back({object.name, model.name, object.state, estimate.confidence, object.existence,
+                               estimate.mean, estimate.covariance, estimate.twist, object.evidence_per_pixel,
+                               object.visible_share, belief::parameter_estimates(model, object.physics),
+                               object.physics.lessons, object.physics.learned_ns});
   }
   return summary;
 }
@@ -98,7 +100,10 @@ ordered_json to_json(const BeliefSummary& summary) {
                        {"covariance", covariance},
                        {"twist", belief::to_json(object.V_WO)},
                        {"evidence_per_pixel", object.evidence_per_pixel},
-                       {"visible_share", object.visible_share}});
+                       {"visible_share", object.visible_share},
+                       {"parameters", belief::to_json(object.parameters)},
+                       {"lessons", object.lessons},
+                       {"learned_ns", object.learned_ns}});
   }
   return {{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
 }

@@ -42,8 +42,7 @@ void inject(const Pose& X_WO, const AugmentOptions& options, const InitialiseOpt
   std::stable_sort(object.particles.begin(), object.particles.end(), lighter);
   const auto total = static_cast<int>(object.particles.size());
   const int count = std::clamp(static_cast<int>(std::lround(options.injected_share * total)), 1, total);
-  const std::vector<Particle> fresh =
-      particles_about(X_WO, object.particles.back().physical, belief::MotionMode::kMoving, count, spread, stream);
+  const std::vector<Particle> fresh = particles_about(X_WO, belief::MotionMode::kMoving, count, spread, stream);
   const double share = count == total ? 1.0 : 0.9;
   for (int i = 0; i < total; ++i) {
     Particle& particle = object.particles[static_cast<std::size_t>(i)];
@@ -125,13 +124,7 @@ bool are_exchanged(const std::array<const rendering::FrameTerms*, 2>& terms,
 }
 
 void exchange(ObjectBelief& first, ObjectBelief& second) {
-  const std::vector<Particle> of_first = first.particles, of_second = second.particles;
-  const auto with_physics_of = [](std::vector<Particle> particles, const std::vector<Particle>& own) {
-    for (std::size_t i = 0; i < particles.size(); ++i) particles[i].physical = own[i % own.size()].physical;
-    return particles;
-  };
-  first.particles = with_physics_of(of_second, of_first);
-  second.particles = with_physics_of(of_first, of_second);
+  std::swap(first.particles, second.particles);
   std::swap(first.state, second.state);
   std::swap(first.evidence_per_pixel, second.evidence_per_pixel);
   std::swap(first.visible_share, second.visible_share);
@@ -139,6 +132,8 @@ void exchange(ObjectBelief& first, ObjectBelief& second) {
   std::swap(first.frames_refuted, second.frames_refuted);
   std::swap(first.last_seen_ns, second.last_seen_ns);
   std::swap(first.island, second.island);
+  // How each moved was the other's motion: nothing is learned from it.
+  first.motion = second.motion = {};
 }
 
 int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
@@ -176,7 +171,7 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
   for (std::size_t i = 0; i < places_W.size() && placed < wanted; ++i) {
     if (evidence[i].measured == 0 || evidence[i].visible_share() >= weighting.hidden_share) continue;
     Particle& particle = object.particles[static_cast<std::size_t>(placed++)];
-    particle = particles_about(places_W[i], last.physical, belief::MotionMode::kMoving, 1, spread, stream).front();
+    particle = particles_about(places_W[i], belief::MotionMode::kMoving, 1, spread, stream).front();
     particle.log_weight = weighting.log_hidden - std::log(static_cast<double>(wanted));
   }
   if (placed > 0) belief::normalize(object.particles);
@@ -206,14 +201,7 @@ int new_objects(const FilterFrame& frame, const belief::Observation& observation
       object.name = model.name + "_" + std::to_string(number);
     object.model = detection_found.model;
     const Pose X_WO = frame.X_WC * detection_found.X_CO;
-    belief::PhysicalParameters physical;
-    physical.mass = belief::mean(model.mass);
-    physical.center_of_mass = belief::mean(model.center_of_mass);
-    physical.friction = belief::mean(model.contact.friction);
-    physical.impact_friction =
-        model.contact.impact_friction ? belief::mean(*model.contact.impact_friction) : physical.friction;
-    physical.restitution = belief::mean(model.contact.restitution);
-    object.particles = particles_about(X_WO, physical, belief::MotionMode::kResting, spread.particles, spread, stream);
+    object.particles = particles_about(X_WO, belief::MotionMode::kResting, spread.particles, spread, stream);
     object.existence = spread.found_existence;
     object.evidence_per_pixel = detection_found.evidence.log_ratio_per_visible_pixel();
     object.last_seen_ns = frame.stamp_ns;

@@ -57,9 +57,8 @@ bool inside_prior(const belief::SceneObject& object, const Pose& X_WO, const Ini
 
 void place(const Pose& X_WO, core::TimeNs stamp_ns, const rendering::PoseEvidence& evidence,
            const InitialiseOptions& options, const core::RandomStream& stream, ObjectBelief& object) {
-  const belief::PhysicalParameters physical = object.particles.front().physical;
-  object.particles = particles_about(X_WO, physical, belief::MotionMode::kResting,
-                                     static_cast<int>(object.particles.size()), options, stream);
+  object.particles =
+      particles_about(X_WO, belief::MotionMode::kResting, static_cast<int>(object.particles.size()), options, stream);
   object.existence = options.found_existence;
   object.state = belief::TrackState::kTracked;
   object.evidence_per_pixel = evidence.log_ratio_per_visible_pixel();
@@ -77,9 +76,8 @@ bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& 
          std::sqrt(covariance.diagonal().tail<3>().maxCoeff()) > options.wide_shift;
 }
 
-std::vector<Particle> particles_about(const Pose& X_WO, const belief::PhysicalParameters& physical,
-                                      belief::MotionMode mode, int count, const InitialiseOptions& options,
-                                      core::RandomStream stream) {
+std::vector<Particle> particles_about(const Pose& X_WO, belief::MotionMode mode, int count,
+                                      const InitialiseOptions& options, core::RandomStream stream) {
   std::vector<Particle> particles;
   for (int i = 0; i < count; ++i) {
     Particle particle;
@@ -90,7 +88,6 @@ std::vector<Particle> particles_about(const Pose& X_WO, const belief::PhysicalPa
     particle.X_WO = geometry::normalized(geometry::box_plus(X_WO, d));
     particle.covariance.topLeftCorner<6, 6>() = first_covariance(options);
     particle.mode = mode;
-    particle.physical = physical;
     particles.push_back(particle);
   }
   return particles;
@@ -126,7 +123,6 @@ belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, st
       particle.X_WO = state.objects[i].X_WO;
       particle.V_WO = state.objects[i].V_WO;
       particle.mode = state.objects[i].mode;
-      particle.physical = state.objects[i].physical;
       particle.covariance.topLeftCorner<6, 6>() =
           first_covariance(options) + 0.25 * prior_covariance(scene->objects[i]);
       belief.objects[i].particles.push_back(particle);

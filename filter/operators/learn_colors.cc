@@ -66,7 +66,7 @@ bool surely_seen(const belief::ObjectBelief& object, const belief::ObjectModel& 
   const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
   return !heaviest.hidden && report.evidence_per_pixel >= options.min_evidence &&
          report.visible_share >= options.min_visible_share && heaviest.evidence.hit_share() >= options.min_hit_share &&
-         belief::estimate(object).confidence >= options.min_confidence;
+         belief::estimate(object, model.symmetry).confidence >= options.min_confidence;
 }
 
 void learn_colors(const FilterFrame& frame, const belief::Observation& observation,

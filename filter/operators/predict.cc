@@ -44,6 +44,15 @@ void clear_twist(Particle& particle) {
   particle.covariance.rightCols<6>().setZero();
 }
 
+bool is_slow(const PredictOptions& options, const Particle& particle) {
+  return particle.V_WO.linear.norm() < options.settle_speed && particle.V_WO.angular.norm() < options.settle_rate;
+}
+
+void settle(Particle& particle) {
+  particle.mode = MotionMode::kResting;
+  clear_twist(particle);
+}
+
 /// Starts to move: at its velocity, with room for more.
 void wake(const PredictOptions& options, Particle& particle) {
   particle.mode = MotionMode::kMoving;
@@ -137,6 +146,44 @@ belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_W
   return scene;
 }
 
+double lowest_point(const std::vector<belief::CollisionShape>& shapes, const Pose& X_W, const Vector3d& up_W) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Vector3d& vertex : belief::collision_mesh(shapes).vertices)
+    lowest = std::min(lowest, up_W.dot(X_W * vertex));
+  return lowest;
+}
+
+/// Where everything stops that falls past all that is known: a floor at the height of the lowest surface that was seen
+/// or of the lowest known support, whichever is lower. What is below that already stops where it is, and the belief
+/// remembers that height.
+std::optional<belief::Support> last_floor(std::span<const Falling> falling, belief::Belief& belief) {
+  const belief::Scene& scene = *belief.scene;
+  if (!belief.lowest_seen || !(scene.gravity_W.norm() > 0.0)) return std::nullopt;
+  const Vector3d up_W = -scene.gravity_W.normalized();
+  double height = *belief.lowest_seen;
+  for (const belief::Support& support : scene.supports)
+    height = std::min(height, lowest_point(support.collision, support.X_WS, up_W));
+  Vector3d middle = Vector3d::Zero();
+  for (const Falling& f : falling) {
+    const Particle& particle = belief.objects[f.object].particles[f.particle];
+    middle += particle.X_WO.translation / static_cast<double>(falling.size());
+    if (up_W.dot(particle.X_WO.translation) >= height) continue;
+    const belief::ObjectModel& model = belief::model_of(belief, belief.objects[f.object]);
+    const double reach = model.visual ? geometry::radius_about(*model.visual, Vector3d::Zero()) : 0.0;
+    height = up_W.dot(particle.X_WO.translation) - reach;
+    belief.lowest_seen = height;
+  }
+  constexpr double kThickness = 1.0, kSize = 40.0;  // m: nothing leaves it sideways, nor passes it in a step
+  belief::Support floor;
+  floor.name = "last_floor";
+  while (belief::find_support(scene, floor.name)) floor.name += '_';
+  floor.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{Vector3d(kSize, kSize, kThickness)}, {}});
+  floor.X_WS.rotation = geometry::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), up_W);
+  floor.X_WS.translation = middle + up_W * (height - 0.5 * kThickness - up_W.dot(middle));
+  floor.contact.friction = belief::FixedScalar{1.0};
+  return floor;
+}
+
 /// Constant velocity in place of physics.
 void go_on_without_physics(const Falling& falling, const std::string& why, belief::Belief& belief,
                            PredictReport& report) {
@@ -167,24 +214,35 @@ std::optional<std::string> failure_of(const belief::Trajectory& run, std::size_t
 }
 
 /// Moves falling particles of one duration by the simulator, each with the other objects (`objects`, by index in the
-/// belief) where they most likely are.
+/// belief) where they most likely are. Its physical parameters are drawn anew for each particle and step from what is
+/// believed of them.
 void simulate(belief::Belief& belief, std::span<const Falling> falling, const std::vector<std::size_t>& objects,
-              double dt, const simulation::Simulator& simulator, const core::RandomStream& stream,
-              core::ThreadPool& threads, PredictReport& report) {
+              double dt, const PredictOptions& options, const simulation::Simulator& simulator,
+              const core::RandomStream& stream, core::ThreadPool& threads, PredictReport& report) {
   belief::WorldState common;
+  std::vector<belief::PhysicalSampler> physics;
   for (const std::size_t i : objects) {
-    const Particle& particle = belief::heaviest(belief.objects[i].particles);
-    common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, particle.physical});
+    const ObjectBelief& object = belief.objects[i];
+    const Particle& particle = belief::heaviest(object.particles);
+    physics.emplace_back(belief::model_of(belief, object), object.physics);
+    common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, physics.back().mean()});
   }
+  const core::RandomStream parameters = stream.for_purpose(core::Purpose::kParameters);
   const auto place_of = [&](const Falling& f) {
     return static_cast<std::size_t>(std::find(objects.begin(), objects.end(), f.object) - objects.begin());
   };
   std::vector<belief::WorldState> starts;
+  std::vector<double> settle_draws;
   for (const Falling& f : falling) {
     belief::WorldState start = common;
     start.time = dt - f.duration;
     const Particle& particle = belief.objects[f.object].particles[f.particle];
-    start.objects[place_of(f)] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, particle.physical};
+    const std::size_t place = place_of(f);
+    core::RandomStream draws = parameters.at(belief.step, static_cast<std::uint32_t>(f.object << 16 | f.particle));
+    std::vector<double> uniforms(static_cast<std::size_t>(physics[place].dimensions()));
+    for (double& u : uniforms) u = draws.uniform();
+    settle_draws.push_back(draws.uniform());
+    start.objects[place] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, physics[place].draw(uniforms)};
     starts.push_back(std::move(start));
   }
   simulation::RunRequest request;
@@ -205,20 +263,25 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     Particle& particle = object.particles[falling[i].particle];
     particle.X_WO = geometry::normalized(end.X_WO);
     particle.V_WO = end.V_WO;
+    if (object.state != belief::TrackState::kTracked && settle_draws[i] < options.settle_probability &&
+        is_slow(options, particle))
+      settle(particle);
     ++report.simulated;
   }
 }
 
 /// Moves all falling particles on: by physics where that can be done.
 PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,
-                      const simulation::SimulatorFactory& simulators, const core::RandomStream& stream,
-                      core::ThreadPool& threads) {
+                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
+                      const core::RandomStream& stream, core::ThreadPool& threads) {
   PredictReport report;
   if (falling.empty()) return report;
   std::vector<std::size_t> objects;
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
     if (present(belief.objects[i])) objects.push_back(i);
-  const auto simulator = simulators(step_scene(belief, X_WG, dt, objects), 1.0);
+  belief::Scene scene = step_scene(belief, X_WG, dt, objects);
+  if (auto floor = last_floor(falling, belief)) scene.supports.push_back(*std::move(floor));
+  const auto simulator = simulators(scene, 1.0);
   if (!simulator) {
     const std::string why = "no simulator could be made: " + simulator.status().message();
     for (const Falling& f : falling) go_on_without_physics(f, why, belief, report);
@@ -231,7 +294,8 @@ PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std:
   for (std::size_t begin = 0; begin < falling.size();) {
     std::size_t end = begin;
     while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
-    simulate(belief, std::span(falling).subspan(begin, end - begin), objects, dt, **simulator, stream, threads, report);
+    simulate(belief, std::span(falling).subspan(begin, end - begin), objects, dt, options, **simulator, stream, threads,
+             report);
     begin = end;
   }
   return report;
@@ -243,8 +307,8 @@ Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
 }
 
 /// The modes of one object's particles for this step.
-void change_modes(const PredictOptions& options, bool tracked, bool in_hand, core::RandomStream& stream,
-                  ObjectBelief& object) {
+void change_modes(const PredictOptions& options, bool tracked, bool in_hand, bool has_physics,
+                  core::RandomStream& stream, ObjectBelief& object) {
   for (Particle& particle : object.particles) {
     const double draw = stream.uniform();
     if (in_hand && particle.mode != MotionMode::kHeld) {
@@ -256,10 +320,8 @@ void change_modes(const PredictOptions& options, bool tracked, bool in_hand, cor
     } else if (particle.mode != MotionMode::kMoving) {
       // What is hidden gives no reason to think that it moves.
       if (tracked && draw < options.wake_probability) wake(options, particle);
-    } else if (draw < options.settle_probability && particle.V_WO.linear.norm() < options.settle_speed &&
-               particle.V_WO.angular.norm() < options.settle_rate) {
-      particle.mode = MotionMode::kResting;
-      clear_twist(particle);
+    } else if ((tracked || !has_physics) && draw < options.settle_probability && is_slow(options, particle)) {
+      settle(particle);  // What is not tracked does so where physics leaves it slow, not at the top of its flight.
     }
   }
 }
@@ -311,7 +373,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
     const std::optional<double> released = release_time(control, *belief.scene, object.name, dt);
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
-    change_modes(options, tracked, hand.has_value(), draws, object);
+    change_modes(options, tracked, hand.has_value(), static_cast<bool>(simulators), draws, object);
     const Vector3d centre = centre_of(*belief.scene, object);
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
@@ -346,7 +408,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     }
     if (released) set_holder(i, std::nullopt, belief);
   }
-  PredictReport report = move_on(belief, std::move(falling), X_WG, dt, simulators, stream, threads);
+  PredictReport report = move_on(belief, std::move(falling), X_WG, dt, options, simulators, stream, threads);
   belief.robot.assign(X_WG.begin(), X_WG.end());
   return report;
 }

@@ -38,6 +38,21 @@ std::string document_text(nlohmann::ordered_json document) {
   return belief::json_text(document, 2) + "\n";
 }
 
+/// What was learned of an object's physical parameters, a line each; "" = nothing was.
+std::string learned_text(const nlohmann::ordered_json& item) {
+  const int lessons = item.value("lessons", 0);
+  if (lessons == 0 || !item.contains("parameters")) return "";
+  std::string text;
+  for (const auto& parameter : item.at("parameters"))
+    text += "  " + parameter.value("name", "") + " " + fixed_text(parameter.value("mean", 0.0), 3) + " +- " +
+            fixed_text(parameter.value("standard_deviation", 0.0), 3) +
+            " (90 %: " + fixed_text(parameter.value("low", 0.0), 3) + " to " +
+            fixed_text(parameter.value("high", 0.0), 3) + ")\n";
+  const double learned = 1e-9 * static_cast<double>(item.value("learned_ns", std::int64_t{0}));
+  return item.value("object", "") + ", learned from " + counted(static_cast<std::size_t>(lessons), "motion") +
+         ", the last at " + fixed_text(learned, 1) + " s:\n" + text;
+}
+
 std::string short_form(const nlohmann::ordered_json& answer) {
   if (const auto stability = answer.find("stability"); stability != answer.end()) {
     return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n" +
@@ -58,14 +73,16 @@ std::string short_form(const nlohmann::ordered_json& answer) {
   }
   if (const auto where = answer.find("where"); where != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"object", "state", "confidence", "position, m"}};
+    std::string learned;
     for (const auto& item : where->at("items")) {
       const auto& p = item.at("estimate").at("mean").at("position");
       rows.push_back({item.value("object", ""), item.value("state", ""),
                       fixed_text(item.at("estimate").value("confidence", 0.0), 2),
                       fixed_text(p.at(0).get<double>(), 3) + " " + fixed_text(p.at(1).get<double>(), 3) + " " +
                           fixed_text(p.at(2).get<double>(), 3)});
+      learned += learned_text(item);
     }
-    return table(rows);
+    return table(rows) + learned;
   }
   return document_text(answer);
 }

@@ -36,6 +36,7 @@ std::vector<std::string> degraded_words(const filter::StepResult& result) {
   if (result.degraded != 0) words.push_back(filter::degraded_text(result.degraded));
   if (!result.frame_status.ok()) words.push_back(result.frame_status.message());
   if (!result.physics_failure.empty()) words.push_back(result.physics_failure);
+  if (!result.learning_failure.empty()) words.push_back(result.learning_failure);
   if (!result.rendering_failure.ok()) words.push_back(result.rendering_failure.message());
   return words;
 }

@@ -48,6 +48,7 @@ TEST(EffectiveSampleSizeLaws, LiesBetweenOneAndTheCount) {
 // Draws of one object's belief, by a net.
 std::vector<ObjectState> draws_of(const ObjectBelief& object, int count) {
   Belief belief;
+  belief.scene = std::make_shared<const Scene>(tests::small_scene());
   belief.objects = {object};
   const BeliefSampler sampler(belief);
   const core::SobolNet net(std::max(1, sampler.dimensions()), 3);
@@ -140,6 +141,37 @@ TEST(Estimate, OfParticlesOnBothSidesOfHalfATurnIsBetweenThem) {
   EXPECT_THAT(estimate(object).mean, tests::is_near(expected, 1e-6, 1e-12));
 }
 
+ObjectBelief turned_particles(const std::vector<double>& angles) {
+  ObjectBelief object;
+  for (const double angle : angles) {
+    Particle particle;
+    particle.X_WO.rotation = geometry::exp_rotation({0.0, 0.0, angle});
+    particle.log_weight = -std::log(static_cast<double>(angles.size()));
+    particle.covariance.diagonal().setConstant(1e-6);
+    object.particles.push_back(particle);
+  }
+  return object;
+}
+
+TEST(Estimate, IsNotSureOfAnObjectThatMayBeTurned) {
+  EXPECT_GT(estimate(turned_particles({0.0, 0.02, -0.02})).confidence, 0.99);
+  // Half of the weight is half a turn away: its mean is where neither is.
+  EXPECT_LT(estimate(turned_particles({0.0, 3.0})).confidence, 0.01);
+  EXPECT_NEAR(estimate(turned_particles({0.0, 0.0, 0.0, 1.0})).confidence, 0.75, 0.03);
+}
+
+TEST(Estimate, TakesPosesThatLookAlikeForOne) {
+  using geometry::SymmetryGroup;
+  const ObjectBelief quarter = turned_particles({0.01, 1.5707963 - 0.01});
+  EXPECT_GT(estimate(quarter, SymmetryGroup::cube()).confidence, 0.99);
+  EXPECT_LT(estimate(quarter, SymmetryGroup::cuboid()).confidence, 0.01);
+  const ObjectBelief any = turned_particles({0.0, 1.0, 2.0, -2.5});
+  const ObjectEstimate of_a_can = estimate(any, SymmetryGroup::continuous(Vector3d::UnitZ(), false));
+  EXPECT_GT(of_a_can.confidence, 0.99);
+  EXPECT_LT(of_a_can.covariance(2, 2), 1e-5);
+  EXPECT_LT(estimate(any).confidence, 0.6);
+}
+
 TEST(DrawStart, ChoosesParticlesByWeightAndSpreadsThemByTheirCovariance) {
   ObjectBelief object;
   object.name = "a";
@@ -148,14 +180,14 @@ TEST(DrawStart, ChoosesParticlesByWeightAndSpreadsThemByTheirCovariance) {
     particle.log_weight = std::log(weight);
     particle.X_WO.translation.x() = weight;
     particle.covariance(3, 3) = 1e-4;
-    particle.physical.mass = weight;
     object.particles.push_back(particle);
   }
   const std::vector<ObjectState> draws = draws_of(object, 1024);
   int heavy = 0;
   for (const ObjectState& state : draws) {
-    heavy += state.physical.mass == 0.75 ? 1 : 0;
-    EXPECT_NEAR(state.X_WO.translation.x(), state.physical.mass, 0.05);
+    const bool is_heavy = state.X_WO.translation.x() > 0.5;
+    heavy += is_heavy ? 1 : 0;
+    EXPECT_NEAR(state.X_WO.translation.x(), is_heavy ? 0.75 : 0.25, 0.05);
   }
   EXPECT_EQ(heavy, 768);
 }

@@ -192,6 +192,45 @@ Query random_query(RandomStream& stream) {
   return query;
 }
 
+MotionSample random_sample(RandomStream& stream, core::TimeNs stamp_ns) {
+  MotionSample sample{stamp_ns, random_pose(stream), {}, {random_pose(stream)}};
+  for (double& value : sample.deviation) value = stream.uniform();
+  return sample;
+}
+
+MotionRecord random_motion(RandomStream& stream) {
+  MotionRecord motion;
+  motion.X_still = random_pose(stream);
+  motion.still_frames = random_below(stream, 100);
+  motion.place_judged = random_below(stream, 2) == 1;
+  motion.held = random_below(stream, 2) == 1;
+  motion.episodes_unexplained = random_below(stream, 3);
+  for (int i = random_below(stream, 3); i > 0; --i) motion.recent.push_back(random_sample(stream, 10 - i));
+  if (random_below(stream, 2) == 0) return motion;
+  MotionEpisode& episode = motion.episode.emplace();
+  episode.kind = static_cast<EpisodeKind>(random_below(stream, 3));
+  for (int i = random_below(stream, 3); i >= 0; --i) episode.samples.push_back(random_sample(stream, 10 - i));
+  episode.V_start = {random_vector(stream), random_vector(stream)};
+  episode.others = {random_pose(stream)};
+  episode.closed = random_below(stream, 2) == 1;
+  episode.probed = random_below(stream, 2) == 1;
+  for (int i = random_below(stream, 3); i > 0; --i) episode.log_likelihoods.push_back(-stream.uniform());
+  return motion;
+}
+
+/// Of a model with one uncertain parameter.
+PhysicalBelief random_physics(RandomStream& stream) {
+  PhysicalBelief physics;
+  if (random_below(stream, 2) == 0) return physics;
+  std::vector<PhysicalDraw> draws(static_cast<std::size_t>(1 + random_below(stream, 4)));
+  for (PhysicalDraw& draw : draws) draw = {{stream.uniform()}, -std::log(static_cast<double>(draws.size()))};
+  physics.draws = std::make_shared<const std::vector<PhysicalDraw>>(std::move(draws));
+  physics.cell = stream.uniform();
+  physics.lessons = 1 + random_below(stream, 9);
+  physics.learned_ns = static_cast<core::TimeNs>(stream.next_u64() >> 2);
+  return physics;
+}
+
 ObjectBelief random_object_belief(RandomStream& stream, const std::string& name) {
   ObjectBelief object;
   object.name = name;
@@ -210,6 +249,8 @@ ObjectBelief random_object_belief(RandomStream& stream, const std::string& name)
   }
   object.last_seen_ns = static_cast<core::TimeNs>(stream.next_u64() >> 2);
   object.island = random_below(stream, 5);
+  object.physics = random_physics(stream);
+  object.motion = random_motion(stream);
   const Pose middle = random_pose(stream);
   for (int i = random_below(stream, 6); i >= 0; --i) {
     Particle particle;
@@ -220,8 +261,6 @@ ObjectBelief random_object_belief(RandomStream& stream, const std::string& name)
     particle.V_WO = {random_vector(stream), random_vector(stream)};
     particle.covariance = random_covariance(stream, 12, random_below(stream, 13));
     particle.mode = static_cast<MotionMode>(random_below(stream, 3));
-    particle.physical = {stream.uniform(0.1, 2.0), random_vector(stream, 0.1), stream.uniform(), stream.uniform(),
-                         stream.uniform()};
     object.particles.push_back(particle);
   }
   normalize(object.particles);
@@ -238,6 +277,7 @@ Belief random_belief(RandomStream& stream, std::shared_ptr<const Scene> scene) {
     belief.objects.push_back(random_object_belief(stream, "object_" + std::to_string(i)));
   for (int i = random_below(stream, 3); i > 0; --i) belief.robot.push_back(random_pose(stream));
   belief.X_WC = random_pose(stream);
+  if (random_below(stream, 2) == 1) belief.lowest_seen = stream.uniform(-1.0, 1.0);
   return belief;
 }
 
@@ -246,6 +286,7 @@ Scene small_scene() {
     ObjectModel shape;
     shape.name = name;
     shape.collision.emplace_back(PrimitiveShape{primitive, {}});
+    shape.contact.friction = UniformScalar{0.2, 0.8};
     return *with_derived_properties(shape);
   };
   Scene scene;

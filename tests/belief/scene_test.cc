@@ -85,6 +85,7 @@ TEST(DrawStart, DealsPositionsFirstAndTheWidestObjectBeforeTheOthers) {
   scene.objects[0].pose = NormalPose{Pose{}, small};
   scene.objects[1].pose = NormalPose{Pose{}, wide};
   scene.models[0].contact.friction = UniformScalar{0.1, 0.5};
+  scene.models[1].contact.friction = FixedScalar{0.5};
   scene.models[1].mass = UniformScalar{1.0, 2.0};
   scene.objects[0].twist.linear.x = UniformScalar{-1.0, 1.0};
   ASSERT_EQ(start_dimensions(scene), 5);

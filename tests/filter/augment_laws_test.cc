@@ -67,7 +67,7 @@ class ABox : public ::testing::Test {
   static ObjectBelief believed_at(const Pose& X_WO, core::TimeNs last_seen_ns) {
     ObjectBelief object;
     object.name = "box";
-    object.particles = particles_about(X_WO, {}, MotionMode::kResting, 16, {}, {4, core::Purpose::kStartBelief});
+    object.particles = particles_about(X_WO, MotionMode::kResting, 16, {}, {4, core::Purpose::kStartBelief});
     core::RandomStream stream(9, core::Purpose::kTest);
     for (Particle& particle : object.particles) particle.log_weight = stream.uniform(-2.0, 0.0);
     belief::normalize(object.particles);
@@ -122,7 +122,6 @@ TEST_F(ABox, IsRecoveredWhereItStandsByTheLeastProbableHalf) {
     if (old == before.end()) {
       found_weight += std::exp(particle.log_weight);
       EXPECT_LT((particle.X_WO * target_.centre() - centre).norm(), 0.06);  // 0.6 cm a direction and the find's error
-      EXPECT_EQ(particle.physical, before[0].physical);
       continue;
     }
     EXPECT_GE(old->log_weight, heaviest_before[7].log_weight);
@@ -272,12 +271,12 @@ ObjectBelief some_object(const std::string& name, int particles, std::uint64_t s
   object.last_seen_ns = static_cast<core::TimeNs>(stream.uniform_below(1000));
   object.island = static_cast<int>(stream.uniform_below(10));
   object.colors.frames = static_cast<int>(stream.uniform_below(50));
+  const std::vector<belief::PhysicalDraw> draws = {{{stream.uniform()}, 0.0}};
+  object.physics.draws = std::make_shared<const std::vector<belief::PhysicalDraw>>(draws);
   for (int i = 0; i < particles; ++i) {
     Particle particle;
     particle.X_WO.translation = Vector3d(stream.uniform(), stream.uniform(), stream.uniform());
     particle.V_WO.linear.x() = stream.uniform();
-    particle.physical.mass = stream.uniform(0.1, 2.0);
-    particle.physical.friction = stream.uniform();
     particle.log_weight = -std::log(particles);
     object.particles.push_back(particle);
   }
@@ -293,6 +292,7 @@ TEST(Exchange, SwapsWhereTheyAreAndNotWhatTheyAre) {
     EXPECT_EQ(now.model, was.model);
     EXPECT_EQ(now.existence, was.existence);
     EXPECT_TRUE(now.colors == was.colors);
+    EXPECT_TRUE(now.physics == was.physics);
     EXPECT_EQ(now.last_seen_ns, other.last_seen_ns);
     EXPECT_EQ(now.frames_unseen, other.frames_unseen);
     EXPECT_EQ(now.frames_refuted, other.frames_refuted);
@@ -304,7 +304,6 @@ TEST(Exchange, SwapsWhereTheyAreAndNotWhatTheyAre) {
       EXPECT_EQ(now.particles[i].X_WO, other.particles[i].X_WO);
       EXPECT_EQ(now.particles[i].V_WO, other.particles[i].V_WO);
       EXPECT_EQ(now.particles[i].log_weight, other.particles[i].log_weight);
-      EXPECT_EQ(now.particles[i].physical, was.particles[i].physical);
     }
   }
   exchange(first, second);
@@ -318,10 +317,6 @@ TEST(Exchange, KeepsSetsOfDifferentSizesWhole) {
   exchange(first, second);
   ASSERT_EQ(first.particles.size(), 8u);
   ASSERT_EQ(second.particles.size(), 3u);
-  for (const auto& [now, was] : {std::pair(first, few), std::pair(second, many)})
-    for (const Particle& particle : now.particles)
-      EXPECT_TRUE(
-          std::ranges::any_of(was.particles, [&](const Particle& own) { return own.physical == particle.physical; }));
 }
 
 /// Red and blue cans of one shape whose colours are known.
@@ -440,7 +435,7 @@ TEST_F(Newcomers, AreAddedToTheBeliefAndToACopyOfItsScene) {
   EXPECT_LT((belief::heaviest(can.particles).X_WO.translation - X_W_can_.translation).norm(), 0.02);
   EXPECT_GT(can.existence, 0.5);
   EXPECT_EQ(can.last_seen_ns, observation_.stamp_ns);
-  EXPECT_EQ(can.particles[0].physical.mass, belief::mean(scene_->models[1].mass));
+  EXPECT_EQ(can.physics, belief::PhysicalBelief{});  // the priors of its model
 
   // A second of its kind has a name of its own.
   belief::Belief named = before;

@@ -42,7 +42,7 @@ class WeightOfABox : public ::testing::Test {
     target_ = target_of(sequence_.scene->models[0], frame_, backends_.tools);
   }
   std::vector<Particle> particles_at(const Pose& X_WO, int count = 8) const {
-    return particles_about(X_WO, {}, belief::MotionMode::kMoving, count, {}, {4, core::Purpose::kStartBelief});
+    return particles_about(X_WO, belief::MotionMode::kMoving, count, {}, {4, core::Purpose::kStartBelief});
   }
   WeightReport weigh(std::vector<Particle>& particles) {
     return weight(frame_.terms, target_, frame_.X_WC, 1.0 / 30.0, {}, backends_.tools, {5, core::Purpose::kProposal},

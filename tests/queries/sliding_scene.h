@@ -86,8 +86,8 @@ inline queries::QueryContext context_with(const FakeSimulator::Formula& formula,
   return context;
 }
 
-/// A belief over the sliding scene: the carton with two hypotheses of weights 0.25 (slippery) and 0.75, the cup
-/// certain.
+/// A belief over the sliding scene: the carton with two hypotheses of its pose of weights 0.25 and 0.75 and two of its
+/// friction of the same weights, of which the lighter is slippery; the cup certain.
 inline belief::Belief two_hypotheses() {
   belief::Belief belief;
   belief.step = 17;
@@ -95,19 +95,21 @@ inline belief::Belief two_hypotheses() {
   belief.scene = sliding_scene();
   belief.robot = {geometry::Pose::from_translation({0.2, 0.0, 0.3})};
   belief.X_WC = belief.scene->camera->X_WC;
-  belief::Particle slippery;
-  slippery.log_weight = std::log(0.25);
-  slippery.X_WO = geometry::Pose::from_translation({0.1, 0.0, 0.1});
-  slippery.physical.friction = 0.2;
-  slippery.covariance.diagonal().segment<3>(3).setConstant(1e-6);
-  belief::Particle rough = slippery;
-  rough.log_weight = std::log(0.75);
-  rough.X_WO.translation.x() = 0.12;
-  rough.physical.friction = 0.9;
+  belief::Particle light;
+  light.log_weight = std::log(0.25);
+  light.X_WO = geometry::Pose::from_translation({0.1, 0.0, 0.1});
+  light.covariance.diagonal().segment<3>(3).setConstant(1e-6);
+  belief::Particle heavy = light;
+  heavy.log_weight = std::log(0.75);
+  heavy.X_WO.translation.x() = 0.12;
   belief::ObjectBelief carton;
   carton.name = "carton";
   carton.model = 0;
-  carton.particles = {slippery, rough};
+  carton.particles = {light, heavy};
+  // Frictions of about 0.27 and 0.73.
+  const std::vector<belief::PhysicalDraw> draws = {{{0.01}, std::log(0.25)}, {{0.99}, std::log(0.75)}};
+  carton.physics.draws = std::make_shared<const std::vector<belief::PhysicalDraw>>(draws);
+  carton.physics.lessons = 1;
   belief::ObjectBelief cup;
   cup.name = "cup";
   cup.model = 1;

@@ -70,6 +70,28 @@ TEST(TrackedPhysics, FallsFarFromTheOriginAsNearIt) {
   }
 }
 
+TEST(TrackedPhysics, WhatIsNotSeenFallsNoFurtherThanTheLowestSurfaceThatWas) {
+  core::ThreadPool pool(1);
+  Backends backends(pool, {});
+  for (const double lowest : {0.0, -0.4}) {
+    belief::Belief belief = box_in_the_air(0.0);
+    auto scene = std::make_shared<belief::Scene>(*belief.scene);
+    scene->supports.clear();
+    belief.scene = scene;
+    belief.lowest_seen = lowest;
+    belief.objects[0].state = belief::TrackState::kUnseen;
+    for (int frame = 0; frame < 60; ++frame) {
+      const auto report = filter::predict(belief, {}, {}, 1.0 / 30.0, {}, backends.simulator_factory(),
+                                          {1, core::Purpose::kProcessNoise}, pool);
+      EXPECT_EQ(report.not_simulated, 0) << report.failure;
+      ++belief.step;
+    }
+    for (const belief::Particle& particle : belief.objects[0].particles)
+      EXPECT_NEAR(particle.X_WO.translation.z(), lowest + 0.06, 0.04) << lowest;  // on a face, an edge or a corner
+    EXPECT_EQ(belief.lowest_seen, lowest);
+  }
+}
+
 /// More objects than the lockstep stepper takes, one of them falling.
 constexpr const char* kFiveBoxes = R"(name: boxes
 duration: 0.4

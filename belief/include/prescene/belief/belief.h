@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "prescene/belief/motion_record.h"
+#include "prescene/belief/physical_belief.h"
 #include "prescene/belief/scene.h"
 #include "prescene/core/clock.h"
 
@@ -28,7 +30,6 @@ struct Particle {
   Twist V_WO;
   Matrix12d covariance = Matrix12d::Zero();
   MotionMode mode = MotionMode::kMoving;
-  PhysicalParameters physical;
   friend bool operator==(const Particle&, const Particle&) = default;
 };
 
@@ -75,6 +76,8 @@ struct ObjectBelief {
   core::TimeNs last_seen_ns = 0;
   int island = 0;  ///< Objects of equal number touch each other.
   LearnedColors colors;
+  PhysicalBelief physics;  ///< Of its model's parameters, apart from the poses.
+  MotionRecord motion;
   friend bool operator==(const ObjectBelief&, const ObjectBelief&) = default;
 };
 
@@ -88,25 +91,34 @@ struct Belief {
   /// Robot body poses used by the last step, in the order of Scene::robot.
   std::vector<Pose> robot;
   Pose X_WC;
+  /// Height, against gravity from W's origin, of the lowest surface that any frame showed, m: what falls out of sight
+  /// falls no further if nothing else is known to be there.
+  std::optional<double> lowest_seen;
 };
 /// Scenes compare by content.
 bool operator==(const Belief& a, const Belief& b);
 
 /// What a user wants to know of one object.
 struct ObjectEstimate {
-  Pose mean;  ///< Weighted mean about the heaviest particle.
+  Pose mean;  ///< Weighted mean about the heaviest particle, up to symmetry.
   Matrix6d covariance =
       Matrix6d::Zero();  ///< Of the whole mixture, order (rotation, translation) as geometry::box_plus.
   Twist twist;
   Pose mode;  ///< The heaviest particle's pose.
   MotionMode motion = MotionMode::kMoving;
-  /// Probability that the object exists and is where the mean says (within 2 cm); 0 when the track is lost.
+  /// Probability that the object exists and is where the mean says, within 2 cm and, up to its symmetry, 15 degrees; 0
+  /// when the track is lost.
   double confidence = 0.0;
   double effective_sample_size = 0.0;
 
   friend bool operator==(const ObjectEstimate&, const ObjectEstimate&) = default;
 };
-ObjectEstimate estimate(const ObjectBelief& object);
+/// `symmetry`: of the object's model. Particles count as the equivalent that is nearest to the heaviest one, so that
+/// the mean of poses that look alike is one of them.
+ObjectEstimate estimate(const ObjectBelief& object,
+                        const geometry::SymmetryGroup& symmetry = geometry::SymmetryGroup::none());
+/// The same with the symmetry of the model that the belief's scene gives it.
+ObjectEstimate estimate(const Belief& belief, const ObjectBelief& object);
 std::optional<int> find_object(const Belief& belief, const std::string& name);
 double effective_sample_size(const std::vector<Particle>& particles);
 
@@ -114,23 +126,27 @@ double effective_sample_size(const std::vector<Particle>& particles);
 const Particle& heaviest(const std::vector<Particle>& particles);
 /// Normalises log weights; false when all are -inf or NaN (then they are made equal).
 bool normalize(std::vector<Particle>& particles);
-/// The world state of the heaviest particle of each object.
+/// The model of an object of the belief. The belief has a scene (checked).
+const ObjectModel& model_of(const Belief& belief, const ObjectBelief& object);
+/// The world state of the heaviest particle of each object, with the means of its physical parameters.
 WorldState most_likely_state(const Belief& belief);
 /// Draws world states from a belief; prepared once, as the square roots of the covariances cost more than a draw.
 class BeliefSampler {
  public:
   /// Every object needs at least one particle (checked). The belief must outlive the sampler.
   explicit BeliefSampler(const Belief& belief);
-  /// How many uniform numbers a draw takes: one an object for the choice of its particle (if it has several), and the
-  /// largest rank of its covariances.
+  /// How many uniform numbers a draw takes: one an object for the choice of its particle (if it has several), those of
+  /// its physical parameters, and the largest rank of its covariances.
   int dimensions() const { return dimensions_; }
   /// One world state, objects in the belief's order, drawn as if each existed; uniforms.size() == dimensions(). First
-  /// come the choices of the particles, then the widest direction of each object, the next widest, ...
+  /// come the choices of the particles, then the physical parameters, then the widest direction of each object, the
+  /// next widest, ...
   WorldState draw(std::span<const double> uniforms) const;
 
  private:
   struct Prepared {
     const ObjectBelief* belief;
+    PhysicalSampler physics;
     std::vector<Eigen::MatrixXd> roots;  // of the particles' covariances
     Eigen::Index rank = 0;
   };

@@ -21,6 +21,8 @@ nlohmann::ordered_json to_json(const WorldState& state);
 nlohmann::ordered_json to_json(const Timeline& timeline);
 nlohmann::ordered_json to_json(const Trajectory& trajectory);
 nlohmann::ordered_json to_json(const ObjectBelief& object);
+/// [{"name", "mean", "standard_deviation", "low", "high"}]
+nlohmann::ordered_json to_json(const std::vector<ParameterEstimate>& estimates);
 /// Without the scene (which a scene file holds).
 nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);

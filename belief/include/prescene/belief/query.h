@@ -80,6 +80,10 @@ struct WhereAnswer {
     ObjectEstimate estimate;
     TrackState state = TrackState::kTracked;
     double existence = 1.0;
+    /// What is believed of those of its physical parameters that its model leaves open, ...
+    std::vector<ParameterEstimate> parameters = {};
+    int lessons = 0;              ///< ... by so many pieces of evidence (0 = the priors), ...
+    core::TimeNs learned_ns = 0;  ///< ... the last of which ended at this stamp.
 
     friend bool operator==(const Item&, const Item&) = default;
   };

@@ -34,6 +34,7 @@ enum class Purpose : std::uint32_t {
   kSurface = 13,
   kAudit = 14,
   kNearbyStart = 15,
+  kLearning = 16,
 };
 
 /// The Philox4x32-10 bijection itself [Salmon et al. 2011]: the four words of a counter under a key.

@@ -22,6 +22,7 @@
 #include "prescene/belief/observation.h"
 #include "prescene/filter/operators/augment.h"
 #include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
 #include "prescene/filter/operators/resample.h"
 #include "prescene/filter/operators/track_state.h"
@@ -38,6 +39,7 @@ struct FilterSettings {
   PredictOptions predict;
   AugmentOptions augment;
   WeightOptions weight;
+  LearnPhysicsOptions learn_physics;
   ResampleOptions resample;
   TrackStateOptions track;
   SupportTrackingOptions supports;
@@ -58,6 +60,7 @@ enum Degraded : std::uint32_t {
   kRobotPoseAssumed = 1u << 6,   ///< A robot body was not named: it was taken to stand where it was last.
   kPhysicsFailed = 1u << 7,      ///< Particles went on at constant velocity in place of physics (see physics_failure).
   kRenderingFailed = 1u << 8,    ///< A picture was not drawn (see rendering_failure): what it was to show hid nothing.
+  kLearningFailed = 1u << 9,     ///< Motion was not learned from (see learning_failure).
 };
 std::string degraded_text(std::uint32_t bits);
 
@@ -69,10 +72,13 @@ struct StepCounters {
   int recoveries_tried = 0;
   int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
-  int exchanges = 0;         ///< Pairs of one shape that had been taken for each other.
-  int hidden_particles = 0;  ///< That stayed hidden.
-  int hidden_proposed = 0;   ///< Put at places where a refuted object may hide.
-  int looked_for = 0;        ///< At the start.
+  int physics_runs = 0;         ///< Simulated to learn physical parameters, ...
+  int physics_lessons = 0;      ///< ... episodes that changed what is believed of them, ...
+  int physics_unexplained = 0;  ///< ... and episodes that no value of theirs explains.
+  int exchanges = 0;            ///< Pairs of one shape that had been taken for each other.
+  int hidden_particles = 0;     ///< That stayed hidden.
+  int hidden_proposed = 0;      ///< Put at places where a refuted object may hide.
+  int looked_for = 0;           ///< At the start.
   int found = 0;
 };
 
@@ -84,6 +90,7 @@ struct StepResult {
   std::uint32_t degraded = 0;
   core::Status frame_status;       ///< Why the frame was rejected; ok otherwise.
   std::string physics_failure;     ///< Why physics could not move the first of not_simulated; "" = it moved all.
+  std::string learning_failure;    ///< Why an episode of motion could not be simulated; "" = all could.
   core::Status rendering_failure;  ///< Why the first of not_drawn failed; ok otherwise.
   StepCounters counters;
   HashTrace trace;

@@ -23,6 +23,11 @@ struct ObjectSummary {
   geometry::Twist V_WO;
   double evidence_per_pixel = 0.0;
   double visible_share = 0.0;
+  /// What is believed of its uncertain physical parameters, by how many pieces of evidence (0 = the priors), and the
+  /// stamp of the last of them.
+  std::vector<belief::ParameterEstimate> parameters = {};
+  int lessons = 0;
+  core::TimeNs learned_ns = 0;
 };
 
 struct BeliefSummary {
@@ -33,7 +38,8 @@ struct BeliefSummary {
 
 BeliefSummary summary_of(const belief::Belief& belief);
 /// {"step", "stamp_ns", "objects": [{"name", "model", "state", "confidence", "existence", "pose", "covariance" (36
-/// numbers, row-major), "twist", "evidence_per_pixel", "visible_share"}]}
+/// numbers, row-major), "twist", "evidence_per_pixel", "visible_share", "parameters": [{"name", "mean",
+/// "standard_deviation", "low", "high"}], "lessons", "learned_ns"}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text);
 

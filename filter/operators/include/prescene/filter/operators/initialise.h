@@ -58,8 +58,7 @@ std::optional<rendering::SupportRegion> region_of(const SampledDepth& sampled, c
                                                   const core::RandomStream& stream);
 
 /// `count` particles about a pose of known spread: the first at the pose itself, at rest.
-std::vector<belief::Particle> particles_about(const Pose& X_WO, const belief::PhysicalParameters& physical,
-                                              belief::MotionMode mode, int count, const InitialiseOptions& options,
-                                              core::RandomStream stream);
+std::vector<belief::Particle> particles_about(const Pose& X_WO, belief::MotionMode mode, int count,
+                                              const InitialiseOptions& options, core::RandomStream stream);
 
 }  // namespace prescene::filter

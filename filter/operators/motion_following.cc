@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion_following.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/filter/operators/predict.h"
+#include "prescene/geometry/symmetry.h"
+
+namespace prescene::filter {
+namespace {
+
+using belief::EpisodeKind;
+using belief::MotionEpisode;
+using belief::MotionRecord;
+using belief::MotionSample;
+using geometry::Vector6d;
+
+/// Share of a new frame in the mean pose of what lies still, at least: supports and cameras may drift.
+constexpr double kLeastGain = 0.02;
+
+double seconds_between(core::TimeNs from, core::TimeNs to) { return 1e-9 * static_cast<double>(to - from); }
+
+MotionSample sample_of(const belief::Belief& belief, const belief::ObjectEstimate& estimate) {
+  return {belief.stamp_ns, estimate.mean, estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), belief.robot};
+}
+
+std::vector<Pose> poses_of(const belief::Belief& belief) {
+  std::vector<Pose> poses;
+  for (const belief::ObjectBelief& object : belief.objects) poses.push_back(belief::heaviest(object.particles).X_WO);
+  return poses;
+}
+
+/// Where what lies still is better known than from one frame. Errors of neighbouring frames are not independent: the
+/// deviation shrinks to a third at most.
+Vector6d still_deviation(const Vector6d& deviation, int frames) {
+  return deviation / std::min(3.0, std::sqrt(static_cast<double>(std::max(1, frames))));
+}
+
+/// Moves the mean pose towards the new one.
+void average(const Pose& X_WO, MotionRecord& record) {
+  ++record.still_frames;
+  const double gain = std::max(1.0 / record.still_frames, kLeastGain);
+  record.X_still =
+      geometry::normalized(geometry::box_plus(record.X_still, gain * geometry::box_minus(X_WO, record.X_still)));
+}
+
+void begin_anew(const Pose& X_WO, MotionRecord& record) {
+  record.X_still = X_WO;
+  record.still_frames = 1;
+  record.place_judged = false;
+  record.recent.clear();
+}
+
+void keep_recent(const MotionSample& sample, const LearnPhysicsOptions& options, MotionRecord& record) {
+  record.recent.push_back(sample);
+  const auto first = std::find_if(record.recent.begin(), record.recent.end(), [&](const MotionSample& kept) {
+    return seconds_between(kept.stamp_ns, sample.stamp_ns) <= options.before;
+  });
+  record.recent.erase(record.recent.begin(), first);
+}
+
+/// It lies still: what lying here says is judged once.
+MotionEpisode rest_episode(const belief::Belief& belief, const MotionSample& now, const LearnPhysicsOptions& options,
+                           const MotionRecord& record) {
+  MotionEpisode episode;
+  episode.kind = EpisodeKind::kRest;
+  episode.others = poses_of(belief);
+  episode.closed = true;
+  MotionSample sample = now;
+  sample.X_WO = record.X_still;
+  sample.deviation = still_deviation(now.deviation, record.still_frames);
+  for (int i = 0; i <= 2; ++i) {
+    sample.stamp_ns = now.stamp_ns + static_cast<core::TimeNs>(std::llround(0.5e9 * i * options.rest_time));
+    episode.samples.push_back(sample);
+  }
+  return episode;
+}
+
+MotionEpisode motion_episode(const belief::Belief& belief, const MotionSample& now, const MotionRecord& record) {
+  MotionEpisode episode;
+  episode.others = poses_of(belief);
+  episode.samples = record.recent;
+  MotionSample& start = episode.samples.front();
+  start.X_WO = record.X_still;
+  start.deviation = still_deviation(start.deviation, record.still_frames);
+  episode.samples.push_back(now);
+  return episode;
+}
+
+}  // namespace
+
+void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsOptions& options, MotionRecord& record) {
+  const belief::ObjectBelief& mine = belief.objects[static_cast<std::size_t>(object)];
+  const bool judging = record.episode && record.episode->closed;
+  const bool held = holder_of(*belief.scene, object).has_value();
+  const bool let_go = record.held && !held;
+  record.held = held;
+  if (held) {
+    record.still_frames = 0;
+    record.recent.clear();
+    if (!judging) record.episode.reset();
+    return;
+  }
+  if (record.episode && !judging &&
+      seconds_between(record.episode->samples.back().stamp_ns, belief.stamp_ns) > options.longest_gap)
+    record.episode.reset();
+  if (mine.state != belief::TrackState::kTracked) return;
+
+  const belief::ObjectEstimate estimate = belief::estimate(belief, mine);
+  MotionSample now = sample_of(belief, estimate);
+  if (let_go && !judging) {
+    begin_anew(now.X_WO, record);
+    record.episode.emplace();
+    record.episode->kind = EpisodeKind::kRelease;
+    record.episode->samples = {now};
+    record.episode->V_start = estimate.twist;
+    record.episode->others = poses_of(belief);
+    return;
+  }
+  if (record.still_frames == 0) {
+    begin_anew(now.X_WO, record);
+    keep_recent(now, options, record);
+    return;
+  }
+  const belief::ObjectModel& model = belief::model_of(belief, mine);
+  now.X_WO = geometry::closest_equivalent(now.X_WO, record.X_still, model.symmetry);
+  const Vector6d moved = geometry::box_minus(now.X_WO, record.X_still);
+  const bool moves = moved.tail<3>().norm() > std::max(options.start_shift, 3.0 * now.deviation.tail<3>().maxCoeff()) ||
+                     moved.head<3>().norm() > std::max(options.start_turn, 3.0 * now.deviation.head<3>().maxCoeff());
+  if (record.episode && !judging) {
+    record.episode->samples.push_back(now);
+    const bool long_enough = seconds_between(record.episode->samples.front().stamp_ns, now.stamp_ns) >= options.longest;
+    record.episode->closed = long_enough || (!moves && record.still_frames + 1 >= options.rest_frames);
+    if (record.episode->closed && std::ssize(record.episode->samples) < options.fewest_samples) record.episode.reset();
+  } else if (!record.episode && moves && record.still_frames >= options.rest_frames) {
+    record.episode = motion_episode(belief, now, record);
+  }
+  if (moves) {
+    begin_anew(now.X_WO, record);
+  } else {
+    average(now.X_WO, record);
+    if (!record.episode && !record.place_judged && record.still_frames >= options.rest_frames) {
+      record.place_judged = true;
+      record.episode = rest_episode(belief, now, options, record);
+    }
+  }
+  keep_recent(now, options, record);
+}
+
+}  // namespace prescene::filter

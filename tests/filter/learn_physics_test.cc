@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// Friction learned from motion: nothing from frames in which nothing happens, a bound from lying on a slope, a value
+// from a push, and never more than the motion says.
+#include "prescene/filter/operators/learn_physics.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "prescene/core/random.h"
+#include "pushed_box.h"
+
+namespace prescene::filter_tests::learn_physics_test {
+namespace {
+
+using belief::Belief;
+using filter::LearnReport;
+
+struct Learned {
+  belief::PhysicalBelief physics;
+  belief::MotionRecord motion;
+  LearnReport total;
+  int most_runs_a_frame = 0;
+  belief::ParameterEstimate friction;
+};
+
+/// Follows the frames of a push; the object's record goes from frame to frame as in the filter.
+Learned learn(const Push& push, std::uint64_t seed, core::ThreadPool& threads,
+              const filter::LearnPhysicsOptions& options = {}) {
+  Learned learned;
+  std::vector<Belief> frames = tracked_push(push, seed, threads);
+  for (Belief& belief : frames) {
+    belief.objects[0].physics = learned.physics;
+    belief.objects[0].motion = learned.motion;
+    const LearnReport report = filter::learn_physics(belief, options, push_simulators(), threads);
+    EXPECT_EQ(report.failure, "");
+    learned.total.runs += report.runs;
+    learned.total.lessons += report.lessons;
+    learned.total.unexplained += report.unexplained;
+    learned.most_runs_a_frame = std::max(learned.most_runs_a_frame, report.runs);
+    learned.physics = belief.objects[0].physics;
+    learned.motion = belief.objects[0].motion;
+  }
+  learned.friction = belief::parameter_estimates(frames[0].scene->models[0], learned.physics)[0];
+  return learned;
+}
+
+class LearnPhysics : public ::testing::Test {
+ protected:
+  core::ThreadPool threads_{2};
+};
+
+TEST_F(LearnPhysics, FramesInWhichNothingHappensChangeNothing) {
+  for (const bool held : {false, true}) {
+    Push push;
+    push.speed = 0.0;
+    push.frames = 300;
+    push.held = held;
+    const Learned learned = learn(push, 1, threads_);
+    EXPECT_EQ(learned.physics, belief::PhysicalBelief{}) << held;
+    EXPECT_EQ(learned.total.lessons, 0);
+    EXPECT_EQ(learned.total.unexplained, 0);
+    EXPECT_LE(learned.total.runs, 8) << "it lies where any friction would let it lie, which a few runs show";
+  }
+}
+
+TEST_F(LearnPhysics, LyingOnASlopeBoundsFrictionFromBelow) {
+  Push push;
+  push.speed = 0.0;
+  push.frames = 60;
+  push.slope = 20.0 * M_PI / 180.0;
+  push.friction = 0.6;
+  const Learned learned = learn(push, 1, threads_);
+  EXPECT_EQ(learned.total.lessons, 1);
+  const auto share_below = [&](double friction) {
+    double share = 0.0;
+    const auto scene = push_scene(push);
+    for (const belief::PhysicalDraw& draw : *learned.physics.draws)
+      if (belief::physical_at(scene->models[0], draw.uniforms).friction < friction) share += std::exp(draw.log_weight);
+    return share;
+  };
+  const double least = std::tan(push.slope);
+  EXPECT_LT(share_below(least - 0.03), 0.02);
+  // Above the bound the prior stays as it was: uniform.
+  EXPECT_NEAR((1.0 - share_below(0.63)) / (1.0 - share_below(least + 0.02)), (0.9 - 0.63) / (0.9 - least - 0.02), 0.05);
+}
+
+TEST_F(LearnPhysics, APushTellsFriction) {
+  Push push;
+  push.friction = 0.3;
+  const Learned learned = learn(push, 1, threads_);
+  EXPECT_EQ(learned.total.lessons, 1);
+  EXPECT_EQ(learned.total.unexplained, 0);
+  EXPECT_LE(learned.most_runs_a_frame, filter::LearnPhysicsOptions().runs_per_frame);
+  EXPECT_LT(learned.friction.low, push.friction);
+  EXPECT_GT(learned.friction.high, push.friction);
+  EXPECT_LT(learned.friction.high - learned.friction.low, 0.5 * 0.9 * 0.8);  // half of the prior's
+}
+
+TEST_F(LearnPhysics, WhatNoFrictionExplainsChangesNothing) {
+  // The pusher that is reported is not the one that pushes: the box moves before anything touches it.
+  Push push;
+  std::vector<Belief> frames = tracked_push(push, 1, threads_);
+  belief::PhysicalBelief physics;
+  belief::MotionRecord motion;
+  int unexplained = 0;
+  for (Belief& belief : frames) {
+    belief.robot[0].translation.z() += 1.0;
+    belief.objects[0].physics = physics;
+    belief.objects[0].motion = motion;
+    unexplained += filter::learn_physics(belief, {}, push_simulators(), threads_).unexplained;
+    physics = belief.objects[0].physics;
+    motion = belief.objects[0].motion;
+  }
+  EXPECT_EQ(unexplained, 1);
+  EXPECT_EQ(physics, belief::PhysicalBelief{});
+}
+
+TEST_F(LearnPhysics, IsTheSameForAnyNumberOfThreads) {
+  core::ThreadPool one(1);
+  Push push;
+  push.frames = 45;
+  const Learned a = learn(push, 4, threads_), b = learn(push, 4, one);
+  EXPECT_EQ(a.physics, b.physics);
+  EXPECT_EQ(a.motion, b.motion);
+}
+
+/// After one push the 90 % interval holds the true friction, which is drawn from the prior, in 85 to 95 % of pushes.
+TEST_F(LearnPhysics, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  constexpr int kPushes = 60;
+  int holds = 0, lessons = 0;
+  double width = 0.0;
+  for (int i = 0; i < kPushes; ++i) {
+    core::RandomStream draws(static_cast<std::uint64_t>(i), core::Purpose::kParameters);
+    Push push;
+    push.friction = draws.uniform(0.1, 0.9);
+    push.mass = std::clamp(0.4 + 0.05 * draws.normal(), 0.2, 0.6);
+    push.speed = draws.uniform(0.3, 0.8);
+    push.aside = draws.uniform(-0.015, 0.015);
+    const Learned learned = learn(push, static_cast<std::uint64_t>(100 + i), threads_);
+    lessons += learned.total.lessons;
+    holds += learned.friction.low <= push.friction && push.friction <= learned.friction.high;
+    width += (learned.friction.high - learned.friction.low) / kPushes;
+  }
+  std::printf(
+      "compared: friction after one push, 90 %% interval: holds the truth in %d of %d, width %.3f of the prior's "
+      "%.3f\n",
+      holds, kPushes, width, 0.72);
+  EXPECT_GE(lessons, kPushes * 9 / 10);
+  // 90 % of 60, with the room of a false alarm in a thousand on either side.
+  EXPECT_GE(holds, 46);
+  EXPECT_LT(width, 0.40);
+}
+
+}  // namespace
+}  // namespace prescene::filter_tests::learn_physics_test
