@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "seating.h"
+
 namespace prescene::queries {
 namespace {
 
@@ -58,7 +60,7 @@ std::shared_ptr<belief::Scene> scene_of(const belief::Belief& belief) {
     belief::SceneObject& known = scene->objects.emplace_back();
     known.name = object.name;
     known.model = object.model;
-    known.pose = belief::FixedPose{belief::estimate(object).mean};
+    known.pose = belief::FixedPose{belief::estimate(belief, object).mean};
     known.held_by = holder_of(*belief.scene, object, X_WG);
   }
   for (std::size_t i = 0; i < X_WG.size(); ++i) scene->robot[i].timeline = {{0.0, X_WG[i]}};
@@ -85,7 +87,17 @@ Prior prior_of(const belief::Belief& belief) {
               belief.X_WC,
               true,
               std::move(left_out)};
+  const auto seating = std::make_shared<const Seating>(*present, *scene);
   prior.starts = simulation::start_of(std::shared_ptr<const belief::Belief>(std::move(present)));
+  if (!seating->any()) return prior;
+  seating->apply(prior.likeliest);
+  for (simulation::StartComponent& component : prior.starts.components) {
+    component.draw = [seating, draw = std::move(component.draw)](std::span<const double> uniforms) {
+      belief::WorldState state = draw(uniforms);
+      seating->apply(state);
+      return state;
+    };
+  }
   return prior;
 }
 

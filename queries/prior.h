@@ -25,7 +25,8 @@ struct Prior {
 /// Whether the object takes part in what is foreseen.
 bool is_present(const belief::ObjectBelief& object);
 
-/// Objects as the belief has them; robot bodies stand where they stood at the belief's step, times count from there.
+/// Objects as the belief has them, those that lie still flush with what is below (Seating); robot bodies stand where
+/// they stood at the belief's step, times count from there.
 Prior prior_of(const belief::Belief& belief);
 Prior prior_of(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed);
 
