@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <deque>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -93,7 +94,10 @@ struct DdsNode::Impl {
   dds_entity_t waitset = 0;
   dds_entity_t stop = 0;
   std::unique_ptr<GraphAnnouncement> graph;
-  mutable std::mutex mutex;  // guards the two lists; their entries stay where they are
+  std::mutex census_mutex;                          // guards what is known of other nodes' writers
+  dds_entity_t census = 0;                          // a reader of the writers on the bus; made when first asked for
+  std::map<std::string, std::string> census_taken;  // topics in the form of DDS, by the bytes of the writer's key
+  mutable std::mutex mutex;                         // guards the two lists; their entries stay where they are
   std::deque<Subscription> subscriptions;
   std::deque<Publication> publications;
   std::atomic<std::uint64_t> dropped{0};
@@ -121,6 +125,8 @@ struct DdsNode::Impl {
   template <class CType, class Message>
   core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
   void announce();
+  /// Brings census_taken up to date; census_mutex is locked.
+  void take_census();
 };
 
 void DdsNode::Impl::run() {
@@ -214,6 +220,30 @@ void DdsNode::Impl::announce() {
   for (const Subscription& subscription : subscriptions) readers.push_back(subscription.reader);
   for (const Publication& publication : publications) writers.push_back(publication.writer);
   graph->publish(options.node_name, readers, writers);
+}
+
+void DdsNode::Impl::take_census() {
+  if (census <= 0) census = dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
+  dds_guid_t own{};
+  if (census <= 0 || dds_get_guid(participant, &own) != DDS_RETCODE_OK) return;
+  const auto bytes_of = [](const dds_guid_t& guid) {
+    return std::string(reinterpret_cast<const char*>(guid.v), sizeof(guid.v));
+  };
+  constexpr std::uint32_t kBatch = 64;
+  for (;;) {
+    void* samples[kBatch] = {};  // lent by the middleware
+    dds_sample_info_t infos[kBatch];
+    const dds_return_t count = dds_take(census, samples, infos, kBatch, kBatch);
+    for (dds_return_t i = 0; i < count; ++i) {
+      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
+      if (infos[i].instance_state != DDS_IST_ALIVE)
+        census_taken.erase(bytes_of(writer.key));
+      else if (infos[i].valid_data && bytes_of(writer.participant_key) != bytes_of(own))
+        census_taken[bytes_of(writer.key)] = writer.topic_name;
+    }
+    if (count > 0) dds_return_loan(census, samples, count);
+    if (count < static_cast<dds_return_t>(kBatch)) return;
+  }
 }
 
 DdsNode::DdsNode(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -388,6 +418,15 @@ int DdsNode::matched_writers(const std::string& topic) const {
     }
   }
   return 0;
+}
+
+int DdsNode::other_writers(const std::string& topic) const {
+  const auto name = dds_topic_name(topic);
+  if (!name) return 0;
+  const std::lock_guard lock(impl_->census_mutex);
+  impl_->take_census();
+  return static_cast<int>(std::count_if(impl_->census_taken.begin(), impl_->census_taken.end(),
+                                        [&](const auto& entry) { return entry.second == *name; }));
 }
 
 std::uint64_t DdsNode::dropped_samples() const { return impl_->dropped.load(std::memory_order_relaxed); }

@@ -305,6 +305,23 @@ TEST_F(TwoNodes, ASampleJustBeyondTheLimitIsCounted) {
   EXPECT_LT(inbox_.messages()[0].cdr.size(), 100'000u);
 }
 
+TEST_F(TwoNodes, WritersOfOthersAreCountedAndOwnOnesAreNot) {
+  const auto others = [&](auto& node, int wanted) {
+    while ((*node)->other_writers("/census") != wanted) std::this_thread::yield();
+  };
+  EXPECT_EQ((*reader_)->other_writers("/census"), 0);
+  text_publisher("/census");
+  text_publisher("/elsewhere");
+  others(reader_, 1);
+  EXPECT_EQ((*writer_)->other_writers("/census"), 0);
+  ASSERT_TRUE((*reader_)->advertise("/census", "std_msgs/msg/String", TopicQos::kState).ok());
+  others(writer_, 1);
+  EXPECT_EQ((*reader_)->other_writers("/census"), 1);
+  EXPECT_EQ((*reader_)->other_writers("not a topic"), 0);
+  writer_->reset();
+  others(reader_, 0);
+}
+
 TEST(DdsNode, SaysWhenTheSystemGrantsASmallerReceiveBuffer) {
   std::vector<std::string> lines;
   const auto log = [&](core::LogLevel, const std::string& line) { lines.push_back(line); };

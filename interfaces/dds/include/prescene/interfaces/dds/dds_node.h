@@ -105,6 +105,9 @@ class DdsNode {
   int matched_readers(DdsPublisher publisher) const;
   /// How many writers match a subscription now, 0 for an unknown topic.
   int matched_writers(const std::string& topic) const;
+  /// How many writers on the bus that are not this node's offer a topic now, whatever their type; no subscription is
+  /// needed.
+  int other_writers(const std::string& topic) const;
   /// Samples that reached this node and were dropped: too large (see DdsOptions), overwritten by newer ones before the
   /// node's thread took them, without memory to hold them, or given up by their callback with an exception. What the
   /// network loses of best-effort topics nobody can count.
