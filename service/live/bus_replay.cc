@@ -33,7 +33,7 @@ constexpr double kLongestWait = 1e9;
 
 steady_clock::duration seconds(double value) {
   return std::chrono::duration_cast<steady_clock::duration>(
-      std::chrono::duration<double>(std::min(value, kLongestWait)));
+      std::chrono::duration<double>(std::clamp(value, -kLongestWait, kLongestWait)));
 }
 
 /// What comes back from the service; filled by the bus's thread.
@@ -195,13 +195,16 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
 
   {  // Advertise everything first, so that the service has found it all before the first frame.
     PRESCENE_TRY(const auto reader, RecordingReader::open(path, options.read));
-    for (;;) {
+    while (!cancellation.requested()) {
       PRESCENE_TRY(const auto entry, reader->next());
       if (!entry) break;
       if (is_robots(*entry)) PRESCENE_RETURN_IF_ERROR(player.publisher_of(entry->message).status());
     }
   }
-  if (options.wait_for_service > 0.0 && !player.wait_for_listeners(options.wait_for_service, cancellation)) {
+  const bool heard =
+      options.wait_for_service <= 0.0 || player.wait_for_listeners(options.wait_for_service, cancellation);
+  if (cancellation.requested()) return core::cancelled("stopped on request, before anything was played");
+  if (!heard) {
     return core::unavailable("no service listens to the recording's topics: start `prescene serve` in domain " +
                              std::to_string(options.dds.domain) + ", with topic names as in the recording");
   }
