@@ -83,6 +83,8 @@ struct LiveService::Impl {
   void refuse(const core::Status& status);
   /// Counts an exception of a library, or the end of memory: what came next may do better.
   void note_failure(const std::string& of, const std::exception& error);
+  /// Counts and logs actions of controls that changed nothing.
+  void note_idle(const IdleControls& idle);
   void record(const std::string& topic, const std::string& json);
   /// Without one of its steps a recording can't be replayed: it ends where that can't be written.
   void record_step(const StepRecord& step);
@@ -124,6 +126,8 @@ struct LiveService::Impl {
   std::string logged_refusal;
   std::uint64_t not_simulated = 0;
   std::string physics_failure;
+  std::uint64_t idle_controls = 0;
+  std::string last_idle_control;
   const Backends* backends = nullptr;
   std::optional<core::Stopwatch> since_frame;
   bool was_tracking = false;
@@ -225,6 +229,13 @@ void LiveService::Impl::note_failure(const std::string& of, const std::exception
   core::log(log, core::LogLevel::kError, last_failure);
 }
 
+void LiveService::Impl::note_idle(const IdleControls& idle) {
+  if (idle.count == 0) return;
+  idle_controls += idle.count;
+  last_idle_control = idle.last;
+  core::log(log, core::LogLevel::kWarning, std::string(kControlTopic) + ": " + idle.last);
+}
+
 void LiveService::Impl::record(const std::string& topic, const std::string& json) {
   if (!recording) return;
   const core::Status written = recording->write_json(topic, json, last_now_ns);
@@ -293,6 +304,7 @@ void LiveService::Impl::look_after_frames() {
       degraded = step->record.degraded;
       not_simulated += static_cast<std::uint64_t>(step->counters.not_simulated);
       if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
+      note_idle(step->idle_controls);
       publish();
     }
   } catch (const std::exception& error) {
@@ -339,6 +351,9 @@ ServiceHealth LiveService::Impl::health() const {
   health.tf_late = tracker->tf_late();
   health.waiting_controls = tracker->waiting_controls();
   health.dropped_controls = tracker->dropped_controls();
+  health.idle_controls = idle_controls;
+  health.last_idle_control = last_idle_control;
+  health.other_services = node->other_writers(kBeliefTopic);
   health.is_recording = recording != nullptr;
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
   health.questions = worker->counts();
@@ -366,6 +381,7 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
     log_limiter.log_once(core::LogLevel::kWarning,
                          "simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
                              health.steppers.last_reason);
+  if (health.other_services > 0) log_limiter.log_once(core::LogLevel::kWarning, others_text(health.other_services));
   // What the log holds back is said at the next look, if it is still so then.
   const bool tracking = is_tracking(health);
   if (tracking && !was_tracking) {

@@ -13,8 +13,8 @@ using interfaces::RosDiagnosticLevel;
 /// What failed or was lost since the start; only ever grows.
 std::uint64_t losses_of(const ServiceHealth& health) {
   std::uint64_t sum = health.lost_on_bus + health.unsent + health.failures + health.tf_forgotten + health.tf_late +
-                      health.dropped_controls + health.unreadable_questions + health.questions.unanswered +
-                      health.questions.failed;
+                      health.dropped_controls + health.idle_controls + health.unreadable_questions +
+                      health.questions.unanswered + health.questions.failed;
   for (const auto& [topic, count] : health.dropped_in_inbox) {
     const auto& images = health.image_topics;
     if (std::find(images.begin(), images.end(), topic) == images.end()) sum += count;
@@ -27,7 +27,7 @@ RosDiagnosticLevel level_of(const ServiceHealth& health, const ServiceHealth& be
   if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
   if (!is_tracking(health)) return RosDiagnosticLevel::kError;
   if (losses_of(health) > losses_of(before)) return RosDiagnosticLevel::kWarn;
-  return health.degraded.empty() ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
+  return health.degraded.empty() && health.other_services == 0 ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
 }
 
 std::uint64_t sum_of(const std::map<std::string, std::uint64_t>& counts) {
@@ -58,8 +58,9 @@ std::string joined(const std::vector<std::string>& words) {
 std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics, lost_on_bus,
                questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late, waiting_controls,
-               dropped_controls, is_recording, recording_failure, seconds_since_frame, last_step_seconds, not_simulated,
-               physics_failure, steppers, degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
+               dropped_controls, idle_controls, last_idle_control, other_services, is_recording, recording_failure,
+               seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers, degraded, last_skip,
+               last_refusal, last_failure, last_failure_ns] = health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
@@ -81,6 +82,9 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"transforms too late", std::to_string(tf_late)},
           {"controls waiting", std::to_string(waiting_controls)},
           {"controls dropped", std::to_string(dropped_controls)},
+          {"controls without effect", std::to_string(idle_controls)},
+          {"last control without effect", last_idle_control},
+          {"other services in the domain", std::to_string(other_services)},
           {"recording", recording_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},
           {"last step, s", core::rounded_text(last_step_seconds)},
@@ -100,23 +104,31 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
 
 }  // namespace
 
+std::string others_text(int other_services) {
+  return (other_services == 1 ? "another service publishes"
+                              : std::to_string(other_services) + " other services publish") +
+         std::string(
+             " in this DDS domain: poses, beliefs and answers of all of them come on the same topics; give each a "
+             "--domain of its own");
+}
+
 bool is_tracking(const ServiceHealth& health) {
   return health.seconds_since_frame && *health.seconds_since_frame <= kSilentAfter;
 }
 
 std::string health_text(const ServiceHealth& health) {
-  const std::string recording =
-      health.recording_failure.empty() ? "" : "; the recording failed: " + health.recording_failure;
+  std::string end = health.recording_failure.empty() ? "" : "; the recording failed: " + health.recording_failure;
+  if (health.other_services > 0) end += "; " + others_text(health.other_services);
   if (is_tracking(health)) {
     std::string text = "tracking";
     for (const std::string& word : health.degraded) text += "; " + word;
-    return text + recording;
+    return text + end;
   }
   std::string text =
       health.seconds_since_frame ? "no frame is used any more" : "waiting for frames on " + health.depth_topic;
   if (!health.last_skip.empty()) text += "; the last one was skipped: " + health.last_skip;
   if (!health.last_refusal.empty()) text += "; the last message refused: " + health.last_refusal;
-  return text + recording;
+  return text + end;
 }
 
 interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const ServiceHealth& before,

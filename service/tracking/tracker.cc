@@ -41,6 +41,11 @@ std::vector<std::string> degraded_words(const filter::StepResult& result) {
   return words;
 }
 
+std::string words_of(const IdleControls& idle) {
+  return idle.count == 1 ? idle.last
+                         : std::to_string(idle.count) + " actions of controls change nothing; the last: " + idle.last;
+}
+
 }  // namespace
 
 core::Result<std::unique_ptr<Tracker>> Tracker::create(std::shared_ptr<const belief::Scene> scene,
@@ -113,9 +118,9 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   }
   // The first frame of a belief predicts nothing, so that no control could act.
   const bool predicts = before->step > 0;
-  filter::StepResult result = filter_.step(
-      *before, frame->observation,
-      predicts ? controls.due(before->stamp_ns, stamp_ns) : belief::Control{before->stamp_ns, stamp_ns, {}});
+  const belief::Control control =
+      predicts ? controls.due(before->stamp_ns, stamp_ns) : belief::Control{before->stamp_ns, stamp_ns, {}};
+  filter::StepResult result = filter_.step(*before, frame->observation, control);
   if (predicts) controls.forget_due(stamp_ns);
   if (!predicts && result.belief.step > 0) controls.begin_at(stamp_ns);
 
@@ -134,6 +139,8 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   if (const std::uint64_t dropped = controls.dropped() - controls_.dropped(); dropped > 0)
     step.record.degraded.push_back(std::to_string(dropped) +
                                    " actions of controls were dropped: they were stamped by another clock");
+  step.idle_controls = idle_controls(*before->scene, control);
+  if (step.idle_controls.count > 0) step.record.degraded.push_back(words_of(step.idle_controls));
   step.record.step = result.belief.step;
   step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
   step.counters = result.counters;

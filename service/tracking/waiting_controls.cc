@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
+#include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/step_record.h"
@@ -50,6 +52,35 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
     control.actions.emplace_back(core::ns_of(action.time), std::move(action));
   }
   return control;
+}
+
+IdleControls idle_controls(const belief::Scene& scene, const belief::Control& control) {
+  std::set<std::string> held;
+  for (const belief::SceneObject& object : scene.objects)
+    if (object.held_by) held.insert(object.name);
+  IdleControls idle;
+  for (const belief::Action& action : control.actions) {
+    const std::string object = belief::object_of(action);
+    if (object.empty()) continue;  // a push needs none
+    const auto* grasp = std::get_if<belief::Grasp>(&action.what);
+    std::string why;
+    if (!belief::find_object(scene, object))
+      why = "the scene has no such object";
+    else if (grasp != nullptr && !belief::find_robot_body(scene, grasp->hand))
+      why = "the scene has no robot body " + interfaces::quote(grasp->hand);
+    else if (grasp == nullptr && !held.contains(object))
+      why = "nothing holds it";
+    if (!why.empty()) {
+      ++idle.count;
+      idle.last =
+          "the action '" + belief::kind_of(action) + "' of " + interfaces::quote(object) + " changes nothing: " + why;
+    } else if (grasp != nullptr) {
+      held.insert(object);
+    } else if (std::holds_alternative<belief::Release>(action.what)) {
+      held.erase(object);
+    }
+  }
+  return idle;
 }
 
 core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message,

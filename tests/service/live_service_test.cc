@@ -206,6 +206,41 @@ TEST_F(LiveServiceTest, TellsWhichControlsWaitAndWhyOneIsRefused) {
   EXPECT_TRUE(stop().ok());
 }
 
+TEST_F(LiveServiceTest, TellsOfControlsThatChangeNothing) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  EXPECT_EQ(robot_.diagnostics()["controls without effect"], "0");
+  EXPECT_TRUE(robot_.send_until(
+      [&] {
+        robot_.control(R"({"actions": [{"time": 0, "release": {"object": "box"}}]})");
+        return robot_.diagnostics()["last control without effect"].find("nothing holds it") != std::string::npos;
+      },
+      kNoon + kSecond));
+  EXPECT_TRUE(stop().ok());
+  EXPECT_THAT(log_, testing::Contains(HasSubstr("/prescene/control: the action 'release' of 'box' changes nothing")));
+}
+
+TEST_F(LiveServiceTest, TellsOfAnotherServiceInItsDomainWhileItIsThere) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  const auto others = [&](const std::string& count) {
+    return robot_.send_until([&] { return robot_.diagnostics()["other services in the domain"] == count; },
+                             kNoon + kSecond);
+  };
+  EXPECT_TRUE(others("0"));
+  interfaces::DdsOptions options;
+  options.domain = own_domain();
+  auto other = interfaces::DdsNode::create(options, {});
+  ASSERT_TRUE(other.ok()) << other.status().message();
+  ASSERT_TRUE((*other)->advertise(kBeliefTopic, "std_msgs/msg/String", interfaces::TopicQos::kState).ok());
+  EXPECT_TRUE(others("1"));
+  EXPECT_THAT(robot_.diagnosis(), HasSubstr("another service publishes in this DDS domain"));
+  other->reset();
+  EXPECT_TRUE(others("0"));
+  EXPECT_TRUE(stop().ok());
+  EXPECT_THAT(log_, testing::Contains(HasSubstr("another service publishes in this DDS domain")));
+}
+
 TEST_F(LiveServiceTest, AReplayThatFailsEndsWhileTheServiceSpeaks) {
   start();
   ASSERT_TRUE(tracks_from(kNoon));

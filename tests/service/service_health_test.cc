@@ -78,6 +78,15 @@ TEST(ServiceHealth, CarriesItsCounts) {
   for (const auto& value : some) EXPECT_THAT(status.values, ::testing::Contains(value)) << value.key;
 }
 
+TEST(ServiceHealth, WarnsAsLongAsThereAreOtherServices) {
+  ServiceHealth health;
+  health.seconds_since_frame = 0.1;
+  health.other_services = 2;
+  EXPECT_EQ(level(health, health), RosDiagnosticLevel::kWarn);
+  EXPECT_THAT(health_text(health), HasSubstr("2 other services publish in this DDS domain"));
+  EXPECT_THAT(health_text(health), HasSubstr("--domain"));
+}
+
 TEST(ServiceHealth, TellsOfEveryLossByItsPlace) {
   ServiceHealth health;
   health.dropped_in_inbox = {{"/tf", 12}, {"/camera/depth", 3}};
@@ -112,6 +121,7 @@ TEST(ServiceHealth, WarnsOfWhatWasLostSinceTheLastReportAndNotForEver) {
       [](ServiceHealth& health) { ++health.tf_forgotten; },
       [](ServiceHealth& health) { ++health.tf_late; },
       [](ServiceHealth& health) { ++health.dropped_controls; },
+      [](ServiceHealth& health) { ++health.idle_controls; },
       [](ServiceHealth& health) { ++health.dropped_in_inbox["/tf"]; }};
   for (std::size_t i = 0; i < losses.size(); ++i) {
     ServiceHealth health = quiet;

@@ -91,6 +91,38 @@ TEST(WaitingControls, AreBounded) {
   EXPECT_EQ(controls.take_in(message(kGrasp, kNoon), kNoon).code(), core::StatusCode::kResourceExhausted);
 }
 
+belief::Control control_of(const std::string& actions) {
+  const auto parsed = parse_control(R"({"actions": [)" + actions + "]}");
+  EXPECT_TRUE(parsed.ok()) << parsed.status().message();
+  belief::Control control;
+  for (const auto& [after_ns, action] : parsed->actions) control.actions.push_back(action);
+  return control;
+}
+
+TEST(IdleControls, AreThoseOfWhatIsNotThereOrNotHeld) {
+  belief::Scene scene;
+  scene.objects.resize(2);
+  scene.objects[0].name = "box";
+  scene.objects[1].name = "mug";
+  scene.objects[1].held_by = "gripper";
+  scene.robot.resize(1);
+  scene.robot[0].name = "gripper";
+  const std::string grasp = R"({"time": 0, "grasp": {"object": "box", "hand": "gripper"}})";
+  const std::string release = R"({"time": 0, "release": {"object": "box"}})";
+  const std::string pour = R"({"time": 0, "pour": {"container": "box", "angle_deg": 90}})";
+  const auto idle = [&](const std::string& actions) { return idle_controls(scene, control_of(actions)); };
+  EXPECT_EQ(idle(grasp + "," + pour + "," + release).count, 0u);
+  EXPECT_EQ(idle(R"({"time": 0, "release": {"object": "mug"}})").count, 0u);
+  EXPECT_EQ(idle(R"({"time": 0, "push": {"from": [0, 0, 0], "to": [1, 0, 0]}})").count, 0u);
+  EXPECT_EQ(idle(release).last, "the action 'release' of 'box' changes nothing: nothing holds it");
+  EXPECT_EQ(idle(pour).last, "the action 'pour' of 'box' changes nothing: nothing holds it");
+  EXPECT_EQ(idle(grasp + "," + release + "," + release).count, 1u);
+  EXPECT_EQ(idle(R"({"time": 0, "release": {"object": "cup\n"}})").last,
+            R"(the action 'release' of 'cup\x0a' changes nothing: the scene has no such object)");
+  EXPECT_EQ(idle(R"({"time": 0, "grasp": {"object": "box", "hand": "foot"}})").last,
+            "the action 'grasp' of 'box' changes nothing: the scene has no robot body 'foot'");
+}
+
 TEST(Tracker, AGraspBeforeTheFirstFrameActsInTheFirstStepThatPredicts) {
   const tests::ScratchDir folder;
   const std::filesystem::path path = folder.path() / "run.mcap";

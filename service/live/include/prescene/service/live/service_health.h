@@ -37,6 +37,9 @@ struct ServiceHealth {
   std::uint64_t tf_late = 0;         ///< Transforms that came when they were older than what is kept.
   std::size_t waiting_controls = 0;  ///< Actions of controls that wait for a frame.
   std::uint64_t dropped_controls = 0;  ///< Those that were dropped, as their stamps are by another clock.
+  std::uint64_t idle_controls = 0;     ///< Actions of controls that changed nothing, as in idle_controls().
+  std::string last_idle_control;       ///< What the last of them was, and why.
+  int other_services = 0;              ///< Which publish beliefs in the same DDS domain.
   bool is_recording = false;
   std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
@@ -54,11 +57,15 @@ struct ServiceHealth {
 /// True while frames come and are used.
 bool is_tracking(const ServiceHealth& health);
 
+/// What `other_services` (at least one) in the same DDS domain mean.
+std::string others_text(int other_services);
+
 /// What it does and, while it does not track, why not: "no frame is used: tf does not connect ...".
 std::string health_text(const ServiceHealth& health);
 
-/// kWarn before the first frame, for degraded steps and when something failed or was lost since `before`, the health of
-/// the last report (or none); kError when frames stopped or the recording failed. The values are those since the start.
+/// kWarn before the first frame, for degraded steps, beside other services, and when something failed, was lost or had
+/// no effect since `before`, the health of the last report (or none); kError when frames stopped or the recording
+/// failed. The values are those since the start.
 interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const ServiceHealth& before,
                                               const std::string& hardware_id);
 

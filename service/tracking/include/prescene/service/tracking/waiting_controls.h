@@ -11,6 +11,7 @@
 
 #include "prescene/belief/action.h"
 #include "prescene/belief/observation.h"
+#include "prescene/belief/scene.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/status.h"
 #include "prescene/interfaces/dds/dds_node.h"
@@ -28,6 +29,15 @@ struct ParsedControl {
 };
 /// Of {"stamp_ns": n, "actions": [...]}; kInvalidInput naming the key that makes no sense.
 core::Result<ParsedControl> parse_control(const std::string& json);
+
+/// Actions that change nothing in what is tracked.
+struct IdleControls {
+  std::uint64_t count = 0;
+  std::string last;  ///< "the action 'release' of 'cup' changes nothing: nothing holds it"; "" = there is none.
+};
+/// Those of a control that begins in `scene`, in their order: an object or a hand that is not in the scene, or
+/// something to be done with an object (release, place, pour, transport) that nothing holds then.
+IdleControls idle_controls(const belief::Scene& scene, const belief::Control& control);
 
 /// Not thread-safe. Times are stamps of frames, ns.
 class WaitingControls {
