@@ -8,6 +8,7 @@
 
 #include <csignal>
 #include <functional>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -255,6 +256,35 @@ TEST_F(LiveServiceTest, AReplayThatFailsEndsWhileTheServiceSpeaks) {
       },
       kNoon + kSecond));
   EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, AReplayStopsInAPauseAndWhileItWaitsForAService) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path path = folder.path() / "run.mcap";
+  const core::Status recorded = tests::record_scene(tests::kBoxScene, {}, 10.0, path);
+  ASSERT_TRUE(recorded.ok()) << recorded.message();
+  BusReplayOptions options;
+  options.dds.domain = own_domain();
+  options.wait_for_service = 1e9;
+  core::Cancellation stop_waiting;
+  stop_waiting.request();
+  EXPECT_EQ(replay_over_bus(path, options, stop_waiting, {}, {}).status().code(), core::StatusCode::kCancelled);
+
+  options.wait_for_service = 0.0;
+  options.speed = kReplaySpeeds.low;  // minutes between one frame and the next
+  std::promise<void> began;
+  core::Cancellation stop_playing;
+  std::thread stopper([&] {
+    began.get_future().wait();
+    stop_playing.request();
+  });
+  int entries = 0;
+  const auto result = replay_over_bus(path, options, stop_playing, {}, {}, [&](const RecordedEntry&) {
+    if (++entries == 1) began.set_value();
+  });
+  stopper.join();
+  ASSERT_TRUE(result.ok()) << result.status().message();
+  EXPECT_LT(entries, 10);
 }
 
 TEST_F(LiveServiceTest, RefusesWhatMakesNoSenseAndGoesOn) {

@@ -227,16 +227,6 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
   EXPECT_EQ(json["different_steps"], 0);
 }
 
-TEST_F(Session, AReplayOverTheBusStopsInItsPauses) {
-  BackgroundProgram service({"serve", "--scene", path("scene.yaml")}, bus_);
-  // A second of the recording takes a quarter of an hour.
-  BackgroundProgram replay({"replay", path("run.mcap"), "--over-dds", "--speed", "0.001"}, bus_);
-  while (parsed(run_program({"ask", "where", "--json"}, bus_)).value("step", 0) == 0) {
-  }
-  EXPECT_EQ(replay.stop(SIGINT), 1);
-  EXPECT_EQ(service.stop(SIGINT), 0);
-}
-
 TEST_F(Session, AskingNobodySaysSo) {
   const Finished asked = run_program({"ask", "where", "--timeout", "0.3"}, bus_);
   EXPECT_EQ(asked.exit_code, 1);

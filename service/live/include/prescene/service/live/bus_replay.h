@@ -48,8 +48,9 @@ struct BusReplayResult {
 };
 
 /// `on_entry` sees each entry of the recording when its time has come. A request to cancel ends it within 0.1 s, also
-/// in a pause of the recording; what was done is returned. Fails with kInvalidInput for a speed out of range or a
-/// question that is none, before anything is published, and with kUnavailable when no service listens in time.
+/// in a pause of the recording; what was done is returned. Before anything is published it fails with kCancelled then,
+/// with kInvalidInput for a speed out of range or a question that is none, and with kUnavailable when no service
+/// listens in time.
 core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path, const BusReplayOptions& options,
                                               const core::Cancellation& cancellation,
                                               const core::ProgressSink& progress, const core::LogSink& log,
