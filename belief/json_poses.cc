@@ -114,7 +114,10 @@ PoseDistribution pose_distribution_from(const JsonAt& at) {
     if (position || rotation || normal) samples->fail("samples exclude everything else: put it into the samples");
     SampledPose sampled;
     for (const JsonAt& item : samples->items()) sampled.samples.push_back(pose_from(item));
-    if (sampled.samples.empty()) samples->fail("at least one sample is needed");
+    if (sampled.samples.empty()) {
+      samples->fail("at least one sample is needed");
+      return FixedPose{};
+    }
     return sampled;
   }
   if (!position && !rotation) at.fail("one of the keys position, rotation, samples is needed");

@@ -105,28 +105,33 @@ Json scalar_json(const ScalarDistribution& distribution) {
   return json;
 }
 
+// What fails is read as a fixed value: callers ask distributions for their mean before anybody looks at the errors.
 ScalarDistribution scalar_from(const JsonAt& at) {
   if (!at.value.is_object()) return FixedScalar{at.number()};
+  const auto failed = [](const JsonAt& where, const char* why) -> ScalarDistribution {
+    where.fail(why);
+    return FixedScalar{};
+  };
   JsonObject object(at);
   const auto form = object.one_of({"normal", "uniform", "samples"});
   if (!form) return FixedScalar{};
   if (form->first == "uniform") {
     const std::vector<double> ends = form->second.numbers(2);
-    if (ends[0] > ends[1]) form->second.fail("the interval runs backwards: give [lowest, highest]");
+    if (ends[0] > ends[1]) return failed(form->second, "the interval runs backwards: give [lowest, highest]");
     return UniformScalar{ends[0], ends[1]};
   }
   if (form->first == "samples") {
     SampledScalar sampled;
     for (const JsonAt& item : form->second.items()) sampled.samples.push_back(item.number());
-    if (sampled.samples.empty()) form->second.fail("at least one sample is needed");
+    if (sampled.samples.empty()) return failed(form->second, "at least one sample is needed");
     return sampled;
   }
   const std::vector<double> moments = form->second.numbers(2);
   NormalScalar normal{moments[0], moments[1]};
-  if (normal.standard_deviation < 0.0) form->second.fail("the standard deviation is negative");
+  if (normal.standard_deviation < 0.0) return failed(form->second, "the standard deviation is negative");
   if (const auto low = object.find("min")) normal.low = low->number();
   if (const auto high = object.find("max")) normal.high = high->number();
-  if (normal.low > normal.high) form->second.fail("min is above max");
+  if (normal.low > normal.high) return failed(form->second, "min is above max");
   return normal;
 }
 

@@ -59,14 +59,17 @@ ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const 
   if (cut_high) normal.high = range.high;
   binder.read("min", normal.low, range);
   binder.read("max", normal.high, range);
-  if (normal.low > normal.high) problems.add(value.place, value.path, "min is above max", "give a min below the max");
+  if (normal.low > normal.high) {
+    problems.add(value.place, value.path, "min is above max", "give a min below the max");
+    return FixedScalar{};  // whoever asks for a mean before the problems are reported needs one that exists
+  }
   if (value.kind != LocatedValue::Kind::kList || value.items.size() != 2) {
     report_type(value, problems, "give [mean, standard deviation]");
     return normal;
   }
   normal.mean = read_number(value.items[0], problems, range).value_or(0.0);
   normal.standard_deviation = read_number(value.items[1], problems, deviation_range(range)).value_or(0.0);
-  if (normal.low <= normal.high && mass_between(normal) < kLeastMass)
+  if (mass_between(normal) < kLeastMass)
     problems.add(value.place, value.path,
                  "hardly anything of a normal distribution of mean " + core::rounded_text(normal.mean) +
                      " and deviation " + core::rounded_text(normal.standard_deviation) + " lies between " +
@@ -78,8 +81,10 @@ ScalarDistribution read_normal(const LocatedValue& value, Binder& binder, const 
 ScalarDistribution read_uniform(const LocatedValue& value, Problems& problems, const NumberRange& range) {
   const std::optional<std::vector<double>> ends = read_numbers(value, problems, 2, range);
   if (!ends) return FixedScalar{};
-  if ((*ends)[0] > (*ends)[1])
+  if ((*ends)[0] > (*ends)[1]) {
     problems.add(value.place, value.path, "the interval runs backwards", "give [lowest, highest]");
+    return FixedScalar{};
+  }
   return UniformScalar{(*ends)[0], (*ends)[1]};
 }
 

@@ -128,6 +128,22 @@ TEST(QueryFromJson, NamesThePathOfWhatIsWrong) {
               HasSubstr("stability.weather: unknown key; the keys here are object, max_move"));
 }
 
+TEST(QueryFromJson, RefusesPositionsOfNoDistribution) {
+  for (const char* x :
+       {R"({"samples": []})", R"({"samples": {}})", R"({"normal": [0, 1], "min": 2, "max": 1})",
+        R"({"normal": [0, 0], "min": 2, "max": 1})", R"({"normal": [0, -1]})", R"({"uniform": [1, 0]})", R"({})"}) {
+    const std::string place = R"({"time": 0, "place": {"object": "cup", "pose": {"position": [)" + std::string(x) +
+                              R"(, 0, 0], "normal": {"position": 0.1}}}})";
+    const auto query = query_from_json(R"({"predict": {"actions": [)" + place + "]}}");
+    EXPECT_THAT(query.status().message(), HasSubstr("pose.position[0]")) << x;
+    EXPECT_FALSE(action_from_json(Json::parse(place)).ok()) << x;
+  }
+  EXPECT_THAT(query_from_json(R"({"predict": {"actions": [{"place": {"object": "cup", "pose": {"samples": []}}}]}})")
+                  .status()
+                  .message(),
+              HasSubstr("pose.samples"));
+}
+
 TEST(QueryFromJson, FillsInWhatIsNotSaid) {
   const auto query = query_from_json(R"({"stability": {"object": "cup"}})");
   ASSERT_TRUE(query.ok());
