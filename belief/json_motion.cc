@@ -14,9 +14,9 @@ constexpr std::size_t kMostDraws = 1u << 16;
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 
 const std::vector<std::pair<std::string, EpisodeKind>>& episode_words() {
-  static const std::vector<std::pair<std::string, EpisodeKind>> words = {
+  static const std::vector<std::pair<std::string, EpisodeKind>> kWords = {
       {"rest", EpisodeKind::kRest}, {"motion", EpisodeKind::kMotion}, {"release", EpisodeKind::kRelease}};
-  return words;
+  return kWords;
 }
 
 Json poses_json(const std::vector<Pose>& poses) {

@@ -3,10 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <memory>
 #include <vector>
 
+#include "falling_particles.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/sampling.h"
 
@@ -36,21 +35,6 @@ void limit_spread(const PredictOptions& options, belief::Matrix12d& covariance) 
     if (deviation > limits[i / 3]) scale[i] = limits[i / 3] / deviation;
   }
   covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
-}
-
-void clear_twist(Particle& particle) {
-  particle.V_WO = {};
-  particle.covariance.bottomRows<6>().setZero();
-  particle.covariance.rightCols<6>().setZero();
-}
-
-bool is_slow(const PredictOptions& options, const Particle& particle) {
-  return particle.V_WO.linear.norm() < options.settle_speed && particle.V_WO.angular.norm() < options.settle_rate;
-}
-
-void settle(Particle& particle) {
-  particle.mode = MotionMode::kResting;
-  clear_twist(particle);
 }
 
 /// Starts to move: at its velocity, with room for more.
@@ -116,194 +100,6 @@ void apply_grasps(const belief::Control& control, belief::Belief& belief) {
       clear_twist(particle);
     }
   }
-}
-
-bool present(const ObjectBelief& object) {
-  return object.existence >= 0.5 && object.state != belief::TrackState::kLost;
-}
-
-/// One particle that physics is to move on.
-struct Falling {
-  std::size_t object;
-  std::size_t particle;
-  double duration;  ///< s
-  Pose X_WO;        ///< Where constant velocity takes it, ...
-  Twist V_WO;       ///< ... and how fast it is then.
-};
-
-/// The scene of one step: robot bodies go from where they were to where they are, absent objects are left out.
-belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_WG, double dt,
-                         const std::vector<std::size_t>& objects) {
-  belief::Scene scene = *belief.scene;
-  for (std::size_t i = 0; i < scene.robot.size(); ++i)
-    scene.robot[i].timeline = {{0.0, belief.robot[i]}, {dt, X_WG[i]}};
-  std::vector<belief::SceneObject> kept;
-  for (const std::size_t i : objects) kept.push_back(belief.scene->objects[i]);
-  scene.objects = std::move(kept);
-  scene.actions.clear();
-  scene.outcomes.clear();
-  scene.exclusive_outcomes.clear();
-  return scene;
-}
-
-double lowest_point(const std::vector<belief::CollisionShape>& shapes, const Pose& X_W, const Vector3d& up_W) {
-  double lowest = std::numeric_limits<double>::infinity();
-  for (const Vector3d& vertex : belief::collision_mesh(shapes).vertices)
-    lowest = std::min(lowest, up_W.dot(X_W * vertex));
-  return lowest;
-}
-
-/// Where everything stops that falls past all that is known: a floor at the height of the lowest surface that was seen
-/// or of the lowest known support, whichever is lower. What is below that already stops where it is, and the belief
-/// remembers that height.
-std::optional<belief::Support> last_floor(std::span<const Falling> falling, belief::Belief& belief) {
-  const belief::Scene& scene = *belief.scene;
-  if (!belief.lowest_seen || !(scene.gravity_W.norm() > 0.0)) return std::nullopt;
-  const Vector3d up_W = -scene.gravity_W.normalized();
-  double height = *belief.lowest_seen;
-  for (const belief::Support& support : scene.supports)
-    height = std::min(height, lowest_point(support.collision, support.X_WS, up_W));
-  Vector3d middle = Vector3d::Zero();
-  for (const Falling& f : falling) {
-    const Particle& particle = belief.objects[f.object].particles[f.particle];
-    middle += particle.X_WO.translation / static_cast<double>(falling.size());
-    if (up_W.dot(particle.X_WO.translation) >= height) continue;
-    const belief::ObjectModel& model = belief::model_of(belief, belief.objects[f.object]);
-    const double reach = model.visual ? geometry::radius_about(*model.visual, Vector3d::Zero()) : 0.0;
-    height = up_W.dot(particle.X_WO.translation) - reach;
-    belief.lowest_seen = height;
-  }
-  constexpr double kThickness = 1.0, kSize = 40.0;  // m: nothing leaves it sideways, nor passes it in a step
-  belief::Support floor;
-  floor.name = "last_floor";
-  while (belief::find_support(scene, floor.name)) floor.name += '_';
-  floor.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{Vector3d(kSize, kSize, kThickness)}, {}});
-  floor.X_WS.rotation = geometry::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), up_W);
-  floor.X_WS.translation = middle + up_W * (height - 0.5 * kThickness - up_W.dot(middle));
-  floor.contact.friction = belief::FixedScalar{1.0};
-  return floor;
-}
-
-/// Constant velocity in place of physics.
-void go_on_without_physics(const Falling& falling, const std::string& why, belief::Belief& belief,
-                           PredictReport& report) {
-  Particle& particle = belief.objects[falling.object].particles[falling.particle];
-  particle.X_WO = falling.X_WO;
-  particle.V_WO = falling.V_WO;
-  if (report.not_simulated++ == 0) report.failure = why;
-}
-
-/// Why the end of a run is no prediction; nothing where it is one.
-std::optional<std::string> failure_of(const belief::Trajectory& run, std::size_t place) {
-  switch (run.end) {
-    case belief::TrajectoryEnd::kDuration:
-      break;
-    case belief::TrajectoryEnd::kDiverged:
-      return "diverged";
-    case belief::TrajectoryEnd::kLeftTheWorld:
-      return "left the simulated world";
-    case belief::TrajectoryEnd::kAtRest:
-    case belief::TrajectoryEnd::kCancelled:
-    case belief::TrajectoryEnd::kDecided:
-      return "ended before the step did";
-  }
-  if (run.states.empty() || place >= run.final().objects.size()) return "has no end";
-  const belief::ObjectState& end = run.final().objects[place];
-  const bool finite = end.X_WO.is_finite() && end.V_WO.linear.allFinite() && end.V_WO.angular.allFinite();
-  return finite ? std::nullopt : std::optional<std::string>("has no finite end");
-}
-
-/// Moves falling particles of one duration by the simulator, each with the other objects (`objects`, by index in the
-/// belief) where they most likely are. Its physical parameters are drawn anew for each particle and step from what is
-/// believed of them.
-void simulate(belief::Belief& belief, std::span<const Falling> falling, const std::vector<std::size_t>& objects,
-              double dt, const PredictOptions& options, const simulation::Simulator& simulator,
-              const core::RandomStream& stream, core::ThreadPool& threads, PredictReport& report) {
-  belief::WorldState common;
-  std::vector<belief::PhysicalSampler> physics;
-  for (const std::size_t i : objects) {
-    const ObjectBelief& object = belief.objects[i];
-    const Particle& particle = belief::heaviest(object.particles);
-    physics.emplace_back(belief::model_of(belief, object), object.physics);
-    common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, physics.back().mean()});
-  }
-  const core::RandomStream parameters = stream.for_purpose(core::Purpose::kParameters);
-  const auto place_of = [&](const Falling& f) {
-    return static_cast<std::size_t>(std::find(objects.begin(), objects.end(), f.object) - objects.begin());
-  };
-  std::vector<belief::WorldState> starts;
-  std::vector<double> settle_draws;
-  for (const Falling& f : falling) {
-    belief::WorldState start = common;
-    start.time = dt - f.duration;
-    const Particle& particle = belief.objects[f.object].particles[f.particle];
-    const std::size_t place = place_of(f);
-    core::RandomStream draws = parameters.at(belief.step, static_cast<std::uint32_t>(f.object << 16 | f.particle));
-    std::vector<double> uniforms(static_cast<std::size_t>(physics[place].dimensions()));
-    for (double& u : uniforms) u = draws.uniform();
-    settle_draws.push_back(draws.uniform());
-    start.objects[place] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, physics[place].draw(uniforms)};
-    starts.push_back(std::move(start));
-  }
-  simulation::RunRequest request;
-  request.stop.duration = falling.front().duration;
-  request.stop.stop_at_rest = false;
-  // The world of a robot has no edge: what is far from its origin falls like everything else.
-  request.stop.world_radius = std::numeric_limits<double>::infinity();
-  std::vector<belief::Trajectory> runs(starts.size());
-  simulator.run(starts, request, stream, 0, threads, runs);
-  for (std::size_t i = 0; i < falling.size(); ++i) {
-    ObjectBelief& object = belief.objects[falling[i].object];
-    const std::size_t place = place_of(falling[i]);
-    if (const std::optional<std::string> failure = failure_of(runs[i], place)) {
-      go_on_without_physics(falling[i], "the simulated motion of '" + object.name + "' " + *failure, belief, report);
-      continue;
-    }
-    const belief::ObjectState& end = runs[i].final().objects[place];
-    Particle& particle = object.particles[falling[i].particle];
-    particle.X_WO = geometry::normalized(end.X_WO);
-    particle.V_WO = end.V_WO;
-    if (object.state != belief::TrackState::kTracked && settle_draws[i] < options.settle_probability &&
-        is_slow(options, particle))
-      settle(particle);
-    ++report.simulated;
-  }
-}
-
-/// Moves all falling particles on: by physics where that can be done.
-PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,
-                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads) {
-  PredictReport report;
-  if (falling.empty()) return report;
-  std::vector<std::size_t> objects;
-  for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    if (present(belief.objects[i])) objects.push_back(i);
-  belief::Scene scene = step_scene(belief, X_WG, dt, objects);
-  if (auto floor = last_floor(falling, belief)) scene.supports.push_back(*std::move(floor));
-  const auto simulator = simulators(scene, 1.0);
-  if (!simulator) {
-    const std::string why = "no simulator could be made: " + simulator.status().message();
-    for (const Falling& f : falling) go_on_without_physics(f, why, belief, report);
-    return report;
-  }
-  PRESCENE_CHECK(*simulator != nullptr);
-  // Runs of one call share a duration.
-  std::stable_sort(falling.begin(), falling.end(),
-                   [](const auto& a, const auto& b) { return a.duration < b.duration; });
-  for (std::size_t begin = 0; begin < falling.size();) {
-    std::size_t end = begin;
-    while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
-    simulate(belief, std::span(falling).subspan(begin, end - begin), objects, dt, options, **simulator, stream, threads,
-             report);
-    begin = end;
-  }
-  return report;
-}
-
-Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
-  const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
-  return model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
 }
 
 /// The modes of one object's particles for this step.
@@ -398,7 +194,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       } else if (left > 0.0) {
         const Particle before = particle;
         drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep, options.moving);
-        if (simulators && present(object) && physics_draw < physics_share) {
+        if (simulators && is_present(object) && physics_draw < physics_share) {
           falling.push_back({i, k, left, particle.X_WO, particle.V_WO});
           particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike
           particle.V_WO = before.V_WO;

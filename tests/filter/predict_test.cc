@@ -384,5 +384,33 @@ TEST(DriftStatistics, CovarianceIsThatOfDriftedSamples) {
       EXPECT_NEAR(sampled(i, j), moved.covariance(i, j), 0.12 * scale[i] * scale[j]) << i << ", " << j;
 }
 
+/// Only what may touch within the step is simulated together: three boxes, two side by side and one far away.
+TEST_F(Predict, SimulatesObjectsWithThoseThatTheyMayTouch) {
+  belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  const double places[] = {0.1, 0.1 + 0.065, 2.0};
+  belief.objects.resize(3, belief.objects[0]);
+  scene->objects.resize(3, scene->objects[0]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    belief.objects[i].name = scene->objects[i].name = "box_" + std::to_string(i);
+    belief.objects[i].island = static_cast<int>(i);
+    for (Particle& particle : belief.objects[i].particles) particle.X_WO.translation.x() = places[i];
+  }
+  belief.scene = scene;
+  std::vector<std::vector<std::string>> groups;
+  const simulation::SimulatorFactory simulators = [&](const belief::Scene& of, double) {
+    std::vector<std::string>& names = groups.emplace_back();
+    for (const belief::SceneObject& object : of.objects) names.push_back(object.name);
+    return by_formula(
+        [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) { return start; });
+  };
+  PredictOptions options = without_mode_changes();
+  options.physics_share = 1.0;
+  const PredictReport report = run(belief, belief.robot[0], 0.04, options, {}, simulators);
+  EXPECT_EQ(report.simulated, 48);
+  const std::vector<std::vector<std::string>> expected = {{"box_0", "box_1"}, {"box_2"}};
+  EXPECT_EQ(groups, expected);
+}
+
 }  // namespace
 }  // namespace prescene::filter_tests

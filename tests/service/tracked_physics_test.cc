@@ -92,7 +92,7 @@ TEST(TrackedPhysics, WhatIsNotSeenFallsNoFurtherThanTheLowestSurfaceThatWas) {
   }
 }
 
-/// More objects than the lockstep stepper takes, one of them falling.
+/// More objects that may touch than the lockstep stepper takes, one of them falling.
 constexpr const char* kFiveBoxes = R"(name: boxes
 duration: 0.4
 models:
@@ -100,11 +100,11 @@ models:
 supports:
   table: {box: [1.6, 1.6, 0.04], pose: {position: [0, 0, -0.02]}}
 objects:
-  a: {model: box, pose: {position: [0, 0, 0.25]}}
-  b: {model: box, pose: {position: [0.2, 0, 0.03]}}
-  c: {model: box, pose: {position: [-0.2, 0, 0.03]}}
-  d: {model: box, pose: {position: [0, 0.2, 0.03]}}
-  e: {model: box, pose: {position: [0, -0.2, 0.03]}}
+  a: {model: box, pose: {position: [0, 0, 0.12]}}
+  b: {model: box, pose: {position: [0.103, 0, 0.03]}}
+  c: {model: box, pose: {position: [-0.103, 0, 0.03]}}
+  d: {model: box, pose: {position: [0, 0.083, 0.03]}}
+  e: {model: box, pose: {position: [0, -0.083, 0.03]}}
 camera:
   width: 80
   height: 60

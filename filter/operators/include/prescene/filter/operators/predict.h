@@ -61,10 +61,10 @@ struct PredictReport {
 /// Steps `belief` from its robot poses and stamp to `X_WG` and `dt` later (s, > 0). Actions of the control act at their
 /// times within the step. Weights do not change.
 ///
-/// `simulators` is called at most once, with the scene of this step, and shapes should come from a cache; empty = none,
-/// then everything that moves does so at constant velocity. A particle whose simulator can't be made, or whose run does
-/// not last for the whole step or ends where nothing can be, goes on at constant velocity like those that are not meant
-/// for physics.
+/// `simulators` is called once for each group of objects that may touch in this step, with a scene of these objects,
+/// and shapes should come from a cache; empty = none, then everything that moves does so at constant velocity. A
+/// particle whose simulator can't be made, or whose run does not last for the whole step or ends where nothing can be,
+/// goes on at constant velocity like those that are not meant for physics.
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
                       const core::RandomStream& stream, core::ThreadPool& threads);
