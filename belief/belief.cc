@@ -359,6 +359,8 @@ std::uint64_t content_hash(const Belief& belief) {
     hash_colors(hasher, object.colors);
     hash_physics(hasher, object.physics);
     hash_motion(hasher, object.motion);
+    hasher.value(object.grip.frames).value(object.grip.apart_frames);
+    hash_pose(hasher, object.grip.X_GO);
   }
   hasher.value(belief.robot.size());
   for (const Pose& pose : belief.robot) hash_pose(hasher, pose);

@@ -102,6 +102,7 @@ ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
     object.physics = physics_from(*physics, dimensions);
   }
   if (const auto motion = fields.require("motion")) object.motion = motion_from(*motion);
+  if (const auto grip = fields.find("grip")) object.grip = grip_from(*grip);
   return object;
 }
 
@@ -182,6 +183,7 @@ Json to_json(const ObjectBelief& object) {
   if (object.colors.shares) json["colors"] = colors_json(object.colors);
   if (object.physics.draws) json["physics"] = physics_json(object.physics);
   json["motion"] = motion_json(object.motion);
+  if (object.grip != GripRecord{}) json["grip"] = grip_json(object.grip);
   return json;
 }
 

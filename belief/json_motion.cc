@@ -179,6 +179,21 @@ MotionRecord motion_from(const JsonAt& at) {
   return motion;
 }
 
+Json grip_json(const GripRecord& grip) {
+  return {{"X_GO", to_json(grip.X_GO)}, {"frames", grip.frames}, {"apart_frames", grip.apart_frames}};
+}
+
+GripRecord grip_from(const JsonAt& at) {
+  GripRecord grip;
+  JsonObject fields(at);
+  if (const auto pose = fields.require("X_GO")) grip.X_GO = pose_from(*pose);
+  if (const auto frames = fields.require("frames"))
+    grip.frames = static_cast<int>(frames->integer(0, std::numeric_limits<int>::max()));
+  if (const auto frames = fields.require("apart_frames"))
+    grip.apart_frames = static_cast<int>(frames->integer(0, std::numeric_limits<int>::max()));
+  return grip;
+}
+
 Json to_json(const std::vector<ParameterEstimate>& estimates) {
   Json json = Json::array();
   for (const ParameterEstimate& estimate : estimates)

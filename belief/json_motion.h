@@ -14,5 +14,7 @@ Json physics_json(const PhysicalBelief& physics);
 PhysicalBelief physics_from(const JsonAt& at, int dimensions);
 Json motion_json(const MotionRecord& motion);
 MotionRecord motion_from(const JsonAt& at);
+Json grip_json(const GripRecord& grip);
+GripRecord grip_from(const JsonAt& at);
 
 }  // namespace prescene::belief

@@ -325,6 +325,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("weight", result);
   exchange_all(current);
   learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
+  result.counters.inferred_releases = infer_releases(belief, settings_.infer_release);
   LearnReport learned = learn_physics(belief, settings_.learn_physics, simulators_, search_.threads());
   result.counters.physics_runs = learned.runs;
   result.counters.physics_lessons = learned.lessons;

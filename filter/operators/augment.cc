@@ -134,6 +134,7 @@ void exchange(ObjectBelief& first, ObjectBelief& second) {
   std::swap(first.island, second.island);
   // How each moved was the other's motion: nothing is learned from it.
   first.motion = second.motion = {};
+  first.grip = second.grip = {};
 }
 
 int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,

@@ -251,6 +251,8 @@ ObjectBelief random_object_belief(RandomStream& stream, const std::string& name)
   object.island = random_below(stream, 5);
   object.physics = random_physics(stream);
   object.motion = random_motion(stream);
+  if (random_below(stream, 2) == 1)
+    object.grip = {random_pose(stream), 1 + random_below(stream, 9), random_below(stream, 3)};
   const Pose middle = random_pose(stream);
   for (int i = random_below(stream, 6); i >= 0; --i) {
     Particle particle;

@@ -2,7 +2,16 @@
 // What the examples in the headers of belief take for granted.
 #pragma once
 
+#include <span>
+
+#include "prescene/belief/belief.h"
 #include "prescene/belief/query_limits.h"
+
+namespace prescene::belief::given_belief::physical_belief_h {
+extern const ObjectModel model;
+extern const ObjectBelief object;
+extern const std::span<const double> uniforms;
+}  // namespace prescene::belief::given_belief::physical_belief_h
 
 namespace prescene::belief::given_belief::query_limits_h {
 extern const double value;

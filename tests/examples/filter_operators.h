@@ -12,8 +12,10 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
 #include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/infer_release.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/operators/learn_colors.h"
+#include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/detection.h"
@@ -47,6 +49,10 @@ extern const WeightOptions weighting;
 extern const InitialiseOptions spread;
 }  // namespace augment_h
 
+namespace infer_release_h {
+extern const InferReleaseOptions options;
+}
+
 namespace initialise_h {
 extern const core::TimeNs stamp_ns;
 extern const InitialiseOptions options;
@@ -56,6 +62,11 @@ namespace learn_colors_h {
 extern const std::vector<WeightReport> reports;
 extern const ColorLearningOptions options;
 }  // namespace learn_colors_h
+
+namespace learn_physics_h {
+extern const LearnPhysicsOptions options;
+extern const simulation::SimulatorFactory simulators;
+}  // namespace learn_physics_h
 
 namespace predict_h {
 extern const belief::Control control;

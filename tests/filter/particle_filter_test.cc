@@ -102,6 +102,44 @@ TEST(ParticleFilter, ARestingObjectStaysStill) {
   EXPECT_EQ(belief::estimate(belief.objects[0]).motion, belief::MotionMode::kResting);
 }
 
+/// A box in a hand, which opens after 0.6 s without a word; the box falls onto the table 15 cm below.
+TEST(ParticleFilter, WhatIsSeenToLeaveItsHandIsNotHeldAnyMore) {
+  Backends backends;
+  const Pose X_WO = Pose::from_translation({0.0, 0.0, 0.20});
+  SimulatedSequence sequence = still_sequence({box_model("box", {0.08, 0.08, 0.10})}, {X_WO});
+  auto scene = std::make_shared<belief::Scene>(*sequence.scene);
+  belief::KinematicBody hand;
+  hand.name = "hand";
+  hand.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{Vector3d(0.04, 0.04, 0.06)}, {}});
+  hand.timeline = {{0.0, Pose::from_translation({0.0, 0.0, 0.285})}};
+  scene->robot.push_back(hand);
+  scene->objects[0].held_by = "hand";
+  sequence.scene = scene;
+  sequence.objects = {[](double time) {
+    const double fallen = 0.5 * 9.81 * std::pow(std::max(0.0, time - 0.6), 2);
+    return Pose::from_translation({0.0, 0.0, std::max(0.05, 0.20 - fallen)});
+  }};
+  ParticleFilter filter = backends.make_filter();
+  Belief belief = filter.start(sequence.scene, 7);
+  int released = 0;
+  std::optional<int> released_at;
+  for (int frame = 0; frame < 40; ++frame) {
+    StepResult result = filter.step(belief, sequence.observe(frame, *backends.renderer), {});
+    belief = std::move(result.belief);
+    released += result.counters.inferred_releases;
+    if (result.counters.inferred_releases > 0) released_at = frame;
+    if (frame < 18) {
+      EXPECT_EQ(belief.scene->objects[0].held_by, "hand") << frame;
+    }
+  }
+  EXPECT_EQ(released, 1);
+  ASSERT_TRUE(released_at.has_value());
+  EXPECT_LE(*released_at, 32);
+  EXPECT_FALSE(belief.scene->objects[0].held_by.has_value());
+  EXPECT_EQ(belief.objects[0].state, TrackState::kTracked);
+  EXPECT_LT((belief::estimate(belief.objects[0]).mode.translation - Vector3d(0.0, 0.0, 0.05)).norm(), 0.015);
+}
+
 /// A plate hides the object from 0.7 s to 1.7 s; it is followed until 2.6 s.
 struct Hiding {
   int hidden = 0, unseen = 0, confidently_wrong = 0;

@@ -78,6 +78,7 @@ struct ObjectBelief {
   LearnedColors colors;
   PhysicalBelief physics;  ///< Of its model's parameters, apart from the poses.
   MotionRecord motion;
+  GripRecord grip;
   friend bool operator==(const ObjectBelief&, const ObjectBelief&) = default;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the filter remembers of an object's motion to learn physical parameters from it: where it lies still, and, while
-// it moves and until that was judged, how it moved. Part of the belief, so that a filter itself remembers nothing.
+// What the filter remembers of an object's motion: where it is in the hand that holds it, where it lies still, and,
+// while it moves and until its physical parameters were learned from that, how it moved. Part of the belief, so that a
+// filter itself remembers nothing.
 #pragma once
 
 #include <cstdint>
@@ -45,6 +46,14 @@ struct MotionEpisode {
   /// Of the draws judged so far.
   std::vector<double> log_likelihoods;
   friend bool operator==(const MotionEpisode&, const MotionEpisode&) = default;
+};
+
+/// Where a held object is in the hand that holds it.
+struct GripRecord {
+  Pose X_GO;             ///< In the hand, the mean over `frames`.
+  int frames = 0;        ///< 0 = not known yet.
+  int apart_frames = 0;  ///< In a row in which it was seen to be elsewhere.
+  friend bool operator==(const GripRecord&, const GripRecord&) = default;
 };
 
 struct MotionRecord {

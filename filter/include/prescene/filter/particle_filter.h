@@ -21,6 +21,7 @@
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
 #include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/infer_release.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
@@ -39,6 +40,7 @@ struct FilterSettings {
   PredictOptions predict;
   AugmentOptions augment;
   WeightOptions weight;
+  InferReleaseOptions infer_release;
   LearnPhysicsOptions learn_physics;
   ResampleOptions resample;
   TrackStateOptions track;
@@ -72,6 +74,7 @@ struct StepCounters {
   int recoveries_tried = 0;
   int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
+  int inferred_releases = 0;    ///< Objects that were seen to have left their hand.
   int physics_runs = 0;         ///< Simulated to learn physical parameters, ...
   int physics_lessons = 0;      ///< ... episodes that changed what is believed of them, ...
   int physics_unexplained = 0;  ///< ... and episodes that no value of theirs explains.

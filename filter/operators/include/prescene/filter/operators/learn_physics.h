@@ -3,7 +3,7 @@
 // tilted, that piece of its motion is simulated under each draw of its friction, mass, restitution and centre of mass,
 // and the draws are weighted by how well they explain what was seen.
 //
-//   LearnReport report = learn_physics(belief, options, simulators, threads);   // once a frame, after weight
+//   LearnReport report = learn_physics(belief, options, simulators, pool);   // once a frame, after weight
 //
 // Frames in which nothing happens change nothing. Posterior = prior times likelihood; the simulator's prediction of a
 // whole piece of motion stands in for the likelihood of its frames, through the tracked poses and their covariances.
