@@ -16,6 +16,7 @@
 #include "prescene/core/utf8.h"
 #include "prescene/service/outside_json.h"
 #include "query_worker_fixture.h"
+#include "tests/support/sanitizers.h"
 
 namespace prescene::service {
 namespace {
@@ -24,7 +25,7 @@ using tests::WorkerUnderTest;
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kPatience(60);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if PRESCENE_SANITIZES_MEMORY
 constexpr double kMostGigabytes = 6.0;  // the sanitizers' own
 #else
 constexpr double kMostGigabytes = 1.5;

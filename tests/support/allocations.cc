@@ -8,11 +8,9 @@
 #include <new>
 #include <utility>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PRESCENE_COUNTS_ALLOCATIONS 0
-#else
-#define PRESCENE_COUNTS_ALLOCATIONS 1
-#endif
+#include "tests/support/sanitizers.h"
+
+#define PRESCENE_COUNTS_ALLOCATIONS (!PRESCENE_SANITIZES_MEMORY)
 
 namespace {
 

@@ -22,12 +22,7 @@
 #include "program.h"
 #include "tests/service/robot_on_bus.h"
 #include "tests/support/paths.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PRESCENE_SANITIZED 1
-#else
-#define PRESCENE_SANITIZED 0
-#endif
+#include "tests/support/sanitizers.h"
 
 namespace prescene::tests {
 namespace {
@@ -90,7 +85,7 @@ class Flood : public ::testing::Test {
   std::vector<std::string> service_environment() const {
     std::vector<std::string> environment = {"ROS_DOMAIN_ID=" + std::to_string(domain_),
                                             "PRESCENE_TEST_CLOCK_FILE=" + path("clock")};
-    if (!PRESCENE_SANITIZED) {
+    if (!PRESCENE_SANITIZES_MEMORY) {
       environment.push_back("LD_PRELOAD=" + (build_dir() / "tests" / "libshifted_clock.so").string());
     }
     return environment;
@@ -284,7 +279,7 @@ TEST_F(Flood, TheServiceStaysUpAnswersAndTellsWhatItLost) {
   double next_where = 0.1, next_frame = 0.0;
   while (elapsed() < seconds) {
     const double share = elapsed() / seconds;
-    if (!PRESCENE_SANITIZED) {
+    if (!PRESCENE_SANITIZES_MEMORY) {
       const std::int64_t shift = share < 0.3 ? 0 : share < 0.6 ? -3600 : 3600;
       if (shift != shift_s_) set_clock(shift);
     }
