@@ -6,7 +6,7 @@ configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/prescene-config.cmake
                               "${PROJECT_BINARY_DIR}/prescene-config.cmake" INSTALL_DESTINATION "${PRESCENE_PACKAGE_DIR}")
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/prescene-config-version.cmake" COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/prescene-config.cmake" "${PROJECT_BINARY_DIR}/prescene-config-version.cmake"
-              cmake/FindBullet64.cmake cmake/FindRandom123.cmake cmake/FindLZ4.cmake cmake/FindZstd.cmake
+              cmake/FindBullet64.cmake cmake/FindRandom123.cmake cmake/FindLZ4.cmake cmake/FindOpenCVImgproc.cmake cmake/FindZstd.cmake
         DESTINATION "${PRESCENE_PACKAGE_DIR}" COMPONENT package)
 
 # What prescene-config.cmake includes for each library: it and what it uses, and the packages that they link.
