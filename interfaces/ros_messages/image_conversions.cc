@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/images/raw_color.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 
 namespace prescene::interfaces {
@@ -19,24 +20,39 @@ using geometry::DepthImage;
 
 struct Encoding {
   std::string_view name;
-  std::uint32_t bytes_per_pixel;
-  int red;  ///< Byte of each colour within the pixel.
-  int green;
-  int blue;
+  RawColor form;
+  int sample_bytes = 1;  ///< Of samples of 16 bits the upper byte is used.
 };
 
-// OpenCV's names without colour order (8UC3) hold blue first. Grey of 16 bits has its upper byte picked apart.
-constexpr std::array<Encoding, 9> kColorEncodings = {{{"rgb8", 3, 0, 1, 2},
-                                                      {"bgr8", 3, 2, 1, 0},
-                                                      {"rgba8", 4, 0, 1, 2},
-                                                      {"bgra8", 4, 2, 1, 0},
-                                                      {"8UC3", 3, 2, 1, 0},
-                                                      {"8UC4", 4, 2, 1, 0},
-                                                      {"mono8", 1, 0, 0, 0},
-                                                      {"8UC1", 1, 0, 0, 0},
-                                                      {"mono16", 2, 1, 1, 1}}};
+// OpenCV's names without colour order (8UC3) hold blue first. `yuv422` and `yuv422_yuy2` are the names of Humble for
+// what Jazzy calls `uyvy` and `yuyv`. ROS has no name for NV12 yet, but drivers use `nv12`.
+constexpr std::array<Encoding, 23> kColorEncodings = {{{"rgb8", RawColor::kRgb},
+                                                       {"bgr8", RawColor::kBgr},
+                                                       {"rgba8", RawColor::kRgba},
+                                                       {"bgra8", RawColor::kBgra},
+                                                       {"8UC3", RawColor::kBgr},
+                                                       {"8UC4", RawColor::kBgra},
+                                                       {"mono8", RawColor::kGrey},
+                                                       {"8UC1", RawColor::kGrey},
+                                                       {"mono16", RawColor::kGrey, 2},
+                                                       {"bayer_rggb8", RawColor::kBayerRggb},
+                                                       {"bayer_bggr8", RawColor::kBayerBggr},
+                                                       {"bayer_gbrg8", RawColor::kBayerGbrg},
+                                                       {"bayer_grbg8", RawColor::kBayerGrbg},
+                                                       {"bayer_rggb16", RawColor::kBayerRggb, 2},
+                                                       {"bayer_bggr16", RawColor::kBayerBggr, 2},
+                                                       {"bayer_gbrg16", RawColor::kBayerGbrg, 2},
+                                                       {"bayer_grbg16", RawColor::kBayerGrbg, 2},
+                                                       {"yuv422", RawColor::kUyvy},
+                                                       {"uyvy", RawColor::kUyvy},
+                                                       {"yuv422_yuy2", RawColor::kYuyv},
+                                                       {"yuyv", RawColor::kYuyv},
+                                                       {"nv12", RawColor::kNv12},
+                                                       {"nv21", RawColor::kNv21}}};
 
-Status check_layout(const RosImage& image, std::uint32_t bytes_per_pixel, const ImageRules& rules) {
+/// `half_rows` are those that follow the image's rows, as the colours of YUV 4:2:0 do.
+Status check_layout(const RosImage& image, std::uint32_t bytes_per_pixel, const ImageRules& rules,
+                    std::uint32_t half_rows = 0) {
   const std::string encoding = quote(image.encoding);
   if (image.width == 0 || image.height == 0) {
     return core::invalid_input("width x height: is " + std::to_string(image.width) + " x " +
@@ -58,7 +74,7 @@ Status check_layout(const RosImage& image, std::uint32_t bytes_per_pixel, const 
                                std::to_string(image.width) + " pixels of " + encoding + "; set it to at least " +
                                std::to_string(row_bytes));
   }
-  const std::uint64_t needed = std::uint64_t{image.step} * (image.height - 1) + row_bytes;
+  const std::uint64_t needed = std::uint64_t{image.step} * (std::uint64_t{image.height} + half_rows - 1) + row_bytes;
   if (image.data.size() < needed) {
     return core::invalid_input("data: has " + std::to_string(image.data.size()) + " bytes, but step " +
                                std::to_string(image.step) + " x height " + std::to_string(image.height) + " of " +
@@ -219,18 +235,16 @@ Result<ColorImage> to_color_image(const RosImage& image, const ImageRules& rules
     return core::unsupported("encoding: " + quote(image.encoding) +
                              " is no colour image that can be read; send one of " + names);
   }
-  PRESCENE_RETURN_IF_ERROR(check_layout(image, encoding->bytes_per_pixel, rules));
-  const bool upper_byte_first = encoding->name == "mono16" && image.is_bigendian == 1;
-  const int red = upper_byte_first ? 0 : encoding->red;
-  const int green = upper_byte_first ? 0 : encoding->green;
-  const int blue = upper_byte_first ? 0 : encoding->blue;
-  ColorImage color(static_cast<int>(image.width), static_cast<int>(image.height));
-  for (int y = 0; y < color.height(); ++y) {
-    const std::uint8_t* in = image.data.data() + std::size_t{image.step} * static_cast<std::size_t>(y);
-    for (int x = 0; x < color.width(); ++x, in += encoding->bytes_per_pixel) {
-      color(x, y) = {in[red], in[green], in[blue]};
-    }
-  }
+  const RawColorLayout layout = layout_of(encoding->form);
+  PRESCENE_RETURN_IF_ERROR(check_layout(image,
+                                        static_cast<std::uint32_t>(layout.bytes_per_pixel * encoding->sample_bytes),
+                                        rules, layout.has_half_rows ? image.height / 2 : 0));
+  RawColorView view{image.data, static_cast<int>(image.width), static_cast<int>(image.height), image.step,
+                    encoding->sample_bytes};
+  // The upper byte of a sample is its first one in big endian order.
+  if (encoding->sample_bytes == 2 && image.is_bigendian == 0) view.bytes = view.bytes.subspan(1);
+  auto color = to_color(view, encoding->form);
+  if (!color) return color.status().at("encoding " + image.encoding);
   return color;
 }
 

@@ -179,7 +179,31 @@ void write_sound_messages() {
   write_seed("cdr_image", "16uc1", encode_cdr(to_ros_image_16uc1(depth, header)));
   write_seed("cdr_image", "32fc1", encode_cdr(to_ros_image_32fc1(depth, header)));
   write_seed("cdr_image", "rgb8", encode_cdr(to_ros_image(color, header)));
-  write_seed("cdr_camera_info", "plain", encode_cdr(to_ros_camera_info(camera, header)));
+  // Colour of every form, with rows as short and images as small as they may be, and one step shorter.
+  for (const auto& [encoding, bytes_per_pixel] : {std::pair{"bayer_rggb8", 1U},
+                                                  {"bayer_grbg16", 2U},
+                                                  {"uyvy", 2U},
+                                                  {"yuv422_yuy2", 2U},
+                                                  {"nv12", 1U},
+                                                  {"nv21", 1U}}) {
+    RosImage image = to_ros_image(color, header);
+    image.encoding = encoding;
+    image.step = image.width * bytes_per_pixel;
+    image.data.resize(std::size_t{image.step} * 6);
+    write_seed("cdr_image", encoding, encode_cdr(image));
+    image.width = 5;
+    image.height = 3;
+    write_seed("cdr_image", std::string(encoding) + "_odd", encode_cdr(image));
+    image.step = 5 * bytes_per_pixel - 1;
+    write_seed("cdr_image", std::string(encoding) + "_short", encode_cdr(image));
+  }
+  RosCameraInfo info = to_ros_camera_info(camera, header);
+  write_seed("cdr_camera_info", "plain", encode_cdr(info));
+  info.d = {-0.3, 0.1, 0.001, -0.002, 0.05};
+  write_seed("cdr_camera_info", "plumb_bob", encode_cdr(info));
+  info.distortion_model = "equidistant";
+  info.d.pop_back();
+  write_seed("cdr_camera_info", "equidistant", encode_cdr(info));
   const geometry::Pose X = geometry::Pose::from_translation({1, 2, 3});
   write_seed("cdr_tf", "plain", encode_cdr(RosTfMessage{{to_ros_transform(FrameTransform{"world", "camera", 5, X})}}));
   write_seed("cdr_pose_stamped", "plain", encode_cdr(RosPoseStamped{header, to_ros_pose(X)}));

@@ -17,7 +17,8 @@ using geometry::ColorImage;
 using geometry::DepthImage;
 using testing::HasSubstr;
 
-RosImage image_of(int width, int height, const char* encoding, std::vector<std::uint8_t> data, std::uint32_t step) {
+RosImage image_of(int width, int height, const std::string& encoding, std::vector<std::uint8_t> data,
+                  std::uint32_t step) {
   RosImage image;
   image.width = static_cast<std::uint32_t>(width);
   image.height = static_cast<std::uint32_t>(height);
@@ -130,11 +131,76 @@ TEST(ColorImages, PutTheChannelsInOrder) {
   EXPECT_EQ(pixel("mono16", {7, 5}, 1), (geometry::Rgb{7, 7, 7}));
 }
 
+TEST(ColorImages, OfEveryPatternOfAGreySurfaceAreGrey) {
+  for (const char* pattern : {"bayer_rggb", "bayer_bggr", "bayer_gbrg", "bayer_grbg"}) {
+    const std::vector<std::uint8_t> grey(20, 90);
+    EXPECT_EQ(*to_color_image(image_of(5, 4, std::string(pattern) + "8", grey, 5)), ColorImage(5, 4, {90, 90, 90}));
+    // Rows of 11 bytes; upper byte 90, lower byte 200, in either order.
+    for (const bool big_endian : {false, true}) {
+      std::vector<std::uint8_t> bytes;
+      for (int y = 0; y < 4; ++y) {
+        for (int x = 0; x < 10; ++x) bytes.push_back((x % 2 == 0) == big_endian ? 90 : 200);
+        if (y < 3) bytes.push_back(7);
+      }
+      auto image = image_of(5, 4, std::string(pattern) + "16", bytes, 11);
+      image.is_bigendian = big_endian ? 1 : 0;
+      EXPECT_EQ(*to_color_image(image), ColorImage(5, 4, {90, 90, 90})) << pattern;
+    }
+  }
+}
+
+TEST(ColorImages, OfBayerPatternsKnowRedFromBlue) {
+  // A red surface: only the samples of red are bright.
+  const struct {
+    const char* encoding;
+    std::size_t red;
+  } patterns[] = {{"bayer_rggb8", 0}, {"bayer_bggr8", 5}, {"bayer_grbg8", 1}, {"bayer_gbrg8", 4}};
+  for (const auto& [encoding, red] : patterns) {
+    std::vector<std::uint8_t> bytes(16, 0);
+    for (const std::size_t offset : {0U, 2U, 8U, 10U}) bytes[red + offset] = 200;
+    EXPECT_EQ(*to_color_image(image_of(4, 4, encoding, bytes, 4)), ColorImage(4, 4, {200, 0, 0})) << encoding;
+  }
+}
+
+// Red of BT.601 is Y 81, U 90, V 240.
+TEST(ColorImages, OfYuvKnowTheOrderOfTheirSamples) {
+  const auto expect_red = [](const RosImage& image) {
+    const auto color = to_color_image(image);
+    ASSERT_TRUE(color.ok()) << color.status().message();
+    for (std::size_t i = 0; i < color->size(); ++i) {
+      EXPECT_NEAR(color->data()[i][0], 254, 1) << image.encoding;
+      EXPECT_NEAR(color->data()[i][1], 0, 1) << image.encoding;
+      EXPECT_NEAR(color->data()[i][2], 0, 1) << image.encoding;
+    }
+  };
+  for (const char* name : {"yuv422", "uyvy"}) expect_red(image_of(2, 1, name, {90, 81, 240, 81}, 4));
+  for (const char* name : {"yuv422_yuy2", "yuyv"}) expect_red(image_of(2, 1, name, {81, 90, 81, 240}, 4));
+  expect_red(image_of(2, 2, "nv12", {81, 81, 81, 81, 90, 240}, 2));
+  expect_red(image_of(2, 2, "nv21", {81, 81, 81, 81, 240, 90}, 2));
+}
+
+TEST(ColorImages, OfSizesThatDoNotFitTheirEncodingAreRefused) {
+  const auto message = [](const char* encoding, std::uint32_t width, std::uint32_t height, std::uint32_t step) {
+    const auto color = to_color_image(image_of(width, height, encoding, std::vector<std::uint8_t>(64), step));
+    EXPECT_EQ(color.status().code(), StatusCode::kInvalidInput) << encoding;
+    return color.status().message();
+  };
+  EXPECT_THAT(message("yuv422", 3, 2, 6), HasSubstr("encoding yuv422: the width of YUV images is even"));
+  EXPECT_THAT(message("yuyv", 4, 2, 7), HasSubstr("step: 7 is less than a row of 4 pixels of 'yuyv'"));
+  EXPECT_THAT(message("nv12", 3, 2, 4), HasSubstr("the width of YUV images is even"));
+  EXPECT_THAT(message("nv21", 4, 3, 4), HasSubstr("the height of YUV 4:2:0 images is even"));
+  EXPECT_THAT(message("nv21", 8, 8, 8), HasSubstr("data: has 64 bytes, but step 8 x height 8 of 'nv21' needs 96"));
+  EXPECT_THAT(message("bayer_rggb8", 2, 4, 2), HasSubstr("a Bayer image has at least 3 x 3 pixels"));
+  EXPECT_THAT(message("bayer_rggb16", 4, 4, 6), HasSubstr("step: 6 is less than a row of 4 pixels"));
+  EXPECT_THAT(message("bayer_rggb16", 8, 8, 16), HasSubstr("data: has 64 bytes"));
+}
+
 TEST(ColorImages, RefuseOthersByName) {
   const auto bayer = to_color_image(image_of(2, 1, "bayer_rggb8\n", {1, 2}, 2)).status();
   EXPECT_EQ(bayer.code(), StatusCode::kUnsupported);
   EXPECT_THAT(bayer.message(),
               HasSubstr("encoding: 'bayer_rggb8\\x0a' is no colour image that can be read; send one of rgb8"));
+  EXPECT_THAT(to_color_image(image_of(2, 2, "nv24", {1, 2}, 2)).status().message(), HasSubstr("nv12, nv21"));
   EXPECT_EQ(to_color_image(image_of(1, 1, "RGB8", {1, 2, 3}, 3)).status().code(), StatusCode::kUnsupported);
   EXPECT_EQ(to_color_image(image_of(2, 2, "rgb8", std::vector<std::uint8_t>(11), 6)).status().code(),
             StatusCode::kInvalidInput);

@@ -91,8 +91,10 @@ struct DepthImageReport {
 /// is above 100 m in 32FC1 (millimetres?), and for colour; kUnsupported for other encodings.
 core::Result<geometry::DepthImage> to_depth_image(const RosImage& image, const ImageRules& rules = {},
                                                   DepthImageReport* report = nullptr);
-/// Colour from rgb8, bgr8, rgba8, bgra8, 8UC3 (blue first) and 8UC4, grey from mono8, 8UC1 and mono16 (its upper byte).
-/// kUnsupported with the encodings that would do for others (bayer, yuv), kInvalidInput as above.
+/// Colour from rgb8, bgr8, rgba8, bgra8, 8UC3 (blue first), 8UC4, from Bayer patterns of 8 and 16 bits (bayer_rggb8,
+/// ...), and from YUV (yuv422 or uyvy, yuv422_yuy2 or yuyv, nv12, nv21); grey from mono8, 8UC1 and mono16. Of 16 bits
+/// the upper byte is used. kUnsupported with the encodings that would do for others, kInvalidInput as above, for YUV of
+/// odd width (nv12 and nv21: or height), and for a Bayer pattern of fewer than 3 x 3 pixels.
 core::Result<geometry::ColorImage> to_color_image(const RosImage& image, const ImageRules& rules = {});
 
 struct CameraRules {
