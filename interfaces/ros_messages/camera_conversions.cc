@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -9,6 +11,7 @@ namespace prescene::interfaces {
 namespace {
 
 using core::Result;
+using geometry::LensDistortion;
 using geometry::PinholeCamera;
 
 /// The part of the full image that arrives, in pixels of the full image, and how many of them make one.
@@ -45,53 +48,8 @@ Result<Readout> to_readout(const RosCameraInfo& info) {
   return readout;
 }
 
-/// Shift in normalised coordinates by the distortion models of OpenCV, or false when the model is unknown.
-bool distortion_shift(const RosCameraInfo& info, double x, double y, double* dx, double* dy) {
-  const auto& d = info.d;
-  const double r2 = x * x + y * y;
-  if ((info.distortion_model == "plumb_bob" && (d.size() == 4 || d.size() == 5)) ||
-      (info.distortion_model == "rational_polynomial" && d.size() == 8)) {
-    const auto k = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
-    const double radial = (1.0 + r2 * (k(0) + r2 * (k(1) + r2 * k(4)))) / (1.0 + r2 * (k(5) + r2 * (k(6) + r2 * k(7))));
-    *dx = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x) - x;
-    *dy = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y - y;
-    return true;
-  }
-  if ((info.distortion_model == "equidistant" || info.distortion_model == "fisheye") && d.size() == 4) {
-    const double r = std::sqrt(r2);
-    const double a = std::atan(r);
-    const double a2 = a * a;
-    const double scale = r < 1e-12 ? 1.0 : a * (1.0 + a2 * (d[0] + a2 * (d[1] + a2 * (d[2] + a2 * d[3])))) / r;
-    *dx = x * scale - x;
-    *dy = y * scale - y;
-    return true;
-  }
-  return false;
-}
-
-void report_distortion(const RosCameraInfo& info, const PinholeCamera& camera, CameraReport* report) {
-  const bool none = std::all_of(info.d.begin(), info.d.end(), [](double v) { return v == 0.0; });
-  if (none) return;
-  for (const double u : {0.0, camera.width - 1.0}) {
-    for (const double v : {0.0, camera.height - 1.0}) {
-      double dx = 0.0;
-      double dy = 0.0;
-      if (!distortion_shift(info, (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, &dx, &dy)) {
-        report->warnings.push_back("distortion_model: " + quote(info.distortion_model) + " with " +
-                                   std::to_string(info.d.size()) +
-                                   " coefficients is unknown, the distortion is ignored; send plumb_bob with 5, "
-                                   "rational_polynomial with 8 or equidistant with 4, or rectified images");
-        return;
-      }
-      const double shift = std::hypot(dx * camera.fx, dy * camera.fy);
-      report->max_distortion = std::isfinite(shift) ? std::max(report->max_distortion, shift) : 1e9;
-    }
-  }
-  if (report->max_distortion > 1.0) {
-    report->warnings.push_back("d: the lens distortion moves the image corners by up to " +
-                               std::to_string(std::lround(report->max_distortion)) +
-                               " pixels and is ignored; send rectified images (image_proc), and say so (--rectified)");
-  }
+bool are_zero(std::span<const double> values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return v == 0.0; });
 }
 
 }  // namespace
@@ -133,13 +91,42 @@ Result<PinholeCamera> to_camera(const RosCameraInfo& info, const CameraRules& ru
   }
   PRESCENE_RETURN_IF_ERROR(geometry::validate(camera));
 
-  if (!rules.rectified) report_distortion(info, camera, report);
   if (rules.rectified && info.p[3] != 0.0) {
     report->warnings.push_back("p: is that of the right camera of a stereo pair, " +
                                number_text(-info.p[3] / info.p[0]) +
                                " m right of the left one; its frame must be the right camera's");
   }
   return camera;
+}
+
+Result<LensDistortion> to_lens(const RosCameraInfo& info, const CameraRules& rules, CameraReport* report) {
+  CameraReport own_report;
+  if (report == nullptr) report = &own_report;
+  *report = {};
+  const std::span<const double> d = info.d;
+  if (rules.rectified || are_zero(d)) return LensDistortion();
+  const std::size_t count = d.size();
+  Result<LensDistortion> lens = LensDistortion();
+  if ((info.distortion_model == "plumb_bob" || info.distortion_model == "rational_polynomial") &&
+      (count == 4 || count == 5 || count == 8 || count == 12 || count == 14)) {
+    std::array<double, 8> k{};
+    std::copy_n(d.begin(), std::min(count, k.size()), k.begin());
+    lens = LensDistortion::brown(k);
+    if (count > k.size() && !are_zero(d.subspan(k.size()))) {
+      report->warnings.push_back(
+          "d: coefficients 9 to " + std::to_string(count) +
+          " (thin prism and tilted sensor) are ignored, the first 8 are used; send rectified images (image_proc), and "
+          "say so (--rectified)");
+    }
+  } else if ((info.distortion_model == "equidistant" || info.distortion_model == "fisheye") && count == 4) {
+    lens = LensDistortion::equidistant({d[0], d[1], d[2], d[3]});
+  } else {
+    report->warnings.push_back("distortion_model: " + quote(info.distortion_model) + " with " + std::to_string(count) +
+                               " coefficients is unknown, the distortion is ignored; send plumb_bob with 5, "
+                               "rational_polynomial with 8 or equidistant with 4, or rectified images (--rectified)");
+  }
+  if (!lens) return lens.status().at("d");
+  return lens;
 }
 
 }  // namespace prescene::interfaces

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -58,13 +59,21 @@ RosImage to_ros_image(const geometry::ColorImage& color, const RosHeader& header
   return image;
 }
 
-RosCameraInfo to_ros_camera_info(const geometry::PinholeCamera& camera, const RosHeader& header) {
+RosCameraInfo to_ros_camera_info(const geometry::PinholeCamera& camera, const RosHeader& header,
+                                 const geometry::LensDistortion& lens) {
   RosCameraInfo info;
   info.header = header;
   info.width = static_cast<std::uint32_t>(camera.width);
   info.height = static_cast<std::uint32_t>(camera.height);
-  info.distortion_model = "plumb_bob";
-  info.d.assign(5, 0.0);
+  const auto& k = lens.coefficients();
+  if (lens.model() == geometry::LensDistortion::Model::kEquidistant) {
+    info.distortion_model = "equidistant";
+    info.d.assign(k.begin(), k.begin() + 4);
+  } else {
+    const bool divides = std::any_of(k.begin() + 5, k.end(), [](double v) { return v != 0.0; });
+    info.distortion_model = divides ? "rational_polynomial" : "plumb_bob";
+    info.d.assign(k.begin(), k.begin() + (divides ? 8 : 5));
+  }
   info.k = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
   info.r = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
   info.p = {camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0};

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "prescene/interfaces/images/frame_folder.h"
+#include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/calibration/depth_noise.h"
@@ -43,6 +44,8 @@ core::Status add_recording(const std::filesystem::path& path, const core::Progre
   double done = 0.0;
   int images = 0;
   std::optional<geometry::PinholeCamera> camera;
+  geometry::LensDistortion lens;
+  std::optional<interfaces::LensWarp> warp;
   while (!estimator.full()) {
     PRESCENE_RETURN_IF_ERROR(going_on(cancellation));
     PRESCENE_TRY(const auto entry, reader->next());
@@ -52,15 +55,23 @@ core::Status add_recording(const std::filesystem::path& path, const core::Progre
     if (entry->message.topic == settings.topics.camera_info) {
       PRESCENE_TRY(const auto info, interfaces::decode_cdr<interfaces::RosCameraInfo>(entry->message.cdr));
       interfaces::CameraRules rules;
-      rules.rectified = settings.assembler.rectified;
-      PRESCENE_TRY(camera, interfaces::to_camera(info, rules));
+      rules.rectified = is_rectified(settings);
+      PRESCENE_TRY(const geometry::PinholeCamera new_camera, interfaces::to_camera(info, rules));
+      PRESCENE_TRY(const geometry::LensDistortion new_lens, interfaces::to_lens(info, rules));
+      if (camera != new_camera || lens != new_lens) warp.reset();
+      camera = new_camera;
+      lens = new_lens;
     } else if (entry->message.topic == settings.topics.depth) {
       ++images;
       if (!camera) continue;
       PRESCENE_TRY(const auto message, interfaces::decode_cdr<interfaces::RosImage>(entry->message.cdr));
       interfaces::ImageRules rules;
       rules.mono16_is_depth = settings.assembler.mono16_is_depth;
-      PRESCENE_TRY(const geometry::DepthImage depth, interfaces::to_depth_image(message, rules));
+      PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(message, rules));
+      if (!lens.is_none()) {
+        if (!warp) warp = interfaces::LensWarp::undistorting(*camera, lens);
+        PRESCENE_TRY(depth, warp->depth(depth));
+      }
       PRESCENE_RETURN_IF_ERROR(estimator.add(depth, *camera));
     }
   }

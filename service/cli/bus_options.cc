@@ -70,7 +70,11 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
           },
           "Pose of the camera where tf has none: x y z qw qx qy qz (m)")
       ->expected(7);
-  group->add_flag("--rectified", assembler.rectified, "The images are rectified: use P of the camera info, not K");
+  group->add_flag_function(
+      "--rectified,!--not-rectified", [&assembler](std::int64_t count) { assembler.rectified = count > 0; },
+      "Whether the images are rectified: P of the camera info is used then, not K and D; default: if the depth topic "
+      "is "
+      "named image_rect...");
 }
 
 void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice) {

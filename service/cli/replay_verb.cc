@@ -88,7 +88,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   options.bus.read = options.read;
   options.bus.read.check_data = options.read.salvage;  // It was when the input was opened, but its loss is told here.
   TrackingScore score(input.scene());
-  SessionReport report(input.scene(), settings.topics);
+  SessionReport report(input.scene(), settings);
   ForeseenAndCame foreseen(input.scene(), settings.topics.depth);
   DamagedRecords damaged;
   FinalStates states;
@@ -158,7 +158,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   TrackingScore score(input.scene());
   SupportScore supports;
   FinalStates states;
-  SessionReport report(input.scene(), settings.topics);
+  SessionReport report(input.scene(), settings);
   ordered_json steps = ordered_json::array();
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
     const BeliefSummary summary = summary_of(*at.belief());

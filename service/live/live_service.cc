@@ -363,6 +363,7 @@ ServiceHealth LiveService::Impl::health() const {
   health.last_failure_ns = last_failure_ns;
   if (since_frame) health.seconds_since_frame = since_frame->seconds();
   health.last_step_seconds = step_seconds;
+  health.lens = tracker->lens_text();
   health.degraded = degraded;
   health.last_skip = tracker->last_skip();
   health.last_refusal = last_refusal;

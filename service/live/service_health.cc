@@ -59,8 +59,8 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics, lost_on_bus,
                questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late, waiting_controls,
                dropped_controls, idle_controls, last_idle_control, other_services, is_recording, recording_failure,
-               seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers, degraded, last_skip,
-               last_refusal, last_failure, last_failure_ns] = health;
+               seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers, lens, degraded,
+               last_skip, last_refusal, last_failure, last_failure_ns] = health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
@@ -88,6 +88,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"recording", recording_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},
           {"last step, s", core::rounded_text(last_step_seconds)},
+          {"lens", lens},
           {"degraded", joined(degraded)},
           {"questions answered", std::to_string(answered)},
           {"questions refused", std::to_string(refused)},

@@ -23,9 +23,11 @@ constexpr std::size_t kMaxObservations = 48;              // in memory
 constexpr std::size_t kMaxPixels = std::size_t{1} << 24;  // of all of them: 54 of 640 x 480
 constexpr std::size_t kPictures = 6;                      // on the page
 
-AssemblerSettings assembler_settings(const belief::Scene& scene) {
-  AssemblerSettings settings;
-  if (scene.camera) settings.X_WC = scene.camera->X_WC;
+AssemblerSettings assembler_settings(const belief::Scene& scene, const TrackerSettings& tracker) {
+  AssemblerSettings settings = tracker.assembler;
+  settings.use_color = settings.use_color && !tracker.topics.color.empty();
+  settings.rectified = is_rectified(tracker);
+  if (!settings.X_WC && scene.camera) settings.X_WC = scene.camera->X_WC;
   return settings;
 }
 
@@ -84,8 +86,10 @@ void add_prediction(const ordered_json& predict, const belief::Scene& scene, int
 
 }  // namespace
 
-SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const InputTopics& topics)
-    : scene_(std::move(scene)), topics_(topics), assembler_(assembler_settings(*scene_), robot_names(*scene_)) {}
+SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings)
+    : scene_(std::move(scene)),
+      topics_(settings.topics),
+      assembler_(assembler_settings(*scene_, settings), robot_names(*scene_), settings.tf) {}
 
 void SessionReport::add(const interfaces::ReceivedMessage& message) {
   const MessageIndex index = next_index_++;

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/robot_motion.h"
 #include "prescene/filter/proposals/frame.h"
+#include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
@@ -35,7 +37,9 @@ class Player {
         renderer_(renderer),
         recording_(recording),
         camera_(rendering::SensorModel(filter::with_settings(options.sensor, scene.depth_noise)), options.camera),
-        noise_(seed, core::Purpose::kSensorNoise) {}
+        noise_(seed, core::Purpose::kSensorNoise) {
+    if (!options.lens.is_none()) warp_ = interfaces::LensWarp::distorting(scene.camera->intrinsics, options.lens);
+  }
 
   core::Status write_camera_pose() {
     const interfaces::FrameTransform transform{options_.world_frame, camera_frame_of(scene_), options_.start_ns,
@@ -79,10 +83,16 @@ class Player {
     geometry::ColorImage color;
     camera_.sample(view.scene, images, nullptr, camera.intrinsics, camera.X_WC, noise_, number, &depth, &color);
 
+    if (warp_) {
+      PRESCENE_TRY(depth, warp_->depth(depth));
+      PRESCENE_TRY(color, warp_->color(color));
+    }
+
     const core::TimeNs stamp_ns = stamp(state.time);
     const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ns), camera_frame_of(scene_)};
-    PRESCENE_RETURN_IF_ERROR(write(options_.topics.camera_info, "sensor_msgs/msg/CameraInfo", stamp_ns,
-                                   interfaces::encode_cdr(interfaces::to_ros_camera_info(camera.intrinsics, header))));
+    PRESCENE_RETURN_IF_ERROR(
+        write(options_.topics.camera_info, "sensor_msgs/msg/CameraInfo", stamp_ns,
+              interfaces::encode_cdr(interfaces::to_ros_camera_info(camera.intrinsics, header, options_.lens))));
     PRESCENE_RETURN_IF_ERROR(write(options_.topics.color, "sensor_msgs/msg/Image", stamp_ns,
                                    interfaces::encode_cdr(interfaces::to_ros_image(color, header))));
     PRESCENE_RETURN_IF_ERROR(write(options_.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
@@ -137,6 +147,7 @@ class Player {
   RecordingWriter& recording_;
   rendering::SimulatedCamera camera_;
   core::RandomStream noise_;
+  std::optional<interfaces::LensWarp> warp_;  // where there is a lens
 };
 
 belief::Trajectory play(const belief::Scene& scene, const simulation::Simulator& simulator, double interval,

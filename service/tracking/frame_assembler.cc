@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
+#include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 
 namespace prescene::service {
@@ -23,6 +25,8 @@ constexpr std::size_t kMaxSkippedKept = 1000;
 constexpr core::TimeNs kClockJumpNs = 1'000'000'000;
 constexpr core::TimeNs kFastestClock = 10;  // of a recording that is played fast
 constexpr int kTooManyToBeWrong = 3;
+// Less of an image than this is left by no lens that was calibrated well, but by a fold in the middle of it.
+constexpr double kLeastVisibleShare = 0.5;
 
 /// Whether so many images wait that the oldest has to go.
 template <class Entries, class Image>
@@ -109,10 +113,42 @@ core::Status FrameAssembler::add_color(const interfaces::RosImage& image, Messag
 core::Status FrameAssembler::add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index) {
   interfaces::CameraReport report;
   interfaces::CameraRules rules;
-  rules.rectified = settings_.rectified;
-  PRESCENE_TRY(camera_, interfaces::to_camera(info, rules, &report));
+  rules.rectified = settings_.rectified.value_or(false);
+  PRESCENE_TRY(const geometry::PinholeCamera camera, interfaces::to_camera(info, rules, &report));
+  std::vector<std::string> doubts = std::move(report.warnings);
+  PRESCENE_TRY(const geometry::LensDistortion lens, interfaces::to_lens(info, rules, &report));
+  std::ranges::move(report.warnings, std::back_inserter(doubts));
+  // A driver sends the same camera info with every frame.
+  if (camera_ != camera || lens_ != lens) warp_.reset();
+  camera_ = camera;
+  lens_ = lens;
+  lens_model_ = info.distortion_model;
   camera_index_ = index;
-  camera_doubts_ = std::move(report.warnings);
+  camera_doubts_ = std::move(doubts);
+  return core::ok_status();
+}
+
+std::string FrameAssembler::lens_text() const {
+  if (!camera_) return "";
+  if (settings_.rectified.value_or(false)) return "images are rectified already, D is not used";
+  if (lens_.is_none()) return camera_doubts_.empty() ? "no distortion" : "distortion ignored";
+  return interfaces::quote(lens_model_) + ", images are straightened here";
+}
+
+core::Status FrameAssembler::straighten(AssembledFrame& frame) {
+  if (lens_.is_none()) return core::ok_status();
+  if (!warp_) warp_ = interfaces::LensWarp::undistorting(*camera_, lens_);
+  belief::RgbdFrame& images = frame.observation.frame;
+  PRESCENE_TRY(geometry::DepthImage depth, warp_->depth(*images.depth));
+  images.depth = std::make_shared<geometry::DepthImage>(std::move(depth));
+  if (images.color) {
+    PRESCENE_TRY(geometry::ColorImage color, warp_->color(*images.color));
+    images.color = std::make_shared<geometry::ColorImage>(std::move(color));
+  }
+  if (warp_->visible_share() < kLeastVisibleShare) {
+    frame.doubts.push_back("d: the lens shows " + std::to_string(std::lround(100.0 * warp_->visible_share())) +
+                           " % of the straightened image; check the calibration");
+  }
   return core::ok_status();
 }
 
@@ -191,10 +227,15 @@ std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
     const bool out_of_time = now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
     Attempt attempt = assemble(waiting, out_of_time);
     if (attempt.frame) {
-      last_taken_ = Taken{waiting.stamp_ns, waiting.received_ns};
+      const Waiting taken = waiting;
+      last_taken_ = Taken{taken.stamp_ns, taken.received_ns};
       for (std::size_t older = 0; older + 1 < newest; ++older) skip(waiting_[older], "a newer frame was ready");
       waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(newest));
-      return std::move(attempt.frame);
+      // Last, as it needs memory: the frame is gone even if there is none.
+      const core::Status straight = straighten(*attempt.frame);
+      if (straight.ok()) return std::move(attempt.frame);
+      skip(taken, straight.message());
+      return std::nullopt;
     }
     if (attempt.hopeless || out_of_time) {
       skip(waiting, attempt.missing);

@@ -11,6 +11,10 @@
 
 namespace prescene::service {
 
+bool names_rectified_images(const std::string& topic) {
+  return topic.substr(topic.rfind('/') + 1).starts_with("image_rect");
+}
+
 core::Status validate(const InputTopics& topics) {
   const std::pair<const char*, const std::string*> named[] = {{"depth", &topics.depth},
                                                               {"color", &topics.color},

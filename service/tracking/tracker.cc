@@ -25,9 +25,10 @@ core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const 
   return interfaces::decode_cdr<Message>(message.cdr, large ? interfaces::CdrLimits{} : interfaces::kSmallMessage);
 }
 
-/// Frames do not wait for the colour of a topic that nobody named.
+/// Frames do not wait for the colour of a topic that nobody named, and topics say by their names what they hold.
 TrackerSettings settled(TrackerSettings settings) {
   settings.assembler.use_color = settings.assembler.use_color && !settings.topics.color.empty();
+  settings.assembler.rectified = is_rectified(settings);
   return settings;
 }
 
@@ -62,6 +63,7 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
                  Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
                  std::unique_ptr<rendering::LikelihoodBatch> likelihood)
     : settings_(settled(settings)),
+      rectified_doubt_(rectified_doubt(settings)),
       renderer_(std::move(renderer)),
       likelihood_(std::move(likelihood)),
       filter_(*likelihood_, *renderer_, backends.pool(), settings.filter, backends.simulator_factory()),
@@ -135,6 +137,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.record.skipped = assembler_.take_skipped();
   step.record.degraded = degraded_words(result);
   std::ranges::move(frame->doubts, std::back_inserter(step.record.degraded));
+  if (!rectified_doubt_.empty()) step.record.degraded.push_back(rectified_doubt_);
   if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
   if (const std::uint64_t dropped = controls.dropped() - controls_.dropped(); dropped > 0)
     step.record.degraded.push_back(std::to_string(dropped) +

@@ -28,6 +28,12 @@ core::Status read_value(const ordered_json& json, const std::string& key, bool& 
   return core::ok_status();
 }
 
+core::Status read_value(const ordered_json& json, const std::string& key, std::optional<bool>& value) {
+  if (!json.is_null() && !json.is_boolean()) return wrong(key, "true, false or null");
+  value = json.is_null() ? std::nullopt : std::optional(json.get<bool>());
+  return core::ok_status();
+}
+
 core::Status read_value(const ordered_json& json, const std::string& key, double& value) {
   if (!json.is_number() || !std::isfinite(json.get<double>()) || json.get<double>() < 0.0)
     return wrong(key, "a number of 0 or more");
@@ -54,6 +60,7 @@ core::Status read_value(const ordered_json& json, const std::string& key, std::o
 ordered_json value_json(const std::optional<geometry::Pose>& pose) {
   return pose ? belief::to_json(*pose) : ordered_json();
 }
+ordered_json value_json(const std::optional<bool>& value) { return value ? ordered_json(*value) : ordered_json(); }
 template <class Value>
 ordered_json value_json(const Value& value) {
   return value;
@@ -82,6 +89,21 @@ void for_each_setting(Settings& settings, const Visit& visit) {
 }
 
 }  // namespace
+
+bool is_rectified(const TrackerSettings& settings) {
+  return settings.assembler.rectified.value_or(names_rectified_images(settings.topics.depth));
+}
+
+std::string rectified_doubt(const TrackerSettings& settings) {
+  const InputTopics& topics = settings.topics;
+  const bool uses_color = settings.assembler.use_color && !topics.color.empty();
+  if (settings.assembler.rectified || !uses_color ||
+      names_rectified_images(topics.depth) == names_rectified_images(topics.color))
+    return "";
+  return "by their names, one of " + topics.depth + " and " + topics.color +
+         " holds rectified images and the other does not: name two of a kind, or say with --rectified or "
+         "--not-rectified what both hold";
+}
 
 ordered_json to_json(const TrackerSettings& settings) {
   ordered_json json = ordered_json::object();

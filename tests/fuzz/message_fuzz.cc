@@ -33,11 +33,13 @@ inline void convert(const RosImage& image) {
 
 inline void convert(const RosCameraInfo& info) {
   for (const bool rectified : {false, true}) {
-    CameraReport report;
-    const auto camera = to_camera(info, {.rectified = rectified}, &report);
-    if (!camera) continue;
-    PRESCENE_CHECK(prescene::geometry::validate(*camera).ok());
-    PRESCENE_CHECK(std::isfinite(report.max_distortion));
+    if (const auto camera = to_camera(info, {.rectified = rectified}))
+      PRESCENE_CHECK(prescene::geometry::validate(*camera).ok());
+    const auto lens = to_lens(info, {.rectified = rectified});
+    if (!lens) continue;
+    for (const double x : {0.0, 0.3, -1.5}) {
+      for (const auto& p : {lens->distort({x, 0.4}), lens->undistort({x, 0.4})}) PRESCENE_CHECK(!p || p->allFinite());
+    }
   }
 }
 

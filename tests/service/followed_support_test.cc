@@ -97,7 +97,7 @@ TEST(FollowedSupport, IsFoundInAFolderOfImagesAndStaysWhereItIs) {
   const auto tracker = Tracker::create(scene, settings, 1, backends);
   ASSERT_TRUE(tracker.ok());
   SupportScore score;
-  SessionReport report(scene, settings.topics);
+  SessionReport report(scene, settings);
   const auto summary =
       replay_folder(*folder, **tracker, {}, {}, [&](const TrackerStep& step, const Tracker& at) -> core::Status {
         score.add(step.record.stamp_ns, step.supports);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 
 namespace prescene::service {
@@ -226,6 +227,98 @@ TEST(FrameAssembler, ABadMessageIsRefusedAndLosesNothing) {
   EXPECT_FALSE(assembler.add_camera_info(uncalibrated, 4).ok());
   ASSERT_TRUE(assembler.add_depth(depth_at(110 * kMs), 5, 110 * kMs).ok());
   EXPECT_TRUE(assembler.take(111 * kMs).has_value());
+}
+
+/// 64 x 48 pixels, with a pattern that shows where each came from.
+interfaces::RosImage patterned_depth(core::TimeNs stamp_ns) {
+  geometry::DepthImage depth(64, 48);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) depth(x, y) = 0.5F + 0.001F * static_cast<float>(64 * y + x);
+  }
+  return interfaces::to_ros_image_16uc1(depth, header(stamp_ns));
+}
+
+const geometry::PinholeCamera kLensCamera{64, 48, 60.0, 62.0, 31.2, 23.7};
+
+geometry::LensDistortion barrel() {
+  return *geometry::LensDistortion::brown({-0.3, 0.1, 0.001, -0.002, 0.05, 0.0, 0.0, 0.0});
+}
+
+class AssemblerBehindALens : public testing::Test {
+ protected:
+  std::optional<AssembledFrame> frame(AssemblerSettings settings, const interfaces::RosCameraInfo& info) {
+    settings.X_WC = geometry::Pose::identity();
+    FrameAssembler assembler(settings, {});
+    EXPECT_EQ(assembler.lens_text(), "");
+    EXPECT_TRUE(assembler.add_camera_info(info, 1).ok());
+    EXPECT_TRUE(assembler.add_depth(patterned_depth(100 * kMs), 2, 100 * kMs).ok());
+    const geometry::ColorImage color(64, 48, {1, 2, 3});
+    EXPECT_TRUE(assembler.add_color(interfaces::to_ros_image(color, header(100 * kMs)), 3, 100 * kMs).ok());
+    auto frame = assembler.take(200 * kMs);
+    lens_text_ = assembler.lens_text();
+    return frame;
+  }
+  geometry::DepthImage raw_ = *interfaces::to_depth_image(patterned_depth(0));
+  std::string lens_text_;
+};
+
+TEST_F(AssemblerBehindALens, StraightensItsImages) {
+  const auto frame = this->frame({}, interfaces::to_ros_camera_info(kLensCamera, header(0), barrel()));
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_TRUE(frame->doubts.empty());
+  EXPECT_EQ(frame->observation.frame.camera, kLensCamera);
+  const auto warp = interfaces::LensWarp::undistorting(kLensCamera, barrel());
+  EXPECT_EQ(*frame->observation.frame.depth, *warp.depth(raw_));
+  EXPECT_EQ((*frame->observation.frame.color)(20, 20), (geometry::Rgb{1, 2, 3}));
+  EXPECT_EQ(lens_text_, "'plumb_bob', images are straightened here");
+}
+
+TEST_F(AssemblerBehindALens, UsesTheCalibrationOfTheFrame) {
+  AssemblerSettings settings = without_color();
+  settings.X_WC = geometry::Pose::identity();
+  FrameAssembler assembler(settings, {});
+  MessageIndex index = 0;
+  for (const geometry::LensDistortion& lens : {barrel(), geometry::LensDistortion(), barrel()}) {
+    const core::TimeNs now_ns = 100 * kMs * (index + 1);
+    ASSERT_TRUE(assembler.add_camera_info(interfaces::to_ros_camera_info(kLensCamera, header(0), lens), ++index).ok());
+    ASSERT_TRUE(assembler.add_depth(patterned_depth(now_ns), ++index, now_ns).ok());
+    const auto frame = assembler.take(now_ns);
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(*frame->observation.frame.depth, *interfaces::LensWarp::undistorting(kLensCamera, lens).depth(raw_));
+  }
+}
+
+TEST_F(AssemblerBehindALens, LeavesRectifiedImagesAsTheyAre) {
+  // The camera info of rectified images still holds the lens of the raw ones.
+  interfaces::RosCameraInfo info = interfaces::to_ros_camera_info(kLensCamera, header(0), barrel());
+  info.p[0] = 55.0;
+  AssemblerSettings settings;
+  settings.rectified = true;
+  const auto frame = this->frame(settings, info);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->observation.frame.camera.fx, 55.0);
+  EXPECT_EQ(*frame->observation.frame.depth, raw_);
+  EXPECT_TRUE(frame->doubts.empty());
+  EXPECT_EQ(lens_text_, "images are rectified already, D is not used");
+}
+
+TEST_F(AssemblerBehindALens, SaysWhichLensesItDoesNotKnow) {
+  interfaces::RosCameraInfo info = interfaces::to_ros_camera_info(kLensCamera, header(0), barrel());
+  info.distortion_model = "omnidirectional";
+  const auto frame = this->frame({}, info);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(*frame->observation.frame.depth, raw_);
+  ASSERT_EQ(frame->doubts.size(), 1u);
+  EXPECT_NE(frame->doubts[0].find("'omnidirectional' with 5 coefficients is unknown"), std::string::npos);
+  EXPECT_EQ(lens_text_, "distortion ignored");
+}
+
+TEST_F(AssemblerBehindALens, DoubtsALensThatShowsLittle) {
+  const auto lens = *geometry::LensDistortion::brown({-8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+  const auto frame = this->frame({}, interfaces::to_ros_camera_info(kLensCamera, header(0), lens));
+  ASSERT_TRUE(frame.has_value());
+  ASSERT_EQ(frame->doubts.size(), 1u);
+  EXPECT_NE(frame->doubts[0].find("% of the straightened image; check the calibration"), std::string::npos);
 }
 
 }  // namespace

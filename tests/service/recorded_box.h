@@ -13,7 +13,7 @@
 namespace prescene::tests {
 
 /// A box at rest on a table, seen by a small camera for `duration` seconds; `more_of_pose` goes behind its position.
-inline std::string box_scene(const std::string& duration, const std::string& more_of_pose = "") {
+inline std::string box_on_table(const std::string& duration, const std::string& more_of_pose = "") {
   return "name: box\nduration: " + duration + R"(
 models:
   box: {box: [0.12, 0.08, 0.1], mass: 0.4}
@@ -30,15 +30,16 @@ camera:
 )";
 }
 
-/// Writes what a robot with `rate` frames a second sees of a scene to `path`, with seed 1.
+/// Writes what a robot with `rate` frames a second sees of a scene, through a lens, to `path`, with seed 1.
 inline core::Status record_scene(const std::string& yaml, const service::RecordingInfo& info, double rate,
-                                 const std::filesystem::path& path) {
+                                 const std::filesystem::path& path, const geometry::LensDistortion& lens = {}) {
   core::ThreadPool pool(1);
   service::Backends backends(pool);
   PRESCENE_TRY(const auto scene, service::load_scene_text(yaml, "scene.yaml", {}));
   PRESCENE_TRY(const auto recording, service::RecordingWriter::create(path, info));
   service::SimulatedRecordingOptions options;
   options.rate = rate;
+  options.lens = lens;
   PRESCENE_RETURN_IF_ERROR(service::simulate_recording(*scene, options, 1, backends, {}, {}, *recording));
   return recording->close();
 }

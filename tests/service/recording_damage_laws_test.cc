@@ -91,7 +91,7 @@ class RecordingDamageLaws : public ::testing::Test {
   }
 
   tests::ScratchDir folder_;
-  const std::string scene_text_ = tests::box_scene("0.8");
+  const std::string scene_text_ = tests::box_on_table("0.8");
   std::filesystem::path path_ = folder_.path() / "run.mcap";
   Bytes bytes_;
   Content whole_;

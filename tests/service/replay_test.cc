@@ -15,7 +15,7 @@ TEST(Replay, StoppedOnRequestKeepsTheStepsThatWereMade) {
   const std::filesystem::path path = folder.path() / "run.mcap";
   core::ThreadPool pool(1);
   Backends backends(pool);
-  const std::string yaml = tests::box_scene("0.5");
+  const std::string yaml = tests::box_on_table("0.5");
   const auto scene = load_scene_text(yaml, "box.yaml", {});
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   const core::Status recorded = tests::record_scene(yaml, {"box.yaml", yaml, 1, ""}, 10.0, path);

@@ -21,7 +21,7 @@
 namespace prescene::tests {
 
 /// A box at rest on a table, seen by a small camera.
-inline const std::string kBoxScene = box_scene("0.3", ", normal: {position: [0.005, 0.005, 0]}");
+inline const std::string kBoxScene = box_on_table("0.3", ", normal: {position: [0.005, 0.005, 0]}");
 
 class RobotOnBus {
  public:

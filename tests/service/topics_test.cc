@@ -18,6 +18,13 @@ BusTopic named(const std::string& name) {
 }
 
 // Of a burst none may push out another before it is read, live and in `record` and `replay`, which all listen so.
+TEST(Topics, SayByTheirNamesThatTheyAreRectified) {
+  for (const char* name : {"/camera/depth/image_rect_raw", "image_rect", "/rgb/image_rect_color"})
+    EXPECT_TRUE(names_rectified_images(name)) << name;
+  for (const char* name : {"", "/image_rect/image_raw", "/camera/color/image_raw", "/image_rect/"})
+    EXPECT_FALSE(names_rectified_images(name)) << name;
+}
+
 TEST(BusTopics, ControlsQuestionsAndAnswersAreReadWithoutOneReplacingAnother) {
   for (const char* name : {kControlTopic, kQueryTopic, kAnswerTopic}) {
     EXPECT_EQ(named(name).read, TopicQos::kCommands) << name;

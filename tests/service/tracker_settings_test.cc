@@ -30,13 +30,32 @@ TEST(TrackerSettings, ComeBackAsTheSameBits) {
   EXPECT_EQ(read->topics, unusual().topics);
   EXPECT_EQ(*read->assembler.X_WC, *unusual().assembler.X_WC);
   EXPECT_EQ(read->assembler.max_wait_s, 0.07);
-  EXPECT_TRUE(read->assembler.rectified);
+  EXPECT_EQ(read->assembler.rectified, true);
   EXPECT_EQ(read->tf.max_frames, 77);
   EXPECT_EQ(read->tf.max_samples, 5000);
   // Every key says something: without it the default stays.
   const ordered_json whole = to_json(unusual());
   const ordered_json defaults = to_json(TrackerSettings{});
   for (const auto& [key, value] : whole.items()) EXPECT_NE(value, defaults.at(key)) << key;
+}
+
+TEST(TrackerSettings, SayWhetherImagesAreRectifiedOrTheirTopicDoes) {
+  TrackerSettings settings;
+  EXPECT_FALSE(is_rectified(settings));
+  EXPECT_EQ(rectified_doubt(settings), "");
+  settings.topics.depth = "/camera/depth_registered/image_rect";
+  EXPECT_TRUE(is_rectified(settings));
+  EXPECT_THAT(rectified_doubt(settings), HasSubstr("one of /camera/depth_registered/image_rect and /camera/color"));
+  settings.topics.color = "/camera/rgb/image_rect_color";
+  EXPECT_EQ(rectified_doubt(settings), "");
+  settings.topics.color = "";
+  EXPECT_EQ(rectified_doubt(settings), "") << "without colour there is no other";
+  settings.assembler.rectified = false;
+  EXPECT_FALSE(is_rectified(settings));
+  settings.topics.color = "/camera/color/image_raw";
+  EXPECT_EQ(rectified_doubt(settings), "");
+  EXPECT_EQ(with_recorded({}, to_json(settings))->assembler.rectified, false);
+  EXPECT_EQ(with_recorded(settings, {{"rectified", nullptr}})->assembler.rectified, std::nullopt);
 }
 
 TEST(TrackerSettings, OfOtherVersionsAreTakenAsFarAsTheyGo) {

@@ -128,7 +128,7 @@ TEST(Tracker, AGraspBeforeTheFirstFrameActsInTheFirstStepThatPredicts) {
   const std::filesystem::path path = folder.path() / "run.mcap";
   core::ThreadPool pool(1);
   Backends backends(pool);
-  const std::string yaml = tests::box_scene("0.5") + R"(robot:
+  const std::string yaml = tests::box_on_table("0.5") + R"(robot:
   gripper: {box: [0.02, 0.02, 0.02], timeline: [{time: 0, position: [0, 0, 0.3]}]}
 )";
   const auto scene = load_scene_text(yaml, "box.yaml", {});

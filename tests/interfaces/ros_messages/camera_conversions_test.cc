@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <limits>
+#include <vector>
 
 #include "prescene/interfaces/ros_messages/conversions.h"
 
@@ -10,6 +13,7 @@ namespace prescene::interfaces {
 namespace {
 
 using core::StatusCode;
+using geometry::LensDistortion;
 using geometry::PinholeCamera;
 using testing::HasSubstr;
 
@@ -24,7 +28,6 @@ TEST(Cameras, GoThereAndBack) {
   EXPECT_EQ(*to_camera(to_ros_camera_info(kCamera, {}), {}, &report), kCamera);
   EXPECT_EQ(*to_camera(to_ros_camera_info(kCamera, {}), {.rectified = true}, &report), kCamera);
   EXPECT_TRUE(report.warnings.empty());
-  EXPECT_EQ(report.max_distortion, 0.0);
 }
 
 TEST(Cameras, ApplyRegionOfInterestAndBinning) {
@@ -61,26 +64,68 @@ TEST(Cameras, RefuseWhatIsNoCalibration) {
   EXPECT_EQ(to_camera(info).status().code(), StatusCode::kInvalidInput);
 }
 
-TEST(Cameras, SayHowMuchDistortionIsLeftOut) {
-  RosCameraInfo info = to_ros_camera_info({200, 200, 100.0, 100.0, 100.0, 100.0}, {});
-  info.d = {0.1, 0.0, 0.0, 0.0, 0.0};
+TEST(Cameras, HaveTheLensOfTheirModel) {
+  RosCameraInfo info = to_ros_camera_info(kCamera, {});
+  EXPECT_TRUE(to_lens(info)->is_none()) << "all of D is zero";
+  const std::vector<double> d = {-0.3, 0.1, 0.001, -0.002, 0.05, 0.2, -0.1, 0.03};
   CameraReport report;
-  ASSERT_TRUE(to_camera(info, {}, &report).ok());
-  // The corner at (-1, -1) has r^2 = 2 and moves outwards by 0.2 in x and y, 20 pixels each.
-  EXPECT_NEAR(report.max_distortion, 20.0 * std::sqrt(2.0), 1e-9);
-  ASSERT_EQ(report.warnings.size(), 1U);
-  EXPECT_THAT(report.warnings[0], HasSubstr("moves the image corners by up to 28 pixels"));
+  for (const char* model : {"plumb_bob", "rational_polynomial"}) {
+    info.distortion_model = model;
+    for (const std::size_t count : {4U, 5U, 8U, 12U, 14U}) {
+      std::array<double, 8> k{};
+      std::copy_n(d.begin(), std::min<std::size_t>(count, 8), k.begin());
+      info.d.assign(k.begin(), k.begin() + std::min<std::ptrdiff_t>(count, 8));
+      info.d.resize(count);
+      EXPECT_EQ(*to_lens(info, {}, &report), *LensDistortion::brown(k)) << model << ' ' << count;
+      EXPECT_TRUE(report.warnings.empty());
+    }
+  }
+  for (const char* model : {"equidistant", "fisheye"}) {
+    info.distortion_model = model;
+    info.d = {-0.03, 0.01, -0.004, 0.0007};
+    EXPECT_EQ(*to_lens(info, {}, &report), *LensDistortion::equidistant({-0.03, 0.01, -0.004, 0.0007}));
+    EXPECT_TRUE(report.warnings.empty());
+    info.d.assign(4, 0.0);
+    EXPECT_TRUE(to_lens(info)->is_none()) << "as image_geometry reads it";
+  }
+}
 
-  info.distortion_model = "equidistant";
-  info.d = {0.0, 0.0, 0.0, 1e-9};
-  ASSERT_TRUE(to_camera(info, {}, &report).ok());
-  EXPECT_NEAR(report.max_distortion, 100.0 * (std::sqrt(2.0) - std::atan(std::sqrt(2.0))), 1e-5);
+TEST(Cameras, LensesGoThereAndBack) {
+  for (const LensDistortion& lens :
+       {LensDistortion(), *LensDistortion::brown({-0.3, 0.1, 0.001, -0.002, 0.05, 0.0, 0.0, 0.0}),
+        *LensDistortion::brown({0.4, -0.2, 0.0007, -0.0003, 0.02, 0.7, -0.3, 0.05}),
+        *LensDistortion::equidistant({-0.03, 0.01, -0.004, 0.0007})}) {
+    EXPECT_EQ(*to_lens(to_ros_camera_info(kCamera, {}, lens)), lens);
+    EXPECT_EQ(*to_camera(to_ros_camera_info(kCamera, {}, lens)), kCamera);
+  }
+}
 
-  info.distortion_model = "rational_polynomial";
-  ASSERT_TRUE(to_camera(info, {}, &report).ok());
-  EXPECT_THAT(report.warnings[0], HasSubstr("'rational_polynomial' with 4 coefficients is unknown"));
-  ASSERT_TRUE(to_camera(info, {.rectified = true}, &report).ok());
+TEST(Cameras, SayWhichDistortionIsIgnored) {
+  RosCameraInfo info = to_ros_camera_info(kCamera, {});
+  CameraReport report;
+  info.d = {0.1, 0.0, 0.0};
+  EXPECT_TRUE(to_lens(info, {}, &report)->is_none());
+  EXPECT_THAT(report.warnings.at(0),
+              HasSubstr("'plumb_bob' with 3 coefficients is unknown, the distortion is ignored"));
+  info.distortion_model = "omnidirectional\n";
+  info.d.assign(5, 0.1);
+  EXPECT_TRUE(to_lens(info, {}, &report)->is_none());
+  EXPECT_THAT(report.warnings.at(0), HasSubstr("'omnidirectional\\x0a' with 5 coefficients is unknown"));
+  EXPECT_TRUE(to_lens(info, {.rectified = true}, &report)->is_none());
   EXPECT_TRUE(report.warnings.empty()) << "rectified images have no distortion";
+  // A thin prism is left out, the rest is not.
+  info.distortion_model = "rational_polynomial";
+  info.d = {-0.3, 0.1, 0.001, -0.002, 0.05, 0.2, -0.1, 0.03, 0.001, 0.0, 0.0, 0.0};
+  EXPECT_EQ(*to_lens(info, {}, &report), *LensDistortion::brown({-0.3, 0.1, 0.001, -0.002, 0.05, 0.2, -0.1, 0.03}));
+  EXPECT_THAT(report.warnings.at(0), HasSubstr("d: coefficients 9 to 12 (thin prism and tilted sensor) are ignored"));
+}
+
+TEST(Cameras, RefuseALensThatIsNotFinite) {
+  RosCameraInfo info = to_ros_camera_info(kCamera, {});
+  info.d[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(to_lens(info).status().code(), StatusCode::kInvalidInput);
+  EXPECT_THAT(to_lens(info).status().message(), HasSubstr("d: lens coefficient 2 is not finite"));
+  EXPECT_TRUE(to_lens(info, {.rectified = true}).ok());
 }
 
 TEST(Cameras, NoticeTheRightCameraOfAPair) {

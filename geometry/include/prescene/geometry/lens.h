@@ -36,6 +36,8 @@ class LensDistortion {
   static core::Result<LensDistortion> equidistant(const std::array<double, 4>& coefficients);
 
   Model model() const { return model_; }
+  /// In the order of the function that made it, then zeros.
+  const std::array<double, 8>& coefficients() const { return k_; }
   bool is_none() const { return model_ == Model::kNone; }
   /// Rays further than this from the optical axis have no image: there the lens folds, or they are more than 89 degrees
   /// off. Of undistorted points; infinite without distortion.

@@ -12,6 +12,7 @@
 #include "prescene/core/status.h"
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
+#include "prescene/geometry/lens.h"
 #include "prescene/geometry/pose.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 
@@ -102,17 +103,21 @@ struct CameraRules {
   int image_width = 0;     ///< Of the images that go with it; 0 = not checked.
   int image_height = 0;
 };
-/// What to_camera saw on the way.
+/// What to_camera and to_lens saw on the way.
 struct CameraReport {
-  double max_distortion =
-      0.0;  ///< Largest shift of an image corner by the lens distortion, which is not modelled; pixels.
   std::vector<std::string> warnings;
 };
 /// The pinhole camera of the images as they arrive: K (or P), with binning and region of interest applied as ROS's
 /// image_geometry does: c' = (c - offset) / binning. kInvalidInput when uncalibrated (K all zero), NaN, focal lengths
-/// <= 0, or a size that does not fit the image. Lens distortion is left out: the report says how much that is.
+/// <= 0, or a size that does not fit the image.
 core::Result<geometry::PinholeCamera> to_camera(const RosCameraInfo& info, const CameraRules& rules = {},
                                                 CameraReport* report = nullptr);
+/// The lens of the images as they arrive: none for rectified ones, and where all of D is zero (as in image_geometry,
+/// whatever the model). plumb_bob and rational_polynomial are one model, told by the number of coefficients (4, 5, 8,
+/// or 12 and 14, of which the first 8 count); equidistant and fisheye have 4. The report warns of an unknown model,
+/// whose lens is none, and of coefficients that are left out. kInvalidInput where one is not finite.
+core::Result<geometry::LensDistortion> to_lens(const RosCameraInfo& info, const CameraRules& rules = {},
+                                               CameraReport* report = nullptr);
 
 /// 16UC1 in millimetres, rounded; depths above 65.535 m and missing ones become 0.
 RosImage to_ros_image_16uc1(const geometry::DepthImage& depth, const RosHeader& header);
@@ -120,8 +125,10 @@ RosImage to_ros_image_16uc1(const geometry::DepthImage& depth, const RosHeader& 
 RosImage to_ros_image_32fc1(const geometry::DepthImage& depth, const RosHeader& header);
 /// rgb8.
 RosImage to_ros_image(const geometry::ColorImage& color, const RosHeader& header);
-/// plumb_bob without distortion, R the identity, P = [K 0].
-RosCameraInfo to_ros_camera_info(const geometry::PinholeCamera& camera, const RosHeader& header);
+/// The camera of raw images: R the identity, P = [K 0]. Without a lens plumb_bob of zeros. (An equidistant lens of
+/// zeros cannot be told: to_lens() and ROS read it as none.)
+RosCameraInfo to_ros_camera_info(const geometry::PinholeCamera& camera, const RosHeader& header,
+                                 const geometry::LensDistortion& lens = {});
 
 // --- Joints ---------------------------------------------------------------------------------------------------------
 

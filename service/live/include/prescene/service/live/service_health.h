@@ -47,6 +47,7 @@ struct ServiceHealth {
   std::uint64_t not_simulated = 0;  ///< Particles that physics could not move and constant velocity did.
   std::string physics_failure;      ///< Why, the last time; "" = it never failed.
   StepperCounts steppers;
+  std::string lens;                   ///< What is done about the distortion of the camera's lens; "" = not known yet.
   std::vector<std::string> degraded;  ///< What the last step could not do fully.
   std::string last_skip;              ///< Why the last frame since the last step was skipped; "" = none was.
   std::string last_refusal;           ///< Why the last refused message was.

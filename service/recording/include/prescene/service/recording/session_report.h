@@ -16,13 +16,14 @@
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/frame_assembler.h"
 #include "prescene/service/tracking/topics.h"
+#include "prescene/service/tracking/tracker_settings.h"
 
 namespace prescene::service {
 
 /// Collects while a session runs; keeps a bounded number of pictures, evenly spread.
 class SessionReport {
  public:
-  SessionReport(std::shared_ptr<const belief::Scene> scene, const InputTopics& topics);
+  SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings);
 
   /// A message of the robot: its frames are assembled as the tracker does.
   void add(const interfaces::ReceivedMessage& message);

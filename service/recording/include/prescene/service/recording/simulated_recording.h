@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "prescene/belief/trajectory.h"
+#include "prescene/geometry/lens.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/recording/recording.h"
@@ -23,6 +24,8 @@ struct SimulatedRecordingOptions {
   std::string world_frame = "world";
   rendering::SimulatedCameraOptions camera;
   rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
+  /// The camera's lens, which bends the images and is told in the camera info: of plumb_bob's or equidistant's form.
+  geometry::LensDistortion lens;
 };
 
 /// What the camera frame is called in simulated recordings: "<camera's name>_optical_frame".

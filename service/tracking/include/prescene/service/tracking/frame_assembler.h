@@ -8,6 +8,9 @@
 // A frame whose stamp is more than a second before the last one taken, or far ahead of it, is skipped: one stamp may be
 // wrong. Three such in a row mean that the sender's clock was set, and count; where it went back, what was known of the
 // moving frames of tf is forgotten.
+//
+// Images through a lens that the camera info describes are straightened when their frame is taken, so that observations
+// are always those of a pinhole camera.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +22,8 @@
 
 #include "prescene/belief/observation.h"
 #include "prescene/belief/scene.h"
+#include "prescene/geometry/lens.h"
+#include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/tracking/tf_buffer.h"
 
@@ -36,7 +41,9 @@ struct AssemblerSettings {
   double max_wait_s = 0.05;               ///< How long a depth image waits for its colour image, camera info and tf.
   double max_stamp_difference_s = 0.017;  ///< Between a depth image and its colour image.
   bool use_color = true;
-  bool rectified = false;        ///< The images are rectified: the camera is P of the camera info instead of K.
+  /// Whether the images are rectified: the camera is then P of the camera info instead of K, and its distortion is not
+  /// that of the images. Empty = not, unless the topic's name says so (is_rectified(TrackerSettings)).
+  std::optional<bool> rectified;
   bool mono16_is_depth = false;  ///< Take `mono16` depth images as millimetres.
 };
 
@@ -50,7 +57,7 @@ struct AssembledFrame {
   MessageIndex camera_info = 0;
   /// All tf messages up to this number had been taken in when the poses were looked up.
   MessageIndex tf_until = 0;
-  std::vector<std::string> doubts;  ///< Of its depth image and camera info: an unlikely unit, a distorting lens.
+  std::vector<std::string> doubts;  ///< Of its depth image and camera info: an unlikely unit, an unknown lens.
 };
 
 struct SkippedFrame {
@@ -84,6 +91,8 @@ class FrameAssembler {
   std::uint64_t skipped_count() const { return skipped_count_; }
   std::uint64_t tf_forgotten() const { return tf_.forgotten(); }
   std::uint64_t tf_late() const { return tf_.late(); }
+  /// What is done about the lens, for a person; "" before a camera info has come.
+  std::string lens_text() const;
 
  private:
   struct Waiting {
@@ -108,6 +117,7 @@ class FrameAssembler {
   const Color* color_of(const Waiting& waiting) const;
   /// Why a frame's stamp is not believed, or null. Counts those in a row, and follows a clock that was set.
   const char* doubt_of_stamp(const Waiting& frame);
+  core::Status straighten(AssembledFrame& frame);
   void skip(const Waiting& waiting, std::string reason);
   void clock_jumped_back();
 
@@ -118,6 +128,9 @@ class FrameAssembler {
   std::deque<Waiting> waiting_;  // ascending stamps
   std::deque<Color> colors_;     // newest last, bounded
   std::optional<geometry::PinholeCamera> camera_;
+  geometry::LensDistortion lens_;
+  std::string lens_model_;                    // as the camera info calls it
+  std::optional<interfaces::LensWarp> warp_;  // of camera_ and lens_, once a frame has needed it
   MessageIndex camera_index_ = 0;
   std::vector<std::string> camera_doubts_;
   struct Taken {

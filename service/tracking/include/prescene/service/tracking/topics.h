@@ -21,6 +21,10 @@ struct InputTopics {
   friend bool operator==(const InputTopics&, const InputTopics&) = default;
 };
 
+/// By its name, whether a topic carries rectified images: those of ROS's image_proc and of drivers are called
+/// image_rect, image_rect_color, image_rect_raw and the like.
+bool names_rectified_images(const std::string& topic);
+
 /// kInvalidInput where a topic but colour is empty, or two are one.
 core::Status validate(const InputTopics& topics);
 

@@ -58,6 +58,8 @@ class Tracker {
   /// Transforms that tf's buffer forgot early for want of room, since the start.
   std::uint64_t tf_forgotten() const { return assembler_.tf_forgotten(); }
   std::uint64_t tf_late() const { return assembler_.tf_late(); }
+  /// What is done about the lens, as FrameAssembler::lens_text().
+  std::string lens_text() const { return assembler_.lens_text(); }
   /// Actions of controls that wait for a frame, and those that were dropped since the start, as in WaitingControls.
   std::size_t waiting_controls() const { return controls_.count(); }
   std::uint64_t dropped_controls() const { return controls_.dropped(); }
@@ -72,6 +74,7 @@ class Tracker {
           std::unique_ptr<rendering::LikelihoodBatch> likelihood);
 
   TrackerSettings settings_;
+  std::string rectified_doubt_;
   std::unique_ptr<rendering::Renderer> renderer_;
   std::unique_ptr<rendering::LikelihoodBatch> likelihood_;
   filter::ParticleFilter filter_;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 
 #include "prescene/core/status.h"
 #include "prescene/filter/particle_filter.h"
@@ -17,6 +18,12 @@ struct TrackerSettings {
   TfBufferSettings tf;
   filter::FilterSettings filter;
 };
+
+/// Whether the images are rectified: as the settings say, else as the name of the depth topic does.
+bool is_rectified(const TrackerSettings& settings);
+/// What speaks against it: one of the image topics is named as rectified, the other is not, and the settings don't say
+/// which holds. "" if nothing does.
+std::string rectified_doubt(const TrackerSettings& settings);
 
 /// Topics, assembler and tf: all that decides which frames are seen from where. The filter's settings are those of the
 /// program's version.
