@@ -85,7 +85,7 @@ TEST(RecordingLimits, ASmallFileOfTheLargestImagesTakesLessThanAGigabyte) {
   const std::string path = (folder.path() / "large.mcap").string();
   {
     HandRecording recording(path);
-    recording.write_camera(4096, 4096);
+    recording.write_camera(4096, 4096, {-0.1, 0.0, 0.0, 0.0, 0.0});  // straightened, which takes most
     const geometry::DepthImage depth(4096, 4096, 1.0F);
     const geometry::ColorImage color(4096, 4096, {90, 90, 90});
     for (int i = 0; i < 4; ++i) recording.write_frame(depth, &color);
