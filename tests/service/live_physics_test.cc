@@ -122,7 +122,7 @@ TEST_F(LivePhysics, FramesThatSayNothingLeaveTheAnswerAtThePriors) {
 
 /// What lies still on a table does so in live answers, too, although its pose is known to some degrees only.
 TEST_F(LivePhysics, WhatLiesStillStays) {
-  const std::string yaml = tests::box_scene("1.5");
+  const std::string yaml = tests::box_on_table("1.5");
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const auto belief = tracked(yaml, yaml, seed);
     const auto query = belief::query_from_json(R"({"stability": {"object": "box"}})");
