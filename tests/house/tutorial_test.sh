@@ -1,0 +1,92 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# The commands of docs/tutorial/first_steps.md run, one after the other in one folder, and print what the page shows.
+#   tutorial_test.sh <root of the checkout> <folder of the built program> [<sanitizers that it is built with>]
+# A block ```sh is run. A block ```text is what the blocks before it print: each of its lines is printed, in this order, whatever
+# its numbers are; "..." stands for any lines, or for the rest of a line.
+set -eu
+if [ -n "${3:-}" ]; then
+  echo "skipped: under sanitizers the service is too slow for the pace of the recording; tests/system runs it under them"
+  exit 77
+fi
+page=$1/docs/tutorial/first_steps.md
+work=$(mktemp -d)
+trap 'kill "$(cat "$work/server" 2> /dev/null)" 2> /dev/null || true; rm -rf "$work"' EXIT
+mkdir "$work/reader"
+awk -v work="$work" '
+/^```sh$/ { kind = "sh"; next }
+/^```text$/ {
+  kind = "text"
+  print "echo @shown" ++shown >> (work "/commands")
+  next
+}
+/^```/ { kind = ""; next }
+kind == "sh" { print >> (work "/commands") }
+kind == "text" { print >> (work "/promised" shown) }
+' "$page"
+cd "$work/reader"
+PATH=$2:$PATH
+# So that a failing command in between does not leave the service running.
+sed -e 's|^prescene serve .*&$|&\necho $! > ../server|' -e 's|^wait \$!$|&\nrm ../server|' "$work/commands" > "$work/script"
+code=0
+ROS_DOMAIN_ID=$((10 + $$ % 200)) sh -eu "$work/script" > "$work/printed" 2> "$work/log" || code=$?
+if [ "$code" != 0 ]; then
+  echo "a command of the page fails with exit code $code"
+  cat "$work/printed" "$work/log" serve.log
+  exit 1
+fi
+
+awk -v work="$work" '
+function plain(line) {
+  gsub(/[0-9]+(\.[0-9]+)?(e-?[0-9]+)?/, "#", line)
+  gsub(/-+/, "-", line)
+  gsub(/[ \t]+/, " ", line)
+  sub(/ $/, "", line)
+  return line
+}
+function compare(file,    line, wanted, start, i, found, any) {
+  i = 0
+  any = 1
+  while ((getline line < file) > 0) {
+    ++lines
+    if (line == "...") {
+      any = 1
+      continue
+    }
+    wanted = plain(line)
+    start = sub(/ ?\.\.\.$/, "", wanted)
+    for (found = 0; !found && i < count; ) {
+      ++i
+      found = start ? index(printed[i], wanted) == 1 : printed[i] == wanted
+      if (!found && !any) break
+    }
+    if (!found) {
+      printf "The page shows, but the program does not print there:\n%s\n", line
+      for (i = 1; i <= count; ++i) print "  " text[i]
+      exit failed = 1
+    }
+    any = 0
+  }
+}
+/^@shown/ {
+  compare(work "/promised" substr($0, 7))
+  count = 0
+  next
+}
+{
+  text[++count] = $0
+  printed[count] = plain($0)
+}
+END {
+  if (failed) exit 1
+  if (lines < 30) {
+    print "only " lines " lines of output are compared"
+    exit 1
+  }
+  print lines " lines of output are as the page shows them"
+}' "$work/printed"
+
+for file in box.yaml predict.html box.mcap box.html seen.png why.png still.mcap; do
+  [ -s "$file" ] || { echo "there is no $file"; exit 1; }
+done
+grep -q 'frames come: tracking' serve.log || { cat serve.log; exit 1; }
