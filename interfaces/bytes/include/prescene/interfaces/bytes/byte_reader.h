@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A cursor over bytes from outside: reads numbers of either byte order and never passes the end. After the first read
 // that does not fit, everything reads as zero and ok() is false, so that a parser may check once a record.
+//
+//   PRESCENE_TRY(const auto bytes, read_file(path, 1 << 20));   // prescene/interfaces/bytes/file.h
+//   ByteReader reader(bytes);                                   // bytes must outlive it
+//   const auto count = reader.read<std::uint32_t>();
+//   const auto name = reader.take(count);
+//   if (!reader.ok()) return core::data_loss(path.string() + ": ends too early");
 #pragma once
 
 #include <bit>

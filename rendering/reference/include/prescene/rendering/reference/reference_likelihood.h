@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The readable likelihood backend: one hypothesis after the other on a scalar rasteriser, within its bounding box.
 // And, for people who ask why a pose is believed, what each pixel says.
+//
+//   const geometry::Image<float> nats = log_ratio_map(terms, hypothesis);
+//   if (nats(x, y) < 0.0F) ...   // this pixel speaks against the pose; NaN where the object is not seen
 #pragma once
 
 #include <memory>

@@ -3,6 +3,10 @@
 // ratio, no image on the way. Pixels are the reference backend's, bit by bit, and so are their ratios; only sums are
 // rounded otherwise (by less than 1e-4 of max(1, |log ratio|)). The same bits on all instruction sets of a processor
 // and for any number of threads.
+//
+//   const auto batch = make_simd_likelihood_batch();
+//   const auto workspace = batch->make_workspace();             // one per thread, kept
+//   batch->evaluate(terms, hypotheses, *workspace, evidences);  // terms: see likelihood_batch.h
 #pragma once
 
 #include <memory>

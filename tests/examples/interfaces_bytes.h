@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the examples in the headers of interfaces/bytes take for granted.
+#pragma once
+
+#include <filesystem>
+
+#include "prescene/core/status.h"
+#include "prescene/interfaces/bytes/file.h"
+
+namespace prescene::interfaces::given_interfaces_bytes {
+
+extern const std::filesystem::path path;
+
+}  // namespace prescene::interfaces::given_interfaces_bytes
