@@ -38,7 +38,7 @@ fi
 
 awk -v work="$work" '
 function plain(line) {
-  gsub(/[0-9]+(\.[0-9]+)?(e-?[0-9]+)?/, "#", line)
+  gsub(/-?[0-9]+(\.[0-9]+)?(e-?[0-9]+)?/, "#", line)
   gsub(/-+/, "-", line)
   gsub(/[ \t]+/, " ", line)
   sub(/ $/, "", line)
