@@ -13,7 +13,6 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/reference/reference_renderer.h"
-#include "prescene/rendering/sensor/levels_of_detail.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 
 namespace prescene::benchmarks {
@@ -26,6 +25,7 @@ using namespace rendering;
 constexpr int kObjects = 5;
 constexpr int kTrackedHypotheses = 200;
 constexpr double kDistance = 1.1;  // m
+constexpr int kSimplifiedTriangles = 1400;
 
 /// Turned on a lathe, standing on z = 0: 10,200 triangles.
 geometry::TriangleMesh turned(int kind) {
@@ -50,9 +50,9 @@ class Tracking {
     X_CW_.translation = Vector3d(0.0, 0.0, kDistance);
     support_.plane_C = geometry::transformed({Vector3d::UnitZ(), 0.0}, X_CW_);
     for (int i = 0; i < kObjects; ++i) {
-      auto levels = LevelsOfDetail::make(turned(i), {});
-      PRESCENE_CHECK(levels.ok());
-      levels_.push_back(*std::move(levels));
+      const geometry::TriangleMesh mesh = turned(i);
+      full_.push_back(make_render_mesh(mesh));
+      simplified_.push_back(make_render_mesh(geometry::simplified(mesh, kSimplifiedTriangles)));
       const double angle = 2.0 * std::numbers::pi * i / kObjects;
       Pose X_WO = Pose::from_translation({0.16 * std::cos(angle), 0.13 * std::sin(angle), 0.0});
       X_WO.rotation = geometry::exp_rotation({0.0, 0.0, 1.0 * i});
@@ -86,12 +86,11 @@ class Tracking {
     PRESCENE_CHECK(make_frame_terms(input, options, SensorModel{}, &terms_).ok());
   }
 
-  /// The level of each thing for this frame, or its full mesh.
+  /// The simplified mesh of each thing, or its full one.
   void choose(bool coarse) {
     for (std::size_t i = 0; i < kObjects; ++i) {
-      const DetailLevel& level = coarse ? levels_[i].at_pose(terms_, X_CO_[i]) : levels_[i].levels().front();
-      chosen_[i] = level.mesh;
-      for (PoseHypothesis& hypothesis : hypotheses_[i]) hypothesis.mesh = level.mesh.get();
+      chosen_[i] = coarse ? simplified_[i] : full_[i];
+      for (PoseHypothesis& hypothesis : hypotheses_[i]) hypothesis.mesh = chosen_[i].get();
     }
   }
 
@@ -118,7 +117,7 @@ class Tracking {
     costs.objects = kObjects;
     costs.hypotheses = kTrackedHypotheses;
     for (std::size_t i = 0; i < kObjects; ++i) {
-      costs.triangles += static_cast<double>(levels_[i].levels().front().mesh->triangles.size()) / kObjects;
+      costs.triangles += static_cast<double>(full_[i]->triangles.size()) / kObjects;
       costs.drawn += static_cast<double>(chosen_[i]->triangles.size()) / kObjects;
       batch_.evaluate(terms_of_[i], hypotheses_[i], *workspace_, evidences_);
       for (const PoseEvidence& evidence : evidences_)
@@ -130,7 +129,6 @@ class Tracking {
     costs.whole = cost_of(
         [&] {
           make_terms();
-          choose(true);
           draw_layers();
           weigh();
         },
@@ -148,8 +146,7 @@ class Tracking {
     table.vertices = {{-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0}};
     table.triangles = {{0, 1, 2}, {0, 2, 3}};
     scene.instances = {{make_render_mesh(table), X_CW_, material_}};
-    for (std::size_t i = 0; i < kObjects; ++i)
-      scene.instances.push_back({levels_[i].levels().front().mesh, X_CO_[i], material_});
+    for (std::size_t i = 0; i < kObjects; ++i) scene.instances.push_back({full_[i], X_CO_[i], material_});
     RenderOptions options;
     options.normals = true;
     RenderedView view;
@@ -166,7 +163,8 @@ class Tracking {
   Pose X_CW_;
   SupportRegion support_;
   SurfaceMaterial material_;
-  std::vector<LevelsOfDetail> levels_;
+  std::vector<MeshHandle> full_;
+  std::vector<MeshHandle> simplified_;
   std::vector<Pose> X_CO_;
   geometry::DepthImage depth_;
   std::vector<std::vector<PoseHypothesis>> hypotheses_;

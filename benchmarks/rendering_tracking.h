@@ -11,7 +11,7 @@ struct TrackingCosts {
   int objects = 0;
   int hypotheses = 0;      ///< Of each.
   double triangles = 0.0;  ///< Of a thing, on average.
-  double drawn = 0.0;      ///< Of the levels of detail that are weighed.
+  double drawn = 0.0;      ///< Of the simplified meshes that are weighed.
   double pixels = 0.0;     ///< That a hypothesis covers.
   // Processor seconds a frame.
   double terms = 0.0;   ///< Of 640 x 480 for 160 x 120.
