@@ -90,6 +90,13 @@ function check_relative(place, path, module, header,    folder, target, line, i)
   complain(place, "\"" header "\" is not a file beside this one, nor \"prescene/<module>/<header>\"")
 }
 
+# Highway includes a source once more for each instruction set, by the name that the source gives.
+function check_itself(place, path, line,    name) {
+  name = path
+  sub(/.*\//, "", name)
+  if (index(line, "\"" name "\"") == 0) complain(place, "HWY_TARGET_INCLUDE must be \"" name "\", this source")
+}
+
 function read_rules(    line, n, part, i, j, k, changed, pair, order, count) {
   while ((getline line < rules) > 0) {
     ++rule_lines
@@ -175,6 +182,7 @@ END {
       for (i = 1; i <= onces; ++i)
         if (index(line, once_text[i]) && path != once_file[i] && path !~ /^tests\//)
           complain(path ":" number, "'" once_text[i] "' is for " once_file[i] " only (its 'text' line in tools/layers.txt)")
+      if (line ~ /^[ \t]*#[ \t]*define[ \t]+HWY_TARGET_INCLUDE[ \t]/) check_itself(path ":" number, path, line)
       if (line !~ /^[ \t]*#[ \t]*include/) continue
       ++includes
       header = line
