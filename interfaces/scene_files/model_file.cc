@@ -96,7 +96,9 @@ std::string flow_text(const LocatedValue& value, const std::string& key, const s
         const std::filesystem::path path =
             std::filesystem::absolute(std::filesystem::path(*value.place.file).parent_path() / value.text)
                 .lexically_normal();
-        const std::filesystem::path relative = path.lexically_relative(std::filesystem::absolute(folder));
+        // The folder of "model.yaml" is the empty path, of which there is no absolute one.
+        const std::filesystem::path relative = path.lexically_relative(
+            folder.empty() ? std::filesystem::current_path() : std::filesystem::absolute(folder));
         return quoted_yaml((relative.empty() ? path : relative).generic_string());
       }
       const bool plain =

@@ -172,6 +172,12 @@ TEST(ModelFile, OfAFittedModelFindsTheSameFilesFromItsOwnFolder) {
   ASSERT_TRUE(yaml.ok()) << yaml.status().message();
   EXPECT_THAT(*yaml, HasSubstr("\"../models/mesh/mug.ply\""));
   EXPECT_THAT(*yaml, HasSubstr("mass: 0.4"));
+
+  // The folder of a file that is named without one.
+  const auto here = fitted_model_yaml(folder.path() / "scene.yaml", "mug", scene->models[0], {});
+  ASSERT_TRUE(here.ok()) << here.status().message();
+  const auto mesh = (folder.path() / "models" / "mesh" / "mug.ply").lexically_relative(std::filesystem::current_path());
+  EXPECT_THAT(*here, HasSubstr("\"" + mesh.generic_string() + "\""));
 }
 
 TEST(ModelFile, MistakesInItAreToldWithItsOwnName) {
