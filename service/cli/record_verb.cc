@@ -15,6 +15,9 @@ namespace {
 struct RecordOptions {
   std::string output;
   std::string simulate;
+  std::vector<std::string> removals;
+  std::vector<std::string> puts;
+  bool unreported_robot = false;
   SimulatedRecordingOptions simulation;
   interfaces::DdsOptions dds;
   InputTopics topics;
@@ -41,10 +44,19 @@ core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene
   return simulated;
 }
 
-core::Status record_simulation(const RecordOptions& options, VerbContext& context) {
+core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   if (options.verb->count("--domain") > 0)
     return core::invalid_input("--domain is for recording the bus, and --simulate needs none: leave one of them out");
   PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {options.simulate}));
+  for (const std::string& text : options.removals) {
+    PRESCENE_TRY(UnannouncedChange change, removal_from_text(text));
+    options.simulation.changes.push_back(std::move(change));
+  }
+  for (const std::string& text : options.puts) {
+    PRESCENE_TRY(UnannouncedChange change, put_from_text(text));
+    options.simulation.changes.push_back(std::move(change));
+  }
+  options.simulation.reports_robot = !options.unreported_robot;
   PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log()));
   // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
@@ -91,6 +103,17 @@ Verb add_record_verb(CLI::App& app) {
       ->check(number_between(0.1, 240.0))
       ->needs("--simulate")
       ->capture_default_str();
+  verb->add_option("--remove", options->removals,
+                   "SECONDS:OBJECT: somebody takes the object away, and nobody is told; at 0: it is not there until it "
+                   "is put in")
+      ->needs("--simulate");
+  verb->add_option("--put", options->puts,
+                   "SECONDS:OBJECT:X,Y,Z[,YAW_DEG]: somebody puts the object there (m, its frame's origin), and nobody "
+                   "is told")
+      ->needs("--simulate");
+  verb->add_flag("--unreported-robot", options->unreported_robot,
+                 "The robot moves and acts, but neither its poses nor its actions are published")
+      ->needs("--simulate");
   add_bus_options(*verb, options->dds, options->topics);
   options->verb = verb;
   verb->footer(

@@ -21,6 +21,10 @@ namespace {
 
 using nlohmann::ordered_json;
 
+bool is_transparent(const rendering::RenderInstance& instance) {
+  return instance.material.behind > rendering::SurfaceMaterial::opaque().behind;
+}
+
 /// A message that is due; the recording is written in the order of these times.
 struct Due {
   core::TimeNs time_ns;
@@ -67,21 +71,30 @@ class Player {
                  interfaces::encode_cdr(interfaces::RosString{belief::json_text(json)}));
   }
 
-  core::Status write_frame(std::uint64_t number, const belief::WorldState& state) {
+  /// `scene`: with the objects that are there now, which are the state's.
+  core::Status write_frame(std::uint64_t number, const belief::Scene& scene, const belief::WorldState& state) {
     std::vector<geometry::Pose> X_WG;
     for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
       X_WG.push_back(belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), state.time));
     }
     const filter::BeliefView view =
-        filter::render_scene(scene_, state, X_WG, filter::MeshDetail::kDisplay, backends_.meshes());
+        filter::render_scene(scene, state, X_WG, filter::MeshDetail::kDisplay, backends_.meshes());
     const belief::SceneCamera& camera = *scene_.camera;
     rendering::RenderOptions render_options;
     render_options.normals = true;
     rendering::RenderedView images;
     PRESCENE_RETURN_IF_ERROR(renderer_.render(view.scene, camera.intrinsics, camera.X_WC, render_options, &images));
+    rendering::RenderedView behind;
+    const bool sees_through = std::any_of(view.scene.instances.begin(), view.scene.instances.end(), is_transparent);
+    if (sees_through) {
+      rendering::RenderScene rest = view.scene;
+      std::erase_if(rest.instances, is_transparent);
+      PRESCENE_RETURN_IF_ERROR(renderer_.render(rest, camera.intrinsics, camera.X_WC, render_options, &behind));
+    }
     geometry::DepthImage depth;
     geometry::ColorImage color;
-    camera_.sample(view.scene, images, nullptr, camera.intrinsics, camera.X_WC, noise_, number, &depth, &color);
+    camera_.sample(view.scene, images, sees_through ? &behind : nullptr, camera.intrinsics, camera.X_WC, noise_, number,
+                   &depth, &color);
 
     if (warp_) {
       PRESCENE_TRY(depth, warp_->depth(depth));
@@ -97,7 +110,7 @@ class Player {
                                    interfaces::encode_cdr(interfaces::to_ros_image(color, header))));
     PRESCENE_RETURN_IF_ERROR(write(options_.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
                                    interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
-    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(state, view, images))),
+    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(scene, state, view, images))),
                                  stamp_ns + core::ns_of(options_.latency));
   }
 
@@ -118,13 +131,13 @@ class Player {
     return written.status();
   }
 
-  TruthRecord truth(const belief::WorldState& state, const filter::BeliefView& view,
+  TruthRecord truth(const belief::Scene& scene, const belief::WorldState& state, const filter::BeliefView& view,
                     const rendering::RenderedView& images) {
     TruthRecord record;
     record.stamp_ns = stamp(state.time);
     std::vector<int> visible(view.scene.instances.size() + 1, 0);
     for (std::size_t i = 0; i < images.labels.size(); ++i) ++visible[images.labels.data()[i]];
-    for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
       rendering::RenderScene alone;
       alone.instances.push_back(view.scene.instances[i]);
       rendering::RenderedView alone_view;
@@ -135,8 +148,10 @@ class Player {
             std::count_if(labels, labels + alone_view.labels.size(), [](std::uint16_t l) { return l != 0; });
         if (covered > 0) share = static_cast<double>(visible[i + 1]) / static_cast<double>(covered);
       }
-      record.objects.push_back({scene_.objects[i].name, state.objects[i].X_WO, share});
+      record.objects.push_back({scene.objects[i].name, state.objects[i].X_WO, share});
     }
+    for (const belief::SceneObject& object : scene_.objects)
+      if (!belief::find_object(scene, object.name)) record.objects.push_back({object.name, {}, 0.0, false});
     return record;
   }
 
@@ -150,22 +165,6 @@ class Player {
   std::optional<interfaces::LensWarp> warp_;  // where there is a lens
 };
 
-belief::Trajectory play(const belief::Scene& scene, const simulation::Simulator& simulator, double interval,
-                        std::uint64_t seed, core::ThreadPool& pool) {
-  core::RandomStream stream(seed, core::Purpose::kScenario);
-  std::vector<double> uniforms(static_cast<std::size_t>(belief::start_dimensions(scene)));
-  for (double& u : uniforms) u = stream.uniform();
-  const belief::WorldState start = belief::draw_start(scene, uniforms);
-  simulation::RunRequest request;
-  request.actions = scene.actions;
-  request.stop.duration = scene.duration;
-  request.stop.stop_at_rest = false;
-  request.sample_interval = interval;
-  belief::Trajectory trajectory;
-  simulator.run({&start, 1}, request, core::RandomStream(seed, core::Purpose::kAction), 0, pool, {&trajectory, 1});
-  return trajectory;
-}
-
 }  // namespace
 
 std::string camera_frame_of(const belief::Scene& scene) { return scene.camera->name + "_optical_frame"; }
@@ -177,25 +176,28 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     return core::invalid_input("scene '" + scene.name +
                                "' has no camera to record with: add one (docs/reference/scene_files.md)");
   }
-  PRESCENE_TRY(const auto simulator, backends.make_simulator(scene));
+  PRESCENE_TRY(const std::vector<PlayedPart> parts, play_scene(scene, options.changes, backends.simulator_factory(),
+                                                               1.0 / options.rate, seed, backends.pool()));
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
-  const belief::Trajectory trajectory = play(scene, *simulator, 1.0 / options.rate, seed, backends.pool());
   Player player(scene, options, seed, backends, *renderer, recording);
 
   std::vector<Due> due;
-  for (std::size_t i = 0; i < trajectory.states.size(); ++i) {
-    const belief::WorldState& state = trajectory.states[i];
-    due.push_back({core::ns_of(state.time), [&player, &state, i] { return player.write_frame(i, state); }});
+  std::uint64_t number = 0;
+  for (const PlayedPart& part : parts) {
+    for (const belief::WorldState& state : part.trajectory.states) {
+      due.push_back({core::ns_of(state.time),
+                     [&player, &part, &state, i = number++] { return player.write_frame(i, part.scene, state); }});
+    }
   }
-  const double end = trajectory.final().time;
-  if (!scene.robot.empty()) {
+  const double end = parts.back().trajectory.final().time;
+  if (!scene.robot.empty() && options.reports_robot) {
     for (int i = 0; i / options.tf_rate <= end; ++i) {
       const double time = i / options.tf_rate;
       due.push_back({core::ns_of(time), [&player, time] { return player.write_robot(time); }});
     }
   }
   for (const belief::Action& action : scene.actions) {
-    if (action.time <= end)
+    if (options.reports_robot && action.time <= end)
       due.push_back({core::ns_of(action.time), [&player, &action] { return player.write_control(action); }});
   }
   std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) { return a.time_ns < b.time_ns; });
@@ -206,14 +208,18 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     PRESCENE_RETURN_IF_ERROR(due[i].write());
     if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(due.size()), {}, ""});
   }
-  return player.write_outcomes(trajectory);
+  return options.changes.empty() ? player.write_outcomes(parts.back().trajectory) : core::ok_status();
 }
 
 ordered_json to_json(const TruthRecord& record) {
   ordered_json objects = ordered_json::array();
   for (const TruthRecord::Object& object : record.objects) {
-    objects.push_back(
-        {{"name", object.name}, {"pose", belief::to_json(object.X_WO)}, {"visible_share", object.visible_share}});
+    if (object.present) {
+      objects.push_back(
+          {{"name", object.name}, {"pose", belief::to_json(object.X_WO)}, {"visible_share", object.visible_share}});
+    } else {
+      objects.push_back({{"name", object.name}, {"present", false}});
+    }
   }
   return {{"stamp_ns", record.stamp_ns}, {"objects", objects}};
 }
@@ -227,8 +233,12 @@ core::Result<TruthRecord> truth_from_json(const std::string& text) {
   TruthRecord record;
   record.stamp_ns = json["stamp_ns"].get<core::TimeNs>();
   for (const ordered_json& object : json["objects"]) {
-    if (!object.is_object() || !object.contains("name") || !object["name"].is_string() || !object.contains("pose"))
-      return bad;
+    if (!object.is_object() || !object.contains("name") || !object["name"].is_string()) return bad;
+    if (const auto present = object.find("present"); present != object.end() && *present == false) {
+      record.objects.push_back({object["name"].get<std::string>(), {}, 0.0, false});
+      continue;
+    }
+    if (!object.contains("pose")) return bad;
     PRESCENE_TRY(const geometry::Pose X_WO, belief::pose_from_json(object["pose"]));
     const auto share = object.find("visible_share");
     const double visible_share = share != object.end() && share->is_number() ? share->get<double>() : 0.0;

@@ -42,7 +42,7 @@ std::optional<FrameError> TrackingScore::error_at(core::TimeNs stamp_ns, const s
   const auto& estimates = summary->second.objects;
   const auto true_object = std::find_if(true_objects.begin(), true_objects.end(), same_name);
   const auto estimate = std::find_if(estimates.begin(), estimates.end(), same_name);
-  if (true_object == true_objects.end() || estimate == estimates.end()) return std::nullopt;
+  if (true_object == true_objects.end() || estimate == estimates.end() || !true_object->present) return std::nullopt;
   geometry::SymmetryGroup symmetry;
   if (const auto index = belief::find_object(*scene_, name)) {
     symmetry = scene_->model_of(scene_->objects[static_cast<std::size_t>(*index)]).symmetry;

@@ -10,6 +10,7 @@
 #include "prescene/geometry/lens.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/recording/played_scene.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/topics.h"
 
@@ -26,6 +27,10 @@ struct SimulatedRecordingOptions {
   rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
   /// The camera's lens, which bends the images and is told in the camera info: of plumb_bob's or equidistant's form.
   geometry::LensDistortion lens;
+  /// What happens to objects without being told. Whether outcomes came to pass is not recorded then.
+  std::vector<UnannouncedChange> changes;
+  /// Else the poses of robot bodies and the actions are left out: hands that nobody knows of, which act unannounced.
+  bool reports_robot = true;
 };
 
 /// What the camera frame is called in simulated recordings: "<camera's name>_optical_frame".
@@ -35,7 +40,7 @@ std::string camera_frame_of(const belief::Scene& scene);
 /// after everything has come to rest, so that the camera sees the end). Messages: latched camera pose, robot poses,
 /// camera info, depth (16UC1, millimetres) and colour (rgb8), the scene's actions as controls at their times, the truth
 /// of each frame, and in the end which of the scene's outcomes came to pass. Fails with kInvalidInput when the scene
-/// has no camera, kCancelled with what is done kept.
+/// has no camera or a change is none (play_scene), kCancelled with what is done kept.
 core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
                                 std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
                                 const core::ProgressSink& progress, RecordingWriter& recording);
@@ -47,6 +52,7 @@ struct TruthRecord {
     std::string name;
     geometry::Pose X_WO;
     double visible_share = 0.0;  ///< Of the pixels that it would cover alone in this view.
+    bool present = true;         ///< Else it was taken away, or not put in yet; the pose says nothing then.
   };
   std::vector<Object> objects;
 };

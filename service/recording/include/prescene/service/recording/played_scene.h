@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// One instance of a scene, played from its start to its duration, with what happens in it that no action says: things
+// that are taken away, moved by somebody, or put in.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/scene.h"
+#include "prescene/belief/trajectory.h"
+#include "prescene/core/parallel.h"
+#include "prescene/core/status.h"
+#include "prescene/simulation/simulator.h"
+
+namespace prescene::service {
+
+/// Something that happens to an object and that nobody is told.
+struct UnannouncedChange {
+  double time = 0.0;  ///< s since the scene's start, in [0, its duration]; taken to the nearest frame.
+  std::string object;
+  /// Where it is from then on, at rest and in nobody's hand; empty = it is taken away. At time 0, empty: it is not
+  /// there until it is put in.
+  std::optional<geometry::Pose> X_WO;
+};
+
+/// "SECONDS:OBJECT", as of something that is taken away; kInvalidInput with the form that is expected.
+core::Result<UnannouncedChange> removal_from_text(const std::string& text);
+/// "SECONDS:OBJECT:X,Y,Z" or "SECONDS:OBJECT:X,Y,Z,YAW_DEG".
+core::Result<UnannouncedChange> put_from_text(const std::string& text);
+
+/// The scene between two changes.
+struct PlayedPart {
+  belief::Scene scene;            ///< With the objects that are there, in the order of the whole scene.
+  belief::Trajectory trajectory;  ///< A state each frame, up to the frame before the next change.
+};
+
+/// One instance of `scene`, drawn with `seed`, sampled every `interval` s. It goes on after everything has come to
+/// rest. kInvalidInput where a change names no object of the scene, lies outside its duration, or within an action
+/// other than a push; errors of the factory.
+core::Result<std::vector<PlayedPart>> play_scene(const belief::Scene& scene, std::vector<UnannouncedChange> changes,
+                                                 const simulation::SimulatorFactory& simulators, double interval,
+                                                 std::uint64_t seed, core::ThreadPool& pool);
+
+}  // namespace prescene::service

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/played_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <utility>
+
+#include "prescene/belief/robot_motion.h"
+#include "prescene/belief/trajectory.h"
+#include "prescene/core/random.h"
+#include "prescene/simulation/rules/action_draws.h"
+
+namespace prescene::service {
+namespace {
+
+using belief::Action;
+using belief::MotionMode;
+using belief::ObjectState;
+using belief::Scene;
+using belief::WorldState;
+
+constexpr double kTimelineStep = 1.0 / 240.0;  // s; what a hand did by its actions is written down so finely
+
+double duration_of(const Action& action) {
+  if (const auto* place = std::get_if<belief::Place>(&action.what)) return place->duration;
+  if (const auto* transport = std::get_if<belief::Transport>(&action.what)) return transport->duration;
+  if (const auto* pour = std::get_if<belief::Pour>(&action.what)) return pour->duration;
+  if (const auto* release = std::get_if<belief::Release>(&action.what))
+    return release->retreat.squaredNorm() > 0.0 ? release->retreat_duration : 0.0;
+  return 0.0;  // a push goes on over a change
+}
+
+core::Status check(const Scene& scene, const UnannouncedChange& change) {
+  const std::string at = "the change of '" + change.object + "'";
+  if (!belief::find_object(scene, change.object))
+    return core::invalid_input(at + ": scene '" + scene.name + "' has no object of that name");
+  if (!(change.time >= 0.0 && change.time <= scene.duration))
+    return core::invalid_input(at + ": its time is outside the scene's duration: give 0 to " +
+                               std::to_string(scene.duration) + " s");
+  for (const Action& action : scene.actions) {
+    if (action.time < change.time && change.time < action.time + duration_of(action))
+      return core::invalid_input(at + ": it lies within a " + belief::kind_of(action) +
+                                 ", which it would break off: give a time before or after");
+  }
+  return core::ok_status();
+}
+
+/// The hand that holds the object after the actions up to `time`.
+std::optional<std::string> holder_at(const Scene& scene, const belief::SceneObject& object, double time) {
+  std::optional<std::string> holder = object.held_by;
+  for (const Action& action : scene.actions) {
+    if (action.time > time || belief::object_of(action) != object.name) continue;
+    if (const auto* grasp = std::get_if<belief::Grasp>(&action.what)) holder = grasp->hand;
+    if (std::holds_alternative<belief::Release>(action.what) || std::holds_alternative<belief::Place>(action.what))
+      holder.reset();
+  }
+  return holder;
+}
+
+/// What the hands do from `time` on, by timelines and by the actions before it, as timelines alone.
+std::vector<belief::KinematicBody> written_down(const Scene& scene, double time) {
+  std::vector<belief::KinematicBody> bodies = scene.robot;
+  const bool acted =
+      std::any_of(scene.actions.begin(), scene.actions.end(), [&](const Action& action) { return action.time < time; });
+  if (!acted) return bodies;
+  std::vector<Action> before;
+  for (const Action& action : scene.actions)
+    if (action.time < time) before.push_back(action);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    bodies[i].timeline.clear();
+    for (double t = time; t < scene.duration + kTimelineStep; t += kTimelineStep)
+      bodies[i].timeline.push_back({t, belief::robot_pose_at(scene, before, static_cast<int>(i), t)});
+  }
+  return bodies;
+}
+
+/// The objects of the scene, each with its state where it is there.
+using Present = std::vector<std::optional<ObjectState>>;
+
+/// What is random in the actions, drawn once for all parts.
+void fix_actions(core::RandomStream stream, std::vector<Action>& actions) {
+  const auto drawn = simulation::draw_actions(actions, stream);
+  for (std::size_t i = 0; i < actions.size(); ++i) {
+    if (auto* place = std::get_if<belief::Place>(&actions[i].what)) place->X_WO = belief::FixedPose{drawn[i].goal};
+    if (auto* move = std::get_if<belief::Transport>(&actions[i].what)) move->X_WO = belief::FixedPose{drawn[i].goal};
+    if (auto* push = std::get_if<belief::Push>(&actions[i].what))
+      push->lateral_error = belief::FixedScalar{drawn[i].sideways};
+    if (auto* release = std::get_if<belief::Release>(&actions[i].what))
+      release->disturbance = {belief::Vector3Distribution::fixed(drawn[i].disturbance.angular),
+                              belief::Vector3Distribution::fixed(drawn[i].disturbance.linear)};
+  }
+}
+
+/// What is left of an action at `time`, as one that begins then or later; empty: nothing.
+std::optional<Action> rest_of(const Action& action, double time) {
+  Action rest = action;
+  rest.time = action.time - time;
+  if (rest.time >= 0.0) return rest;
+  auto* push = std::get_if<belief::Push>(&rest.what);
+  if (push == nullptr || rest.time + push->duration <= 0.0) return std::nullopt;
+  push->from += -rest.time / push->duration * (push->to - push->from);
+  push->duration += rest.time;
+  rest.time = 0.0;
+  return rest;
+}
+
+/// The scene as it goes on at `time`, with the objects that are there only.
+Scene scene_from(const Scene& whole, const Present& present, double time) {
+  Scene scene = whole;
+  scene.robot = written_down(whole, time);
+  scene.objects.clear();
+  scene.actions.clear();
+  for (std::size_t i = 0; i < whole.objects.size(); ++i) {
+    if (!present[i]) continue;
+    belief::SceneObject object = whole.objects[i];
+    const bool is_held = present[i]->mode == MotionMode::kHeld;
+    object.held_by = is_held ? holder_at(whole, object, time) : std::nullopt;
+    scene.objects.push_back(std::move(object));
+  }
+  for (const Action& action : whole.actions) {
+    const std::string object = belief::object_of(action);
+    if (!object.empty() && !belief::find_object(scene, object)) continue;
+    if (auto rest = rest_of(action, time)) scene.actions.push_back(*std::move(rest));
+  }
+  // Outcomes are judged on the whole scene, not on a part of it.
+  scene.outcomes.clear();
+  scene.exclusive_outcomes.clear();
+  return scene;
+}
+
+void apply(const UnannouncedChange& change, const WorldState& start, const Scene& scene, Present& present) {
+  const auto i = static_cast<std::size_t>(*belief::find_object(scene, change.object));
+  if (!change.X_WO) {
+    present[i].reset();
+    return;
+  }
+  ObjectState state = start.objects[i];  // with its physical parameters
+  state.X_WO = *change.X_WO;
+  state.V_WO = {};
+  state.mode = MotionMode::kMoving;
+  present[i] = state;
+}
+
+std::optional<double> number(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || end != text.c_str() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator)
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  }
+  return parts;
+}
+
+}  // namespace
+
+core::Result<UnannouncedChange> removal_from_text(const std::string& text) {
+  const std::vector<std::string> parts = split(text, ':');
+  const std::optional<double> time = number(parts[0]);
+  if (parts.size() != 2 || !time || parts[1].empty())
+    return core::invalid_input("--remove SECONDS:OBJECT, as 1.5:cup; this is not: " + text);
+  return UnannouncedChange{*time, parts[1], std::nullopt};
+}
+
+core::Result<UnannouncedChange> put_from_text(const std::string& text) {
+  const core::Status bad = core::invalid_input(
+      "--put SECONDS:OBJECT:X,Y,Z or SECONDS:OBJECT:X,Y,Z,YAW_DEG, as 1.5:cup:0.1,0,0.05; this is "
+      "not: " +
+      text);
+  const std::vector<std::string> parts = split(text, ':');
+  const std::optional<double> time = number(parts[0]);
+  if (parts.size() != 3 || !time || parts[1].empty()) return bad;
+  std::vector<double> values;
+  for (const std::string& part : split(parts[2], ',')) {
+    const std::optional<double> value = number(part);
+    if (!value) return bad;
+    values.push_back(*value);
+  }
+  if (values.size() != 3 && values.size() != 4) return bad;
+  geometry::Pose X_WO = geometry::Pose::from_translation({values[0], values[1], values[2]});
+  if (values.size() == 4) X_WO.rotation = geometry::exp_rotation({0.0, 0.0, values[3] * std::numbers::pi / 180.0});
+  return UnannouncedChange{*time, parts[1], X_WO};
+}
+
+core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector<UnannouncedChange> changes,
+                                                 const simulation::SimulatorFactory& simulators, double interval,
+                                                 std::uint64_t seed, core::ThreadPool& pool) {
+  for (UnannouncedChange& change : changes) {
+    PRESCENE_RETURN_IF_ERROR(check(scene, change));
+    change.time = std::round(change.time / interval) * interval;
+  }
+  std::stable_sort(changes.begin(), changes.end(), [](const auto& a, const auto& b) { return a.time < b.time; });
+
+  core::RandomStream stream(seed, core::Purpose::kScenario);
+  std::vector<double> uniforms(static_cast<std::size_t>(belief::start_dimensions(scene)));
+  for (double& u : uniforms) u = stream.uniform();
+  const WorldState start = belief::draw_start(scene, uniforms);
+  Present present(start.objects.begin(), start.objects.end());
+
+  const core::RandomStream action_draws(seed, core::Purpose::kAction);
+  Scene fixed = scene;
+  fix_actions(action_draws.at(0, 0), fixed.actions);
+  std::vector<PlayedPart> parts;
+  double time = 0.0;
+  for (std::size_t next = 0;;) {
+    while (next < changes.size() && changes[next].time <= time) apply(changes[next++], start, scene, present);
+    const double until = next < changes.size() ? std::min(changes[next].time, scene.duration) : scene.duration;
+    PlayedPart part{changes.empty() ? scene : scene_from(fixed, present, time), {}};
+    WorldState from;
+    from.time = time;
+    for (const std::optional<ObjectState>& object : present)
+      if (object) from.objects.push_back(*object);
+    simulation::RunRequest request;
+    request.actions = part.scene.actions;
+    request.stop.duration = until - time;
+    request.stop.stop_at_rest = false;
+    request.sample_interval = interval;
+    std::vector<WorldState>& states = part.trajectory.states;
+    if (until > time) {
+      PRESCENE_TRY(const auto simulator, simulators(part.scene, 1.0));
+      simulator->run({&from, 1}, request, action_draws, 0, pool, {&part.trajectory, 1});
+    } else {
+      states = {from};
+    }
+    std::size_t i = 0;
+    for (std::optional<ObjectState>& object : present)
+      if (object) object = states.back().objects[i++];
+    const bool last = next >= changes.size();
+    if (!last) states.pop_back();  // it is the next part's first
+    parts.push_back(std::move(part));
+    if (last) return parts;
+    time = until;
+  }
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/played_scene.h"
+
+#include <gtest/gtest.h>
+
+#include "prescene/service/backends.h"
+#include "prescene/service/load_scene.h"
+
+namespace prescene::service {
+namespace {
+
+constexpr double kFrameInterval = 0.1;
+
+constexpr const char* kPushedAndHeld = R"(
+duration: 1.0
+models:
+  block: {box: [0.05, 0.05, 0.05], mass: 0.2, friction: 0.5}
+supports:
+  table: {box: [1, 1, 0.04], pose: {position: [0, 0, -0.02]}}
+robot:
+  hand:
+    box: [0.05, 0.05, 0.02]
+    timeline: [{time: 0, position: [0.2, 0, 0.3]}, {time: 1, position: [0.2, 0.2, 0.3]}]
+objects:
+  left: {model: block, pose: {position: [-0.2, 0, 0.025]}}
+  held: {model: block, held_by: hand, pose: {position: [0.2, 0, 0.26]}}
+actions:
+  - {time: 0.2, push: {from: [-0.3, 0, 0.02], to: [-0.2, 0, 0.02], duration: 0.6}}
+  - {time: 0.4, release: {object: held}}
+)";
+
+class PlayedSceneTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto loaded = load_scene_text(kPushedAndHeld, "made.yaml", {});
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    scene_ = *loaded;
+  }
+
+  core::Result<std::vector<PlayedPart>> play(std::vector<UnannouncedChange> changes) {
+    return play_scene(*scene_, std::move(changes), backends_.simulator_factory(), kFrameInterval, 1, pool_);
+  }
+
+  core::ThreadPool pool_{1};
+  Backends backends_{pool_};
+  std::shared_ptr<const belief::Scene> scene_;
+};
+
+TEST_F(PlayedSceneTest, IsOneTrajectoryWithoutChanges) {
+  const auto parts = play({});
+  ASSERT_TRUE(parts.ok()) << parts.status().message();
+  ASSERT_EQ(parts->size(), 1u);
+  EXPECT_EQ((*parts)[0].trajectory.states.size(), 11u);
+  EXPECT_TRUE((*parts)[0].scene == *scene_);
+}
+
+TEST_F(PlayedSceneTest, StatesFollowEachOtherAcrossChanges) {
+  const auto parts =
+      play({{0.31, "left", std::nullopt}, {0.62, "left", geometry::Pose::from_translation({0.0, 0.3, 0.025})}});
+  ASSERT_TRUE(parts.ok()) << parts.status().message();
+  ASSERT_EQ(parts->size(), 3u);
+  std::vector<double> times;
+  for (const PlayedPart& part : *parts)
+    for (const belief::WorldState& state : part.trajectory.states) {
+      times.push_back(state.time);
+      EXPECT_EQ(state.objects.size(), part.scene.objects.size());
+    }
+  ASSERT_EQ(times.size(), 11u);
+  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_NEAR(times[i], kFrameInterval * static_cast<double>(i), 3e-3);
+  EXPECT_EQ((*parts)[1].scene.objects.size(), 1u);
+  EXPECT_EQ((*parts)[1].scene.objects[0].name, "held");
+  const belief::WorldState& put = (*parts)[2].trajectory.states.front();
+  EXPECT_EQ((*parts)[2].scene.objects[0].name, "left");
+  EXPECT_EQ(put.objects[0].X_WO.translation, geometry::Vector3d(0.0, 0.3, 0.025));
+}
+
+TEST_F(PlayedSceneTest, WhatAChangeDoesNotTouchGoesOnAsWithoutIt) {
+  // The held block moves with the hand, is let go at 0.4 s and falls beside the change of the other one.
+  const auto whole = play({});
+  const auto changed =
+      play({{0.2, "left", std::nullopt}, {0.6, "left", geometry::Pose::from_translation({0, 0.3, 0.025})}});
+  ASSERT_TRUE(whole.ok() && changed.ok());
+  std::vector<geometry::Pose> poses;
+  for (const PlayedPart& part : *changed)
+    for (const belief::WorldState& state : part.trajectory.states)
+      poses.push_back(state.objects[static_cast<std::size_t>(*belief::find_object(part.scene, "held"))].X_WO);
+  const auto& states = (*whole)[0].trajectory.states;
+  ASSERT_EQ(poses.size(), states.size());
+  for (std::size_t i = 0; i < states.size(); ++i)
+    EXPECT_LT((poses[i].translation - states[i].objects[1].X_WO.translation).norm(), 2e-3) << i;
+  EXPECT_LT(poses.back().translation.z(), 0.05);
+}
+
+TEST_F(PlayedSceneTest, APushUnderWayGoesOn) {
+  const auto whole = play({});
+  const auto changed = play({{0.5, "held", std::nullopt}});
+  ASSERT_TRUE(whole.ok() && changed.ok());
+  const geometry::Vector3d end = (*whole)[0].trajectory.final().objects[0].X_WO.translation;
+  EXPECT_GT(end.x(), -0.19);  // it was pushed at all
+  EXPECT_LT((changed->back().trajectory.final().objects[0].X_WO.translation - end).norm(), 2e-3);
+}
+
+TEST_F(PlayedSceneTest, WhatIsNotThereFromTheStartMayBePutIn) {
+  const auto parts =
+      play({{0.0, "left", std::nullopt}, {0.5, "left", geometry::Pose::from_translation({-0.2, 0.1, 0.025})}});
+  ASSERT_TRUE(parts.ok()) << parts.status().message();
+  EXPECT_EQ(parts->front().scene.objects.size(), 1u);
+  EXPECT_EQ(parts->back().scene.objects.size(), 2u);
+}
+
+TEST_F(PlayedSceneTest, RefusesWhatCannotBe) {
+  const auto fails_with = [&](std::vector<UnannouncedChange> changes, const std::string& part) {
+    const auto parts = play(std::move(changes));
+    ASSERT_FALSE(parts.ok());
+    EXPECT_EQ(parts.status().code(), core::StatusCode::kInvalidInput);
+    EXPECT_NE(parts.status().message().find(part), std::string::npos) << parts.status().message();
+  };
+  fails_with({{0.5, "cup", std::nullopt}}, "has no object of that name");
+  fails_with({{1.5, "left", std::nullopt}}, "outside the scene's duration");
+  fails_with({{-0.1, "left", std::nullopt}}, "outside the scene's duration");
+}
+
+TEST(UnannouncedChanges, AreReadFromText) {
+  const auto removal = removal_from_text("1.5:cup");
+  ASSERT_TRUE(removal.ok());
+  EXPECT_EQ(removal->time, 1.5);
+  EXPECT_EQ(removal->object, "cup");
+  EXPECT_FALSE(removal->X_WO);
+  const auto put = put_from_text("0.5:cup:0.1,-0.2,0.3,90");
+  ASSERT_TRUE(put.ok());
+  EXPECT_EQ(put->X_WO->translation, geometry::Vector3d(0.1, -0.2, 0.3));
+  EXPECT_NEAR((put->X_WO->rotation * geometry::Vector3d::UnitX() - geometry::Vector3d::UnitY()).norm(), 0.0, 1e-12);
+  for (const char* text : {"", ":", "cup", "1.5", "1.5:", "x:cup", "1:cup:0,0,0", "inf:cup"})
+    EXPECT_FALSE(removal_from_text(text).ok()) << text;
+  for (const char* text :
+       {"", "1:cup", "1:cup:", "1:cup:0,0", "1:cup:0,0,0,0,0", "1:cup:0,0,x", "1::0,0,0", "1:cup:nan,0,0"})
+    EXPECT_FALSE(put_from_text(text).ok()) << text;
+}
+
+}  // namespace
+}  // namespace prescene::service
