@@ -9,6 +9,7 @@
 #include "prescene/service/evaluate/cleargrasp.h"
 #include "prescene/service/evaluate/credible_regions.h"
 #include "prescene/service/evaluate/cube_tosses.h"
+#include "prescene/service/evaluate/tracking_suite.h"
 #include "prescene/service/evaluate/ycb_video.h"
 #include "verb.h"
 
@@ -23,6 +24,8 @@ struct EvaluateOptions {
   std::string split = "report";
   rendering::LikelihoodChoice likelihood;
   int frames = CredibleRegionOptions{}.frames;
+  TrackingOptions tracking;
+  std::string keep;
 };
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
@@ -89,7 +92,21 @@ std::string text_of(const CredibleRegionReport& report) {
   return table(rows);
 }
 
+core::Status run_tracking(const EvaluateOptions& options, VerbContext& context) {
+  TrackingOptions tracking = options.tracking;
+  tracking.keep = options.keep;
+  tracking.likelihood = options.likelihood;
+  PRESCENE_TRY(const TrackingReport report,
+               evaluate_tracking(options.data, tracking, context.options().seed, context.pool(),
+                                 context.progress("evaluating tracking"), &context.cancellation()));
+  if (options.data.empty())
+    core::log(context.log(), core::LogLevel::kInfo, "simulated sequences only: name the recorded data with --data");
+  context.print(to_json(report), table(table_of(report)));
+  return core::ok_status();
+}
+
 core::Status run(const EvaluateOptions& options, VerbContext& context) {
+  if (options.name == "tracking") return run_tracking(options, context);
   if (options.name != "credible_regions" && options.data.empty())
     return core::invalid_input("evaluate " + options.name + " needs recorded data: name its folder with --data");
   const std::filesystem::path folder = std::filesystem::path(options.data) / options.name;
@@ -136,12 +153,14 @@ Verb add_evaluate_verb(CLI::App& app) {
       "evaluate",
       "Figures on real data, and of the likelihood's calibration on simulated frames (docs/studies/accuracy.md)");
   auto options = std::make_shared<EvaluateOptions>();
-  verb->add_option("NAME", options->name,
-                   "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
-                   "the transparent material explains better than the opaque one), or credible_regions (tempering, on "
-                   "simulated frames: needs no data)")
+  verb->add_option(
+          "NAME", options->name,
+          "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
+          "the transparent material explains better than the opaque one), credible_regions (tempering, on "
+          "simulated frames: needs no data), or tracking (simulated sequences of eleven kinds, and with --data "
+          "a real cube in a robot's hand)")
       ->required()
-      ->check(CLI::IsMember({"cube_tosses", "ycb_video", "cleargrasp", "credible_regions"}));
+      ->check(CLI::IsMember({"cube_tosses", "ycb_video", "cleargrasp", "credible_regions", "tracking"}));
   verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(CLI::IsMember({"calibrate", "report", "all"}))
@@ -150,6 +169,17 @@ Verb add_evaluate_verb(CLI::App& app) {
   verb->add_option("--frames", options->frames, "Of credible_regions: simulated frames")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
+  verb->add_option("--sequences", options->tracking.sequences, "Of tracking: sequences of each kind")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  verb->add_option("--kind", options->tracking.kinds, "Of tracking: only sequences of this kind (may be repeated)");
+  verb->add_option("--rate", options->tracking.rate, "Of tracking: simulated frames a second")
+      ->check(number_between(1.0, 120.0))
+      ->capture_default_str();
+  verb->add_option(
+          "--keep", options->keep,
+          "Of tracking: a folder for the recordings and their scene files; those that are there are used again")
+      ->check(file_name());
   verb->footer("Example: prescene evaluate ycb_video --data data --json");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/evaluate/suite_scenes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "prescene/core/check.h"
+#include "prescene/core/random.h"
+#include "prescene/core/text.h"
+
+namespace prescene::service {
+namespace {
+
+using geometry::Vector3d;
+
+std::string number(double value) { return core::fixed_text(value, 4); }
+std::string list(const Vector3d& v) { return "[" + number(v.x()) + ", " + number(v.y()) + ", " + number(v.z()) + "]"; }
+
+/// Sections of a scene file, and the random numbers that it is made with.
+class Writer {
+ public:
+  explicit Writer(core::RandomStream stream) : draws(stream) {}
+
+  double about(double mean, double share) { return mean * draws.uniform(1.0 - share, 1.0 + share); }
+  double between(double low, double high) { return draws.uniform(low, high); }
+
+  void model(const std::string& name, const std::string& keys) { models += "  " + name + ": {" + keys + "}\n"; }
+  void support(const std::string& name, const std::string& keys) { supports += "  " + name + ": {" + keys + "}\n"; }
+  /// The tracker knows the pose to 5 mm and 3 degrees.
+  void object(const std::string& name, const std::string& model_name, const Vector3d& p, const Vector3d& euler_deg,
+              const std::string& more = "") {
+    objects += "  " + name + ": {model: " + model_name + ", pose: {position: " + list(p) +
+               ", rotation: {euler_deg: " + list(euler_deg) +
+               "}, normal: {position: [0.005, 0.005, 0], rotation_deg: [0, 0, 3]}}" + more + "}\n";
+  }
+  void hand(const std::string& name, const std::string& shape, const std::vector<std::pair<Vector3d, Vector3d>>& poses,
+            const std::vector<double>& times) {
+    robot += "  " + name + ":\n    " + shape + "\n    friction: 0.8\n    color: [0.2, 0.2, 0.22]\n    timeline:\n";
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      robot += "      - {time: " + number(times[i]) + ", position: " + list(poses[i].first) +
+               ", rotation: {euler_deg: " + list(poses[i].second) + "}}\n";
+  }
+  void action(double time, const std::string& what) { actions += "  - {time: " + number(time) + ", " + what + "}\n"; }
+
+  /// A camera at the near side of the table, 0.75 to 1 m from what it looks at.
+  void camera_at(const Vector3d& target) {
+    const double azimuth = between(-0.5, 0.5);
+    const double elevation = between(0.5, 0.8);
+    const double distance = between(0.75, 1.0);
+    const Vector3d from = target + distance * Vector3d(std::cos(elevation) * std::sin(azimuth),
+                                                       -std::cos(elevation) * std::cos(azimuth), std::sin(elevation));
+    camera = "  fov_deg: 58\n  look: {from: " + list(from) + ", at: " + list(target) + "}\n";
+  }
+
+  std::string text(const std::string& name, double duration, bool with_robot) const {
+    const auto section = [](const std::string& key, const std::string& content) {
+      return content.empty() ? std::string() : key + ":\n" + content;
+    };
+    return "name: " + name + "\nduration: " + number(duration) + "\n" + section("models", models) +
+           section("supports", supports) + section("robot", with_robot ? robot : "") + section("objects", objects) +
+           section("camera", camera) + section("actions", with_robot ? actions : "");
+  }
+
+  core::RandomStream draws;
+  std::string models, supports, robot, objects, camera, actions;
+};
+
+void table(Writer& w) {
+  w.support("floor", "ground: {size: 6}, pose: {position: [0, 0, -0.75]}, friction: 0.9");
+  w.support("table", "box: [1.2, 0.8, 0.04], pose: {position: [0, 0, -0.02]}, friction: 0.9, color: [0.6, 0.45, 0.3]");
+}
+
+struct Thing {
+  std::string name;
+  double height = 0.0;  ///< m, of its frame's origin above what it stands on.
+  double reach = 0.0;   ///< m, half of its horizontal extent.
+};
+
+/// One of six everyday things as a model of that name.
+Thing everyday_thing(Writer& w, const std::string& name, std::uint64_t which) {
+  const std::string contact = ", density: 500, friction: {normal: [0.45, 0.08], min: 0.1}";
+  switch (which % 6) {
+    case 0: {
+      const double h = w.about(0.19, 0.1);
+      w.model(name, "gable_carton: {base: [0.07, 0.07], shoulder_height: " + number(0.83 * h) +
+                        ", height: " + number(h) + "}" + contact + ", symmetry: {axis: z, order: 2}, color: '#e8ecf4'");
+      return {name, 0.5 * h, 0.05};
+    }
+    case 1: {
+      const double r = w.about(0.034, 0.1), h = w.about(0.11, 0.1);
+      w.model(name, "cylinder: {radius: " + number(r) + ", length: " + number(h) + "}" + contact +
+                        ", symmetry: {axis: z, continuous: true, flip: true}, color: '#c03020'");
+      return {name, 0.5 * h, r};
+    }
+    case 2: {
+      const Vector3d size(w.about(0.09, 0.15), w.about(0.06, 0.15), w.about(0.14, 0.15));
+      w.model(name, "box: " + list(size) + contact + ", symmetry: cuboid, color: '#3060c0'");
+      return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y())};
+    }
+    case 3: {
+      const double r = w.about(0.038, 0.1), h = w.about(0.095, 0.1);
+      w.model(name, "parts: [{lathe: {profile: [[" + number(0.9 * r) + ", " + number(-0.5 * h) + "], [" + number(r) +
+                        ", " + number(0.5 * h) +
+                        "]], segments: 32, use: convex_hull}}, {box: [0.022, 0.010, 0.012], position: [" +
+                        number(r + 0.008) + ", 0, " + number(0.25 * h) +
+                        "]}, {box: [0.022, 0.010, 0.012], position: [" + number(r + 0.008) + ", 0, " +
+                        number(-0.2 * h) + "]}, {box: [0.010, 0.010, " + number(0.45 * h + 0.012) + "], position: [" +
+                        number(r + 0.023) + ", 0, " + number(0.025 * h) + "]}]" + contact + ", color: '#40a060'");
+      return {name, 0.5 * h, r + 0.028};
+    }
+    case 4: {
+      const Vector3d size(w.about(0.15, 0.1), w.about(0.10, 0.1), w.about(0.04, 0.15));
+      w.model(name, "box: " + list(size) + contact + ", symmetry: cuboid, color: '#d0b040'");
+      return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y())};
+    }
+    default: {
+      const double h = w.about(0.20, 0.1);
+      w.model(name, "lathe: {profile: [[0.030, 0], [0.032, " + number(0.6 * h) + "], [0.013, " + number(0.85 * h) +
+                        "], [0.013, " + number(h) + "]], segments: 32, use: convex_hull}" + contact +
+                        ", symmetry: {axis: z, continuous: true}, color: '#208080'");
+      return {name, 0.0, 0.032};
+    }
+  }
+}
+
+constexpr const char* kGripper =
+    "parts: [{box: [0.018, 0.022, 0.06], position: [0.055, 0, 0.02]}, {box: [0.018, 0.022, 0.06], position: [-0.055, "
+    "0, "
+    "0.02]}, {box: [0.14, 0.05, 0.04], position: [0, 0, 0.07]}, {cylinder: {radius: 0.03, length: 0.25}, position: [0, "
+    "0, 0.21]}]";
+
+/// A path through the air over the table at up to about 0.3 m/s and 50 degrees a second.
+void carry(Writer& w, const std::string& hand, Vector3d p, double begin, double duration) {
+  std::vector<std::pair<Vector3d, Vector3d>> poses = {{p, Vector3d::Zero()}};
+  std::vector<double> times = {begin};
+  Vector3d euler = Vector3d::Zero();
+  const Vector3d home = p + Vector3d(0.0, 0.0, 0.12);
+  for (double t = begin; t < duration;) {
+    const double step = w.between(0.5, 0.8);
+    const Vector3d goal = home + Vector3d(w.between(-0.15, 0.15), w.between(-0.12, 0.12), w.between(-0.06, 0.10));
+    Vector3d move = goal - p;
+    move *= std::min(1.0, 0.3 * step / move.norm());
+    p += move;
+    for (int i = 0; i < 3; ++i) euler[i] = std::clamp(euler[i] + w.between(-30.0, 30.0) * step, -35.0, 35.0);
+    t += step;
+    poses.emplace_back(p, euler);
+    times.push_back(t);
+  }
+  w.hand(hand, kGripper, poses, times);
+}
+
+SuiteScene in_hand(Writer& w, std::uint64_t seed) {
+  table(w);
+  const Thing thing = everyday_thing(w, "thing", seed);
+  const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), 0.10);
+  carry(w, "gripper", p + Vector3d(0, 0, thing.height + 0.03), 0.3, 3.0);
+  w.object("thing", "thing", p + Vector3d(0, 0, thing.height), {0, 0, w.between(-60, 60)}, ", held_by: gripper");
+  w.camera_at(p + Vector3d(0, 0, 0.15));
+  return {w.text("in_hand", 3.0, true), w.text("in_hand", 3.0, true), {}, true};
+}
+
+SuiteScene behind_box(Writer& w, std::uint64_t seed) {
+  table(w);
+  w.support("screen", "box: [0.24, 0.06, 0.24], pose: {position: [0.08, -0.05, 0.12]}, color: [0.4, 0.4, 0.45]");
+  const Thing thing = everyday_thing(w, "thing", seed % 2 == 0 ? 4 : 2);
+  const double y = w.between(0.10, 0.14);
+  w.object("thing", "thing", {-0.22, y, thing.height}, {0, 0, w.between(-20, 20)});
+  w.action(0.3, "push: {from: [" + number(-0.22 - thing.reach - 0.03) + ", " + number(y) + ", 0.02], to: [" +
+                    number(w.between(0.0, 0.06) - thing.reach) + ", " + number(y + 0.01) + ", 0.02], duration: 1.3}");
+  w.camera = "  fov_deg: 58\n  look: {from: [0.05, -0.8, 0.33], at: [0.0, 0.0, 0.08]}\n";
+  return {w.text("behind_box", 3.0, true), w.text("behind_box", 3.0, true), {}, true};
+}
+
+SuiteScene drawer(Writer& w, std::uint64_t seed) {
+  table(w);
+  w.support("cabinet",
+            "parts: [{box: [0.36, 0.30, 0.02], position: [0, 0, 0.17]}, {box: [0.02, 0.30, 0.16], position: [-0.17, 0, "
+            "0.08]}, {box: [0.02, 0.30, 0.16], position: [0.17, 0, 0.08]}], pose: {position: [0, 0.2, 0]}");
+  const double out = w.between(0.9, 1.3), back = out + w.between(0.9, 1.2);
+  w.hand("drawer", "open_bin: {inner: [0.26, 0.22, 0.06], wall: 0.008}",
+         {{{0, -0.06, 0.012}, Vector3d::Zero()},
+          {{0, -0.06, 0.012}, Vector3d::Zero()},
+          {{0, 0.2, 0.012}, Vector3d::Zero()},
+          {{0, 0.2, 0.012}, Vector3d::Zero()},
+          {{0, -0.06, 0.012}, Vector3d::Zero()}},
+         {0.0, out - 0.8, out, back - 0.3, back + 0.6});
+  const double side = w.about(0.05, 0.15);
+  w.model("block", "box: " + list({side, 1.3 * side, 0.9 * side}) +
+                       ", density: 500, friction: 0.5, symmetry: cuboid, color: '#d04040'");
+  w.object("block", "block", {w.between(-0.08, 0.08), w.between(-0.10, 0.0), 0.021 + 0.45 * side + 0.0},
+           {0, 0, w.between(-40, 40)});
+  w.camera_at({0.0, -0.02, 0.05});
+  (void)seed;
+  return {w.text("drawer", 3.4, true), w.text("drawer", 3.4, true), {}, true};
+}
+
+SuiteScene tipped(Writer& w, std::uint64_t seed) {
+  table(w);
+  const double h = w.about(0.19, 0.1);
+  w.model("tower", "box: " + list({0.055, 0.075, h}) +
+                       ", density: 500, friction: {normal: [0.5, 0.08], min: 0.1}, symmetry: cuboid, color: '#3060c0'");
+  const Thing other = everyday_thing(w, "other", seed + 1);
+  w.object("tower", "tower", {-0.05, 0.0, 0.5 * h}, {0, 0, w.between(-15, 15)});
+  w.object("other", "other", {0.30, 0.16, other.height}, {0, 0, w.between(-60, 60)});
+  w.action(0.3, "push: {from: [-0.16, 0, " + number(0.8 * h) + "], to: [0.08, " + number(w.between(-0.01, 0.01)) +
+                    ", " + number(0.8 * h) + "], duration: " + number(w.between(1.2, 1.8)) + "}");
+  w.camera_at({0.05, 0.0, 0.07});
+  return {w.text("tipped", 2.6, true), w.text("tipped", 2.6, true), {}, true};
+}
+
+SuiteScene twins(Writer& w, std::uint64_t) {
+  table(w);
+  const std::string shape =
+      "cylinder: {radius: 0.034, length: 0.11}, density: 500, friction: 0.5, learn_colors: true, "
+      "symmetry: {axis: z, continuous: true, flip: true}";
+  w.model("red_can", shape + ", color: '#c03020'");
+  w.model("blue_can", shape + ", color: '#2040c0'");
+  const Vector3d red(w.between(-0.12, -0.08), w.between(-0.03, 0.03), 0.055);
+  const Vector3d blue(w.between(0.08, 0.12), w.between(-0.03, 0.03), 0.055);
+  w.object("red", "red_can", red, Vector3d::Zero());
+  w.object("blue", "blue_can", blue, Vector3d::Zero());
+  w.camera = "  fov_deg: 58\n  look: {from: [0.0, -0.8, 0.45], at: [0.0, 0.0, 0.05]}\n";
+  const std::string known = w.text("twins", 3.0, false);
+  // A board that nobody knows of passes in front; behind it the cans change places.
+  w.hand("board", "box: [0.46, 0.01, 0.32]",
+         {{{-0.9, -0.3, 0.18}, Vector3d::Zero()},
+          {{-0.9, -0.3, 0.18}, Vector3d::Zero()},
+          {{0.0, -0.3, 0.18}, Vector3d::Zero()},
+          {{0.0, -0.3, 0.18}, Vector3d::Zero()},
+          {{0.9, -0.3, 0.18}, Vector3d::Zero()}},
+         {0.0, 0.7, 1.3, 1.5, 2.1});
+  return {w.text("twins", 3.0, true),
+          known,
+          {{1.4, "red", geometry::Pose::from_translation(blue)}, {1.4, "blue", geometry::Pose::from_translation(red)}},
+          false};
+}
+
+SuiteScene taken_away(Writer& w, std::uint64_t seed) {
+  table(w);
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const std::string name = "thing_" + std::to_string(i);
+    const Thing thing = everyday_thing(w, name, seed + 2 * i);
+    w.object(name, name,
+             {-0.18 + 0.18 * static_cast<double>(i) + w.between(-0.02, 0.02), w.between(-0.08, 0.08), thing.height},
+             {0, 0, w.between(-90, 90)});
+  }
+  w.camera_at({0.0, 0.0, 0.06});
+  return {w.text("taken_away", 2.5, true),
+          w.text("taken_away", 2.5, true),
+          {{w.between(0.6, 1.0), "thing_" + std::to_string(seed % 3), std::nullopt}},
+          true};
+}
+
+SuiteScene put_in(Writer& w, std::uint64_t seed) {
+  table(w);
+  const Thing there = everyday_thing(w, "there", seed);
+  const Thing comes = everyday_thing(w, "comes", seed + 3);
+  w.object("there", "there", {-0.12, w.between(-0.06, 0.06), there.height}, {0, 0, w.between(-90, 90)});
+  w.objects += "  comes: {model: comes, pose: {position: {uniform: {from: [-0.3, -0.2, " + number(comes.height) +
+               "], to: [0.3, 0.2, " + number(comes.height) + "]}}}}\n";
+  w.camera_at({0.0, 0.0, 0.06});
+  geometry::Pose X_WO =
+      geometry::Pose::from_translation({w.between(0.06, 0.18), w.between(-0.08, 0.08), comes.height + 0.002});
+  X_WO.rotation = geometry::exp_rotation({0.0, 0.0, w.between(-1.0, 1.0)});
+  return {w.text("put_in", 2.5, true),
+          w.text("put_in", 2.5, true),
+          {{0.0, "comes", std::nullopt}, {w.between(0.6, 1.0), "comes", X_WO}},
+          true};
+}
+
+SuiteScene clutter(Writer& w, std::uint64_t seed) {
+  table(w);
+  for (std::uint64_t i = 0; i < 12; ++i) {
+    const std::string name = "thing_" + std::to_string(i);
+    const Thing thing = everyday_thing(w, name, seed + i);
+    const double column = static_cast<double>(i % 4), row = static_cast<double>(i / 4);
+    w.object(
+        name, name,
+        {-0.30 + 0.20 * column + w.between(-0.012, 0.012), -0.18 + 0.20 * row + w.between(-0.012, 0.012), thing.height},
+        {0, 0, w.between(-90, 90)});
+  }
+  w.action(0.4, "push: {from: [-0.45, -0.18, 0.05], to: [-0.24, -0.16, 0.05], duration: 1.2}");
+  w.camera = "  fov_deg: 58\n  look: {from: [" + number(w.between(-0.1, 0.1)) + ", -0.95, 0.75], at: [0, 0, 0.03]}\n";
+  return {w.text("clutter", 2.0, true), w.text("clutter", 2.0, true), {}, true};
+}
+
+SuiteScene unknown_hand(Writer& w, std::uint64_t seed) {
+  table(w);
+  const Thing mug = everyday_thing(w, "mug", 3);
+  const Thing other = everyday_thing(w, "other", seed + 1);
+  const Vector3d p(w.between(-0.08, 0.0), w.between(-0.05, 0.05), mug.height);
+  w.object("mug", "mug", p, {0, 0, w.between(-90, 90)});
+  w.object("other", "other", {0.24, 0.16, other.height}, {0, 0, w.between(-60, 60)});
+  w.camera_at(p + Vector3d(0, 0, 0.12));
+  const std::string known = w.text("unknown_hand", 3.4, false);
+  // It comes from above, takes the mug and carries it about.
+  const Vector3d grip = p + Vector3d(0, 0, mug.height + 0.01);
+  std::vector<std::pair<Vector3d, Vector3d>> poses = {
+      {grip + Vector3d(0.3, 0.1, 0.3), Vector3d::Zero()}, {grip, Vector3d::Zero()}, {grip, Vector3d::Zero()}};
+  std::vector<double> times = {0.2, 1.0, 1.1};
+  Vector3d at = grip, euler = Vector3d::Zero();
+  for (double t = 1.1; t < 3.4;) {
+    const double step = w.between(0.5, 0.8);
+    Vector3d move = grip + Vector3d(w.between(-0.15, 0.15), w.between(-0.12, 0.12), w.between(0.06, 0.22)) - at;
+    move *= std::min(1.0, 0.3 * step / move.norm());
+    at += move;
+    for (int i = 0; i < 3; ++i) euler[i] = std::clamp(euler[i] + w.between(-30.0, 30.0) * step, -35.0, 35.0);
+    t += step;
+    poses.emplace_back(at, euler);
+    times.push_back(t);
+  }
+  w.hand("hand", kGripper, poses, times);
+  w.action(1.05, "grasp: {object: mug, hand: hand}");
+  return {w.text("unknown_hand", 3.4, true), known, {}, false};
+}
+
+SuiteScene thin(Writer& w, std::uint64_t) {
+  table(w);
+  w.model("marker", "cylinder: {radius: " + number(w.about(0.009, 0.1)) + ", length: " + number(w.about(0.135, 0.1)) +
+                        "}, density: 700, friction: 0.4, symmetry: {axis: z, continuous: true, flip: true}, color: "
+                        "'#202020'");
+  w.model("scissors",
+          "parts: [{box: [0.018, 0.17, 0.010], rotation: {euler_deg: [0, 0, 12]}}, {box: [0.018, 0.17, 0.010], "
+          "rotation: {euler_deg: [0, 0, -12]}}, {box: [0.05, 0.045, 0.010], position: [0.026, -0.09, 0]}, {box: [0.05, "
+          "0.045, 0.010], position: [-0.026, -0.09, 0]}], density: 2500, friction: 0.4, symmetry: {axis: y, order: 2}, "
+          "color: '#c04080'");
+  const Vector3d p(w.between(-0.15, -0.1), w.between(-0.05, 0.05), 0.12);
+  carry(w, "gripper", p + Vector3d(0, 0, 0.03), 0.3, 3.0);
+  w.object("marker", "marker", p, {0, 90, w.between(-30, 30)}, ", held_by: gripper");
+  w.object("scissors", "scissors", {0.16, w.between(-0.04, 0.04), 0.005}, {0, 0, w.between(-60, 60)});
+  w.action(0.6, "push: {from: [0.33, 0.02, 0.012], to: [0.14, 0.0, 0.012], duration: 1.6, radius: 0.01}");
+  w.camera_at({0.0, 0.0, 0.10});
+  return {w.text("thin", 3.0, true), w.text("thin", 3.0, true), {}, true};
+}
+
+SuiteScene bottle(Writer& w, std::uint64_t seed) {
+  table(w);
+  const double h = w.about(0.21, 0.1);
+  w.model("bottle", "lathe: {profile: [[0.033, 0], [0.035, " + number(0.6 * h) + "], [0.014, " + number(0.85 * h) +
+                        "], [0.014, " + number(h) +
+                        "]], segments: 32, use: convex_hull}, density: 400, friction: 0.4, symmetry: {axis: z, "
+                        "continuous: true}, surface: transparent, color: '#a0c0d0'");
+  const Thing other = everyday_thing(w, "other", seed + 2);
+  const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), 0.08);
+  carry(w, "gripper", p + Vector3d(0, 0, h), 0.3, 3.0);
+  w.object("bottle", "bottle", p, {0, 0, 0}, ", held_by: gripper");
+  w.object("other", "other", {0.26, 0.14, other.height}, {0, 0, w.between(-60, 60)});
+  w.camera_at(p + Vector3d(0, 0, 0.15));
+  return {w.text("bottle", 3.0, true), w.text("bottle", 3.0, true), {}, true};
+}
+
+using Maker = SuiteScene (*)(Writer& w, std::uint64_t seed);
+constexpr std::pair<const char*, Maker> kMakers[] = {
+    {"in_hand", in_hand}, {"behind_box", behind_box}, {"drawer", drawer},
+    {"tipped", tipped},   {"twins", twins},           {"taken_away", taken_away},
+    {"put_in", put_in},   {"clutter", clutter},       {"unknown_hand", unknown_hand},
+    {"thin", thin},       {"bottle", bottle}};
+
+}  // namespace
+
+const std::vector<std::string>& suite_kinds() {
+  static const std::vector<std::string> kinds = [] {
+    std::vector<std::string> names;
+    for (const auto& [name, make] : kMakers) names.emplace_back(name);
+    return names;
+  }();
+  return kinds;
+}
+
+SuiteScene make_suite_scene(const std::string& kind, std::uint64_t seed) {
+  for (std::uint32_t i = 0; i < std::size(kMakers); ++i) {
+    if (kind != kMakers[i].first) continue;
+    Writer w(core::RandomStream(seed, core::Purpose::kEvaluation, 0, i));
+    return kMakers[i].second(w, seed);
+  }
+  PRESCENE_CHECK(false);
+  return {};
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/evaluate/tracking_suite.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "prescene/core/clock.h"
+#include "prescene/core/text.h"
+#include "prescene/geometry/symmetry.h"
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/service/backends.h"
+#include "prescene/service/evaluate/carried_cube.h"
+#include "prescene/service/evaluate/suite_scenes.h"
+#include "prescene/service/evaluate/tracking_counter.h"
+#include "prescene/service/load_scene.h"
+#include "prescene/service/recording/replay.h"
+#include "prescene/service/recording/simulated_recording.h"
+
+namespace prescene::service {
+namespace {
+
+namespace fs = std::filesystem;
+using core::fixed_text;
+using nlohmann::ordered_json;
+
+/// A camera that is not the tracker's own model of one: noisier, correlated over larger patches, with more of a fixed
+/// pattern, and more holes and flying pixels.
+void set_suite_camera(SimulatedRecordingOptions& options) {
+  options.sensor.sigma_per_depth_squared *= 1.2;
+  options.sensor.incidence_knee = 0.5;
+  options.camera.fixed_pattern_share = 0.35;
+  options.camera.correlated_share = 0.45;
+  options.camera.correlation_px = 20.0;
+  options.camera.edge_outlier = {0.30, 0.22, 0.10, 0.02};
+  options.camera.interior_outlier = 0.015;
+  options.camera.quantisation_per_depth_squared = 0.0018;
+  options.camera.color_noise = 4.0;
+}
+
+/// A folder of its own below the system's for temporary files, removed in the end.
+class ScratchFolder {
+ public:
+  static core::Result<std::unique_ptr<ScratchFolder>> create() {
+    std::error_code error;
+    const fs::path below = fs::temp_directory_path(error);
+    if (error) return core::unavailable("there is no folder for temporary files: " + error.message());
+    std::string name = (below / "prescene_tracking_XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr)
+      return core::unavailable(below.string() + ": no folder can be made there: set TMPDIR to one with some 200 MB");
+    return std::unique_ptr<ScratchFolder>(new ScratchFolder(name));
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  explicit ScratchFolder(fs::path path) : path_(std::move(path)) {}
+  fs::path path_;
+};
+
+struct Sequence {
+  std::string kind;
+  std::uint64_t seed = 0;
+};
+
+/// Whether an earlier evaluation left this very sequence.
+bool is_recorded(const fs::path& path, const RecordingInfo& info) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return false;
+  const auto reader = RecordingReader::open(path);
+  return reader.ok() && (*reader)->info().scene_text == info.scene_text && (*reader)->info().seed == info.seed;
+}
+
+core::Result<TrackingFigures> run_sequence(const Sequence& sequence, const TrackingOptions& options,
+                                           const fs::path& folder, core::ThreadPool& threads,
+                                           const core::Cancellation& cancellation) {
+  const SuiteScene scene = make_suite_scene(sequence.kind, sequence.seed);
+  const std::string name = sequence.kind + "_" + std::to_string(sequence.seed);
+  const fs::path recording_path = folder / (name + ".mcap");
+  if (!options.keep.empty()) {
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(folder / (name + "_world.yaml"), scene.world));
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(folder / (name + ".yaml"), scene.known));
+  }
+  PRESCENE_TRY(const auto world, load_scene_text(scene.world, folder / (name + "_world.yaml"), {}));
+  PRESCENE_TRY(const auto known, load_scene_text(scene.known, folder / (name + ".yaml"), {}));
+  BackendSettings backend_settings;
+  backend_settings.likelihood = options.likelihood;
+  Backends backends(threads, backend_settings);
+  const RecordingInfo info{name + ".yaml", scene.known, sequence.seed, ""};
+  if (!is_recorded(recording_path, info)) {
+    SimulatedRecordingOptions simulated;
+    simulated.rate = options.rate;
+    simulated.changes = scene.changes;
+    simulated.reports_robot = scene.reports_robot;
+    set_suite_camera(simulated);
+    PRESCENE_TRY(const auto recording, RecordingWriter::create(recording_path, info));
+    PRESCENE_RETURN_IF_ERROR(
+        simulate_recording(*world, simulated, sequence.seed, backends, cancellation, {}, *recording));
+    PRESCENE_RETURN_IF_ERROR(recording->close());
+  }
+  PRESCENE_TRY(const auto tracker, Tracker::create(known, {}, sequence.seed, backends));
+  TrackingCounter counter(known);
+  const StepSink on_step = [&](const TrackerStep&, const Tracker& at) {
+    counter.add(summary_of(*at.belief()));
+    return core::ok_status();
+  };
+  const JsonSink on_json = [&](const std::string& topic, const std::string& json, core::TimeNs) -> core::Status {
+    if (topic != kTruthTopic) return core::ok_status();
+    PRESCENE_TRY(const TruthRecord truth, truth_from_json(json));
+    counter.add(truth);
+    return core::ok_status();
+  };
+  const double begin = core::process_cpu_seconds();
+  PRESCENE_TRY(const ReplaySummary summary,
+               replay_recording(recording_path, {}, *tracker, cancellation, {}, on_step, on_json));
+  if (summary.cancelled) return core::cancelled("stopped on request");
+  TrackingFigures figures = counter.figures();
+  figures.cpu_seconds = core::process_cpu_seconds() - begin;
+  std::error_code ignored;
+  if (options.keep.empty()) fs::remove(recording_path, ignored);
+  return figures;
+}
+
+double share(int part, int whole) {
+  return whole > 0 ? static_cast<double>(part) / whole : std::numeric_limits<double>::quiet_NaN();
+}
+
+double quantile(std::vector<double> values, double at) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto place = values.begin() + std::lround(at * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+ordered_json or_null(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(); }
+
+ordered_json figures_json(const TrackingFigures& f) {
+  ordered_json calibration = ordered_json::array();
+  for (std::size_t i = 0; i < f.by_confidence.size(); ++i)
+    calibration.push_back({{"confidence", 0.05 + 0.1 * static_cast<double>(i)},
+                           {"n", f.by_confidence[i]},
+                           {"right", or_null(share(f.right_by_confidence[i], f.by_confidence[i]))}});
+  return {{"sequences", f.sequences},
+          {"frames", f.frames},
+          {"visible", f.visible},
+          {"share_tracked", or_null(share(f.tracked, f.visible))},
+          {"believed", f.believed},
+          {"share_wrong", or_null(share(f.wrong, f.believed))},
+          {"wrong", f.wrong},
+          {"median_position_error_m", or_null(quantile(f.position_errors, 0.5))},
+          {"p90_position_error_m", or_null(quantile(f.position_errors, 0.9))},
+          {"median_turn_error_rad", or_null(quantile(f.turn_errors, 0.5))},
+          {"p90_turn_error_rad", or_null(quantile(f.turn_errors, 0.9))},
+          {"hidden", f.hidden},
+          {"hidden_90_percent_region_holds", or_null(share(f.hidden_covered, f.hidden))},
+          {"confidence_above_099", f.sure},
+          {"confidence_above_099_right", or_null(share(f.sure_right, f.sure))},
+          {"still", f.still_shifts.size()},
+          {"still_shift_p90_m", or_null(quantile(f.still_shifts, 0.9))},
+          {"still_turn_p90_rad", or_null(quantile(f.still_turns, 0.9))},
+          {"cpu_ms_per_frame",
+           or_null(f.frames > 0 ? 1e3 * f.cpu_seconds / f.frames : std::numeric_limits<double>::quiet_NaN())},
+          {"calibration", calibration}};
+}
+
+std::string percent(double value) { return std::isfinite(value) ? fixed_text(100.0 * value, 1) : "-"; }
+std::string scaled(double value, double factor, int decimals) {
+  return std::isfinite(value) ? fixed_text(factor * value, decimals) : "-";
+}
+
+std::vector<std::string> row_of(const std::string& kind, const TrackingFigures& f) {
+  constexpr double kDegrees = 57.29577951308232;
+  return {kind,
+          std::to_string(f.frames),
+          std::to_string(f.visible),
+          percent(share(f.tracked, f.visible)),
+          std::to_string(f.wrong) + " of " + std::to_string(f.believed),
+          scaled(quantile(f.position_errors, 0.5), 1e3, 1),
+          scaled(quantile(f.turn_errors, 0.5), kDegrees, 1),
+          percent(share(f.hidden_covered, f.hidden)) + " of " + std::to_string(f.hidden),
+          percent(share(f.sure_right, f.sure)) + " of " + std::to_string(f.sure),
+          scaled(quantile(f.still_shifts, 0.9), 1e3, 2),
+          scaled(quantile(f.still_turns, 0.9), kDegrees, 2),
+          f.frames > 0 ? fixed_text(1e3 * f.cpu_seconds / f.frames, 0) : "-"};
+}
+
+}  // namespace
+
+void TrackingFigures::add(const TrackingFigures& more) {
+  sequences += more.sequences;
+  frames += more.frames;
+  visible += more.visible;
+  tracked += more.tracked;
+  believed += more.believed;
+  wrong += more.wrong;
+  hidden += more.hidden;
+  hidden_covered += more.hidden_covered;
+  sure += more.sure;
+  sure_right += more.sure_right;
+  for (std::size_t i = 0; i < by_confidence.size(); ++i) {
+    by_confidence[i] += more.by_confidence[i];
+    right_by_confidence[i] += more.right_by_confidence[i];
+  }
+  cpu_seconds += more.cpu_seconds;
+  const auto append = [](const std::vector<double>& from, std::vector<double>& to) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  append(more.position_errors, position_errors);
+  append(more.turn_errors, turn_errors);
+  append(more.still_shifts, still_shifts);
+  append(more.still_turns, still_turns);
+}
+
+core::Result<TrackingReport> evaluate_tracking(const fs::path& data, const TrackingOptions& options, std::uint64_t seed,
+                                               core::ThreadPool& threads, const core::ProgressSink& progress,
+                                               const core::Cancellation* cancellation) {
+  const core::Cancellation never;
+  const core::Cancellation& stop = cancellation != nullptr ? *cancellation : never;
+  const auto wanted = [&](const std::string& kind) {
+    return options.kinds.empty() || std::find(options.kinds.begin(), options.kinds.end(), kind) != options.kinds.end();
+  };
+  for (const std::string& kind : options.kinds) {
+    const std::vector<std::string>& kinds = suite_kinds();
+    if (kind != kCarriedCube && std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
+      return core::invalid_input("'" + kind + "' is no kind of sequence");
+  }
+  PRESCENE_TRY(const auto scratch, ScratchFolder::create());
+  fs::path folder = scratch->path();
+  if (!options.keep.empty()) {
+    std::error_code error;
+    fs::create_directories(options.keep, error);
+    if (error) return core::unavailable(options.keep.string() + ": cannot be made: " + error.message());
+    folder = options.keep;
+  }
+  std::vector<Sequence> sequences;
+  for (const std::string& kind : suite_kinds())
+    if (wanted(kind))
+      for (int k = 0; k < options.sequences; ++k) sequences.push_back({kind, seed + static_cast<std::uint64_t>(k)});
+  const bool cube = !data.empty() && wanted(kCarriedCube);
+  const double parts = static_cast<double>(sequences.size()) + (cube ? options.sequences : 0);
+
+  TrackingReport report;
+  double done = 0.0;
+  for (const Sequence& sequence : sequences) {
+    const std::string name = sequence.kind + " " + std::to_string(sequence.seed);
+    if (progress) progress({done / parts, std::nullopt, name});
+    core::Result<TrackingFigures> figures = run_sequence(sequence, options, folder, threads, stop);
+    if (!figures) return figures.status().at(name);
+    if (report.rows.empty() || report.rows.back().kind != sequence.kind) report.rows.push_back({sequence.kind, {}});
+    report.rows.back().figures.add(*figures);
+    report.simulated.add(*figures);
+    done += 1.0;
+  }
+  if (cube) {
+    TrackingRow row{kCarriedCube, {}};
+    for (int k = 0; k < options.sequences; ++k) {
+      if (progress) progress({done / parts, std::nullopt, row.kind});
+      BackendSettings backend_settings;
+      backend_settings.likelihood = options.likelihood;
+      Backends backends(threads, backend_settings);
+      PRESCENE_TRY(const TrackingFigures figures,
+                   track_carried_cube(data / kCarriedCube, seed + static_cast<std::uint64_t>(k), backends, stop));
+      row.figures.add(figures);
+      done += 1.0;
+    }
+    report.rows.push_back(std::move(row));
+  }
+  if (progress) progress({1.0, std::nullopt, "done"});
+  return report;
+}
+
+ordered_json to_json(const TrackingReport& report) {
+  ordered_json kinds = ordered_json::array();
+  for (const TrackingRow& row : report.rows) {
+    ordered_json json = {{"kind", row.kind}};
+    json.update(figures_json(row.figures));
+    kinds.push_back(std::move(json));
+  }
+  return {{"kinds", kinds}, {"simulated", figures_json(report.simulated)}};
+}
+
+std::vector<std::vector<std::string>> table_of(const TrackingReport& report) {
+  std::vector<std::vector<std::string>> rows = {
+      {"sequences", "frames", "visible", "tracked, %", "wrong of tracked", "median, mm", "median, deg",
+       "hidden in 90 % region, %", "right at 0.99, %", "still p90, mm", "still p90, deg", "CPU ms/frame"}};
+  for (const TrackingRow& row : report.rows) rows.push_back(row_of(row.kind, row.figures));
+  if (report.simulated.sequences > 0) rows.push_back(row_of("all simulated", report.simulated));
+  return rows;
+}
+
+}  // namespace prescene::service
