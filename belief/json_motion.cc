@@ -154,6 +154,7 @@ PhysicalBelief physics_from(const JsonAt& at, int dimensions) {
 Json motion_json(const MotionRecord& motion) {
   Json json{{"X_still", to_json(motion.X_still)},
             {"still_frames", motion.still_frames},
+            {"moved_frames", motion.moved_frames},
             {"place_judged", motion.place_judged},
             {"held", motion.held},
             {"episodes_unexplained", motion.episodes_unexplained},
@@ -171,6 +172,7 @@ MotionRecord motion_from(const JsonAt& at) {
   };
   if (const auto pose = fields.require("X_still")) motion.X_still = pose_from(*pose);
   count("still_frames", motion.still_frames);
+  count("moved_frames", motion.moved_frames);
   if (const auto judged = fields.require("place_judged")) motion.place_judged = judged->boolean();
   if (const auto held = fields.require("held")) motion.held = held->boolean();
   count("episodes_unexplained", motion.episodes_unexplained);

@@ -24,6 +24,7 @@ using belief::PhysicalDraw;
 using geometry::Vector6d;
 
 constexpr double kSampleInterval = 1.0 / 60.0;  // s, of simulated states; between them poses are interpolated
+constexpr double kTouchMargin = 0.02;           // m; what is further apart than bounding balls and this does not touch
 constexpr double kMostSquares = 49.0;           // a sample that is further off than 7 standard deviations says no more
 
 /// Nats; draws whose likelihoods differ by less say nothing.
@@ -72,9 +73,10 @@ class Judge {
       if (i != object && (other.existence < 0.5 || other.state == belief::TrackState::kLost ||
                           i >= episode_.others.size() || other.particles.empty()))
         continue;
-      if (i == object) place_ = present_.size();
       present_.push_back(i);
     }
+    keep_within_reach();
+    place_ = static_cast<std::size_t>(std::find(present_.begin(), present_.end(), object) - present_.begin());
     draw_starts();
   }
 
@@ -153,6 +155,45 @@ class Judge {
   }
 
  private:
+  struct Ball {
+    geometry::Vector3d p_W;
+    double radius;
+  };
+  Ball ball_of(std::size_t i, const Pose& X_WO) const {
+    const belief::ObjectModel& model = belief::model_of(belief_, belief_.objects[i]);
+    if (!model.visual) return {X_WO.translation, std::numeric_limits<double>::infinity()};
+    const geometry::Vector3d middle = geometry::bounding_box(*model.visual).center();
+    return {X_WO * middle, geometry::radius_about(*model.visual, middle)};
+  }
+
+  /// Of the others, leaves out those that neither the object on its way nor what it may push can touch.
+  void keep_within_reach() {
+    std::vector<Ball> way;
+    for (const MotionSample& sample : episode_.samples) way.push_back(ball_of(object_, sample.X_WO));
+    std::vector<std::size_t> kept = {object_}, left;
+    for (const std::size_t i : present_)
+      if (i != object_) left.push_back(i);
+    for (bool grew = true; grew;) {
+      grew = false;
+      for (auto i = left.begin(); i != left.end();) {
+        const Ball ball = ball_of(*i, episode_.others[*i]);
+        const bool near = std::any_of(way.begin(), way.end(), [&](const Ball& other) {
+          return (other.p_W - ball.p_W).norm() < other.radius + ball.radius + kTouchMargin;
+        });
+        if (!near) {
+          ++i;
+          continue;
+        }
+        way.push_back(ball);
+        kept.push_back(*i);
+        i = left.erase(i);
+        grew = true;
+      }
+    }
+    std::sort(kept.begin(), kept.end());
+    present_ = std::move(kept);
+  }
+
   static Pose pose_of(const belief::WorldState& state, std::size_t place) { return state.objects[place].X_WO; }
 
   Pose pose_at(const belief::Trajectory& run, double time) const {

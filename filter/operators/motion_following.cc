@@ -31,6 +31,9 @@ std::vector<Pose> poses_of(const belief::Belief& belief) {
   return poses;
 }
 
+/// So often in a row it is seen elsewhere before it counts as moved: a single frame may be wrong.
+constexpr int kMovedFrames = 2;
+
 /// Where what lies still is better known than from one frame. Errors of neighbouring frames are not independent: the
 /// deviation shrinks to a third at most.
 Vector6d still_deviation(const Vector6d& deviation, int frames) {
@@ -48,6 +51,7 @@ void average(const Pose& X_WO, MotionRecord& record) {
 void begin_anew(const Pose& X_WO, MotionRecord& record) {
   record.X_still = X_WO;
   record.still_frames = 1;
+  record.moved_frames = 0;
   record.place_judged = false;
   record.recent.clear();
 }
@@ -128,17 +132,20 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
   const Vector6d moved = geometry::box_minus(now.X_WO, record.X_still);
   const bool moves = moved.tail<3>().norm() > std::max(options.start_shift, 3.0 * now.deviation.tail<3>().maxCoeff()) ||
                      moved.head<3>().norm() > std::max(options.start_turn, 3.0 * now.deviation.head<3>().maxCoeff());
+  record.moved_frames = moves ? record.moved_frames + 1 : 0;
+  const bool lay_still = record.still_frames >= options.rest_frames;
+  const bool moved_for_good = moves && (!lay_still || record.moved_frames >= kMovedFrames);
   if (record.episode && !judging) {
     record.episode->samples.push_back(now);
     const bool long_enough = seconds_between(record.episode->samples.front().stamp_ns, now.stamp_ns) >= options.longest;
     record.episode->closed = long_enough || (!moves && record.still_frames + 1 >= options.rest_frames);
     if (record.episode->closed && std::ssize(record.episode->samples) < options.fewest_samples) record.episode.reset();
-  } else if (!record.episode && moves && record.still_frames >= options.rest_frames) {
+  } else if (!record.episode && moved_for_good && lay_still) {
     record.episode = motion_episode(belief, now, record);
   }
-  if (moves) {
+  if (moved_for_good) {
     begin_anew(now.X_WO, record);
-  } else {
+  } else if (!moves) {
     average(now.X_WO, record);
     if (!record.episode && !record.place_judged && record.still_frames >= options.rest_frames) {
       record.place_judged = true;

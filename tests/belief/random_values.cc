@@ -202,6 +202,7 @@ MotionRecord random_motion(RandomStream& stream) {
   MotionRecord motion;
   motion.X_still = random_pose(stream);
   motion.still_frames = random_below(stream, 100);
+  motion.moved_frames = random_below(stream, 3);
   motion.place_judged = random_below(stream, 2) == 1;
   motion.held = random_below(stream, 2) == 1;
   motion.episodes_unexplained = random_below(stream, 3);

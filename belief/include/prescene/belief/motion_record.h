@@ -59,6 +59,7 @@ struct GripRecord {
 struct MotionRecord {
   Pose X_still;                      ///< Where it lies still, the mean over `still_frames`.
   int still_frames = 0;              ///< 0 = it does not.
+  int moved_frames = 0;              ///< In a row in which it was seen elsewhere than where it lay still.
   bool place_judged = false;         ///< What lying there says was learned.
   bool held = false;                 ///< In the step before.
   int episodes_unexplained = 0;      ///< That no draw explained, and that therefore changed nothing.
