@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/filter/operators/predict.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -17,6 +18,8 @@ using belief::ObjectBelief;
 using belief::Particle;
 using geometry::Matrix3d;
 using geometry::Twist;
+
+constexpr double kTwist95 = 12.59;  // 95 % quantile of chi-squared with 6 degrees of freedom
 
 /// Adds the noise of dt, in the error coordinates (rotation, translation, angular, linear).
 void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covariance) {
@@ -35,6 +38,16 @@ void limit_spread(const PredictOptions& options, belief::Matrix12d& covariance) 
     if (deviation > limits[i / 3]) scale[i] = limits[i / 3] / deviation;
   }
   covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
+}
+
+/// Whether what is known of a particle's velocity agrees with none: noise of one frame alone looks like motion.
+bool may_be_still(const PredictOptions& options, const Particle& particle) {
+  if (is_slow(options, particle)) return true;
+  Eigen::Matrix<double, 6, 1> twist;
+  twist << particle.V_WO.angular, particle.V_WO.linear;
+  const Eigen::Matrix<double, 6, 6> covariance = particle.covariance.bottomRightCorner<6, 6>();
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(covariance);
+  return llt.info() == Eigen::Success && twist.dot(llt.solve(twist)) < kTwist95;
 }
 
 /// Starts to move: at its velocity, with room for more.
@@ -116,7 +129,7 @@ void change_modes(const PredictOptions& options, bool tracked, bool in_hand, boo
     } else if (particle.mode != MotionMode::kMoving) {
       // What is hidden gives no reason to think that it moves.
       if (tracked && draw < options.wake_probability) wake(options, particle);
-    } else if ((tracked || !has_physics) && draw < options.settle_probability && is_slow(options, particle)) {
+    } else if ((tracked || !has_physics) && draw < options.settle_probability && may_be_still(options, particle)) {
       settle(particle);  // What is not tracked does so where physics leaves it slow, not at the top of its flight.
     }
   }
@@ -190,11 +203,14 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
         wake(options, particle);  // nobody holds it
       }
       if (particle.mode == MotionMode::kResting) {
+        particle.covariance.topLeftCorner<6, 6>() *= 1.0 + options.still_forgetting;
         add_noise(options.resting, dt, particle.covariance);
       } else if (left > 0.0) {
+        // What is seen and may be still goes nowhere in one step that its velocity does not say.
+        const bool idle = tracked && !released && may_be_still(options, particle);
         const Particle before = particle;
         drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep, options.moving);
-        if (simulators && is_present(object) && physics_draw < physics_share) {
+        if (simulators && !idle && is_present(object) && physics_draw < physics_share) {
           falling.push_back({i, k, left, particle.X_WO, particle.V_WO});
           particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike
           particle.V_WO = before.V_WO;

@@ -28,7 +28,10 @@ struct MotionNoise {
 };
 
 struct PredictOptions {
-  MotionNoise resting = {.shift = 0.003, .turn = 0.03, .speed = 0.0, .rate = 0.0};
+  MotionNoise resting = {.shift = 0.0006, .turn = 0.006, .speed = 0.0, .rate = 0.0};
+  /// By this share the covariance of a resting pose grows in a frame: errors of the camera that stay from frame to frame
+  /// (calibration, a pattern in the depth) do not average out.
+  double still_forgetting = 0.1;
   MotionNoise held = {.shift = 0.010, .turn = 0.08, .speed = 0.0, .rate = 0.0};
   /// Per frame at 30 Hz: 3 mm, 0.03 rad, 0.10 m/s, 0.8 rad/s.
   MotionNoise moving = {.shift = 0.0164, .turn = 0.164, .speed = 0.55, .rate = 4.4};
