@@ -86,7 +86,7 @@ END {
   print lines " lines of output are as the page shows them"
 }' "$work/printed"
 
-for file in box.yaml predict.html box.mcap box.html seen.png why.png still.mcap; do
+for file in box.yaml predict.html box.mcap box.html seen.png why.png still.mcap calibrated.yaml; do
   [ -s "$file" ] || { echo "there is no $file"; exit 1; }
 done
 grep -q 'frames come: tracking' serve.log || { cat serve.log; exit 1; }
