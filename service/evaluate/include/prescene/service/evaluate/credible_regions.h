@@ -2,6 +2,10 @@
 // Are the poses that one frame leaves possible as many as it says? On simulated frames the truth is known: a region of
 // 90 % should hold it in 90 % of frames. Two kinds of region: of highest density, by weighted samples of
 // prior * exp(alpha * log ratio), and the ellipsoid of the Gauss-Newton information.
+//
+//   const CredibleRegionOptions options;
+//   PRESCENE_TRY(const std::vector<FramePosterior> frames, frame_posteriors(options, seed, threads));
+//   ... coverage(frames, options.factors).rows
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

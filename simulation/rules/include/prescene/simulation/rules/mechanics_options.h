@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What all our simulators of rigid bodies understand alike.
+//
+//   MechanicsOptions options;
+//   options.step = 1e-3;  // s: finer than the default, for impacts
+//   PRESCENE_RETURN_IF_ERROR(validate(options));
 #pragma once
 
 #include "prescene/core/status.h"
