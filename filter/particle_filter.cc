@@ -16,6 +16,8 @@ using belief::ObjectBelief;
 using belief::Particle;
 using belief::TrackState;
 
+constexpr double kIslandGap = 0.005;  // m; objects nearer than this form an island
+
 const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
   return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
 }
@@ -341,7 +343,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   if (settings_.recover) recover_all(current);
   look_for_more(current);
-  number_islands(settings_.island_gap, meshes_, belief);
+  number_islands(kIslandGap, meshes_, belief);
   note_failed_rendering(result);
   note("augment", result);
   return result;

@@ -12,14 +12,27 @@ namespace {
 using belief::ObjectBelief;
 using belief::Particle;
 
+// Of the starts of a search, this share is near the last pose, with these standard deviations; the others are at
+// unexplained pixels.
+constexpr double kNearShare = 0.33;
+constexpr double kNearShift = 0.08;  // m
+constexpr double kNearTurn = 0.8;    // rad
+constexpr SearchOptions kRecoverySearch = {.refine = {.steps = 10}, .polish_candidates = 1, .polish_draws = 12};
+constexpr double kExplained = 0.015;     // m; measurements so near to a known surface are explained
+constexpr double kLeastShown = 0.08;     // share of the pixels in view that must not be hidden for a find to count ...
+constexpr double kLeastHits = 0.5;       // ... and share of those that must match
+constexpr double kInjectedShare = 0.5;   // of the particles are put at the find, the least probable ones
+constexpr int kHiddenDraws = 160;        // places that are tried for what may have gone where it cannot be seen
+constexpr double kHiddenFurthest = 0.3;  // m; their standard deviation grows no further
+constexpr double kHiddenTurn = 0.8;      // rad
+
 bool lighter(const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }
 
 std::vector<Pose> recovery_starts(const Pose& X_CO, const SearchTarget& target, std::span<const Vector3d> points,
                                   const AugmentOptions& options, const core::RandomStream& stream) {
-  const int near = points.empty() ? options.recover_starts
-                                  : static_cast<int>(std::lround(options.near_share * options.recover_starts));
-  std::vector<Pose> starts =
-      disturbed_starts(X_CO, target.centre(), options.near_shift, options.near_turn, near, stream);
+  const int near =
+      points.empty() ? options.recover_starts : static_cast<int>(std::lround(kNearShare * options.recover_starts));
+  std::vector<Pose> starts = disturbed_starts(X_CO, target.centre(), kNearShift, kNearTurn, near, stream);
   core::RandomStream draws = stream.for_purpose(core::Purpose::kDetection);
   while (static_cast<int>(starts.size()) < options.recover_starts) {
     const Vector3d& seen = points[draws.uniform_below(points.size())];
@@ -37,11 +50,10 @@ std::vector<Pose> recovery_starts(const Pose& X_CO, const SearchTarget& target, 
 }
 
 /// Puts the lightest particles at the find; together they then weigh more than the others.
-void inject(const Pose& X_WO, const AugmentOptions& options, const InitialiseOptions& spread,
-            const core::RandomStream& stream, ObjectBelief& object) {
+void inject(const Pose& X_WO, const InitialiseOptions& spread, const core::RandomStream& stream, ObjectBelief& object) {
   std::stable_sort(object.particles.begin(), object.particles.end(), lighter);
   const auto total = static_cast<int>(object.particles.size());
-  const int count = std::clamp(static_cast<int>(std::lround(options.injected_share * total)), 1, total);
+  const int count = std::clamp(static_cast<int>(std::lround(kInjectedShare * total)), 1, total);
   const std::vector<Particle> fresh = particles_about(X_WO, belief::MotionMode::kMoving, count, spread, stream);
   const double share = count == total ? 1.0 : 0.9;
   for (int i = 0; i < total; ++i) {
@@ -86,14 +98,14 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
              ObjectBelief& object) {
   const Particle& last = belief::heaviest(object.particles);
   const Pose X_CO = frame.X_CW * last.X_WO;
-  const std::vector<Vector3d> points = unexplained_points(frame, terms, options.explained);
+  const std::vector<Vector3d> points = unexplained_points(frame, terms, kExplained);
   const std::vector<Pose> starts = recovery_starts(X_CO, target, points, options, stream);
-  const PoseCandidate found = tools.search->run(terms, target, starts, options.search, stream).front();
+  const PoseCandidate found = tools.search->run(terms, target, starts, kRecoverySearch, stream).front();
 
   const rendering::PoseEvidence& e = found.evidence;
   const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
   if (e.log_ratio < options.accept_log_ratio || e.log_ratio < current.log_ratio + options.min_gain) return false;
-  if (shown < options.accept_visible_share || e.hit_share() < options.accept_hit_share) return false;
+  if (shown < kLeastShown || e.hit_share() < kLeastHits) return false;
   const double outline =
       outline_support(terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer), weighting.outline_step);
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
@@ -101,7 +113,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
   const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
   if (supported_evidence(e, outline, weighting) < needed) return false;
-  inject(frame.X_WC * found.X_CO, options, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
+  inject(frame.X_WC * found.X_CO, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
   return true;
 }
 
@@ -145,16 +157,16 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
   const Particle last = object.particles.back();
   if (last.mode == belief::MotionMode::kHeld) return 0;
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
-  const double shift = std::min(options.hidden_furthest, options.hidden_shift + options.hidden_speed * unseen);
-  const double fall = std::min(options.hidden_furthest, 0.5 * gravity_W.norm() * unseen * unseen);
+  const double shift = std::min(kHiddenFurthest, options.hidden_shift + options.hidden_speed * unseen);
+  const double fall = std::min(kHiddenFurthest, 0.5 * gravity_W.norm() * unseen * unseen);
   const Vector3d down = fall * gravity_W.normalized();
   core::RandomStream draws = stream.for_purpose(core::Purpose::kProposal);
   const Vector3d p_WQ = last.X_WO * target.centre();
   std::vector<Pose> places_W;
   std::vector<rendering::PoseHypothesis> hypotheses;
-  for (int i = 0; i < options.hidden_draws; ++i) {
+  for (int i = 0; i < kHiddenDraws; ++i) {
     Vector6d d;
-    for (int k = 0; k < 6; ++k) d[k] = draws.normal() * (k < 3 ? options.hidden_turn : shift);
+    for (int k = 0; k < 6; ++k) d[k] = draws.normal() * (k < 3 ? kHiddenTurn : shift);
     if (fall > 0.0) d.tail<3>() += draws.uniform() * down;
     const Pose X_WO = moved_about(last.X_WO, target.centre(), d);
     if (frame.surfaces->crosses(p_WQ, X_WO * target.centre())) continue;
@@ -203,7 +215,7 @@ int new_objects(const FilterFrame& frame, const belief::Observation& observation
     object.model = detection_found.model;
     const Pose X_WO = frame.X_WC * detection_found.X_CO;
     object.particles = particles_about(X_WO, belief::MotionMode::kResting, spread.particles, spread, stream);
-    object.existence = spread.found_existence;
+    object.existence = kFoundExistence;
     object.evidence_per_pixel = detection_found.evidence.log_ratio_per_visible_pixel();
     object.last_seen_ns = frame.stamp_ns;
     object.island = static_cast<int>(belief.objects.size());

@@ -19,6 +19,9 @@ using belief::MotionMode;
 using belief::ObjectBelief;
 using belief::Particle;
 
+constexpr double kSettleSpeed = 0.04;  // m/s; what is slower than this ...
+constexpr double kSettleRate = 0.5;    // rad/s; ... and this may come to rest
+
 /// The scene of one step: robot bodies go from where they were to where they are, absent objects are left out.
 belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_WG, double dt,
                          const std::vector<std::size_t>& objects) {
@@ -152,7 +155,7 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     particle.X_WO = geometry::normalized(end.X_WO);
     particle.V_WO = end.V_WO;
     if (object.state != belief::TrackState::kTracked && settle_draws[i] < options.settle_probability &&
-        is_slow(options, particle))
+        is_slow(particle))
       settle(particle);
     ++report.simulated;
   }
@@ -242,8 +245,8 @@ void clear_twist(Particle& particle) {
   particle.covariance.rightCols<6>().setZero();
 }
 
-bool is_slow(const PredictOptions& options, const Particle& particle) {
-  return particle.V_WO.linear.norm() < options.settle_speed && particle.V_WO.angular.norm() < options.settle_rate;
+bool is_slow(const Particle& particle) {
+  return particle.V_WO.linear.norm() < kSettleSpeed && particle.V_WO.angular.norm() < kSettleRate;
 }
 
 void settle(Particle& particle) {

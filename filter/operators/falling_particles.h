@@ -26,7 +26,7 @@ Vector3d centre_of(const belief::Scene& scene, const belief::ObjectBelief& objec
 /// Takes velocity and what is known of it from a particle.
 void clear_twist(belief::Particle& particle);
 /// Slower than what settles.
-bool is_slow(const PredictOptions& options, const belief::Particle& particle);
+bool is_slow(const belief::Particle& particle);
 /// Lies from now on.
 void settle(belief::Particle& particle);
 

@@ -13,6 +13,8 @@ namespace {
 /// Share of a new frame in the mean place in the hand, at least: a grip may creep.
 constexpr double kLeastGripGain = 0.05;
 
+constexpr int kSettledFrames = 3;  // where an object is in its hand is known after so many tracked frames
+
 bool has_left(const Vector3d& shift, const Vector3d& turn, const geometry::Matrix6d& covariance,
               const InferReleaseOptions& options) {
   const geometry::Vector6d deviation = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -38,7 +40,7 @@ bool follow_grip(const belief::Belief& belief, const belief::ObjectBelief& objec
     grip.X_GO = geometry::normalized(geometry::box_plus(grip.X_GO, gain * moved));
     return false;
   }
-  if (grip.frames < options.settled_frames) {  // it was not known well where it is
+  if (grip.frames < kSettledFrames) {  // it was not known well where it is
     grip = {X_GO, 1, 0};
     return false;
   }

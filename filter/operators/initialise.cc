@@ -14,7 +14,10 @@ namespace {
 using belief::ObjectBelief;
 using belief::Particle;
 
-constexpr int kSpreadDraws = 64;  // enough to tell a wide prior from a narrow one
+constexpr int kSpreadDraws = 64;            // enough to tell a wide prior from a narrow one
+constexpr double kMissingExistence = 0.2;   // of an object that was looked for and not found
+constexpr double kBoxMargin = 0.05;         // m that a find may lie outside of where the scene says
+constexpr double kSupportThickness = 0.02;  // m, of a support that is made of the first frame's plane
 
 std::vector<double> uniforms(int count, core::RandomStream& stream) {
   std::vector<double> u(static_cast<std::size_t>(count));
@@ -42,15 +45,14 @@ Matrix6d first_covariance(const InitialiseOptions& options) {
   return covariance;
 }
 
-bool inside_prior(const belief::SceneObject& object, const Pose& X_WO, const InitialiseOptions& options) {
+bool inside_prior(const belief::SceneObject& object, const Pose& X_WO) {
   const auto* box = std::get_if<belief::BoxPose>(&object.pose);
   if (box == nullptr) return true;
   const belief::ScalarDistribution* axes[] = {&box->position.x, &box->position.y, &box->position.z};
   for (int i = 0; i < 3; ++i) {
     const auto* range = std::get_if<belief::UniformScalar>(axes[i]);
     if (range == nullptr) continue;
-    if (X_WO.translation[i] < range->low - options.box_margin || X_WO.translation[i] > range->high + options.box_margin)
-      return false;
+    if (X_WO.translation[i] < range->low - kBoxMargin || X_WO.translation[i] > range->high + kBoxMargin) return false;
   }
   return true;
 }
@@ -59,7 +61,7 @@ void place(const Pose& X_WO, core::TimeNs stamp_ns, const rendering::PoseEvidenc
            const InitialiseOptions& options, const core::RandomStream& stream, ObjectBelief& object) {
   object.particles =
       particles_about(X_WO, belief::MotionMode::kResting, static_cast<int>(object.particles.size()), options, stream);
-  object.existence = options.found_existence;
+  object.existence = kFoundExistence;
   object.state = belief::TrackState::kTracked;
   object.evidence_per_pixel = evidence.log_ratio_per_visible_pixel();
   object.visible_share = evidence.visible_share();
@@ -162,12 +164,12 @@ std::optional<belief::Support> support_from_frame(const belief::Observation& obs
   R_WS << x, z.cross(x), z;
   geometry::Box extent;
   for (const Vector3d& p : corners) extent.extend(Vector3d(R_WS.transpose() * p));
-  const Vector3d size(extent.sizes().x(), extent.sizes().y(), options.support_thickness);
+  const Vector3d size(extent.sizes().x(), extent.sizes().y(), kSupportThickness);
   belief::Support support;
   support.name = kFoundSupport;
   support.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{size}, Pose::identity()});
   support.X_WS.rotation = geometry::Quaterniond(R_WS).normalized();
-  support.X_WS.translation = R_WS * extent.center() - 0.5 * options.support_thickness * z;
+  support.X_WS.translation = R_WS * extent.center() - 0.5 * kSupportThickness * z;
   return support;
 }
 
@@ -218,12 +220,12 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
   for (const std::size_t i : wide) {
     ObjectBelief& object = belief.objects[i];
     object.state = belief::TrackState::kLost;
-    object.existence = options.missing_existence;
+    object.existence = kMissingExistence;
     object.frames_unseen = 1000;
     for (std::size_t k = 0; k < found.size(); ++k) {
       const Pose X_WO = frame.X_WC * found[k].X_CO;
       if (used[k] || model_of_wanted[static_cast<std::size_t>(found[k].model)] != object.model ||
-          !inside_prior(scene.objects[i], X_WO, options))
+          !inside_prior(scene.objects[i], X_WO))
         continue;
       used[k] = true;
       ++report.found;

@@ -10,6 +10,13 @@
 namespace prescene::filter {
 namespace {
 
+constexpr double kLeastConfidence = 0.9;  // belief::ObjectEstimate::confidence from which a frame is learned from
+constexpr double kLeastMatching = 0.8;    // share of the visible pixels that must match
+constexpr int kFewestColorPixels = 12;    // inside the outline
+constexpr int kColorWidth = 160;          // the image is sampled every round(width / this) pixels
+// Mean nats of an object's pixels by the colours learned so far: less, and it may well be another thing of its shape.
+constexpr double kLeastColorEvidence = -0.5;
+
 /// The colours of one frame at its sampled pixels.
 struct SampledView {
   geometry::PinholeCamera camera;
@@ -20,10 +27,9 @@ struct SampledView {
 };
 
 /// What is believed to be in view.
-core::Status render_belief(const FilterFrame& frame, const geometry::PinholeCamera& full, int target_width,
-                           const FilterTools& tools, const belief::Belief& belief, SampledView* view) {
-  const int target = std::max(1, target_width);
-  view->step = std::max(1, (2 * full.width + target) / (2 * target));
+core::Status render_belief(const FilterFrame& frame, const geometry::PinholeCamera& full, const FilterTools& tools,
+                           const belief::Belief& belief, SampledView* view) {
+  view->step = std::max(1, (2 * full.width + kColorWidth) / (2 * kColorWidth));
   view->offset = std::min({view->step / 2, full.width - 1, full.height - 1});
   view->camera = full.subsampled(view->step, view->offset);
   const BeliefView drawn = render_scene(belief, MeshDetail::kLikelihood, *tools.meshes);
@@ -65,8 +71,8 @@ bool surely_seen(const belief::ObjectBelief& object, const belief::ObjectModel& 
   if (object.state != belief::TrackState::kTracked || model.surface != belief::SurfaceKind::kOpaque) return false;
   const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
   return !heaviest.hidden && report.evidence_per_pixel >= options.min_evidence &&
-         report.visible_share >= options.min_visible_share && heaviest.evidence.hit_share() >= options.min_hit_share &&
-         belief::estimate(object, model.symmetry).confidence >= options.min_confidence;
+         report.visible_share >= options.min_visible_share && heaviest.evidence.hit_share() >= kLeastMatching &&
+         belief::estimate(object, model.symmetry).confidence >= kLeastConfidence;
 }
 
 void learn_colors(const FilterFrame& frame, const belief::Observation& observation,
@@ -82,8 +88,7 @@ void learn_colors(const FilterFrame& frame, const belief::Observation& observati
   SampledView view;
   // The camera was checked when the frame was prepared, so a failure is a lost device: nothing is learned,
   // and the filter's WatchedRenderer knows of it.
-  if (seen.empty() || !render_belief(frame, observation.frame.camera, options.target_width, tools, belief, &view).ok())
-    return;
+  if (seen.empty() || !render_belief(frame, observation.frame.camera, tools, belief, &view).ok()) return;
   const geometry::LabelImage& labels = view.rendered.labels;
   for (const std::size_t i : seen) {
     const std::size_t label = view.label_of_object[i];
@@ -99,8 +104,8 @@ void learn_colors(const FilterFrame& frame, const belief::Observation& observati
         }
         (shows ? object : rest).add((*observation.frame.color)(full_x, full_y));
       }
-    if (label == 0 || object.total() < options.min_pixels || !(rest.total() > 0.0)) continue;
-    if (mean_evidence(object, belief.objects[i].colors, options) < options.min_color_evidence) continue;
+    if (label == 0 || object.total() < kFewestColorPixels || !(rest.total() > 0.0)) continue;
+    if (mean_evidence(object, belief.objects[i].colors, options) < kLeastColorEvidence) continue;
     blend(object, rest, options, belief.objects[i].colors);
   }
 }

@@ -19,6 +19,12 @@ using geometry::Vector6d;
 /// Share of a new frame in the mean pose of what lies still, at least: supports and cameras may drift.
 constexpr double kLeastGain = 0.02;
 
+constexpr double kBefore = 0.4;      // s; an episode begins so long before motion was noticed
+constexpr double kLongest = 2.0;     // s; what lasts longer is judged by its beginning
+constexpr double kLongestGap = 0.3;  // s; an episode in which the object is not tracked for longer is given up
+constexpr int kFewestSamples = 5;    // of an episode
+constexpr double kRestTime = 0.5;    // s; what lies still is simulated for so long
+
 double seconds_between(core::TimeNs from, core::TimeNs to) { return 1e-9 * static_cast<double>(to - from); }
 
 MotionSample sample_of(const belief::Belief& belief, const belief::ObjectEstimate& estimate) {
@@ -56,17 +62,16 @@ void begin_anew(const Pose& X_WO, MotionRecord& record) {
   record.recent.clear();
 }
 
-void keep_recent(const MotionSample& sample, const LearnPhysicsOptions& options, MotionRecord& record) {
+void keep_recent(const MotionSample& sample, MotionRecord& record) {
   record.recent.push_back(sample);
   const auto first = std::find_if(record.recent.begin(), record.recent.end(), [&](const MotionSample& kept) {
-    return seconds_between(kept.stamp_ns, sample.stamp_ns) <= options.before;
+    return seconds_between(kept.stamp_ns, sample.stamp_ns) <= kBefore;
   });
   record.recent.erase(record.recent.begin(), first);
 }
 
 /// It lies still: what lying here says is judged once.
-MotionEpisode rest_episode(const belief::Belief& belief, const MotionSample& now, const LearnPhysicsOptions& options,
-                           const MotionRecord& record) {
+MotionEpisode rest_episode(const belief::Belief& belief, const MotionSample& now, const MotionRecord& record) {
   MotionEpisode episode;
   episode.kind = EpisodeKind::kRest;
   episode.others = poses_of(belief);
@@ -75,7 +80,7 @@ MotionEpisode rest_episode(const belief::Belief& belief, const MotionSample& now
   sample.X_WO = record.X_still;
   sample.deviation = still_deviation(now.deviation, record.still_frames);
   for (int i = 0; i <= 2; ++i) {
-    sample.stamp_ns = now.stamp_ns + static_cast<core::TimeNs>(std::llround(0.5e9 * i * options.rest_time));
+    sample.stamp_ns = now.stamp_ns + static_cast<core::TimeNs>(std::llround(0.5e9 * i * kRestTime));
     episode.samples.push_back(sample);
   }
   return episode;
@@ -107,7 +112,7 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
     return;
   }
   if (record.episode && !judging &&
-      seconds_between(record.episode->samples.back().stamp_ns, belief.stamp_ns) > options.longest_gap)
+      seconds_between(record.episode->samples.back().stamp_ns, belief.stamp_ns) > kLongestGap)
     record.episode.reset();
   if (mine.state != belief::TrackState::kTracked) return;
 
@@ -124,7 +129,7 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
   }
   if (record.still_frames == 0) {
     begin_anew(now.X_WO, record);
-    keep_recent(now, options, record);
+    keep_recent(now, record);
     return;
   }
   const belief::ObjectModel& model = belief::model_of(belief, mine);
@@ -137,9 +142,9 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
   const bool moved_for_good = moves && (!lay_still || record.moved_frames >= kMovedFrames);
   if (record.episode && !judging) {
     record.episode->samples.push_back(now);
-    const bool long_enough = seconds_between(record.episode->samples.front().stamp_ns, now.stamp_ns) >= options.longest;
+    const bool long_enough = seconds_between(record.episode->samples.front().stamp_ns, now.stamp_ns) >= kLongest;
     record.episode->closed = long_enough || (!moves && record.still_frames + 1 >= options.rest_frames);
-    if (record.episode->closed && std::ssize(record.episode->samples) < options.fewest_samples) record.episode.reset();
+    if (record.episode->closed && std::ssize(record.episode->samples) < kFewestSamples) record.episode.reset();
   } else if (!record.episode && moved_for_good && lay_still) {
     record.episode = motion_episode(belief, now, record);
   }
@@ -149,10 +154,10 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
     average(now.X_WO, record);
     if (!record.episode && !record.place_judged && record.still_frames >= options.rest_frames) {
       record.place_judged = true;
-      record.episode = rest_episode(belief, now, options, record);
+      record.episode = rest_episode(belief, now, record);
     }
   }
-  keep_recent(now, options, record);
+  keep_recent(now, record);
 }
 
 }  // namespace prescene::filter

@@ -20,6 +20,12 @@ using geometry::Matrix3d;
 using geometry::Twist;
 
 constexpr double kTwist95 = 12.59;  // 95 % quantile of chi-squared with 6 degrees of freedom
+constexpr double kLargestDeviations[] = {1.0, 0.15, 8.0, 1.0};  // rad, m, rad/s, m/s; spreads grow no further
+constexpr double kUnseenPhysicsShare = 1.0;   // of what is not tracked: nothing else says where it goes
+constexpr double kPhysicsAfterRelease = 1.0;  // in the step in which an object was released
+// By this share the covariance of a resting pose that is seen grows in a frame: errors of the camera that stay from
+// frame to frame (calibration, a pattern in the depth) do not average out.
+constexpr double kStillForgetting = 0.1;
 
 /// Adds the noise of dt, in the error coordinates (rotation, translation, angular, linear).
 void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covariance) {
@@ -29,20 +35,18 @@ void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covarianc
 }
 
 /// Scales rows and columns so that no standard deviation exceeds its limit; correlations stay.
-void limit_spread(const PredictOptions& options, belief::Matrix12d& covariance) {
-  const double limits[] = {options.max_turn_deviation, options.max_shift_deviation, options.max_rate_deviation,
-                           options.max_speed_deviation};
+void limit_spread(belief::Matrix12d& covariance) {
   Eigen::Matrix<double, 12, 1> scale = Eigen::Matrix<double, 12, 1>::Ones();
   for (int i = 0; i < 12; ++i) {
     const double deviation = std::sqrt(std::max(0.0, covariance(i, i)));
-    if (deviation > limits[i / 3]) scale[i] = limits[i / 3] / deviation;
+    if (deviation > kLargestDeviations[i / 3]) scale[i] = kLargestDeviations[i / 3] / deviation;
   }
   covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
 /// Whether what is known of a particle's velocity agrees with none: noise of one frame alone looks like motion.
-bool may_be_still(const PredictOptions& options, const Particle& particle) {
-  if (is_slow(options, particle)) return true;
+bool may_be_still(const Particle& particle) {
+  if (is_slow(particle)) return true;
   Eigen::Matrix<double, 6, 1> twist;
   twist << particle.V_WO.angular, particle.V_WO.linear;
   const Eigen::Matrix<double, 6, 6> covariance = particle.covariance.bottomRightCorner<6, 6>();
@@ -129,7 +133,7 @@ void change_modes(const PredictOptions& options, bool tracked, bool in_hand, boo
     } else if (particle.mode != MotionMode::kMoving) {
       // What is hidden gives no reason to think that it moves.
       if (tracked && draw < options.wake_probability) wake(options, particle);
-    } else if ((tracked || !has_physics) && draw < options.settle_probability && may_be_still(options, particle)) {
+    } else if ((tracked || !has_physics) && draw < options.settle_probability && may_be_still(particle)) {
       settle(particle);  // What is not tracked does so where physics leaves it slow, not at the top of its flight.
     }
   }
@@ -188,7 +192,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       Particle& particle = object.particles[k];
       double left = dt;
       const double physics_draw = draws.uniform();
-      double physics_share = tracked ? options.physics_share : options.unseen_physics_share;
+      double physics_share = tracked ? options.physics_share : kUnseenPhysicsShare;
       if (particle.mode == MotionMode::kHeld && hand) {
         const Pose& X_from = belief.robot[static_cast<std::size_t>(*hand)];
         const Pose& X_to = X_WG[static_cast<std::size_t>(*hand)];
@@ -198,16 +202,16 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
         if (!released) continue;
         wake(options, particle);
         left = dt - held;
-        physics_share = options.physics_after_release;
+        physics_share = kPhysicsAfterRelease;
       } else if (particle.mode == MotionMode::kHeld) {
         wake(options, particle);  // nobody holds it
       }
       if (particle.mode == MotionMode::kResting) {
-        particle.covariance.topLeftCorner<6, 6>() *= 1.0 + options.still_forgetting;
+        if (tracked) particle.covariance.topLeftCorner<6, 6>() *= 1.0 + kStillForgetting;
         add_noise(options.resting, dt, particle.covariance);
       } else if (left > 0.0) {
         // What is seen and may be still goes nowhere in one step that its velocity does not say.
-        const bool idle = tracked && !released && may_be_still(options, particle);
+        const bool idle = tracked && !released && may_be_still(particle);
         const Particle before = particle;
         drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep, options.moving);
         if (simulators && !idle && is_present(object) && physics_draw < physics_share) {
@@ -216,7 +220,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
           particle.V_WO = before.V_WO;
         }
       }
-      limit_spread(options, particle.covariance);
+      limit_spread(particle.covariance);
     }
     if (released) set_holder(i, std::nullopt, belief);
   }

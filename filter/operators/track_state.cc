@@ -10,10 +10,14 @@ namespace {
 using belief::ObjectBelief;
 using belief::TrackState;
 
-void change_existence(double nats, const TrackStateOptions& options, ObjectBelief& object) {
+constexpr double kExistenceRate = 0.5;        // nats; largest change of the log odds of existence by one frame
+constexpr double kLeastExistenceOdds = -5.0;  // nats; log odds are kept between these
+constexpr double kMostExistenceOdds = 7.0;
+
+void change_existence(double nats, ObjectBelief& object) {
   const double p = std::clamp(object.existence, 1e-6, 1.0 - 1e-6);
-  const double odds = std::log(p / (1.0 - p)) + std::clamp(nats, -options.existence_rate, options.existence_rate);
-  const double kept = std::clamp(odds, options.min_existence_odds, options.max_existence_odds);
+  const double odds = std::log(p / (1.0 - p)) + std::clamp(nats, -kExistenceRate, kExistenceRate);
+  const double kept = std::clamp(odds, kLeastExistenceOdds, kMostExistenceOdds);
   object.existence = 1.0 / (1.0 + std::exp(-kept));
 }
 
@@ -38,7 +42,7 @@ void update_track(const WeightReport& report, core::TimeNs stamp_ns, const Track
   }
   object.evidence_per_pixel = report.evidence_per_pixel;
   object.visible_share = report.visible_share;
-  change_existence(report.evidence_per_pixel - options.lost_evidence, options, object);
+  change_existence(report.evidence_per_pixel - options.lost_evidence, object);
   object.frames_refuted = report.evidence_per_pixel >= options.lost_evidence ? 0 : object.frames_refuted + 1;
   if (report.evidence_per_pixel >= options.tracked_evidence && report.visible_pixels >= options.tracked_pixels) {
     object.state = TrackState::kTracked;

@@ -16,6 +16,13 @@ using geometry::Matrix3d;
 
 constexpr double kMatch = 0.008;             // m: a measurement so near to the pose's surface is taken for it
 constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
+constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
+constexpr double kLastGate = 0.012;          // m; ... in the last steps
+constexpr double kMostStartShift = 0.03;     // m; a start is never further off, however wide the prediction is, ...
+constexpr double kMostStartTurn = 0.35;      // rad; ... nor turned further
+constexpr double kFewestPixels = 12;         // the tempering's pixel count is at least this
+constexpr double kFullOverlap = 0.25;        // share of a hidden pose's overlap with a support from which ...
+constexpr double kLogInSupport = -12.0;      // nats; ... it costs this; less in proportion
 
 struct Gaussian {
   Matrix6d covariance;
@@ -50,8 +57,8 @@ Vector6d random_start(const Gaussian& predicted, const WeightOptions& options, c
   Vector6d z;
   for (int i = 0; i < 6; ++i) z[i] = stream.normal();
   Vector6d d = options.start_spread * (predicted.root * z);
-  d.head<3>() *= limited(d.head<3>().norm(), options.max_start_turn);
-  d.tail<3>() *= limited(d.tail<3>().norm(), options.max_start_shift);
+  d.head<3>() *= limited(d.head<3>().norm(), kMostStartTurn);
+  d.tail<3>() *= limited(d.tail<3>().norm(), kMostStartShift);
   return d;
 }
 
@@ -80,7 +87,7 @@ class ParticleUpdate {
     for (int step = 0; step <= options_.steps; ++step) {
       const double t = options_.steps > 1 ? std::min(1.0, static_cast<double>(step) / (options_.steps - 1)) : 1.0;
       rendering::LineariseOptions linearise;
-      linearise.gate = options_.first_gate * std::pow(options_.last_gate / options_.first_gate, t);
+      linearise.gate = kFirstGate * std::pow(kLastGate / kFirstGate, t);
       const rendering::PoseHypothesis h = hypothesis(target_, X_CW_ * mode.X_WO, pixels_);
       rendering::PoseLinearisation equations;
       tools_.search->batch().linearise(terms_, std::span(&h, 1), linearise, workspace_, std::span(&equations, 1));
@@ -119,7 +126,7 @@ class ParticleUpdate {
   double log_overlap(const Pose& X_WO) const {
     if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
     const double overlap = context_.supports->overlap(*target_.mesh, X_WO, options_.support_tolerance);
-    return options_.log_in_support * std::min(1.0, overlap / options_.support_overlap);
+    return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
   }
 
   bool was_unseen() const { return context_.was_unseen; }
@@ -275,7 +282,7 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
     const auto h = hypothesis(target, X_CW * particles[static_cast<std::size_t>(best)].X_WO);
     rendering::PoseEvidence e;
     tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&e, 1));
-    pixels = std::max(options.min_pixels, static_cast<double>(e.measured));
+    pixels = std::max(kFewestPixels, static_cast<double>(e.measured));
   }
   tools.search->threads().for_each_index(particles.size(), [&](std::size_t i) {
     const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());

@@ -9,6 +9,15 @@
 namespace prescene::filter {
 namespace {
 
+constexpr int kKept = 3;    // best poses of a cluster and model that compete
+constexpr int kRounds = 2;  // the second looks at what the first left unexplained
+// m below the support's plane that a pose may reach: planes and meshes are off by 15 mm.
+constexpr double kMostSinking = 0.03;
+// m; a measurement so little in front of a known surface, or up to twice as much behind it, is explained.
+constexpr double kExplainedDepth = 0.015;
+// Joint refinement of what is accepted.
+constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
+
 struct Proposal {
   int model = 0;
   PoseCandidate candidate;
@@ -19,11 +28,10 @@ bool acceptable(const rendering::PoseEvidence& evidence, const DetectionOptions&
 }
 
 /// Whether an object at this pose can stand on the support: over it, and not sunk into it.
-bool possible(const SearchTarget& target, const Pose& X_CO, const rendering::SupportRegion& support,
-              const DetectionOptions& options) {
+bool possible(const SearchTarget& target, const Pose& X_CO, const rendering::SupportRegion& support) {
   if (!stands_on(support, X_CO * target.centre())) return false;
   return std::all_of(target.mesh->vertices.begin(), target.mesh->vertices.end(), [&](const auto& vertex) {
-    return support.plane_C.signed_distance(X_CO * vertex.template cast<double>()) > -options.max_sinking;
+    return support.plane_C.signed_distance(X_CO * vertex.template cast<double>()) > -kMostSinking;
   });
 }
 
@@ -49,8 +57,8 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<cons
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
     const std::vector<Pose> starts = cluster_starts(*task.cluster, target, options.starts, mine);
     task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
-    std::erase_if(task.found, [&](const PoseCandidate& c) { return !possible(target, c.X_CO, support, options); });
-    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(std::max(1, options.keep))));
+    std::erase_if(task.found, [&](const PoseCandidate& c) { return !possible(target, c.X_CO, support); });
+    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
   });
   std::vector<Proposal> proposals;
   for (const Task& task : tasks)
@@ -104,7 +112,7 @@ void settle(const rendering::FrameTerms& terms, std::span<const WantedModel> wan
       if (j != i) with_known_surfaces(mine, depths[j], &mine);
     const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
     SearchOptions search = options.search;
-    search.refine = options.settle;
+    search.refine = kSettling;
     search.polish_candidates = 1;
     const Pose starts[] = {found[i].X_CO};
     const auto refined = tools.search->run_serial(mine, target, starts, search, stream.at(i), *workspace);
@@ -169,8 +177,8 @@ std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry
   geometry::DepthImage explained_depth =
       known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
   std::vector<Detection> found;
-  for (int round = 0; round < options.rounds; ++round) {
-    const auto mask = explained_pixels(sampled, explained_depth, terms.camera, options.explained);
+  for (int round = 0; round < kRounds; ++round) {
+    const auto mask = explained_pixels(sampled, explained_depth, terms.camera, kExplainedDepth);
     std::vector<Cluster> clusters = find_clusters(sampled, support, mask, options.segmentation);
     if (static_cast<int>(clusters.size()) > options.max_clusters)
       clusters.resize(static_cast<std::size_t>(options.max_clusters));

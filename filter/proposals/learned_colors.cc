@@ -14,6 +14,10 @@ using belief::LearnedColors;
 
 static_assert(belief::kColorCells == rendering::kColorBins * rendering::kColorBins * rendering::kColorBins);
 
+namespace {
+constexpr double kLeastShare = 1e-6;  // bins seen less than this on both are forgotten
+}  // namespace
+
 void blend(const rendering::ColorHistogram& object, const rendering::ColorHistogram& rest,
            const ColorLearningOptions& options, LearnedColors& colors) {
   const double object_total = object.total(), rest_total = rest.total();
@@ -30,7 +34,7 @@ void blend(const rendering::ColorHistogram& object, const rendering::ColorHistog
     const auto i = static_cast<std::size_t>(bin);
     share.object += gain * (object.counts()[i] / object_total - share.object);
     share.rest += gain * (rest.counts()[i] / rest_total - share.rest);
-    if (std::max(share.object, share.rest) >= options.least_share) shares->push_back(share);
+    if (std::max(share.object, share.rest) >= kLeastShare) shares->push_back(share);
   }
   colors.shares = std::move(shares);
 }

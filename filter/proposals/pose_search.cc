@@ -13,6 +13,12 @@ namespace {
 
 constexpr std::size_t kStartsInBlock = 4;  // enough for a batch to share work, few enough to balance threads
 constexpr int kMinPixels = 6;              // fewer residuals than unknowns say nothing
+constexpr double kMostShift = 0.03;        // m, of the centre in one step (trust region)
+constexpr double kMostTurn = 0.25;         // rad in one step
+constexpr double kSettledShift = 1e-4;     // m; below this and kSettledTurn at the last gate a start stops early
+constexpr double kSettledTurn = 1e-3;      // rad
+constexpr double kPolishShift = 0.004;     // m, standard deviation of the first moves per axis; shrinks to a quarter
+constexpr double kPolishTurn = 0.06;       // rad
 
 double gate_at(const RefineOptions& options, int step) {
   // The last quarter of the steps works at the final gate.
@@ -22,8 +28,7 @@ double gate_at(const RefineOptions& options, int step) {
 }
 
 /// The step d (about the centre) of the damped normal equations within the trust region; zero when they are singular.
-Vector6d bounded_step(const rendering::PoseLinearisation& equations, const Matrix6d& A, const RefineOptions& options,
-                      double radius) {
+Vector6d bounded_step(const rendering::PoseLinearisation& equations, const Matrix6d& A, double radius) {
   Matrix6d H = A.transpose() * equations.H * A;
   const Vector6d g = A.transpose() * equations.g;
   // Directions that depth does not see (a can's turn about its axis) are held by a damping that a seen one outweighs.
@@ -33,8 +38,7 @@ Vector6d bounded_step(const rendering::PoseLinearisation& equations, const Matri
   Vector6d d = H.ldlt().solve(g);
   if (!d.allFinite()) return Vector6d::Zero();
   const double turn = d.head<3>().norm(), shift = d.tail<3>().norm();
-  const double factor =
-      std::min({1.0, options.max_turn / std::max(turn, 1e-12), options.max_shift / std::max(shift, 1e-12)});
+  const double factor = std::min({1.0, kMostTurn / std::max(turn, 1e-12), kMostShift / std::max(shift, 1e-12)});
   return factor * d;
 }
 
@@ -114,10 +118,10 @@ void PoseSearch::refine(const rendering::FrameTerms& terms, const SearchTarget& 
     for (std::size_t k = 0; k < active.size(); ++k) {
       if (equations[k].pixels < kMinPixels) continue;
       Pose& pose = poses_CO[active[k]];
-      const Vector6d d = bounded_step(equations[k], from_point_coordinates(pose.rotation, centre), options, radius);
+      const Vector6d d = bounded_step(equations[k], from_point_coordinates(pose.rotation, centre), radius);
       pose = moved_about(pose, centre, d);
-      const bool settled = linearise.gate <= options.last_gate * 1.0001 && d.head<3>().norm() < options.settled_turn &&
-                           d.tail<3>().norm() < options.settled_shift;
+      const bool settled = linearise.gate <= options.last_gate * 1.0001 && d.head<3>().norm() < kSettledTurn &&
+                           d.tail<3>().norm() < kSettledShift;
       if (!settled) still_active.push_back(active[k]);
     }
     active = std::move(still_active);
@@ -131,8 +135,8 @@ void PoseSearch::polish(const rendering::FrameTerms& terms, const SearchTarget& 
   for (int draw = 0; draw < options.polish_draws; ++draw) {
     const double size = std::pow(0.25, static_cast<double>(draw) / std::max(1, options.polish_draws - 1));
     Vector6d d;
-    d.head<3>() = size * options.polish_turn * geometry::normal_vector(stream);
-    d.tail<3>() = size * options.polish_shift * geometry::normal_vector(stream);
+    d.head<3>() = size * kPolishTurn * geometry::normal_vector(stream);
+    d.tail<3>() = size * kPolishShift * geometry::normal_vector(stream);
     PoseCandidate trial;
     trial.X_CO = moved_about(candidate.X_CO, centre, d);
     const rendering::PoseHypothesis h = hypothesis(target, trial.X_CO);

@@ -15,6 +15,10 @@ namespace {
 
 using Eigen::Vector2d;
 
+constexpr int kPlaneDraws = 400;           // triples of points tried
+constexpr double kLeastPlaneShare = 0.08;  // of the measured points; less is no support
+constexpr double kOutlineMargin = 0.01;    // m that a support's outline is widened by
+
 bool measured(const Vector3d& p) { return p.z() > 0.0; }
 
 /// Two unit vectors that span a plane.
@@ -192,7 +196,7 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
   };
   geometry::Plane best;
   std::size_t best_inliers = 0;
-  for (int draw = 0; draw < options.plane_draws; ++draw) {
+  for (int draw = 0; draw < kPlaneDraws; ++draw) {
     std::array<Vector3d, 3> corner;
     for (Vector3d& p : corner) p = points[draws.uniform_below(points.size())];
     const auto plane = plane_through(corner[0], corner[1], corner[2]);
@@ -201,8 +205,7 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
     for (const Vector3d& p : points) inliers += std::abs(plane->signed_distance(p)) < options.plane_inlier;
     if (inliers > best_inliers) best = *plane, best_inliers = inliers;
   }
-  if (static_cast<double>(best_inliers) < options.min_plane_share * static_cast<double>(points.size()) ||
-      best_inliers < 30)
+  if (static_cast<double>(best_inliers) < kLeastPlaneShare * static_cast<double>(points.size()) || best_inliers < 30)
     return std::nullopt;
 
   for (int round = 0; round < 3; ++round) {
@@ -232,7 +235,7 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
   if (largest == patches.end() || largest->size() < 10) return std::nullopt;
   std::vector<Vector3d> patch;
   for (const int i : *largest) patch.push_back(sampled.points_C[static_cast<std::size_t>(i)]);
-  support.region.outline_C = convex_outline(best, patch, options.outline_margin);
+  support.region.outline_C = convex_outline(best, patch, kOutlineMargin);
   return support;
 }
 

@@ -8,6 +8,11 @@
 namespace prescene::filter {
 namespace {
 
+constexpr double kInlier = 0.008;         // m from the fitted plane
+constexpr double kGrowth = 1.2;           // 1/m^2; thresholds grow by this times the squared depth, as noise does
+constexpr int kFewestFacePixels = 60;     // at the sampled width; less is no measurement
+constexpr double kLeastFaceShare = 0.25;  // of the pixels that should show it; less is something else
+
 /// The upper face of a box that is a support: its middle, axes and half sizes.
 struct Face {
   Pose X_WF;  ///< z along the normal, origin in the face's middle.
@@ -31,9 +36,7 @@ struct Candidates {
 };
 
 /// What a threshold for near points is at this depth.
-double at_depth(double threshold, double z, const SupportTrackingOptions& options) {
-  return threshold * std::max(1.0, options.growth * z * z);
-}
+double at_depth(double threshold, double z) { return threshold * std::max(1.0, kGrowth * z * z); }
 
 Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Pose& X_CF,
                          const SupportTrackingOptions& options) {
@@ -53,7 +56,7 @@ Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Po
       if (std::abs(foot.x()) > face.half_x || std::abs(foot.y()) > face.half_y) continue;
       const Vector3d p_C = sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)];
       const double above = normal.dot(p_C) - offset;
-      const double gate = at_depth(options.gate, z, options);
+      const double gate = at_depth(options.gate, z);
       if (above > gate) continue;  // something stands on it, or before it
       ++found.expected;
       if (above > -gate) found.points_C.push_back(p_C);
@@ -71,22 +74,22 @@ std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, c
   const Pose X_CF = X_WC.inverse() * face->X_WF;
   if ((X_CF.inverse().translation).z() <= 0.0) return std::nullopt;  // seen from below
   const Candidates seen = candidates_of(sampled, *face, X_CF, options);
-  if (static_cast<int>(seen.points_C.size()) < options.min_pixels) return std::nullopt;
+  if (static_cast<int>(seen.points_C.size()) < kFewestFacePixels) return std::nullopt;
 
   geometry::Plane plane_C = fit_plane(seen.points_C);
   std::vector<Vector3d> inliers;
   for (int round = 0; round < 3; ++round) {
     inliers.clear();
     for (const Vector3d& p : seen.points_C)
-      if (std::abs(plane_C.signed_distance(p)) < at_depth(options.inlier, p.z(), options)) inliers.push_back(p);
-    if (static_cast<int>(inliers.size()) < options.min_pixels) return std::nullopt;
+      if (std::abs(plane_C.signed_distance(p)) < at_depth(kInlier, p.z())) inliers.push_back(p);
+    if (static_cast<int>(inliers.size()) < kFewestFacePixels) return std::nullopt;
     plane_C = fit_plane(inliers);
   }
   SupportMeasurement measured;
   measured.support = support.name;
   measured.pixels = static_cast<int>(inliers.size());
   measured.share = static_cast<double>(inliers.size()) / seen.expected;
-  if (measured.share < options.min_share) return std::nullopt;
+  if (measured.share < kLeastFaceShare) return std::nullopt;
   double squares = 0.0;
   for (const Vector3d& p : inliers) squares += std::pow(plane_C.signed_distance(p), 2);
   measured.rms = std::sqrt(squares / static_cast<double>(inliers.size()));

@@ -45,10 +45,12 @@ struct FilterSettings {
   ResampleOptions resample;
   TrackStateOptions track;
   SupportTrackingOptions supports;
-  ColorModels colors;   ///< By model name; what an object's colours were learned to be (frame.colors) takes precedence.
-  bool recover = true;  ///< Look for objects that are not tracked.
-  double max_gap = 1.0;       ///< s; a longer pause between frames is predicted as one of this length.
-  double island_gap = 0.005;  ///< m; objects nearer than this form an island.
+  /// By model name. What an object's colours were learned to be (frame.colors) takes precedence.
+  ColorModels colors;
+  /// switch. Look for objects that are not tracked. Range true or false. Measured: docs/studies/tracking.md.
+  bool recover = true;
+  /// s. A longer pause between frames is predicted as one of this length. Range 0.1 to 10. Chosen.
+  double max_gap = 1.0;
 };
 
 /// Bits of StepResult::degraded.

@@ -19,45 +19,49 @@
 namespace prescene::filter {
 
 struct AugmentOptions {
-  int recover_after_frames = 4;  ///< An object not supported for so many frames is looked for ...
-  int recover_every = 3;         ///< ... every so many frames.
-  /// An object that is tracked by less than this share of its pixels may be a wrong pose that the true one sticks out
-  /// of: it is looked for too, every so many frames.
+  /// frames. An object not supported for so many frames is looked for ... Range 1 to 100. Chosen.
+  int recover_after_frames = 4;
+  /// frames. ... every so many. Range 1 to 100. Chosen.
+  int recover_every = 3;
+  /// share. An object that is tracked by less than this share of its pixels may be a wrong pose that the true one
+  /// sticks out of: it is looked for too ... Range 0 to 1. Chosen.
   double suspicious_share = 0.75;
+  /// frames. ... every so many. Range 1 to 100. Chosen.
   int suspicious_every = 10;
+  /// count. Poses that a search starts from. Range 8 to 1000. Chosen.
   int recover_starts = 48;
-  double near_share = 0.33;  ///< Of the starts are near the last pose; the others at unexplained pixels.
-  double near_shift = 0.08;  ///< m, standard deviation
-  double near_turn = 0.8;    ///< rad
-  SearchOptions search = {.refine = {.steps = 10}, .polish_candidates = 1, .polish_draws = 12};
-  double accept_evidence = 3.0;    ///< Nats per visible pixel, outline considered.
-  double accept_log_ratio = 40.0;  ///< nats
-  double accept_visible_share = 0.08;
-  double accept_hit_share = 0.5;  ///< Of the visible pixels.
-  double min_gain = 10.0;         ///< nats more than where it was thought to be.
-  /// Where motion could not have carried it since it was seen last (at this speed, m/s, and not less than 10 cm), a
-  /// find needs this much more evidence per pixel.
+  /// nats per pixel. A find needs so much for each visible pixel, outline considered. Range 0 to 10. Measured:
+  /// docs/studies/tracking.md.
+  double accept_evidence = 3.0;
+  /// nats. A find needs so much, untempered. Range 0 to 1000. Chosen.
+  double accept_log_ratio = 40.0;
+  /// nats. So much more than where it was thought to be. Range 0 to 1000. Chosen.
+  double min_gain = 10.0;
+  /// m/s. Where motion could not have carried it since it was seen last (at this speed, and not less than 10 cm), ...
+  /// Range 0 to 10. Chosen.
   double reach_speed = 0.7;
+  /// nats per pixel. ... a find needs so much more evidence. Range 0 to 10. Chosen.
   double far_evidence = 1.0;
-  double injected_share = 0.5;  ///< Of the particles are put at the find, the least probable ones.
-  double explained = 0.015;     ///< m; measurements so near to a known surface are explained.
-
-  /// An object that the evidence speaks against may have gone where it cannot be seen: so many places about where it
-  /// was and below it are tried, those that are hidden and free get this share of the particles.
-  int hidden_draws = 160;
+  /// share. An object that the evidence speaks against may have gone where it cannot be seen: places about where it
+  /// was and below it that are hidden and free get this share of the particles. Range 0 to 1. Chosen.
   double hidden_share = 0.25;
-  double hidden_shift = 0.06;    ///< m, standard deviation of the places, ...
-  double hidden_speed = 0.3;     ///< m/s; ... growing so fast while it was not seen ...
-  double hidden_furthest = 0.3;  ///< m; ... to this.
-  double hidden_turn = 0.8;      ///< rad
-
-  /// Two objects of one shape change places where the colours of both together say so by this many nats (tempered), ...
+  /// m. Standard deviation of these places, ... Range 0 to 1. Chosen.
+  double hidden_shift = 0.06;
+  /// m/s. ... growing so fast while it was not seen, to 0.3 m. Range 0 to 10. Chosen.
+  double hidden_speed = 0.3;
+  /// nats. Two objects of one shape change places where the colours of both together say so by this much (tempered),
+  /// ... Range 0 to 1000. Chosen.
   double exchange_gain = 10.0;
-  double exchange_evidence = 1.0;  ///< ... and so many per visible pixel.
-
-  bool new_objects = false;      ///< Look for more objects of the scene's models than it names.
-  int new_every = 15;            ///< frames
-  double new_log_ratio = 250.0;  ///< nats; smaller finds are remnants more often than objects.
+  /// nats per pixel. ... and by so much for each visible pixel. Range 0 to 10. Chosen.
+  double exchange_evidence = 1.0;
+  /// switch. Look for more objects of the scene's models than it names. Range true or false. Chosen.
+  bool new_objects = false;
+  /// frames. Between two such searches. Range 1 to 1000. Chosen.
+  int new_every = 15;
+  /// nats. Smaller finds of new objects are remnants more often than objects. Range 0 to 10000. Measured:
+  /// docs/studies/tracking.md.
+  double new_log_ratio = 250.0;
+  /// Of new objects.
   DetectionOptions detection;
 };
 

@@ -9,10 +9,12 @@
 namespace prescene::filter {
 
 struct InferReleaseOptions {
-  int settled_frames = 3;     ///< Where an object is in its hand is known after so many tracked frames.
-  double least_shift = 0.03;  ///< m; it has left its place in the hand when it is further from it, or turned ...
-  double least_turn = 0.5;    ///< rad; ... further, each at least three of its standard deviations, ...
-  int apart_frames = 3;       ///< ... in so many tracked frames in a row.
+  /// m. An object has left its place in the hand when it is further from it, or turned ... Range 0 to 0.2. Chosen.
+  double least_shift = 0.03;
+  /// rad. ... further, each at least three of its standard deviations, ... Range 0 to 3.2. Chosen.
+  double least_turn = 0.5;
+  /// frames. ... in so many tracked ones in a row. Range 1 to 30. Chosen.
+  int apart_frames = 3;
 };
 
 /// Follows where each held object is in its hand, and lets go of those that left it: the belief's scene (a copy of it)

@@ -17,27 +17,34 @@
 namespace prescene::filter {
 
 struct LearnPhysicsOptions {
+  /// switch. Learn at all. Range true or false. Chosen.
   bool enabled = true;
-  int rest_frames = 10;        ///< An object that is tracked for so many frames without moving lies still.
-  double start_shift = 0.008;  ///< m; it moves when it is further from where it lay, ...
-  double start_turn = 0.09;    ///< rad; ... or turned further, each at least three of its standard deviations.
-  double before = 0.4;         ///< s; an episode begins so long before motion was noticed.
-  double longest = 2.0;        ///< s; what lasts longer is judged by its beginning.
-  double longest_gap = 0.3;    ///< s; an episode in which the object is not tracked for longer is given up.
-  int fewest_samples = 5;
-  double rest_time = 0.5;  ///< s; what lies still is simulated for so long.
-  int variants = 4;  ///< Starts a draw is simulated from, drawn from the start's covariance; the same for all draws.
-  int runs_per_frame = 64;  ///< Simulated at most, so that no frame takes long.
-  /// Errors of the simulator, by which the standard deviations of the tracked poses are enlarged: shares of the path
-  /// and of the turn since the start, and these floors.
+  /// frames. An object that is tracked for so many without moving lies still. Range 2 to 100. Chosen.
+  int rest_frames = 10;
+  /// m. It moves when it is further from where it lay, ... Range 0.001 to 0.1. Chosen.
+  double start_shift = 0.008;
+  /// rad. ... or turned further, each at least three of its standard deviations. Range 0.01 to 1. Chosen.
+  double start_turn = 0.09;
+  /// count. Starts a draw is simulated from, drawn from the start's covariance; the same for all draws. Range 1 to 64.
+  /// Chosen.
+  int variants = 4;
+  /// count. Simulated at most in a frame, so that none takes long. Range 1 to 10000. Chosen.
+  int runs_per_frame = 64;
+  /// share. Errors of the simulator, by which the standard deviations of the tracked poses are enlarged: this share of
+  /// the path and of the turn since the start, ... Range 0 to 1. Chosen.
   double model_share = 0.025;
-  double shift_floor = 0.0015;        ///< m
-  double turn_floor = 0.015;          ///< rad
-  double correlation_time = 0.15;     ///< s; samples nearer to each other count as one.
-  double release_speed_error = 0.03;  ///< m/s, standard deviation of the velocity with which something is let go.
-  double largest_misfit =
-      12.0;  ///< Mean squared standardised error of the best run beyond which nothing was explained.
-  /// Probability that something else moved the object as it moved, whatever its parameters are.
+  /// m. ... at least this ... Range 0 to 0.1. Chosen.
+  double shift_floor = 0.0015;
+  /// rad. ... and this. Range 0 to 1. Chosen.
+  double turn_floor = 0.015;
+  /// s. Samples nearer to each other count as one. Range 0.01 to 1. Chosen.
+  double correlation_time = 0.15;
+  /// m/s. Standard deviation of the velocity with which something is let go. Range 0 to 1. Chosen.
+  double release_speed_error = 0.03;
+  /// squared deviations. Mean squared standardised error of the best run beyond which nothing was explained. Range 1
+  /// to 49. Chosen.
+  double largest_misfit = 12.0;
+  /// probability. That something else moved the object as it moved, whatever its parameters are. Range 0 to 1. Chosen.
   double other_cause = 0.01;
 };
 

@@ -21,36 +21,43 @@ using geometry::Vector3d;
 
 /// Standard deviations that are added within one second, as random walks: rates in m, rad per square root of a second.
 struct MotionNoise {
-  double shift;  ///< m / sqrt(s)
-  double turn;   ///< rad / sqrt(s)
-  double speed;  ///< m/s / sqrt(s)
-  double rate;   ///< rad/s / sqrt(s)
+  /// m per sqrt(s). Of the position. Range 0 to 0.5. Chosen.
+  double shift;
+  /// rad per sqrt(s). Of the rotation. Range 0 to 5. Chosen.
+  double turn;
+  /// m/s per sqrt(s). Of the velocity. Range 0 to 10. Chosen.
+  double speed;
+  /// rad/s per sqrt(s). Of the angular velocity. Range 0 to 100. Chosen.
+  double rate;
 };
 
 struct PredictOptions {
+  /// What lies still. What is seen of it forgets a tenth a frame besides. Chosen.
   MotionNoise resting = {.shift = 0.0006, .turn = 0.006, .speed = 0.0, .rate = 0.0};
-  /// By this share the covariance of a resting pose grows in a frame: errors of the camera that stay from frame to frame
-  /// (calibration, a pattern in the depth) do not average out.
-  double still_forgetting = 0.1;
+  /// About the hand. Chosen.
   MotionNoise held = {.shift = 0.010, .turn = 0.08, .speed = 0.0, .rate = 0.0};
-  /// Per frame at 30 Hz: 3 mm, 0.03 rad, 0.10 m/s, 0.8 rad/s.
+  /// For each frame at 30 Hz: 3 mm, 0.03 rad, 0.10 m/s, 0.8 rad/s. What moves faster is often lost. Chosen.
   MotionNoise moving = {.shift = 0.0164, .turn = 0.164, .speed = 0.55, .rate = 4.4};
-  double velocity_keep = 0.55;         ///< Share of a seen object's velocity that is left after one second.
-  double unseen_velocity_keep = 2e-4;  ///< The same of an object that is not tracked: it would drift away.
-  double max_shift_deviation = 0.15;   ///< m; covariances grow no further.
-  double max_turn_deviation = 1.0;     ///< rad
-  double max_speed_deviation = 1.0;    ///< m/s
-  double max_rate_deviation = 8.0;     ///< rad/s
-  double wake_probability = 0.12;      ///< Per frame and particle: resting or held becomes moving.
-  double regrasp_probability = 0.5;  ///< Per frame and particle: what the scene says is held moves with the hand again.
-  double settle_probability = 0.15;  ///< Per frame and particle: moving slower than the next two becomes resting.
-  double settle_speed = 0.04;        ///< m/s
-  double settle_rate = 0.5;          ///< rad/s
-  double wake_speed = 0.15;          ///< m/s, standard deviation of the velocity of what starts to move.
-  double wake_rate = 1.0;            ///< rad/s
-  double physics_share = 0.5;        ///< Of the moving particles, simulated in place of constant velocity.
-  double unseen_physics_share = 1.0;   ///< The same of an object that is not tracked: nothing else says where it goes.
-  double physics_after_release = 1.0;  ///< The same in the step in which an object was released.
+  /// share. Of a seen object's velocity that is left after one second. Range 0 to 1. Chosen.
+  double velocity_keep = 0.55;
+  /// share. The same of an object that is not tracked: it would drift away. Range 0 to 1. Measured:
+  /// docs/studies/tracking.md.
+  double unseen_velocity_keep = 2e-4;
+  /// probability. For each frame and particle: resting or held becomes moving. Range 0 to 1. Chosen.
+  double wake_probability = 0.12;
+  /// probability. For each frame and particle: what the scene says is held moves with the hand again. Range 0 to 1.
+  /// Chosen.
+  double regrasp_probability = 0.5;
+  /// probability. For each frame and particle: moving with a velocity that agrees with none becomes resting. Range 0
+  /// to 1. Chosen.
+  double settle_probability = 0.15;
+  /// m/s. Standard deviation of the velocity of what starts to move. Range 0 to 5. Chosen.
+  double wake_speed = 0.15;
+  /// rad/s. The same of the rotation. Range 0 to 50. Chosen.
+  double wake_rate = 1.0;
+  /// share. Of the moving particles of a tracked object, simulated in place of constant velocity. Range 0 to 1.
+  /// Chosen.
+  double physics_share = 0.5;
 };
 
 /// What physics did in a step.

@@ -11,9 +11,10 @@
 namespace prescene::filter {
 
 struct ResampleOptions {
-  double min_effective_share = 0.5;  ///< Resample when the effective sample size is below this share of the particles.
-  /// Copies are drawn from their particle's Gaussian times this, and keep the rest as their covariance: between 0
-  /// (copies are equal) and 1 (copies are points).
+  /// share. Resample when the effective sample size is below this share of the particles. Range 0 to 1. Chosen.
+  double min_effective_share = 0.5;
+  /// share. Copies are drawn from their particle's Gaussian times this, and keep the rest as their covariance: between
+  /// 0 (copies are equal) and 1 (copies are points). Range 0 to 1. Chosen.
   double spread = 0.4;
 };
 

@@ -9,15 +9,19 @@
 namespace prescene::filter {
 
 struct TrackStateOptions {
-  double tracked_evidence = 3.0;  ///< Nats per visible pixel from which a pose counts as tracked ...
-  int tracked_pixels = 5;      ///< ... if so many pixels show it, at the likelihood's resolution; else it is doubtful.
-  double lost_evidence = 1.0;  ///< Below this it is refuted; between, it is doubtful.
-  int lost_after_frames = 4;   ///< Refuted so often without a better frame or hiding in between, it is lost.
-  double min_visible_share = 0.08;   ///< Of the covered pixels: with less, nothing can be said.
-  double unseen_lost_after = 60.0;   ///< s
-  double existence_rate = 0.5;       ///< Largest change of the log odds of existence by one frame.
-  double min_existence_odds = -5.0;  ///< Log odds are kept between these.
-  double max_existence_odds = 7.0;
+  /// nats per pixel. Of a visible pixel, from which a pose counts as tracked ... Range 0 to 10. Measured:
+  /// docs/studies/tracking.md.
+  double tracked_evidence = 3.0;
+  /// pixels. ... if so many show it, at the likelihood's resolution; else it is doubtful. Range 1 to 100. Chosen.
+  int tracked_pixels = 5;
+  /// nats per pixel. Below this it is refuted; between, it is doubtful. Range 0 to 10. Chosen.
+  double lost_evidence = 1.0;
+  /// frames. Refuted in so many without a better one or hiding in between, it is lost. Range 1 to 100. Chosen.
+  int lost_after_frames = 4;
+  /// share. Of the covered pixels: with less in sight, nothing can be said. Range 0 to 1. Chosen.
+  double min_visible_share = 0.08;
+  /// s. An object that is unseen for longer is lost. Range 1 to 100000. Chosen.
+  double unseen_lost_after = 60.0;
 };
 
 /// Sets state, evidence, visible share, counters and existence of `object` from a frame's report.

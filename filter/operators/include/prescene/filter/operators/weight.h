@@ -16,27 +16,26 @@
 namespace prescene::filter {
 
 struct WeightOptions {
-  int steps = 5;                  ///< Gauss-Newton steps per particle.
-  double first_gate = 0.03;       ///< m
-  double last_gate = 0.012;       ///< m
-  double start_spread = 0.8;      ///< Standard deviation of the random starts, of the predicted one.
-  double max_start_shift = 0.03;  ///< m; a start is never further off, however wide the prediction is.
-  double max_start_turn = 0.35;   ///< rad
-  double min_pixels = 12;         ///< The tempering's pixel count is at least this.
-  /// A pose is hidden when less than this share of the pixels that it should show is not behind something else; then
-  /// staying hidden competes with moving to where something is seen.
+  /// count. Gauss-Newton steps of a particle, at most. Range 1 to 20. Chosen.
+  int steps = 5;
+  /// share. Standard deviation of the random starts, of the predicted one. Range 0 to 1. Chosen.
+  double start_spread = 0.8;
+  /// share. A pose is hidden when less than this share of the pixels that it should show is not behind something else;
+  /// then staying hidden competes with moving to where something is seen. Range 0 to 1. Chosen.
   double hidden_share = 0.35;
-  double log_hidden = -4.0;  ///< log prior odds of becoming hidden, and of coming into sight again.
-  /// Hidden poses that overlap a support by this share (beyond the tolerance, m: contacts are not known better) or more
-  /// cost so many nats, others in proportion.
-  double support_overlap = 0.25;
+  /// nats. Log prior odds of becoming hidden, and of coming into sight again. Range -20 to 0. Chosen.
+  double log_hidden = -4.0;
+  /// m. Hidden poses that overlap a support by more than this (contacts are not known better) are improbable. Range 0
+  /// to 0.1. Chosen.
   double support_tolerance = 0.015;
-  double log_in_support = -12.0;
-  double max_jump_speed = 2.0;  ///< m/s; a mode further from the prediction than this and its spread allow is refused.
-  double outline_step =
-      0.02;                   ///< m; where the measured surface goes on past the outline within this, there is no edge.
-  double min_outline = 0.50;  ///< Share of the outline with an edge below which a match is no evidence at all ...
-  double full_outline = 0.80;  ///< ... and from which it is full evidence.
+  /// m/s. A mode further from the prediction than this and its spread allow is refused. Range 0.1 to 20. Chosen.
+  double max_jump_speed = 2.0;
+  /// m. Where the measured surface goes on past the outline within this, there is no edge. Range 0.001 to 0.1. Chosen.
+  double outline_step = 0.02;
+  /// share. Of the outline with an edge, below which a match is no evidence at all ... Range 0 to 1. Chosen.
+  double min_outline = 0.50;
+  /// share. ... and from which it is full evidence. Range 0 to 1. Chosen.
+  double full_outline = 0.80;
 };
 
 /// What became of one particle.

@@ -16,19 +16,15 @@ namespace prescene::filter {
 
 struct DetectionOptions {
   SegmentationOptions segmentation;
-  int starts = 64;  ///< Random poses tried per cluster and model.
+  /// count. Random poses tried for each cluster and model. Range 8 to 1000. Measured: docs/studies/tracking.md.
+  int starts = 64;
   SearchOptions search;
-  int keep = 3;                 ///< Best poses per cluster and model that compete.
-  int rounds = 2;               ///< The second round looks at what the first left unexplained.
-  int max_clusters = 12;        ///< Largest ones only.
-  double min_hit_share = 0.6;   ///< Of the visible pixels.
-  double min_log_ratio = 40.0;  ///< nats, untempered, at the likelihood's resolution.
-  double max_sinking =
-      0.03;                  ///< m below the support's plane that a pose may reach: planes and meshes are off by 15 mm.
-  double explained = 0.015;  ///< m; a measurement so little in front of a known surface, or up to twice as much behind
-                             ///< it, is explained.
-  RefineOptions settle = {
-      .steps = 8, .first_gate = 0.02, .last_gate = 0.008};  ///< Joint refinement of what is accepted.
+  /// count. The largest clusters only. Range 1 to 100. Chosen.
+  int max_clusters = 12;
+  /// share. Of the visible pixels that must match. Range 0 to 1. Tuned: docs/studies/tracking.md.
+  double min_hit_share = 0.6;
+  /// nats. Untempered, at the likelihood's resolution. Range 0 to 10000. Tuned: docs/studies/tracking.md.
+  double min_log_ratio = 40.0;
 };
 
 /// A model that is looked for, and how many of it may be found.

@@ -35,7 +35,8 @@ struct FilterTools {
 
 struct FrameOptions {
   rendering::FrameTermsOptions terms;
-  rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
+  /// The scene's depth_noise takes precedence.
+  rendering::SensorModelOptions sensor;
   ColorLearningOptions colors;
 };
 

@@ -16,18 +16,18 @@ namespace prescene::filter {
 
 /// When colours are learned and how much they count. Source of the blending: region-based tracking [Bibby & Reid 2008].
 struct ColorLearningOptions {
-  bool learn = false;  ///< The colours of every object; else of those alone whose model says so (learn_colors).
-  double gain = 0.05;  ///< Share of a new frame in the histograms; the first 1 / gain frames are averaged evenly.
-  int frames = 5;      ///< To learn from before the colours count.
-  double min_evidence = 3.0;    ///< Nats per visible pixel from which on a tracked object's frame is learned from, ...
-  double min_confidence = 0.9;  ///< ... if its place is so sure (belief::ObjectEstimate::confidence), ...
-  double min_visible_share = 0.5;  ///< ... so much of it is seen ...
-  double min_hit_share = 0.8;      ///< ... and matches.
-  /// Mean nats of its pixels by the colours learned so far: less, and it may well be another thing of the same shape.
-  double min_color_evidence = -0.5;
-  int min_pixels = 12;        ///< Fewer pixels inside the outline are not learned from.
-  int target_width = 160;     ///< The image is sampled every round(width / target_width) pixels for learning.
-  double least_share = 1e-6;  ///< Bins seen less than this on both are forgotten.
+  /// switch. Learn the colours of every object; else of those alone whose model says so (learn_colors). Range true or
+  /// false. Chosen.
+  bool learn = false;
+  /// share. Of a new frame in the histograms; the first 1 / gain frames are averaged evenly. Range 0 to 1. Chosen.
+  double gain = 0.05;
+  /// frames. To learn from before the colours count. Range 1 to 1000. Chosen.
+  int frames = 5;
+  /// nats per pixel. A tracked object's frame is learned from if so much speaks for each visible pixel ... Range 0 to
+  /// 10. Chosen.
+  double min_evidence = 3.0;
+  /// share. ... and so much of it is seen. Range 0 to 1. Chosen.
+  double min_visible_share = 0.5;
   rendering::ColorModelOptions model;
 };
 

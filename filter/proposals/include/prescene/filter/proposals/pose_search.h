@@ -36,21 +36,20 @@ struct SearchTarget {
 rendering::PoseHypothesis hypothesis(const SearchTarget& target, const Pose& X_CO, double tempering_pixels = 0.0);
 
 struct RefineOptions {
-  int steps = 12;            ///< Gauss-Newton steps, at most.
-  double first_gate = 0.06;  ///< m; residuals beyond about half of it lose their weight; shrinks geometrically to ...
-  double last_gate = 0.012;  ///< m
-  double max_shift = 0.03;   ///< m, of the centre in one step (trust region)
-  double max_turn = 0.25;    ///< rad in one step
-  double settled_shift = 1e-4;  ///< m; below this and settled_turn at the last gate a start stops early.
-  double settled_turn = 1e-3;   ///< rad
+  /// count. Gauss-Newton steps, at most. Range 1 to 100. Chosen.
+  int steps = 12;
+  /// m. Residuals beyond about half of it lose their weight; shrinks geometrically to ... Range 0.001 to 1. Chosen.
+  double first_gate = 0.06;
+  /// m. ... this. Range 0.001 to 1. Chosen.
+  double last_gate = 0.012;
 };
 
 struct SearchOptions {
   RefineOptions refine;
-  int polish_candidates = 3;    ///< The best so many are improved by random moves that the likelihood accepts ...
-  int polish_draws = 20;        ///< ... so many each; they see silhouettes, which Gauss-Newton does not.
-  double polish_shift = 0.004;  ///< m, standard deviation of the first moves per axis; shrinks to a quarter.
-  double polish_turn = 0.06;    ///< rad
+  /// count. The best so many are improved by random moves that the likelihood accepts ... Range 0 to 100. Chosen.
+  int polish_candidates = 3;
+  /// count. ... so many each; they see silhouettes, which Gauss-Newton does not. Range 0 to 1000. Chosen.
+  int polish_draws = 20;
 };
 
 struct PoseCandidate {

@@ -21,18 +21,24 @@ using geometry::Pose;
 using geometry::Vector3d;
 
 struct SegmentationOptions {
-  int target_width = 160;         ///< The image is sampled to about this width.
-  double min_depth = 0.2;         ///< m; measurements outside the range are not looked at.
-  double max_depth = 2.5;         ///< m
-  int plane_draws = 400;          ///< Triples of points tried.
-  double plane_inlier = 0.008;    ///< m
-  double min_plane_share = 0.08;  ///< Of the measured points; less is no support.
-  double max_plane_tilt = 0.6;    ///< rad from up, where up is known.
-  double outline_margin = 0.01;   ///< m that the outline is widened by.
-  double min_height = 0.008;      ///< m above the plane: nearer points are the plane's.
-  double max_height = 0.4;        ///< m above the plane: further points are not on it.
-  double depth_step = 0.02;       ///< m between neighbouring pixels of one cluster.
-  int min_cluster_pixels = 25;    ///< At the sampled width.
+  /// pixels. The image is sampled to about this width. Range 40 to 640. Chosen.
+  int target_width = 160;
+  /// m. Nearer measurements are not looked at, ... Range 0 to 10. Chosen.
+  double min_depth = 0.2;
+  /// m. ... and neither are further ones. Range 0 to 10. Chosen.
+  double max_depth = 2.5;
+  /// m. Points so near to a plane are on it. Range 0.001 to 0.05. Tuned: docs/studies/tracking.md.
+  double plane_inlier = 0.008;
+  /// rad. Of a support, from up, where up is known. Range 0 to 1.6. Chosen.
+  double max_plane_tilt = 0.6;
+  /// m. Above the plane: nearer points are the plane's. Range 0.001 to 0.1. Tuned: docs/studies/tracking.md.
+  double min_height = 0.008;
+  /// m. Above the plane: further points are not on it. Range 0.01 to 2. Tuned: docs/studies/tracking.md.
+  double max_height = 0.4;
+  /// m. Between neighbouring pixels of one cluster, at most. Range 0.001 to 0.2. Tuned: docs/studies/tracking.md.
+  double depth_step = 0.02;
+  /// pixels. Of a cluster, at the sampled width. Range 1 to 1000. Chosen.
+  int min_cluster_pixels = 25;
 };
 
 /// A depth image sampled to a smaller camera, with its points.

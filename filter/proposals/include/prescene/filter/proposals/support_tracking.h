@@ -17,13 +17,10 @@ namespace prescene::filter {
 inline constexpr const char* kFoundSupport = "support_plane";
 
 struct SupportTrackingOptions {
-  double gate = 0.02;     ///< m from the believed plane: measurements further off belong to something else.
-  double inlier = 0.008;  ///< m from the fitted plane
-  double growth =
-      1.2;  ///< 1/m^2: both grow by this factor times the squared depth where that is more than 1, as noise does.
-  int min_pixels = 60;      ///< At the sampled width; less is no measurement.
-  double min_share = 0.25;  ///< Of the pixels that should show it; less is something else.
-  /// A found support is averaged over the first frames and follows at this rate afterwards.
+  /// m. From the believed plane: measurements further off belong to something else. Range 0.001 to 0.1. Chosen.
+  double gate = 0.02;
+  /// share. A found support is averaged over the first frames and follows at this rate afterwards. Range 0 to 1.
+  /// Chosen.
   double least_gain = 0.1;
 };
 
