@@ -2,10 +2,9 @@
 #include "prescene/core/utf8.h"
 
 namespace prescene::core {
-namespace {
 
-/// Length of the well-formed sequence that begins at `i`; 0 where none does [The Unicode Standard, table 3-7].
-std::size_t sequence_at(std::string_view text, std::size_t i) {
+// Source: The Unicode Standard, table 3-7.
+std::size_t utf8_length_at(std::string_view text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0u; };
   const auto within = [&](std::size_t k, unsigned low, unsigned high) { return byte(k) >= low && byte(k) <= high; };
   const auto tail = [&](std::size_t k) { return within(k, 0x80, 0xbf); };
@@ -23,11 +22,18 @@ std::size_t sequence_at(std::string_view text, std::size_t i) {
   return 0;
 }
 
-}  // namespace
+char32_t utf8_character_at(std::string_view text, std::size_t i) {
+  const std::size_t length = utf8_length_at(text, i);
+  if (length == 0) return U'\ufffd';
+  const auto first = static_cast<unsigned char>(text[i]);
+  char32_t code = length == 1 ? first : first & (0x7fu >> length);
+  for (std::size_t k = 1; k < length; ++k) code = code << 6 | (static_cast<unsigned char>(text[i + k]) & 0x3fu);
+  return code;
+}
 
 std::optional<std::size_t> not_utf8_at(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
-    const std::size_t length = sequence_at(text, i);
+    const std::size_t length = utf8_length_at(text, i);
     if (length == 0) return i;
     i += length;
   }

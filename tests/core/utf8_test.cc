@@ -25,6 +25,9 @@ TEST(Utf8, EveryCodePointIsTextInItsShortestFormAndInNoOther) {
     const bool is_one = point <= 0x10ffff && (point < 0xd800 || point > 0xdfff);
     for (int bytes = shortest(point); bytes <= 4; ++bytes)
       ASSERT_EQ(is_utf8(encoded(point, bytes)), is_one && bytes == shortest(point)) << point << " in " << bytes;
+    const std::string text = "\x7f" + encoded(point, shortest(point));
+    ASSERT_EQ(utf8_character_at(text, 1), char32_t{is_one ? point : 0xfffdu});
+    ASSERT_EQ(utf8_length_at(text, 1), is_one ? text.size() - 1 : 0u);
   }
 }
 

@@ -13,6 +13,11 @@ namespace prescene::core {
 /// above U+10FFFF are none. Nothing where all of it is.
 std::optional<std::size_t> not_utf8_at(std::string_view text);
 
+/// Length of the well-formed sequence that begins at byte `i` (< text.size()), 1 to 4; 0 where none does.
+std::size_t utf8_length_at(std::string_view text, std::size_t i);
+/// The character that begins at byte `i` (< text.size()); U+FFFD where none does.
+char32_t utf8_character_at(std::string_view text, std::size_t i);
+
 inline bool is_utf8(std::string_view text) { return !not_utf8_at(text); }
 
 }  // namespace prescene::core
