@@ -21,7 +21,7 @@ using interfaces::TextAlign;
 constexpr std::size_t kMostBars = 8, kMostLines = 6;
 constexpr int kBarApart = 23, kLineApart = 17, kFirst = 30, kLeast = 196;
 constexpr const char* kOtherwise = "otherwise";
-constexpr double kName = 11.5, kNote = 10.0;  // letters' height
+constexpr double kName = 11.0, kNote = 9.0;  // letters' height
 
 /// Items one after the other, in lines no wider than `width`; those beyond the last line are counted.
 std::vector<std::string> lines_of(const std::vector<std::string>& items, double width) {

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/reports/lettering.h"
@@ -64,6 +66,11 @@ std::string text_of(const ObjectEvidence& object) {
   return object.object + ": " + (e.log_ratio >= 0.0 ? "+" : "") + fixed_text(e.log_ratio, 0) + " nats from " +
          std::to_string(e.covered) + " pixels; " + fixed_text(100.0 * e.visible_share(), 0) + " % of them visible, " +
          fixed_text(100.0 * e.hit_share(), 0) + " % of these on its surface";
+}
+
+/// Of letters that are `wanted` pixels high, or so much less, down to 7, that the text fits.
+double fitting_height(std::string_view text, double wanted, double room) {
+  return std::clamp(wanted * room / std::max(1.0, interfaces::text_width(text, wanted)), std::min(7.0, wanted), wanted);
 }
 
 void draw_scale(double end, double x, double y, double width, ColorImage& canvas) {
@@ -156,13 +163,17 @@ ColorImage likelihood_picture(const belief::Observation& observation, const std:
   for (int y = 0; y < picture.height(); ++y)
     for (int x = 0; x < picture.width(); ++x) canvas(left + x, y) = picture(x, y);
   double y = picture.height() + 24.0;
-  interfaces::draw_text("What each pixel says, nats: log of p(measured | object there) / p(measured | not there)",
-                        {12.0, y}, 11.0, kTextColor, canvas);
+  const std::string title = "What each pixel says, nats: log of p(measured | object there) / p(measured | not there)";
+  const std::string meaning = "blue: against the pose, orange: for";
+  double height = fitting_height(title, 11.0, width - 24.0);
+  for (const ObjectEvidence& object : objects)
+    height = std::min(height, fitting_height(text_of(object), 11.0, width - 24.0));
+  interfaces::draw_text(title, {12.0, y}, height, kTextColor, canvas);
   draw_scale(end, 12.0, y + 8.0, 380.0, canvas);
-  interfaces::draw_text("blue: against the pose, orange: for", {408.0, y + 22.0}, 10.5, kNoteColor, canvas);
+  interfaces::draw_text(meaning, {408.0, y + 22.0}, fitting_height(meaning, 10.5, width - 420.0), kNoteColor, canvas);
   y += 68.0;
   for (const ObjectEvidence& object : objects) {
-    interfaces::draw_text(text_of(object), {12.0, y}, 11.0, kTextColor, canvas);
+    interfaces::draw_text(text_of(object), {12.0, y}, height, kTextColor, canvas);
     y += kLine;
   }
   if (objects.empty()) interfaces::draw_text("No object is believed to be there.", {12.0, y}, 11.0, kTextColor, canvas);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines and letters on pictures, smooth at their edges. Letters are drawn as strokes, so that they are sharp at any
-// size and need no font file.
+// Lines and letters on pictures, smooth at their edges. Letters are those of DejaVu Sans, drawn by FreeType; the font
+// is part of the program.
 //
 //   draw_line({{{10, 10}, {200, 40}}}, 3.0, {200, 60, 20}, 1.0, picture);
 //   draw_text("in_bin 62 %", {20, 60}, 14.0, {30, 30, 30}, picture);
@@ -29,10 +29,10 @@ void fill_rectangle(int x0, int y0, int x1, int y1, const geometry::Rgb& color, 
                     geometry::ColorImage& picture);
 
 enum class TextAlign { kLeft, kCenter, kRight };
-/// Width of a text in pixels whose capitals are `height` pixels high.
+/// Width of a text in pixels whose capitals are `height` pixels high: the sum of those of its characters.
 double text_width(std::string_view text, double height);
-/// `at` is the left end of the text's base line (its middle, its right end). ASCII, and +- as U+00B1; other characters
-/// are drawn as a box.
+/// `at` is the left end of the text's base line (its middle, its right end); y is rounded to a whole pixel. UTF-8;
+/// bytes that are none, and characters that the font does not have, are drawn as a box or a question mark.
 void draw_text(std::string_view text, const Eigen::Vector2d& at, double height, const geometry::Rgb& color,
                geometry::ColorImage& picture, TextAlign align = TextAlign::kLeft);
 /// The same on a light halo, readable on any picture.
