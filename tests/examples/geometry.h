@@ -10,7 +10,7 @@
 
 namespace prescene::geometry::given_geometry {
 
-extern const TriangleMesh mesh, coarse;
+extern const TriangleMesh mesh;
 
 namespace dense_solvers_h {
 extern const Eigen::MatrixXd covariance;
@@ -20,5 +20,9 @@ namespace polygon_h {
 extern const std::vector<Vector2d> points;
 extern const Vector2d p;
 }  // namespace polygon_h
+
+namespace surface_tree_h {
+extern const Vector3d p;
+}  // namespace surface_tree_h
 
 }  // namespace prescene::geometry::given_geometry

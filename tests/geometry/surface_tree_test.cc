@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "prescene/core/random.h"
@@ -12,8 +11,6 @@
 
 namespace prescene::geometry {
 namespace {
-
-TriangleMesh box(double x, double y, double z) { return make_mesh(BoxShape{{x, y, z}}); }
 
 TEST(SurfaceTree, NearestIsThatOfAllTriangles) {
   const TriangleMesh mesh = make_open_bin({0.2, 0.15, 0.1}, 0.01);
@@ -39,54 +36,6 @@ TEST(SurfaceTree, NearestIsThatOfAllTriangles) {
     EXPECT_GE(found.place.weights.minCoeff(), 0.0);
     EXPECT_TRUE(tree.is_within(p, std::sqrt(least) * (1.0 + 1e-9)));
     EXPECT_FALSE(tree.is_within(p, std::sqrt(least) * (1.0 - 1e-9)));
-  }
-}
-
-TEST(SurfaceDistance, OfNestedBoxesIsKnown) {
-  const TriangleMesh inner_mesh = box(0.2, 0.2, 0.2), outer_mesh = box(0.24, 0.24, 0.24);
-  const SurfaceTree inner(inner_mesh), outer(outer_mesh);
-  // From the inner surface it is 20 mm straight out, everywhere but for rounding; from the outer one's corners more.
-  const double out = largest_distance(inner_mesh, outer, 0.01), in = largest_distance(outer_mesh, inner, 0.01);
-  EXPECT_GE(out, 0.02 - 1e-12);
-  EXPECT_LE(out, 0.02 * 1.01 + 1e-4 * 0.36);
-  EXPECT_GE(in, 0.02 * std::sqrt(3.0) - 1e-12);
-  EXPECT_LE(in, 0.02 * std::sqrt(3.0) * 1.01 + 1e-4 * 0.42);
-  EXPECT_EQ(surface_distance(inner, outer, 0.01), std::max(in, out));
-  EXPECT_LE(surface_distance(inner, inner, 0.01), 1e-4 * 0.36);
-}
-
-TEST(SurfaceDistance, IsFoundWithinTrianglesToo) {
-  // All corners of the large triangle lie on the other surface; its middle is above a pit.
-  TriangleMesh plain;
-  plain.vertices = {{-1, -1, 0}, {3, -1, 0}, {-1, 3, 0}};
-  plain.triangles = {{0, 1, 2}};
-  TriangleMesh pit = plain;
-  pit.vertices.push_back({0.0, 0.0, -0.5});
-  pit.triangles = {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-  const double found = largest_distance(plain, SurfaceTree(pit), 0.01);
-  double sampled = 0.0;
-  const SurfaceTree tree(pit);
-  for (const SurfacePoint& p : sample_surface(plain, 200'000, 3))
-    sampled = std::max(sampled, std::sqrt(tree.nearest(p.position).place.squared_distance));
-  EXPECT_GT(sampled, 0.3);
-  EXPECT_GE(found, sampled);
-  EXPECT_LE(found, sampled * 1.02);
-}
-
-TEST(SurfaceDistance, IsABoundThatIsNearlyMet) {
-  const TriangleMesh fine = make_mesh(Sphere{0.1}, 48);
-  const SurfaceTree fine_tree(fine);
-  for (const int triangles : {40, 100, 300}) {
-    const TriangleMesh coarse = simplified(fine, triangles);
-    const SurfaceTree coarse_tree(coarse);
-    const double bound = surface_distance(fine_tree, coarse_tree, 0.1);
-    double sampled = 0.0;
-    for (const SurfacePoint& p : sample_surface(fine, 50'000, 5))
-      sampled = std::max(sampled, coarse_tree.nearest(p.position).place.squared_distance);
-    for (const SurfacePoint& p : sample_surface(coarse, 50'000, 6))
-      sampled = std::max(sampled, fine_tree.nearest(p.position).place.squared_distance);
-    EXPECT_GE(bound, std::sqrt(sampled));
-    EXPECT_LE(bound, 1.2 * std::sqrt(sampled)) << "0.1 of it is allowed, the rest is what no sample found";
   }
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The surface of a mesh for questions of nearness, and how far two surfaces are apart.
+// The surface of a mesh for questions of nearness.
 //
-//   const SurfaceTree original(mesh), other(coarse);
-//   const double error = surface_distance(original, other, 0.05);   // no point of either is further from the other
+//   const SurfaceTree tree(mesh);
+//   const double distance = std::sqrt(tree.nearest(p).place.squared_distance);
 #pragma once
 
 #include <cstdint>
@@ -40,13 +40,5 @@ class SurfaceTree {
   const TriangleMesh* mesh_;
   std::unique_ptr<const Tree> tree_;
 };
-
-/// A bound, m: no point of `from` is further than this from `to`. It is above the largest such distance by at most
-/// `tolerance` times that and 1e-4 of the size of `from`, unless it takes more than a million questions of nearness, or
-/// 20 a triangle: then it may be higher. tolerance > 0 (checked).
-double largest_distance(const TriangleMesh& from, const SurfaceTree& to, double tolerance);
-
-/// The larger of both ways: a bound on the Hausdorff distance of two surfaces, m.
-double surface_distance(const SurfaceTree& a, const SurfaceTree& b, double tolerance);
 
 }  // namespace prescene::geometry
