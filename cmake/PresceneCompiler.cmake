@@ -16,6 +16,9 @@ add_compile_options(-ffp-contract=off)
 # exact arithmetic on float coordinates would then see coordinates that are not floats (tests/core/rounding_test.cc).
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options(-fno-tree-slp-vectorize)
+  # g++ collects its garbage again and again below half a GiB, which takes an eighth of the time of a build and changes no
+  # byte of an object.
+  add_compile_options(--param=ggc-min-heapsize=524288)
 endif()
 foreach(_flags "${CMAKE_CXX_FLAGS}" "${CMAKE_CXX_FLAGS_${CMAKE_BUILD_TYPE}}" "$ENV{CXXFLAGS}")
   if(_flags MATCHES "-ffast-math|-Ofast|-funsafe-math-optimizations|-ffp-contract=fast|-fassociative-math")
