@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/belief/validation.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "prescene/core/text.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::belief {
 namespace {
@@ -50,8 +50,7 @@ Status check_covariance(const Matrix6d& covariance) {
                          ": give variances in rad^2 and m^2");
   if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > 1e-9 * scale)
     return invalid_input("the covariance is not symmetric: give the same value on both sides of the diagonal");
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(covariance, Eigen::EigenvaluesOnly);
-  if (eigen.eigenvalues().minCoeff() < -1e-9 * scale)
+  if (geometry::symmetric_eigenvalues_6(covariance).minCoeff() < -1e-9 * scale)
     return invalid_input("the covariance has a negative eigenvalue: no distribution has it, check its correlations");
   return {};
 }

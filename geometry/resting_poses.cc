@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "mesh_edges.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::geometry {
 namespace {
@@ -175,8 +176,8 @@ core::Result<std::vector<RestingPose>> resting_poses_of_hull(TriangleMesh hull, 
   std::vector<RestingPose> poses;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (faces[f].tip_angle < 0.0) continue;
-    poses.push_back({Quaterniond::FromTwoVectors(faces[f].normal, -Vector3d::UnitZ()), faces[f].height,
-                     faces[f].tip_angle, share[f]});
+    poses.push_back(
+        {rotation_between(faces[f].normal, -Vector3d::UnitZ()), faces[f].height, faces[f].tip_angle, share[f]});
   }
   std::stable_sort(poses.begin(), poses.end(),
                    [](const RestingPose& a, const RestingPose& b) { return a.probability > b.probability; });

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "prescene/geometry/dense_solvers.h"
+
 namespace prescene::queries {
 namespace {
 
@@ -130,7 +132,7 @@ void Seating::apply(belief::WorldState& state) const {
     const Vector3d face = down_of(*best);
     const double gap = ground->normal_W.dot(p_WCm - ground->point_W) - best->height;
     if (std::acos(std::clamp(-ground->normal_W.dot(face), -1.0, 1.0)) > kMostTilt || std::abs(gap) > kMostGap) continue;
-    const geometry::Quaterniond turn = geometry::Quaterniond::FromTwoVectors(face, -ground->normal_W);
+    const geometry::Quaterniond turn = geometry::rotation_between(face, -ground->normal_W);
     object.X_WO.rotation = (turn * object.X_WO.rotation).normalized();
     object.X_WO.translation = p_WCm - gap * ground->normal_W - object.X_WO.rotation * body.p_OoOcm;
   }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::filter {
 namespace {
@@ -69,7 +70,7 @@ std::optional<belief::Support> last_floor(std::span<const Falling> falling, beli
   floor.name = "last_floor";
   while (belief::find_support(scene, floor.name)) floor.name += '_';
   floor.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{Vector3d(kSize, kSize, kThickness)}, {}});
-  floor.X_WS.rotation = geometry::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), up_W);
+  floor.X_WS.rotation = geometry::rotation_between(Vector3d::UnitZ(), up_W);
   floor.X_WS.translation = middle + up_W * (height - 0.5 * kThickness - up_W.dot(middle));
   floor.contact.friction = belief::FixedScalar{1.0};
   return floor;

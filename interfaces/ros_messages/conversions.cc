@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/interfaces/ros_messages/conversions.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <set>
 #include <utility>
 
 #include "prescene/core/check.h"
 #include "prescene/core/utf8.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -166,10 +166,10 @@ Result<std::optional<Matrix6d>> to_covariance(const RosPoseWithCovariance& pose)
   if (!covariance.allFinite()) {
     return core::invalid_input("covariance: has entries that are not finite; send all zeros when it is unknown");
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance);
-  if (solver.eigenvalues().minCoeff() < 0.0) {
-    const Matrix6d& V = solver.eigenvectors();
-    covariance = V * solver.eigenvalues().cwiseMax(0.0).asDiagonal() * V.transpose();
+  const geometry::SymmetricEigen6 eigen = geometry::symmetric_eigen_6(covariance);
+  if (eigen.values.minCoeff() < 0.0) {
+    const Matrix6d& V = eigen.vectors;
+    covariance = V * eigen.values.cwiseMax(0.0).asDiagonal() * V.transpose();
     covariance = (0.5 * (covariance + covariance.transpose())).eval();
   }
   return std::optional<Matrix6d>(covariance);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "read_values.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,6 +8,7 @@
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prescene/geometry/angles.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
@@ -134,8 +134,7 @@ Matrix6d read_covariance(const LocatedValue& value, Problems& problems) {
   if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > 1e-9 * scale) {
     problems.add(value.place, value.path, "the covariance is not symmetric",
                  "give the same value on both sides of the diagonal");
-  } else if (Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance, Eigen::EigenvaluesOnly).eigenvalues().minCoeff() <
-             -1e-9 * scale) {
+  } else if (geometry::symmetric_eigenvalues_6(covariance).minCoeff() < -1e-9 * scale) {
     problems.add(value.place, value.path, "the covariance has a negative eigenvalue, which no distribution has",
                  "make the correlations smaller");
   }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eigen's decompositions of matrices of any size, compiled once: each costs seconds in every source that instantiates
-// it.
+// Eigen's decompositions of matrices of any size or of 6 x 6, compiled once: each costs seconds in every source that
+// instantiates it.
 //
 //   const SymmetricEigen eigen = symmetric_eigen(covariance);
 //   const Eigen::MatrixXd root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 #pragma once
 
 #include <Eigen/Core>
+
+#include "prescene/geometry/pose.h"
 
 namespace prescene::geometry {
 
@@ -31,5 +33,17 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
 Eigen::MatrixXd cholesky_factor(const Eigen::MatrixXd& A);
 /// L^-1 B of a lower triangular L.
 Eigen::MatrixXd solve_lower(const Eigen::MatrixXd& L, const Eigen::MatrixXd& B);
+
+/// As symmetric_eigen and its values alone, for matrices of six degrees of freedom (SelfAdjointEigenSolver).
+struct SymmetricEigen6 {
+  Vector6d values;
+  Matrix6d vectors;
+};
+SymmetricEigen6 symmetric_eigen_6(const Matrix6d& A);
+Vector6d symmetric_eigenvalues_6(const Matrix6d& A);
+
+/// The smallest rotation that takes the direction of `from` to that of `to`, both not zero; of opposite directions one
+/// of the half turns, by a singular value decomposition (Quaterniond::FromTwoVectors).
+Quaterniond rotation_between(const Vector3d& from, const Vector3d& to);
 
 }  // namespace prescene::geometry

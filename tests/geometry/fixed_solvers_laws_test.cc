@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+#include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
+
+namespace prescene::geometry {
+namespace {
+
+Vector3d some_direction(core::RandomStream& stream) {
+  return Vector3d(stream.normal(), stream.normal(), stream.normal()).normalized();
+}
+
+TEST(RotationBetween, TakesOneDirectionToTheOtherByTheSmallestAngle) {
+  core::RandomStream stream(1, core::Purpose::kTest);
+  for (int i = 0; i < 1000; ++i) {
+    const Vector3d from = some_direction(stream), to = some_direction(stream);
+    const Quaterniond R = rotation_between(from, to);
+    // 1 + cos is divided by, and has the rounding of the cosine.
+    constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
+    EXPECT_NEAR((R * from - to).norm(), 0.0, kRounding / (1.0 + from.dot(to)));
+    EXPECT_NEAR(2.0 * std::acos(std::abs(R.w())), std::acos(from.dot(to)), 1e-7);
+    const Quaterniond half_turn = rotation_between(from, -from);
+    EXPECT_NEAR((half_turn * from + from).norm(), 0.0, 1e-7);
+  }
+}
+
+TEST(SymmetricEigen6, ValuesAndVectorsMakeTheMatrix) {
+  core::RandomStream stream(2, core::Purpose::kTest);
+  for (int i = 0; i < 100; ++i) {
+    Matrix6d A;
+    for (double& x : A.reshaped()) x = stream.normal();
+    A = (A + A.transpose()).eval();
+    const auto [values, vectors] = symmetric_eigen_6(A);
+    EXPECT_NEAR((vectors * values.asDiagonal() * vectors.transpose() - A).norm(), 0.0, 1e-12 * A.norm());
+    EXPECT_NEAR((symmetric_eigenvalues_6(A) - values).norm(), 0.0, 1e-12 * A.norm());
+    for (Eigen::Index k = 1; k < 6; ++k) EXPECT_LE(values[k - 1], values[k]);
+  }
+}
+
+}  // namespace
+}  // namespace prescene::geometry
