@@ -77,8 +77,40 @@ TEST_F(Predict, RestingStaysWhereItIsAndGrowsALittleUnsure) {
     const Particle& particle = belief.objects[0].particles[i];
     EXPECT_EQ(particle.X_WO, before.objects[0].particles[i].X_WO);
     EXPECT_EQ(particle.log_weight, before.objects[0].particles[i].log_weight);
-    EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.003 * 0.003 * 0.04, 1e-15);
+    EXPECT_NEAR(particle.covariance(3, 3), 1.1e-6 + 0.0006 * 0.0006 * 0.04, 1e-15);
     EXPECT_EQ(particle.covariance(9, 9), 1e-6);
+  }
+}
+
+TEST_F(Predict, HiddenRestingIsForgottenNoFasterThanItMayCreep) {
+  // A minute of frames in which it is not seen: only the random walk remains.
+  belief::Belief belief = hand_and_object(MotionMode::kResting, false);
+  belief.objects[0].state = belief::TrackState::kUnseen;
+  for (int i = 0; i < 1800; ++i) run(belief, belief.robot[0], 1.0 / 30.0, without_mode_changes());
+  for (const Particle& particle : belief.objects[0].particles)
+    EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.0006 * 0.0006 * 60.0, 1e-9);
+}
+
+TEST_F(Predict, AVelocityThatAgreesWithNoneSettlesAndIsNotSimulated) {
+  int simulated = 0;
+  const simulation::SimulatorFactory source = [&](const belief::Scene&, double) {
+    ++simulated;
+    return by_formula(
+        [](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) { return start; });
+  };
+  PredictOptions options = without_mode_changes();
+  options.physics_share = 1.0;
+  options.settle_probability = 1.0;
+  for (const double deviation : {0.01, 0.1}) {  // of the velocity, which is 10 cm/s
+    belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
+    for (Particle& particle : belief.objects[0].particles) {
+      particle.V_WO.linear.x() = 0.1;
+      particle.covariance.bottomRightCorner<6, 6>() = deviation * deviation * geometry::Matrix6d::Identity();
+    }
+    run(belief, belief.robot[0], 0.04, options, {}, source);
+    const MotionMode expected = deviation > 0.05 ? MotionMode::kResting : MotionMode::kMoving;
+    for (const Particle& particle : belief.objects[0].particles) EXPECT_EQ(particle.mode, expected);
+    EXPECT_EQ(simulated, 1);
   }
 }
 
@@ -172,6 +204,7 @@ TEST_F(Predict, FallsByTheSimulatorWhereThereIsOne) {
     });
   };
   belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
+  for (Particle& particle : belief.objects[0].particles) particle.V_WO.linear.x() = 0.05;
   PredictOptions options = without_mode_changes();
   options.physics_share = 0.5;
   const PredictReport report = run(belief, Pose::from_translation({0.1, 0.0, 0.45}), 0.1, options, {}, source);
@@ -394,7 +427,10 @@ TEST_F(Predict, SimulatesObjectsWithThoseThatTheyMayTouch) {
   for (std::size_t i = 0; i < 3; ++i) {
     belief.objects[i].name = scene->objects[i].name = "box_" + std::to_string(i);
     belief.objects[i].island = static_cast<int>(i);
-    for (Particle& particle : belief.objects[i].particles) particle.X_WO.translation.x() = places[i];
+    for (Particle& particle : belief.objects[i].particles) {
+      particle.X_WO.translation.x() = places[i];
+      particle.V_WO.linear.x() = 0.05;  // faster than what may be still
+    }
   }
   belief.scene = scene;
   std::vector<std::vector<std::string>> groups;
