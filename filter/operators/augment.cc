@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/filter/operators/track_state.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -112,7 +113,9 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const double reach = std::max(0.10, options.reach_speed * unseen);
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
   const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
-  if (supported_evidence(e, outline, weighting) < needed) return false;
+  // Far from where it was, what is seen has to speak for itself.
+  const double scale = far ? 1.0 : evidence_scale(expected_evidence_of(terms, target, found.X_CO, *tools.renderer));
+  if (supported_evidence(e, outline, weighting) < scale * needed) return false;
   inject(frame.X_WC * found.X_CO, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
   return true;
 }

@@ -14,6 +14,11 @@ constexpr double kExistenceRate = 0.5;        // nats; largest change of the log
 constexpr double kLeastExistenceOdds = -5.0;  // nats; log odds are kept between these
 constexpr double kMostExistenceOdds = 7.0;
 
+/// nats per pixel; a pose of which so much or more is expected has to reach the limits in full. That of opaque things
+/// in front of what is far or not known is 5.5 to 6.5.
+constexpr double kFullEvidence = 6.0;
+constexpr double kLeastScale = 0.15;  // however little is expected, some of it has to be seen
+
 void change_existence(double nats, ObjectBelief& object) {
   const double p = std::clamp(object.existence, 1e-6, 1.0 - 1e-6);
   const double odds = std::log(p / (1.0 - p)) + std::clamp(nats, -kExistenceRate, kExistenceRate);
@@ -22,6 +27,10 @@ void change_existence(double nats, ObjectBelief& object) {
 }
 
 }  // namespace
+
+double evidence_scale(double expected_evidence) {
+  return std::clamp(expected_evidence / kFullEvidence, kLeastScale, 1.0);
+}
 
 void mark_unseen(core::TimeNs stamp_ns, const TrackStateOptions& options, ObjectBelief& object) {
   ++object.frames_unseen;
@@ -40,11 +49,14 @@ void update_track(const WeightReport& report, core::TimeNs stamp_ns, const Track
     object.visible_share = report.visible_share;
     return;
   }
+  const double scale = evidence_scale(report.expected_evidence);
+  const double lost_evidence = scale * options.lost_evidence;
   object.evidence_per_pixel = report.evidence_per_pixel;
   object.visible_share = report.visible_share;
-  change_existence(report.evidence_per_pixel - options.lost_evidence, object);
-  object.frames_refuted = report.evidence_per_pixel >= options.lost_evidence ? 0 : object.frames_refuted + 1;
-  if (report.evidence_per_pixel >= options.tracked_evidence && report.visible_pixels >= options.tracked_pixels) {
+  change_existence(report.evidence_per_pixel - lost_evidence, object);
+  object.frames_refuted = report.evidence_per_pixel >= lost_evidence ? 0 : object.frames_refuted + 1;
+  if (report.evidence_per_pixel >= scale * options.tracked_evidence &&
+      report.visible_pixels >= options.tracked_pixels) {
     object.state = TrackState::kTracked;
     object.frames_unseen = 0;
     object.last_seen_ns = stamp_ns;

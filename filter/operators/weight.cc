@@ -117,7 +117,9 @@ class ParticleUpdate {
     return e;
   }
 
+  /// Of what is mostly seen through, the measured surface is the one behind, which goes on.
   double outline(const Pose& X_WO) const {
+    if (target_.material.behind > target_.material.hit) return 1.0;
     return outline_support(terms_, depth_of(target_, X_CW_ * X_WO, terms_.camera, *tools_.renderer),
                            options_.outline_step);
   }
@@ -298,6 +300,8 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
     if (report.particles[i].hidden) report.hidden_weight += std::exp(particles[i].log_weight);
   const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
   report.evidence_per_pixel = supported_evidence(heaviest.evidence, heaviest.outline, options);
+  report.expected_evidence = expected_evidence_of(
+      terms, target, X_CW * particles[static_cast<std::size_t>(report.heaviest)].X_WO, *tools.renderer);
   report.visible_pixels = heaviest.evidence.visible;
   report.visible_share =
       heaviest.evidence.in_view > 0 ? static_cast<double>(heaviest.evidence.visible) / heaviest.evidence.in_view : 0.0;

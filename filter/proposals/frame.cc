@@ -2,6 +2,7 @@
 #include "prescene/filter/proposals/frame.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace prescene::filter {
 namespace {
@@ -132,6 +133,19 @@ geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, cons
   if (!render_depth(scene, camera, Pose::identity(), renderer, &depth).ok())
     depth = geometry::DepthImage(camera.width, camera.height);
   return depth;
+}
+
+double expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
+                            rendering::Renderer& renderer) {
+  rendering::RenderScene scene;
+  scene.instances.push_back({target.mesh, X_CO, target.material});
+  rendering::RenderOptions options;
+  options.normals = true;
+  rendering::RenderedView view;
+  // As above; nothing is expected less of it then.
+  if (!renderer.render(scene, terms.camera, Pose::identity(), options, &view).ok())
+    return std::numeric_limits<double>::infinity();
+  return rendering::expected_evidence(terms, target.material, view.depth, view.normals);
 }
 
 rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,

@@ -6,6 +6,7 @@
 //   WeightReport report = weight(terms, target, X_WC, dt, options, tools, stream, object.particles);
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -58,6 +59,8 @@ struct WeightReport {
   bool all_impossible = false;  ///< No particle had a finite weight: the weights were made equal.
   /// Nats per visible pixel of the heaviest particle, worth less where the outline has no edge.
   double evidence_per_pixel = 0.0;
+  /// What the heaviest particle's pose would say on average were it right, in the same unit.
+  double expected_evidence = std::numeric_limits<double>::infinity();
   double visible_share = 0.0;  ///< Of the pixels that it covers in view.
   int visible_pixels = 0;
 };

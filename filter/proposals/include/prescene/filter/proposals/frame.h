@@ -91,6 +91,11 @@ SearchTarget target_of(const belief::ObjectBelief& object, const belief::Scene& 
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
                               rendering::Renderer& renderer);
 
+/// What the frame says on average of the object if it is there, nats per visible pixel (rendering::expected_evidence);
+/// infinite if it can't be drawn.
+double expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
+                            rendering::Renderer& renderer);
+
 using rendering::merge_nearest;
 
 /// The frame for one object: robot, neighbours (`others`, one depth image each) and those supports that stand clearly
