@@ -9,6 +9,7 @@
 #include "prescene/service/evaluate/cleargrasp.h"
 #include "prescene/service/evaluate/credible_regions.h"
 #include "prescene/service/evaluate/cube_tosses.h"
+#include "prescene/service/evaluate/finding.h"
 #include "prescene/service/evaluate/tracking_suite.h"
 #include "prescene/service/evaluate/ycb_video.h"
 #include "verb.h"
@@ -23,7 +24,7 @@ struct EvaluateOptions {
   std::string data;
   std::string split = "report";
   rendering::LikelihoodChoice likelihood;
-  int frames = CredibleRegionOptions{}.frames;
+  int frames = 0;  // 0 = as many as the figure's own default
   TrackingOptions tracking;
   std::string keep;
 };
@@ -92,6 +93,20 @@ std::string text_of(const CredibleRegionReport& report) {
   return table(rows);
 }
 
+std::string text_of(const FindingReport& report) {
+  std::vector<std::vector<std::string>> rows = {
+      {"objects", "looked for", "expected", "found", "found, %", "wrong", "wrong and sure"}};
+  for (const FindingRow& row : report.rows)
+    rows.push_back({row.group, std::to_string(row.looked_for), std::to_string(row.expected), std::to_string(row.found),
+                    fixed_text(100.0 * row.found / std::max(1, row.expected), 1), std::to_string(row.wrong),
+                    std::to_string(row.sure_wrong)});
+  return table(rows) + std::to_string(report.frames) + " frames; median ADD-S " + metres_as_mm(report.median_adds_m) +
+         " mm; mean confidence " + fixed_text(report.right_confidence, 2) + " at the right place, " +
+         fixed_text(report.wrong_confidence, 2) + " elsewhere; processor time " + fixed_text(report.cpu_s, 2) +
+         " s, at most " + fixed_text(report.most_cpu_s, 2) + " s, with five objects " +
+         fixed_text(report.cpu_s_of_five, 2) + " s\n";
+}
+
 core::Status run_tracking(const EvaluateOptions& options, VerbContext& context) {
   TrackingOptions tracking = options.tracking;
   tracking.keep = options.keep;
@@ -107,7 +122,8 @@ core::Status run_tracking(const EvaluateOptions& options, VerbContext& context) 
 
 core::Status run(const EvaluateOptions& options, VerbContext& context) {
   if (options.name == "tracking") return run_tracking(options, context);
-  if (options.name != "credible_regions" && options.data.empty())
+  const bool simulated = options.name == "credible_regions" || options.name == "finding";
+  if (!simulated && options.data.empty())
     return core::invalid_input("evaluate " + options.name + " needs recorded data: name its folder with --data");
   const std::filesystem::path folder = std::filesystem::path(options.data) / options.name;
   const core::ProgressSink progress = context.progress("evaluating " + options.name);
@@ -115,10 +131,19 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
   std::string text;
   if (options.name == "credible_regions") {
     CredibleRegionOptions regions;
-    regions.frames = options.frames;
+    if (options.frames > 0) regions.frames = options.frames;
     PRESCENE_TRY(const auto frames,
                  frame_posteriors(regions, context.options().seed, context.pool(), progress, &context.cancellation()));
     const CredibleRegionReport report = coverage(frames, regions.factors);
+    document = to_json(report);
+    text = text_of(report);
+  } else if (options.name == "finding") {
+    FindingOptions finding;
+    finding.first = context.options().seed;
+    finding.likelihood = options.likelihood;
+    if (options.frames > 0) finding.frames = options.frames;
+    PRESCENE_TRY(const FindingReport report,
+                 evaluate_finding(finding, context.pool(), progress, &context.cancellation()));
     document = to_json(report);
     text = text_of(report);
   } else if (options.name == "cleargrasp") {
@@ -150,25 +175,23 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
 
 Verb add_evaluate_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
-      "evaluate",
-      "Figures on real data, and of the likelihood's calibration on simulated frames (docs/studies/accuracy.md)");
+      "evaluate", "Figures on real data, and on simulated frames where the truth is known (docs/studies/accuracy.md)");
   auto options = std::make_shared<EvaluateOptions>();
-  verb->add_option(
-          "NAME", options->name,
-          "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
-          "the transparent material explains better than the opaque one), credible_regions (tempering, on "
-          "simulated frames: needs no data), or tracking (simulated sequences of eleven kinds, and with --data "
-          "a real cube in a robot's hand)")
+  verb->add_option("NAME", options->name,
+                   "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
+                   "the transparent material explains better than the opaque one), or, on simulated frames, which need "
+                   "no data: credible_regions (tempering), finding (objects without start poses, several supports), "
+                   "tracking (sequences of eleven kinds, and with --data a real cube in a robot's hand)")
       ->required()
-      ->check(CLI::IsMember({"cube_tosses", "ycb_video", "cleargrasp", "credible_regions", "tracking"}));
+      ->check(CLI::IsMember({"cube_tosses", "ycb_video", "cleargrasp", "credible_regions", "finding", "tracking"}));
   verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(CLI::IsMember({"calibrate", "report", "all"}))
       ->capture_default_str();
   add_likelihood_options(*verb, options->likelihood);
-  verb->add_option("--frames", options->frames, "Of credible_regions: simulated frames")
-      ->check(CLI::Range(1, 1'000'000))
-      ->capture_default_str();
+  verb->add_option("--frames", options->frames,
+                   "Of credible_regions (480) and finding (60, the first of them numbered by --seed): simulated frames")
+      ->check(CLI::Range(1, 1'000'000));
   verb->add_option("--sequences", options->tracking.sequences, "Of tracking: sequences of each kind")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
