@@ -192,7 +192,10 @@ void ParticleFilter::weigh_all(FrameStep& step, double dt) {
     WeightReport& report = step.reports[i];
     report = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
                     stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
-                    {.supports = frame.surfaces.get(), .was_unseen = object.state == TrackState::kUnseen});
+                    {.supports = frame.surfaces.get(),
+                     .was_unseen = object.state == TrackState::kUnseen,
+                     .depth = step.observation.frame.depth.get(),
+                     .camera = step.observation.frame.camera});
     if (report.all_impossible) result.degraded |= kImpossibleWeights;
     for (const ParticleWeight& particle : report.particles) result.counters.hidden_particles += particle.hidden;
     update_track(report, frame.stamp_ns, settings_.track, object);

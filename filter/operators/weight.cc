@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "prescene/filter/proposals/outline.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -83,6 +85,9 @@ class ParticleUpdate {
     Mode mode;
     mode.X_WO = geometry::box_plus(X_WO_predicted, start);
     mode.shift = start;
+    std::optional<Outline> outline;
+    if (context_.depth != nullptr && !is_see_through())
+      outline.emplace(target_, X_CW_ * mode.X_WO, context_.camera, *tools_.renderer);
     Matrix6d information = predicted.information;
     for (int step = 0; step <= options_.steps; ++step) {
       const double t = options_.steps > 1 ? std::min(1.0, static_cast<double>(step) / (options_.steps - 1)) : 1.0;
@@ -91,11 +96,18 @@ class ParticleUpdate {
       const rendering::PoseHypothesis h = hypothesis(target_, X_CW_ * mode.X_WO, pixels_);
       rendering::PoseLinearisation equations;
       tools_.search->batch().linearise(terms_, std::span(&h, 1), linearise, workspace_, std::span(&equations, 1));
-      information = predicted.information + information_share_ * information_in_world(equations.H, X_CW_.rotation);
+      Matrix6d H = information_share_ * equations.H;
+      Vector6d g = information_share_ * equations.g;
+      if (outline) {
+        const OutlineEquations edges = outline->linearise(X_CW_ * mode.X_WO, *context_.depth, terms_);
+        H += edges.H;
+        g += edges.g;
+      }
+      information = predicted.information + information_in_world(H, X_CW_.rotation);
       if (step == options_.steps) break;  // the last pass is for the information at the mode
-      Vector6d gradient = equations.g;
-      gradient.tail<3>() = X_CW_.rotation.conjugate() * equations.g.tail<3>();
-      gradient = information_share_ * gradient - predicted.information * mode.shift;
+      Vector6d gradient = g;
+      gradient.tail<3>() = X_CW_.rotation.conjugate() * g.tail<3>();
+      gradient -= predicted.information * mode.shift;
       Vector6d d = information.llt().solve(gradient);
       if (!d.allFinite()) break;
       d *= std::min(limited(d.head<3>().norm(), 0.25), limited(d.tail<3>().norm(), 0.03));
@@ -119,10 +131,12 @@ class ParticleUpdate {
 
   /// Of what is mostly seen through, the measured surface is the one behind, which goes on.
   double outline(const Pose& X_WO) const {
-    if (target_.material.behind > target_.material.hit) return 1.0;
+    if (is_see_through()) return 1.0;
     return outline_support(terms_, depth_of(target_, X_CW_ * X_WO, terms_.camera, *tools_.renderer),
                            options_.outline_step);
   }
+
+  bool is_see_through() const { return target_.material.behind > target_.material.hit; }
 
   /// What it costs to be where a support is.
   double log_overlap(const Pose& X_WO) const {

@@ -50,6 +50,9 @@ struct ParticleWeight {
 struct WeightContext {
   const SupportSurfaces* supports = nullptr;  ///< Where hidden poses cannot be; null = anywhere.
   bool was_unseen = false;                    ///< In the frame before.
+  /// The full depth image and its camera, for where the object ends in it; null = poses follow depth residuals alone.
+  const geometry::DepthImage* depth = nullptr;
+  geometry::PinholeCamera camera = {};
 };
 
 struct WeightReport {
