@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "prescene/filter/proposals/facets.h"
 #include "prescene/filter/proposals/outline.h"
 #include "prescene/geometry/sampling.h"
 
@@ -98,6 +99,7 @@ class ParticleUpdate {
       tools_.search->batch().linearise(terms_, std::span(&h, 1), linearise, workspace_, std::span(&equations, 1));
       Matrix6d H = information_share_ * equations.H;
       Vector6d g = information_share_ * equations.g;
+      without_facets(target_.facet_lever, X_CW_.rotation * mode.X_WO.rotation, target_.centre(), H, g);
       if (outline) {
         const OutlineEquations edges = outline->linearise(X_CW_ * mode.X_WO, *context_.depth, terms_);
         H += edges.H;

@@ -108,6 +108,7 @@ SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& fram
   SearchTarget target;
   target.mesh = tools.meshes->get(model.visual, model.collision, MeshDetail::kLikelihood);
   target.material = material_of(model.surface, model.color);
+  target.facet_lever = tools.meshes->facet_lever(*target.mesh);
   const auto color = std::find(frame.color_models.begin(), frame.color_models.end(), model.name);
   if (color != frame.color_models.end()) target.color_model = static_cast<int>(color - frame.color_models.begin());
   return target;

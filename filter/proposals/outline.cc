@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "prescene/filter/proposals/facets.h"
+
 namespace prescene::filter {
 namespace {
 
@@ -21,6 +23,7 @@ constexpr double kKnownTolerance = 0.012;  // m; a measurement so near to a know
 constexpr double kLogOdds = 1.1;           // nats a pixel; less than its reliability, as neighbours err together
 constexpr double kEdgeSigma = 2.0;         // pixels, error of a depth camera's edges
 constexpr double kIndependent = 10.0;      // pixels along the outline that share an error
+constexpr double kDirectionError = 0.15;   // rad, of the directions across a drawn outline
 constexpr int kFewestSeen = 2;             // pixels of either kind on a line
 
 /// A camera of which the object's sphere fills the picture.
@@ -61,10 +64,10 @@ Outline::Outline(const SearchTarget& target, const Pose& X_CO, const geometry::P
     for (int x = 1; x + 1 < picture.width; ++x) {
       if (!covered(x, y)) continue;
       if (covered(x - 1, y) && covered(x + 1, y) && covered(x, y - 1) && covered(x, y + 1)) continue;
-      // Away from what is covered, over a neighbourhood of two pixels.
+      // Away from what is covered, over a neighbourhood of three pixels.
       Vector2d outwards = Vector2d::Zero();
-      for (int dy = -2; dy <= 2; ++dy)
-        for (int dx = -2; dx <= 2; ++dx)
+      for (int dy = -3; dy <= 3; ++dy)
+        for (int dx = -3; dx <= 3; ++dx)
           if (!covered(x + dx, y + dy)) outwards += Vector2d(dx, dy);
       if (!(outwards.norm() > 0.5)) continue;
       outwards.normalize();
@@ -83,6 +86,8 @@ Outline::Outline(const SearchTarget& target, const Pose& X_CO, const geometry::P
   // Edge points follow each other at about a picture pixel.
   const double spacing = static_cast<double>(std::max<std::size_t>(1, stride)) * camera.fx / picture.fx;
   share_ = std::min(1.0, spacing / kIndependent);
+  lever_ = kDirectionError * radius;
+  p_OQ_ = target.centre();
 }
 
 OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage& depth,
@@ -170,6 +175,7 @@ OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage
     equations.g += weight * mean * row;
     ++equations.points;
   }
+  without_facets(lever_, X_CO.rotation, p_OQ_, equations.H, equations.g);
   return equations;
 }
 

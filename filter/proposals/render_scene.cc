@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "prescene/core/check.h"
+#include "prescene/filter/proposals/facets.h"
 
 namespace prescene::filter {
 namespace {
@@ -71,6 +72,13 @@ rendering::MeshHandle MeshCache::get(const belief::MeshPtr& visual,
   rendering::MeshHandle& handle = by_content_[{geometry::content_hash(mesh), MeshDetail::kDisplay}];
   if (!handle) handle = rendering::make_render_mesh(mesh);
   return handle;
+}
+
+double MeshCache::facet_lever(const rendering::RenderMesh& mesh) {
+  const std::lock_guard lock(mutex_);
+  const auto [entry, is_new] = facet_levers_.try_emplace(mesh.number.value(), 0.0);
+  if (is_new) entry->second = filter::facet_lever(mesh);
+  return entry->second;
 }
 
 rendering::SurfaceMaterial material_of(belief::SurfaceKind kind, const belief::Color& color) {

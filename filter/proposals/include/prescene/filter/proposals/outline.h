@@ -46,6 +46,8 @@ class Outline {
 
   geometry::PinholeCamera camera_;
   double share_ = 0.0;  // of a point's information: neighbouring points share errors
+  double lever_ = 0.0;  // m, error of the levers, as facet_lever()
+  Vector3d p_OQ_ = Vector3d::Zero();
   std::vector<Point> points_;
 };
 

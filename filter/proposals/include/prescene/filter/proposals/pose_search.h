@@ -27,6 +27,8 @@ struct SearchTarget {
   rendering::MeshHandle mesh;
   rendering::SurfaceMaterial material;
   int color_model = -1;  ///< Index into the frame's colour models, -1 = no colour.
+  /// m, of the mesh as facet_lever() says (facets.h).
+  double facet_lever = 0.0;
 
   /// Centre of the mesh's bounding sphere: turns are made about it, wherever the object's frame lies.
   Vector3d centre() const { return mesh->centre.cast<double>(); }

@@ -38,6 +38,9 @@ class MeshCache {
   rendering::MeshHandle get(const belief::MeshPtr& visual, const std::vector<belief::CollisionShape>& collision,
                             MeshDetail detail);
 
+  /// facet_lever() (facets.h) of a mesh that get() returned.
+  double facet_lever(const rendering::RenderMesh& mesh);
+
  private:
   struct Entry {
     belief::MeshPtr source;
@@ -47,6 +50,7 @@ class MeshCache {
   std::mutex mutex_;
   std::map<std::pair<const geometry::TriangleMesh*, MeshDetail>, Entry> by_address_;
   std::map<std::pair<std::uint64_t, MeshDetail>, rendering::MeshHandle> by_content_;
+  std::map<std::uint64_t, double> facet_levers_;  // by the mesh's unique number
 };
 
 rendering::SurfaceMaterial material_of(belief::SurfaceKind kind, const belief::Color& color);
