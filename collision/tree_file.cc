@@ -163,6 +163,10 @@ std::string readable(const std::array<char, 16>& kind) {
   return text;
 }
 
+void check_kind(std::string_view kind) {
+  PRESCENE_CHECK_MSG(!kind.empty() && kind.size() < sizeof(Header::kind), "a kind of tree has 1 to 15 characters");
+}
+
 std::array<char, 16> padded(std::string_view kind) {
   std::array<char, 16> result{};
   std::copy(kind.begin(), kind.end(), result.begin());
@@ -199,9 +203,7 @@ Status check_header(Bytes bytes, const TreeFileKey& key, const std::string& name
 
 }  // namespace
 
-TreeFileWriter::TreeFileWriter(const TreeFileKey& key) : kind_(key.kind), key_(key) {
-  PRESCENE_CHECK(!kind_.empty() && kind_.size() < sizeof(Header::kind));
-}
+TreeFileWriter::TreeFileWriter(const TreeFileKey& key) : kind_(key.kind), key_(key) { check_kind(kind_); }
 
 TreeFileWriter& TreeFileWriter::add_section(Bytes bytes, std::size_t element_size) {
   PRESCENE_CHECK(sections_.size() < kMostTreeFileSections);
@@ -256,6 +258,7 @@ Status TreeFileWriter::write(const std::filesystem::path& path) const {
 }
 
 Result<TreeFile> TreeFile::open(const std::filesystem::path& path, const TreeFileKey& key) {
+  check_kind(key.kind);
   const std::string name = path.string();
   // Opening a named pipe must not wait for its other end.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
@@ -275,6 +278,7 @@ Result<TreeFile> TreeFile::open(const std::filesystem::path& path, const TreeFil
 }
 
 Result<TreeFile> TreeFile::from_bytes(Bytes bytes, const TreeFileKey& key, std::string_view name) {
+  check_kind(key.kind);
   struct alignas(kTreeFileAlignment) Line {
     std::array<std::uint8_t, kTreeFileAlignment> bytes;
   };

@@ -178,6 +178,26 @@ TEST(TreeFile, SaysWhyAFileIsRefused) {
   EXPECT_THAT(file->section<float>(0).status().message(), HasSubstr("values of 32 bytes instead of 4"));
 }
 
+// The header has 16 bytes for the kind, the last of which is zero. A longer kind is a bug of the caller, on both sides.
+TEST(TreeFile, AbortsForAKindThatTheHeaderCannotHold) {
+  const tests::ScratchDir dir;
+  core::RandomStream random(8, core::Purpose::kTest);
+  const Content content = random_content(random, 20);
+  TreeFileKey key = kKey;
+  const std::string longest(15, 'k');
+  key.kind = longest;
+  const std::vector<std::uint8_t> bytes = content.writer(key).bytes();
+  EXPECT_EQ(refusal(bytes, key), "accepted");
+  const auto path = dir.path() / "a.tree";
+  ASSERT_TRUE(content.writer(key).write(path).ok());
+  for (const std::string& kind : {std::string(), std::string(16, 'k'), std::string(17, 'k'), std::string(4096, 'k')}) {
+    key.kind = kind;
+    EXPECT_DEATH(content.writer(key), "1 to 15 characters");
+    EXPECT_DEATH(static_cast<void>(TreeFile::from_bytes(bytes, key, "cup.tree")), "1 to 15 characters");
+    EXPECT_DEATH(static_cast<void>(TreeFile::open(path, key)), "1 to 15 characters");
+  }
+}
+
 // With the checksum made right: what a program with other ideas, or an attacker, might write.
 TEST(TreeFile, TrustsNoNumberBehindARightChecksum) {
   core::RandomStream random(5, core::Purpose::kTest);

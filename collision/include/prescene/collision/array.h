@@ -21,7 +21,7 @@ class Array {
     view_ = *kept;
     owner_ = std::move(kept);
   }
-  /// Looks at `view`, which lives as long as `owner`.
+  /// Looks at `view`, which lives as long as `owner` (not checked).
   Array(std::span<const T> view, std::shared_ptr<const void> owner) : view_(view), owner_(std::move(owner)) {}
 
   std::span<const T> span() const { return view_; }
@@ -29,6 +29,7 @@ class Array {
   std::size_t size() const { return view_.size(); }
   std::size_t bytes() const { return view_.size_bytes(); }
   bool empty() const { return view_.empty(); }
+  /// `i` < size(); not checked.
   const T& operator[](std::size_t i) const { return view_[i]; }
   auto begin() const { return view_.begin(); }
   auto end() const { return view_.end(); }

@@ -34,10 +34,10 @@ inline constexpr std::size_t kMostTreeFileSections = 62;
 
 /// What a file must agree with to be read.
 struct TreeFileKey {
-  std::string_view kind;        ///< Of tree: 1 to 15 characters.
-  std::uint32_t layout = 1;     ///< Version of the kind's sections: to be raised when their meaning changes.
-  std::uint64_t mesh_hash = 0;  ///< Mesh::content_hash.
-  std::uint64_t settings_hash = 0;
+  std::string_view kind;            ///< Of tree: 1 to 15 characters (checked).
+  std::uint32_t layout = 1;         ///< Version of the kind's sections: to be raised when their meaning changes.
+  std::uint64_t mesh_hash = 0;      ///< Mesh::content_hash.
+  std::uint64_t settings_hash = 0;  ///< Of what else the tree depends on.
 };
 
 template <class T>
@@ -48,6 +48,7 @@ class TreeFileWriter {
  public:
   explicit TreeFileWriter(const TreeFileKey& key);
 
+  /// Adds a section, at most kMostTreeFileSections (checked).
   template <TreeFileValue T>
   TreeFileWriter& add(std::span<const T> values) {
     return add_section({reinterpret_cast<const std::uint8_t*>(values.data()), values.size_bytes()}, sizeof(T));
