@@ -89,7 +89,7 @@ core::Status TfBuffer::check_acyclic(const std::string& parent, const std::strin
   for (auto edge = edges_.find(parent); edge != edges_.end(); edge = edges_.find(edge->second.parent)) {
     if (edge->second.parent == child) {
       return core::invalid_input("transform " + parent + " -> " + child +
-                                 " would close a cycle: a frame has one parent");
+                                 " would close a cycle: stop the publisher of one of its transforms");
     }
   }
   return core::ok_status();
