@@ -33,13 +33,14 @@ struct RestingOn {
   std::string support;
   friend bool operator==(const RestingOn&, const RestingOn&) = default;
 };
-/// The body axis is within `max_angle` of W's up.
+/// The body axis is within `max_angle` of W's +z, whatever gravity is.
 struct UprightWithin {
   Vector3d axis_O = Vector3d::UnitZ();
   double max_angle = 0.26;  ///< rad
   friend bool operator==(const UprightWithin&, const UprightWithin&) = default;
 };
-/// The face or axis of the body (unit vector in O) is the one of +-x, +-y, +-z that points most upwards.
+/// The face or axis of the body (unit vector in O) is the one of +-x, +-y, +-z that points most along W's +z, whatever
+/// gravity is.
 struct FaceUp {
   Vector3d axis_O = Vector3d::UnitZ();
   friend bool operator==(const FaceUp&, const FaceUp&) = default;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Triangle meshes: the one shape that everything else (hulls, trees, renderings) is made from.
+// Triangle meshes: the one shape that everything else (hulls, trees, renderings) is made from. Lengths are metres.
+// Indices of triangles must be those of vertices; only repair_mesh takes others (not checked elsewhere).
 #pragma once
 
 #include <Eigen/Core>
@@ -59,12 +60,16 @@ struct MeshTopology {
 MeshTopology mesh_topology(const TriangleMesh& mesh);
 
 using Box = Eigen::AlignedBox3d;
+/// Of all vertices, in the mesh's frame; empty (isEmpty()) without any.
 Box bounding_box(const TriangleMesh& mesh);
-/// Largest distance of a vertex from `p_MQ` (mesh frame).
+/// Largest distance of a vertex from `p_MQ` (mesh frame), m; 0 without vertices.
 double radius_about(const TriangleMesh& mesh, const Vector3d& p_MQ);
+/// m^2. Of one side: a closed surface counts once.
 double surface_area(const TriangleMesh& mesh);
 
+/// The mesh of frame M in frame N.
 TriangleMesh transformed(const TriangleMesh& mesh, const Pose& X_NM);
+/// All coordinates times `factor`; a negative one mirrors, and triangles are turned so that they stay outward.
 TriangleMesh scaled(const TriangleMesh& mesh, double factor);
 /// One mesh holding both.
 TriangleMesh joined(const TriangleMesh& a, const TriangleMesh& b);
@@ -75,14 +80,17 @@ std::vector<TriangleMesh> connected_components(const TriangleMesh& mesh);
 /// for so few triangles close, and leave edges with four triangles where they pinch the surface. max_triangles >= 4
 /// (checked).
 TriangleMesh simplified(const TriangleMesh& mesh, int max_triangles);
-/// The convex hull, outward triangles (Fails with kInvalidInput when all points lie in a plane).
+/// The convex hull in the points' frame, its triangles outward. Fails with kInvalidInput when a point is not finite or
+/// all lie in a plane.
 core::Result<TriangleMesh> convex_hull(const std::vector<Vector3d>& points);
 
-/// Uniform points on the surface from a stream of numbers; each with its triangle's normal.
+/// A point of a surface, in the mesh's frame.
 struct SurfacePoint {
-  Vector3d position;
-  Vector3d normal;
+  Vector3d position;  ///< m
+  Vector3d normal;    ///< Of its triangle, outward, of unit length.
 };
+/// `count` points, uniform over the surface; the same seed gives the same points. Aborts when count < 0 or the mesh has
+/// no triangle.
 std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, int count, std::uint64_t seed);
 
 /// Stable identity of the content, for caches.
