@@ -27,9 +27,9 @@
 namespace prescene::collision {
 
 struct SurfaceSphereOptions {
-  int count = 3000;  ///< About: of the spheres on faces, [50, 100000]. Sharp edges get others.
-  /// m; spheres of sharp edges and corners have their centres this far inside: bodies rest and tip on these edges with
-  /// an error of about 0.7 of it. 0: 0.3 % of the body's size.
+  int count = 3000;  ///< Approximate number of spheres on faces, [50, 100000]. Sharp edges and corners get more.
+  /// m, at most a tenth of the bounding box's diagonal; spheres of sharp edges and corners have their centres this far
+  /// inside: bodies rest and tip on these edges with an error of about 0.7 of it. 0: 0.3 % of that diagonal.
   double edge_fidelity = 0.0;
 
   friend bool operator==(const SurfaceSphereOptions&, const SurfaceSphereOptions&) = default;
@@ -42,10 +42,11 @@ struct SurfacePatch {
   Vector3f centre = Vector3f::Zero();
   float radius = 0.0F;
   Vector3f point = Vector3f::Zero();
-  Vector3f normal = Vector3f::Zero();  ///< Outward, of unit length.
-  Vector3f tangent = Vector3f::Zero();
-  Vector3f bitangent = Vector3f::Zero();
-  /// About the point the surface is at the height (b0 u^2 + b1 u v + b2 v^2) / 2 over its tangent plane, 1/m.
+  Vector3f normal = Vector3f::Zero();     ///< Outward, of unit length.
+  Vector3f tangent = Vector3f::Zero();    ///< Some unit vector in the tangent plane ...
+  Vector3f bitangent = Vector3f::Zero();  ///< ... and normal x tangent: with the normal a right-handed frame.
+  /// b0, b1, b2, 1/m: at p, with u = tangent . (p - point) and v = bitangent . (p - point), the surface is at the
+  /// height (b0 u^2 + b1 u v + b2 v^2) / 2 along the normal over its tangent plane.
   std::array<float, 3> bend = {};
   /// How far from the point the patch goes; 0 for spheres of edges and corners, which stand for themselves.
   float reach = 0.0F;
