@@ -8,7 +8,7 @@
 //   double log_r = model.log_ratio(m, z, absent, color_ratio);
 //   double drawn = model.sample(m, absent, stream);       // 0 = no return
 //
-// The formula of one pixel is written four times, which tests hold together. A new term goes into each, in this order:
+// The formula of one pixel is written in several places. A new term goes into each, in this order:
 // - rendering/sensor/sensor_model.cc: the definition, in double precision, with its sampler; tests/rendering compares
 //   the two.
 // - rendering/sensor/pixel_classes.cc: what of the term does not depend on the pixel's depths, in single precision.
@@ -17,6 +17,7 @@
 //   same bits.
 // - rendering/gpu/shader_pixels.cc: the same operations as a shader; tests/rendering/gpu wants the same bits
 //   where the device computes exactly.
+// - rendering/sensor/expected_evidence.cc: the parts of the mixture, for the expectation of the ratio.
 // - docs/reference/sensor_model.md: the equation, and where the term's figures come from.
 #pragma once
 
