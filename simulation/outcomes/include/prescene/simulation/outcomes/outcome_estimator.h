@@ -5,6 +5,14 @@
 // grown in steps (64, 96, 128, 192, 256, 384, ...) until every interval is narrow enough. Aligned consecutive blocks of
 // the net serve as pseudo-replicates, so that the whole net's accuracy is kept and still has an error estimate.
 //
+// The stop rule, looked at after each step of the net (the end of the loop in estimate_outcomes, outcome_estimator.cc):
+// - converged: every half width is at most `tolerance`, and at least `min_instances` were run;
+// - or `max_instances` were run;
+// - with `exact_instances`: just that many were run, whatever the intervals say;
+// - where nothing is random (OutcomeEstimate::certain): one instance of each component was run, which is converged.
+// Between two chunks of instances it also ends when `max_seconds` are over (not with `exact_instances`) or the work is
+// cancelled; what was finished until then is the estimate. EstimateStop says which of these it was.
+//
 //   StartDistribution starts = start_of(scene);
 //   std::vector<Variable> variables = variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
 //   OutcomeEstimate estimate = estimate_outcomes(simulator, starts, variables, request, stream, options, pool);
@@ -93,7 +101,7 @@ struct ClassEstimate {
   double probability = 0.0;
   double low = 0.0;  ///< Of the interval, within [0, 1].
   double high = 1.0;
-  double half_width = 0.5;  ///< What the stop rule looks at.
+  double half_width = 0.5;  ///< What the stop rule (top of this file) looks at.
   friend bool operator==(const ClassEstimate&, const ClassEstimate&) = default;
 };
 struct VariableEstimate {
@@ -134,12 +142,12 @@ struct OutcomeEstimate {
   EstimateStop stop = EstimateStop::kConverged;
 };
 
-/// Runs instances until the stop rule holds. The same arguments give the same bits for any number of threads; with a
-/// time limit or cancellation, for equal numbers of instances (rerun with exact_instances for that number). `variables`
-/// may be empty: then the first step at min_instances or above ends it. `stream` seeds the nets and what is random in
-/// the simulator's actions. Progress is told between chunks of instances, from the calling thread; its seconds_left
-/// come from the rate at which the widest interval shrinks. With a certifier, the share of audited instances that had
-/// another class times the share certified is added to every half width.
+/// Runs instances until the stop rule (top of this file) holds. The same arguments give the same bits for any number of
+/// threads; with a time limit or cancellation, for equal numbers of instances (rerun with exact_instances for that
+/// number). `variables` may be empty: then the first step at min_instances or above ends it. `stream` seeds the nets
+/// and what is random in the simulator's actions. Progress is told between chunks of instances, from the calling
+/// thread; its seconds_left come from the rate at which the widest interval shrinks. With a certifier, the share of
+/// audited instances that had another class times the share certified is added to every half width.
 OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistribution& starts,
                                   std::span<const Variable> variables, const RunRequest& request,
                                   const core::RandomStream& stream, const EstimatorOptions& options,

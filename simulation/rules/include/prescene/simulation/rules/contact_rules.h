@@ -33,7 +33,10 @@ inline SurfaceCoefficients mean_coefficients(const belief::ContactProperties& co
 inline constexpr SurfaceCoefficients kPusherSurface{0.5, 0.5, 0.0, 0.0};
 
 /// Of a pair of surfaces. Frictions and restitution are products: a smooth surface makes every pair smooth, and against
-/// a reference surface of 1 a coefficient is that of the pair. The rolling arm is the longer one.
+/// a reference surface of 1 a coefficient is that of the pair. The rolling arm is the longer one. The lockstep stepper
+/// does the same in vectors (simulation/lockstep/impulse_load-inl.h: load_row and load_motion), and certificates take
+/// the product of the smaller frictions of both bodies as a bound (simulation/outcomes/certified_motion.cc): what
+/// changes here changes there, too. tests/simulation/lockstep hold both steppers to the same laws.
 inline SurfaceCoefficients pair_of(const SurfaceCoefficients& a, const SurfaceCoefficients& b) {
   return {a.friction * b.friction, a.impact_friction * b.impact_friction, a.restitution * b.restitution,
           std::max(a.rolling_arm, b.rolling_arm)};
