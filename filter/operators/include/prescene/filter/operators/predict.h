@@ -43,7 +43,8 @@ struct PredictOptions {
   /// share. The same of an object that is not tracked: it would drift away. Range 0 to 1. Measured:
   /// docs/studies/tracking.md.
   double unseen_velocity_keep = 2e-4;
-  /// probability. For each frame and particle: resting or held becomes moving. Range 0 to 1. Chosen.
+  /// probability. For each frame and particle of a tracked object: resting or held becomes moving. Range 0 to 1.
+  /// Chosen.
   double wake_probability = 0.12;
   /// probability. For each frame and particle: what the scene says is held moves with the hand again. Range 0 to 1.
   /// Chosen.
