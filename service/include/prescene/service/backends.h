@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one place that chooses: Bullet simulates, or the lockstep stepper what it can, poses are scored by the processor
-// or a graphics card, the reference renderer draws what is recorded or answered, shapes and meshes are made once and
-// kept.
+// Chooses the stepper, who scores poses and who renders. The stepper is Bullet's or the lockstep stepper, poses are
+// scored by the processor or a graphics card, and the reference renderer draws what is recorded or answered. Collision
+// shapes and meshes are made once and kept.
 //
 //   Backends backends(pool);
 //   auto simulator = backends.make_simulator(scene);
@@ -40,7 +40,7 @@ struct StepperCounts {
 
 struct BackendSettings {
   simulation::BulletOptions bullet;
-  /// Answers of the two differ by rounding, which chaotic scenes blow up to other draws of the same probabilities.
+  /// The two differ by rounding. Chaos amplifies rounding differences, so single runs differ while probabilities agree.
   Stepper stepper = Stepper::kAutomatic;
   /// Who scores poses; the same bits whoever does.
   rendering::LikelihoodChoice likelihood;
@@ -55,15 +55,18 @@ class Backends {
   core::ThreadPool& pool() { return pool_; }
   filter::MeshCache& meshes() { return meshes_; }
 
-  /// With steps so many times as long as the settings say. Simulator::stepper() says who it is; with
-  /// Stepper::kLockstep kUnsupported names what of the scene can't be simulated in lockstep.
+  /// Its steps are `step_factor` (> 0) times as long as BackendSettings::bullet says. Simulator::stepper() says who it
+  /// is. Fails as make_bullet_simulator does: kInvalidInput for shapes without thickness and for a step out of range,
+  /// kUnsupported for a triangle surface that moves. With Stepper::kLockstep, kUnsupported names what of the scene
+  /// can't be simulated in lockstep.
   core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene,
                                                                       double step_factor = 1.0);
   /// The same as a function; the backends must outlive it.
   simulation::SimulatorFactory simulator_factory();
   StepperCounts stepper_counts() const;
+  /// Fails as rendering::make_likelihood_batch does for BackendSettings::likelihood.
   core::Result<std::unique_ptr<rendering::LikelihoodBatch>> make_likelihood();
-  /// Deterministic bits: what is recorded, replayed or answered is drawn by it.
+  /// The reference renderer, of deterministic bits: what is recorded, replayed or answered is drawn by it. Never fails.
   core::Result<std::unique_ptr<rendering::Renderer>> make_renderer();
   /// For queries that run in `pool`.
   queries::QueryContext query_context(core::ThreadPool& pool);

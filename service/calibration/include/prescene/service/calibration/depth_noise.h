@@ -52,9 +52,11 @@ class DepthNoiseEstimator {
  public:
   static constexpr int kFewestFrames = 12;
 
-  /// Keeps frames until some 130 MB are full; those after that are counted, not used. kInvalidInput when an image's
-  /// size changes or is not the camera's.
+  /// Keeps at most 200 frames and some 130 MB (but kFewestFrames of any size); later ones are ignored. Values that are
+  /// negative or not finite count as no return. Fails with kInvalidInput for a camera that makes no sense, and when an
+  /// image's size changes or is not the camera's.
   core::Status add(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera);
+  /// Whether further frames are ignored.
   bool full() const { return static_cast<int>(frames_.size()) >= most_frames_; }
 
   /// kInvalidInput for too few frames, for a recording in which something moves, and where no surface is seen well.
@@ -66,7 +68,11 @@ class DepthNoiseEstimator {
   int most_frames_ = kFewestFrames;
 };
 
-/// Of a recording (.mcap; topics as recorded, else the defaults) or a folder of images.
+/// Of a recording (.mcap) or a folder of images. Of a recording the depth images and the camera info are taken from the
+/// topics that its own settings name, or from the default ones if it has no settings. `metres_per_unit`: of the
+/// depth PNGs of a folder; not used for recordings. Fails as RecordingReader and interfaces::FrameFolder do for files
+/// that cannot be read, as DepthNoiseEstimator does, with kInvalidInput when a recording has no depth image or no
+/// camera info on its topic, and with kCancelled when asked to stop; texts begin with the path.
 core::Result<DepthNoise> depth_noise_of(const std::filesystem::path& path, double metres_per_unit,
                                         const core::ProgressSink& progress, const core::Cancellation& cancellation);
 

@@ -13,16 +13,16 @@
 namespace prescene::service {
 
 struct ImportanceOptions {
-  int rounds = 8;             ///< In which the proposal is fitted ...
-  int samples_a_round = 400;  ///< ... to so many samples each.
-  int samples = 2500;         ///< From the last proposal.
+  int rounds = 8;             ///< In which the proposal is fitted, >= 0, ...
+  int samples_a_round = 400;  ///< ... to so many samples each, > 0.
+  int samples = 2500;         ///< From the last proposal, > 0.
   double widening = 1.25;     ///< Of the fitted standard deviations, so that tails are reached.
 };
 
-/// A Gaussian-like place to start from or to draw from.
+/// Centre and covariance of the Student proposal. With its 6 degrees of freedom, draws have 1.5 times this covariance.
 struct ImportanceProposal {
   geometry::Vector6d mean = geometry::Vector6d::Zero();
-  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
+  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();  ///< Positive definite (not checked).
 };
 
 struct ImportanceSamples {
@@ -37,9 +37,12 @@ struct ImportanceSamples {
   double mass_above(double log_density) const;
 };
 
-/// Fills `log_densities[i]` of points[i].
+/// Fills `log_densities[i]` of points[i], up to one constant. -inf where the density is zero; not NaN or +inf. Called
+/// on the caller's thread, once a round with all of its points.
 using LogDensity = std::function<void(std::span<const geometry::Vector6d> points, std::span<double> log_densities)>;
 
+/// In each round at least one point must have a density above zero (not checked): weights are NaN otherwise. The same
+/// stream gives the same samples.
 ImportanceSamples sample_by_importance(const LogDensity& target, const ImportanceProposal& start,
                                        const ImportanceOptions& options, core::RandomStream& stream);
 

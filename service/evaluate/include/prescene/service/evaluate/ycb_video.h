@@ -31,31 +31,33 @@ struct YcbOptions {
 struct YcbObjectScore {
   std::string frame;
   std::string object;
-  int n = 0;  ///< Runs (disturbed) or 1 (amortised).
-  double share_adds_below_2cm = 0.0;
-  double median_adds_m = 0.0;  ///< Of runs that found a pose; infinite errors of misses count.
+  int n = 0;                          ///< Runs (disturbed) or 1 (amortised).
+  double share_adds_below_2cm = 0.0;  ///< Share of the runs, in [0, 1].
+  double median_adds_m = 0.0;         ///< Over the runs; a miss is an infinite error.
   double median_add_m = 0.0;
   bool found = false;  ///< Amortised: under its own name, ADD-S below 2 cm.
 };
 
 struct YcbSection {
-  int n = 0;
-  double share_adds_below_2cm = 0.0;
+  int n = 0;                          ///< Runs of all objects.
+  double share_adds_below_2cm = 0.0;  ///< Share of the runs, in [0, 1].
   double median_adds_m = 0.0;
   double median_add_m = 0.0;
-  double ms_per_object = 0.0;  ///< Wall time per run and object, on the given threads.
+  double ms_per_object = 0.0;  ///< Wall time per run and object, on the given threads, ms.
   std::vector<YcbObjectScore> objects;
-  int found = 0;             ///< Amortised: recall.
+  int found = 0;             ///< Amortised: objects found (YcbObjectScore::found).
   int false_detections = 0;  ///< Amortised: accepted poses that are not where the object is.
 };
 
 struct YcbAucRow {
   std::string method;
   std::string object;  ///< Or "ALL".
-  double add = 0.0;    ///< Percent.
-  double adds = 0.0;
-  double expected_add = 0.0;
-  double expected_adds = 0.0;
+  /// Area under the share of poses whose ADD is below a threshold, for thresholds from 0 to 10 cm, in percent of what
+  /// it would be if all errors were zero (stepwise_auc, pose_auc.h).
+  double add = 0.0;
+  double adds = 0.0;           ///< The same of ADD-S.
+  double expected_add = 0.0;   ///< What the published evaluator says of the same poses, in the same unit.
+  double expected_adds = 0.0;  ///< The same of ADD-S.
 };
 
 struct YcbReport {
@@ -71,7 +73,7 @@ core::Result<YcbReport> evaluate_ycb_video(const std::filesystem::path& dir, std
                                            const core::Cancellation* cancellation = nullptr,
                                            const YcbOptions& options = {});
 
-/// Its parts, for tests.
+/// Its parts, for tests; errors as above.
 core::Result<YcbSection> evaluate_disturbed(const std::filesystem::path& dir, std::uint64_t seed,
                                             core::ThreadPool& threads, const YcbOptions& options = {},
                                             const core::ProgressSink& progress = {},
