@@ -33,6 +33,21 @@ TEST(TrackState, FollowsTheEvidence) {
   EXPECT_EQ(object.frames_unseen, 0);
 }
 
+TEST(TrackState, AsksOfAPoseWhatItCanSay) {
+  // Of a transparent thing 2 nats a pixel are expected: half of the usual limits' share of that is enough.
+  belief::ObjectBelief object;
+  WeightReport report = seen(1.2);
+  report.expected_evidence = 2.0;
+  filter::update_track(report, kFrame, {}, object);
+  EXPECT_EQ(object.state, TrackState::kTracked);
+  report.expected_evidence = 6.5;
+  filter::update_track(report, 2 * kFrame, {}, object);
+  EXPECT_EQ(object.state, TrackState::kDoubtful);
+  EXPECT_EQ(filter::evidence_scale(6.5), 1.0);
+  EXPECT_GT(filter::evidence_scale(0.0), 0.0);
+  EXPECT_EQ(filter::evidence_scale(std::numeric_limits<double>::infinity()), 1.0);
+}
+
 TEST(TrackState, IsLostOnlyAfterSomeFramesOfContradiction) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;

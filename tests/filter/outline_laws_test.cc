@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/filter/proposals/outline.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <numbers>
+
+#include "filter_fixture.h"
+#include "prescene/filter/proposals/facets.h"
+#include "prescene/geometry/primitives.h"
+
+namespace prescene::filter_tests {
+namespace {
+
+class OutlineOfAThing : public ::testing::Test {
+ protected:
+  void see(const belief::ObjectModel& model, const Pose& X_WO) {
+    sequence_ = still_sequence({model}, {X_WO});
+    observation_ = sequence_.observe(30, *backends_.renderer);
+    frame_ = backends_.frame_of(sequence_.scene, observation_);
+    target_ = target_of(sequence_.scene->models[0], frame_, backends_.tools);
+    X_CO_ = frame_.X_CW * X_WO;
+  }
+
+  OutlineEquations equations_at(const Pose& X_CO) const {
+    const Outline outline(target_, X_CO, observation_.frame.camera, *backends_.renderer);
+    return outline.linearise(X_CO, *observation_.frame.depth, frame_.terms);
+  }
+
+  /// Some Gauss-Newton steps across the line of sight on the outline alone.
+  Pose followed(Pose X_CO) const {
+    for (int step = 0; step < 8; ++step) {
+      const OutlineEquations e = equations_at(X_CO);
+      const Eigen::Matrix2d H = e.H.block<2, 2>(3, 3) + 100.0 * Eigen::Matrix2d::Identity();  // a prior of 0.1 m
+      X_CO.translation.head<2>() += H.llt().solve(e.g.segment<2>(3));
+    }
+    return X_CO;
+  }
+
+  Backends backends_;
+  SimulatedSequence sequence_;
+  belief::Observation observation_;
+  FilterFrame frame_;
+  SearchTarget target_;
+  Pose X_CO_;
+};
+
+TEST_F(OutlineOfAThing, BringsBackWhatSlidAlongItsFaces) {
+  const Pose X_WO{geometry::exp_rotation({0.0, 0.0, 0.4}), {0.02, -0.03, 0.09}};
+  see(box_model("box", {0.06, 0.10, 0.18}), X_WO);
+  // Across the line of sight.
+  for (const Vector3d& shift : {Vector3d(0.010, 0.0, 0.0), Vector3d(-0.010, 0.0, 0.0), Vector3d(0.0, -0.010, 0.0)}) {
+    Pose off = X_CO_;
+    off.translation += shift;
+    const Pose back = followed(off);
+    EXPECT_LT((back.translation - X_CO_.translation).head<2>().norm(), 0.004) << shift.transpose();
+  }
+  EXPECT_GT(equations_at(X_CO_).points, 10);
+}
+
+TEST_F(OutlineOfAThing, LeavesATruePoseWhereItIs) {
+  const Pose X_WO{geometry::exp_rotation({0.0, 0.0, -0.3}), {0.0, 0.02, 0.09}};
+  see(box_model("box", {0.06, 0.10, 0.18}), X_WO);
+  const Pose stays = followed(X_CO_);
+  EXPECT_LT((stays.translation - X_CO_.translation).norm(), 0.003);
+}
+
+TEST_F(OutlineOfAThing, SaysNothingOfATurnAboutACansAxisAndMuchOfItsTilt) {
+  see(can_model("can", 0.035, 0.12), {geometry::Quaterniond::Identity(), {0.0, 0.0, 0.06}});
+  const OutlineEquations e = equations_at(X_CO_);
+  ASSERT_GT(e.points, 5);
+  EXPECT_LT(e.H(2, 2), 0.1 * std::max(e.H(0, 0), e.H(1, 1)));
+}
+
+TEST_F(OutlineOfAThing, SeesNoEdgeInAnEmptyImage) {
+  see(box_model("box", {0.06, 0.10, 0.18}), {geometry::Quaterniond::Identity(), {0.0, 0.0, 0.09}});
+  observation_.frame.depth =
+      std::make_shared<const geometry::DepthImage>(observation_.frame.camera.width, observation_.frame.camera.height);
+  const OutlineEquations e = equations_at(X_CO_);
+  EXPECT_EQ(e.points, 0);
+  EXPECT_TRUE(e.H.isZero());
+}
+
+TEST_F(OutlineOfAThing, IsEmptyBehindTheCamera) {
+  see(box_model("box", {0.06, 0.10, 0.18}), {geometry::Quaterniond::Identity(), {0.0, 0.0, 0.09}});
+  const Pose behind = Pose::from_translation({0.0, 0.0, -0.5});
+  EXPECT_TRUE(Outline(target_, behind, observation_.frame.camera, *backends_.renderer).empty());
+}
+
+TEST(FacetLever, IsThatOfTheFlatsOfARoundThing) {
+  const auto box = rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{{0.1, 0.06, 0.2}}));
+  EXPECT_EQ(facet_lever(*box), 0.0);
+  for (const int segments : {16, 32, 64}) {
+    const auto can = rendering::make_render_mesh(geometry::make_mesh(geometry::Cylinder{0.035, 0.12}, segments));
+    const double width = 2.0 * 0.035 * std::sin(std::numbers::pi / segments);
+    EXPECT_NEAR(facet_lever(*can), width / std::sqrt(12.0), 0.02 * width) << segments;
+  }
+}
+
+TEST(WithoutFacets, TakesTheSquareOfTheLeverAndNoMore) {
+  // A can of pixels on its wall, each on a facet: rows of information as depth residuals have them.
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+  const double lever = 0.002;
+  for (int i = 0; i < 4000; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 4000.0;
+    const double error =
+        lever * std::sqrt(12.0) * ((i % 100 + 0.5) / 100.0 - 0.5);  // uniform, of this root mean square
+    const Vector3d n(std::cos(angle), std::sin(angle), 0.0), along(-n.y(), n.x(), 0.0);
+    const Vector3d p = 0.035 * n + error * along + Vector3d(0.0, 0.0, 0.05 * std::sin(7.0 * angle));
+    Vector6d row;
+    row << p.cross(n), n;
+    H += row * row.transpose();
+    g += 0.001 * row;
+  }
+  Matrix6d corrected = H;
+  without_facets(lever, geometry::Quaterniond::Identity(), Vector3d::Zero(), corrected, g);
+  EXPECT_LT(corrected(2, 2), 0.02 * H(2, 2));
+  EXPECT_GT(corrected(0, 0), 0.98 * H(0, 0));
+  EXPECT_NEAR(corrected(3, 3), H(3, 3), 1e-9 * H(3, 3));
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(corrected);
+  EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-9 * eigen.eigenvalues().maxCoeff());
+}
+
+}  // namespace
+}  // namespace prescene::filter_tests
