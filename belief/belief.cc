@@ -159,7 +159,11 @@ void hash_twist(core::Hasher& hasher, const Twist& twist) {
 }
 
 void hash_motion(core::Hasher& hasher, const MotionRecord& motion) {
-  hasher.value(motion.still_frames).value(motion.moved_frames).value(motion.place_judged).value(motion.held).value(motion.episodes_unexplained);
+  hasher.value(motion.still_frames)
+      .value(motion.moved_frames)
+      .value(motion.place_judged)
+      .value(motion.held)
+      .value(motion.episodes_unexplained);
   hash_pose(hasher, motion.X_still);
   const auto hash_samples = [&](const std::vector<MotionSample>& samples) {
     for (const MotionSample& sample : samples) {

@@ -52,6 +52,12 @@ extern const rendering::ColorHistogram object_histogram, rest_histogram;
 extern const ColorLearningOptions options;
 }  // namespace learned_colors_h
 
+namespace outline_h {
+extern const geometry::PinholeCamera camera;
+extern const geometry::DepthImage depth;
+extern rendering::Renderer& renderer;
+}  // namespace outline_h
+
 namespace pose_search_h {
 extern const rendering::LikelihoodBatch& batch;
 extern const SearchOptions options;

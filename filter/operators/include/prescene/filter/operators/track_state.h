@@ -24,8 +24,8 @@ struct TrackStateOptions {
   double unseen_lost_after = 60.0;
 };
 
-/// By how much the limits of evidence are lowered for a pose that, were it right, would say so much on average (nats per
-/// visible pixel): thin things on a known surface, transparent ones. In (0, 1], 1 for everything else.
+/// By how much the limits of evidence are lowered for a pose that, were it right, would say so much on average (nats
+/// per visible pixel): thin things on a known surface, transparent ones. In (0, 1], 1 for everything else.
 double evidence_scale(double expected_evidence);
 
 /// Sets state, evidence, visible share, counters and existence of `object` from a frame's report.

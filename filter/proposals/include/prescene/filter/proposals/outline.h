@@ -3,7 +3,7 @@
 // these alone a thing slides along its own faces, and a handle says little about how a mug is turned.
 //
 //   const Outline outline(target, X_CO, camera, renderer);     // points on the body where it ends as seen from here
-//   OutlineEquations equations = outline.linearise(X_CO, depth, terms, material_sigma);
+//   OutlineEquations equations = outline.linearise(X_CO, depth, terms);
 #pragma once
 
 #include <vector>

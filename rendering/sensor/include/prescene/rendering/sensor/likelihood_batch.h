@@ -81,8 +81,8 @@ void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& kn
 void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth);
 
 /// What a frame says on average of an object that is there and seen: the expectation of log_ratio over that of the
-/// number of visible pixels, nats, over what the camera may return of it. `depth` and `normals`: the object alone, drawn
-/// in frame.camera, 0 = not covered; their size is the camera's (checked). A thin thing on a known surface and a
+/// number of visible pixels, nats, over what the camera may return of it. `depth` and `normals`: the object alone,
+/// drawn in frame.camera, 0 = not covered; their size is the camera's (checked). A thin thing on a known surface and a
 /// transparent one say less than others even at their true pose. 0 where nothing of it can be seen. The expectation is
 /// taken by quadrature: three nodes of a hit, of what is behind, and of an outlier.
 double expected_evidence(const FrameTerms& frame, const SurfaceMaterial& material, const geometry::DepthImage& depth,
