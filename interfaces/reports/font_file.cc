@@ -3,17 +3,17 @@
 
 // PRESCENE_FONT_FILE is the path of the font at build time.
 asm(".section .rodata\n"
-    "prescene_font_begin:\n"
+    "kPresceneFontBegin:\n"
     ".incbin \"" PRESCENE_FONT_FILE
     "\"\n"
-    "prescene_font_end:\n"
+    "kPresceneFontEnd:\n"
     ".byte 0\n"
     ".previous\n");
 
-extern "C" const unsigned char prescene_font_begin[], prescene_font_end[];
+extern "C" const unsigned char kPresceneFontBegin[], kPresceneFontEnd[];
 
 namespace prescene::interfaces {
 
-std::span<const unsigned char> font_file() { return {prescene_font_begin, prescene_font_end}; }
+std::span<const unsigned char> font_file() { return {kPresceneFontBegin, kPresceneFontEnd}; }
 
 }  // namespace prescene::interfaces

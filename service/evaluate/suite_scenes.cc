@@ -361,12 +361,12 @@ constexpr std::pair<const char*, Maker> kMakers[] = {
 }  // namespace
 
 const std::vector<std::string>& suite_kinds() {
-  static const std::vector<std::string> kinds = [] {
+  static const std::vector<std::string> kKinds = [] {
     std::vector<std::string> names;
     for (const auto& [name, make] : kMakers) names.emplace_back(name);
     return names;
   }();
-  return kinds;
+  return kKinds;
 }
 
 SuiteScene make_suite_scene(const std::string& kind, std::uint64_t seed) {
