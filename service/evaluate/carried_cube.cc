@@ -140,6 +140,7 @@ core::Result<TrackingFigures> track_carried_cube(const fs::path& folder, std::ui
   TrackingCounter counter(scene);
   belief::Belief belief = filter.start(scene, seed);
   double cpu_seconds = 0.0;
+  geometry::PinholeCamera camera;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (cancellation.requested()) return core::cancelled("stopped on request");
     belief::Observation observation;
@@ -147,7 +148,10 @@ core::Result<TrackingFigures> track_carried_cube(const fs::path& folder, std::ui
     PRESCENE_TRY(auto depth,
                  interfaces::read_png_depth(folder / "depth" / (frames[i].number + ".png"), kMetresPerUnit));
     PRESCENE_TRY(auto color, interfaces::read_color(folder / "color" / (frames[i].number + ".jpg")));
-    PRESCENE_TRY(observation.frame.camera, read_camera(folder / "cam_K.txt", depth.width(), depth.height()));
+    if (i == 0) {
+      PRESCENE_TRY(camera, read_camera(folder / "cam_K.txt", depth.width(), depth.height()));
+    }
+    observation.frame.camera = camera;
     observation.frame.depth = std::make_shared<const geometry::DepthImage>(std::move(depth));
     observation.frame.color = std::make_shared<const geometry::ColorImage>(std::move(color));
     observation.X_WC = Pose::identity();

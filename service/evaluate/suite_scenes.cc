@@ -131,24 +131,35 @@ constexpr const char* kGripper =
     "0.02]}, {box: [0.14, 0.05, 0.04], position: [0, 0, 0.07]}, {cylinder: {radius: 0.03, length: 0.25}, position: [0, "
     "0, 0.21]}]";
 
-/// A path through the air over the table at up to about 0.3 m/s and 50 degrees a second.
-void carry(Writer& w, const std::string& hand, Vector3d p, double begin, double duration) {
-  std::vector<std::pair<Vector3d, Vector3d>> poses = {{p, Vector3d::Zero()}};
-  std::vector<double> times = {begin};
-  Vector3d euler = Vector3d::Zero();
+/// Poses of a hand over time.
+struct Path {
+  std::vector<std::pair<Vector3d, Vector3d>> poses;  // positions, and turns as euler_deg
+  std::vector<double> times;
+};
+
+/// Lets a path go on from `p`, where it is at `begin`, through the air above it until `end`, at up to 0.3 m/s and 30
+/// degrees a second about each axis.
+void wander(Writer& w, const Vector3d& p, double begin, double end, Path& path) {
   const Vector3d home = p + Vector3d(0.0, 0.0, 0.12);
-  for (double t = begin; t < duration;) {
+  Vector3d at = p, euler = Vector3d::Zero();
+  for (double t = begin; t < end;) {
     const double step = w.between(0.5, 0.8);
     const Vector3d goal = home + Vector3d(w.between(-0.15, 0.15), w.between(-0.12, 0.12), w.between(-0.06, 0.10));
-    Vector3d move = goal - p;
+    Vector3d move = goal - at;
     move *= std::min(1.0, 0.3 * step / move.norm());
-    p += move;
+    at += move;
     for (int i = 0; i < 3; ++i) euler[i] = std::clamp(euler[i] + w.between(-30.0, 30.0) * step, -35.0, 35.0);
     t += step;
-    poses.emplace_back(p, euler);
-    times.push_back(t);
+    path.poses.emplace_back(at, euler);
+    path.times.push_back(t);
   }
-  w.hand(hand, kGripper, poses, times);
+}
+
+/// A gripper that stays at `p` until `begin` and wanders until `end`.
+void carry(Writer& w, const std::string& hand, const Vector3d& p, double begin, double end) {
+  Path path{{{p, Vector3d::Zero()}}, {begin}};
+  wander(w, p, begin, end, path);
+  w.hand(hand, kGripper, path.poses, path.times);
 }
 
 SuiteScene in_hand(Writer& w, std::uint64_t seed) {
@@ -173,7 +184,7 @@ SuiteScene behind_box(Writer& w, std::uint64_t seed) {
   return {w.text("behind_box", 3.0, true), w.text("behind_box", 3.0, true), {}, true};
 }
 
-SuiteScene drawer(Writer& w, std::uint64_t seed) {
+SuiteScene drawer(Writer& w, std::uint64_t) {
   table(w);
   w.support("cabinet",
             "parts: [{box: [0.36, 0.30, 0.02], position: [0, 0, 0.17]}, {box: [0.02, 0.30, 0.16], position: [-0.17, 0, "
@@ -189,10 +200,9 @@ SuiteScene drawer(Writer& w, std::uint64_t seed) {
   const double side = w.about(0.05, 0.15);
   w.model("block", "box: " + list({side, 1.3 * side, 0.9 * side}) +
                        ", density: 500, friction: 0.5, symmetry: cuboid, color: '#d04040'");
-  w.object("block", "block", {w.between(-0.08, 0.08), w.between(-0.10, 0.0), 0.021 + 0.45 * side + 0.0},
+  w.object("block", "block", {w.between(-0.08, 0.08), w.between(-0.10, 0.0), 0.021 + 0.45 * side},
            {0, 0, w.between(-40, 40)});
   w.camera_at({0.0, -0.02, 0.05});
-  (void)seed;
   return {w.text("drawer", 3.4, true), w.text("drawer", 3.4, true), {}, true};
 }
 
@@ -297,21 +307,10 @@ SuiteScene unknown_hand(Writer& w, std::uint64_t seed) {
   const std::string known = w.text("unknown_hand", 3.4, false);
   // It comes from above, takes the mug and carries it about.
   const Vector3d grip = p + Vector3d(0, 0, mug.height + 0.01);
-  std::vector<std::pair<Vector3d, Vector3d>> poses = {
-      {grip + Vector3d(0.3, 0.1, 0.3), Vector3d::Zero()}, {grip, Vector3d::Zero()}, {grip, Vector3d::Zero()}};
-  std::vector<double> times = {0.2, 1.0, 1.1};
-  Vector3d at = grip, euler = Vector3d::Zero();
-  for (double t = 1.1; t < 3.4;) {
-    const double step = w.between(0.5, 0.8);
-    Vector3d move = grip + Vector3d(w.between(-0.15, 0.15), w.between(-0.12, 0.12), w.between(0.06, 0.22)) - at;
-    move *= std::min(1.0, 0.3 * step / move.norm());
-    at += move;
-    for (int i = 0; i < 3; ++i) euler[i] = std::clamp(euler[i] + w.between(-30.0, 30.0) * step, -35.0, 35.0);
-    t += step;
-    poses.emplace_back(at, euler);
-    times.push_back(t);
-  }
-  w.hand("hand", kGripper, poses, times);
+  Path path{{{grip + Vector3d(0.3, 0.1, 0.3), Vector3d::Zero()}, {grip, Vector3d::Zero()}, {grip, Vector3d::Zero()}},
+            {0.2, 1.0, 1.1}};
+  wander(w, grip, 1.1, 3.4, path);
+  w.hand("hand", kGripper, path.poses, path.times);
   w.action(1.05, "grasp: {object: mug, hand: hand}");
   return {w.text("unknown_hand", 3.4, true), known, {}, false};
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/tracking_suite.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -12,7 +11,6 @@
 
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
-#include "prescene/geometry/symmetry.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/evaluate/carried_cube.h"
