@@ -62,7 +62,7 @@ endif()
 # compilation goes into headers. A file-local name is therefore used once in a library, or stands in a namespace of its
 # file. The preset dev compiles each source alone, which shows that each includes what it uses.
 option(PRESCENE_UNITY "Compile several sources as one" ON)
-set(PRESCENE_UNITY_SOURCES 12 CACHE STRING "Sources compiled as one, 0 for all of a target")
+set(PRESCENE_UNITY_SOURCES 24 CACHE STRING "Sources compiled as one, 0 for all of a target")
 
 # prescene_unity(<target>) for a target whose sources are known.
 function(prescene_unity target)
@@ -88,4 +88,26 @@ function(prescene_unity_except_simd)
       endif()
     endif()
   endforeach()
+endfunction()
+
+# The headers that most sources include are parsed once for all libraries and once, with GoogleTest's, for all tests. The
+# preset dev, which compiles each source alone, has none of it and shows that each source includes what it uses.
+# g++ gives a source the optimisation of the precompiled headers, whatever the source's own options say: sources with such
+# options (prescene_kernel_sources) do without.
+option(PRESCENE_PRECOMPILED "Parse common headers once, where several sources are compiled as one by g++" ON)
+
+# prescene_precompile(<target> <set> <library>...): `target` reads the precompiled headers of the set `libraries` or `tests`,
+# which see the outside libraries that are named.
+function(prescene_precompile target set)
+  if(NOT PRESCENE_PRECOMPILED OR NOT PRESCENE_UNITY OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    return()
+  endif()
+  set(owner prescene_precompiled_${set})
+  if(NOT TARGET ${owner})
+    prescene_find("The precompiled headers" ${ARGN})
+    # A folder of its own: they lie in one place whichever part is built.
+    add_subdirectory("${PROJECT_SOURCE_DIR}/cmake/precompiled" "${PROJECT_BINARY_DIR}/precompiled/${set}")
+  endif()
+  target_precompile_headers(${target} REUSE_FROM ${owner})
+  target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>")  # for ccache
 endfunction()

@@ -39,6 +39,8 @@ function(prescene_tests name)
   add_executable(${target} ${T_SOURCES})
   target_link_libraries(${target} PRIVATE ${T_USES} ${T_PRIVATE_LINKS} GTest::gmock GTest::gtest_main)
   prescene_unity(${target})
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 12)  # tests have many names of their own
+  prescene_precompile(${target} tests Eigen3::Eigen tl::expected GTest::gmock)
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
 
   # Discovery runs when CTest starts, so that building needs to run nothing.

@@ -44,10 +44,11 @@ std::string c_library() {
 }  // namespace
 
 std::string platform() {
-  return std::string(PRESCENE_COMPILER) + "; Bullet " PRESCENE_BULLET_VERSION + "; Eigen " +
-         std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
-         std::to_string(EIGEN_MINOR_VERSION) + "; " + c_library() + " whose elementary functions hash to " +
-         core::hash_text(elementary_functions());
+  std::string text = PRESCENE_COMPILER "; Bullet " PRESCENE_BULLET_VERSION "; Eigen ";
+  text += std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
+          std::to_string(EIGEN_MINOR_VERSION);
+  text += "; " + c_library() + " whose elementary functions hash to " + core::hash_text(elementary_functions());
+  return text;
 }
 
 }  // namespace prescene::tests
