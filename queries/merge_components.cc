@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reduction of a mixture of Gaussians on poses [Runnalls 2007].
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 #include <map>
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/queries/final_poses.h"
 
 namespace prescene::queries {
@@ -33,10 +33,10 @@ PoseComponent joined(const PoseComponent& a, const PoseComponent& b) {
 }
 
 double log_determinant(const Matrix6d& covariance) {
-  const Eigen::LLT<Matrix6d> factor(covariance);
-  PRESCENE_CHECK(factor.info() == Eigen::Success);
+  const geometry::Cholesky6 cholesky(covariance);
+  PRESCENE_CHECK(cholesky.positive_definite());
   double sum = 0.0;
-  for (Eigen::Index i = 0; i < 6; ++i) sum += std::log(factor.matrixLLT()(i, i));
+  for (Eigen::Index i = 0; i < 6; ++i) sum += std::log(cholesky.factor()(i, i));
   return 2.0 * sum;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/spheres/relative_uncertainty.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "prescene/collision/spheres/distance_probability.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::collision {
 
@@ -132,7 +132,7 @@ void RelativeUncertainty::set_growth(const UncertainPose& a, const UncertainPose
     const Matrix3d M = rotation.trace() * (1.0 + 1e-9) * Matrix3d::Identity() - rotation;
     const Vector3d v(mixed(1, 2) - mixed(2, 1), mixed(2, 0) - mixed(0, 2), mixed(0, 1) - mixed(1, 0));
     // Solved for the offset from B's origin: the components that don't matter stay there.
-    pivot_ += M.ldlt().solve(-v - M * p_AB);
+    pivot_ += geometry::solve_symmetric_3(M, -v - M * p_AB);
   }
   const Matrix3d mixed_at_pivot = mixed - geometry::cross_matrix(pivot_) * rotation;
   const Matrix3d least = covariance_at(pivot_);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/filter/operators/predict.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "falling_particles.h"
 #include "prescene/core/check.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -50,8 +50,8 @@ bool may_be_still(const Particle& particle) {
   Eigen::Matrix<double, 6, 1> twist;
   twist << particle.V_WO.angular, particle.V_WO.linear;
   const Eigen::Matrix<double, 6, 6> covariance = particle.covariance.bottomRightCorner<6, 6>();
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(covariance);
-  return llt.info() == Eigen::Success && twist.dot(llt.solve(twist)) < kTwist95;
+  const geometry::Cholesky6 cholesky(covariance);
+  return cholesky.positive_definite() && twist.dot(cholesky.solve(twist)) < kTwist95;
 }
 
 /// Starts to move: at its velocity, with room for more.

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/filter/operators/resample.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::filter {
 namespace {
@@ -14,10 +15,10 @@ using Vector12d = Eigen::Matrix<double, 12, 1>;
 
 /// Moves a copy within its Gaussian and narrows what is left, so that mean and covariance over many copies stay.
 void spread_copy(double share, core::RandomStream& stream, Particle& particle) {
-  const Eigen::SelfAdjointEigenSolver<Matrix12d> solver(particle.covariance);
+  const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(particle.covariance);
   Vector12d d = Vector12d::Zero();
   for (int i = 0; i < 12; ++i)
-    d += stream.normal() * std::sqrt(share * std::max(0.0, solver.eigenvalues()[i])) * solver.eigenvectors().col(i);
+    d += stream.normal() * std::sqrt(share * std::max(0.0, eigen.values[i])) * eigen.vectors.col(i);
   particle.X_WO = geometry::normalized(geometry::box_plus(particle.X_WO, d.head<6>()));
   particle.V_WO.angular += d.segment<3>(6);
   particle.V_WO.linear += d.tail<3>();

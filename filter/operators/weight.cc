@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/filter/operators/weight.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "prescene/filter/proposals/facets.h"
 #include "prescene/filter/proposals/outline.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -38,9 +38,9 @@ Gaussian gaussian(const Matrix6d& covariance) {
   Gaussian g;
   g.covariance = 0.5 * (covariance + covariance.transpose());
   g.covariance.diagonal().array() += kSmallestVariance;
-  const Eigen::LLT<Matrix6d> llt(g.covariance);
-  g.root = llt.matrixL();
-  g.information = llt.solve(Matrix6d::Identity());
+  const geometry::Cholesky6 cholesky(g.covariance);
+  g.root = cholesky.factor();
+  g.information = cholesky.inverse();
   g.log_determinant = 2.0 * g.root.diagonal().array().log().sum();
   return g;
 }
@@ -110,17 +110,16 @@ class ParticleUpdate {
       Vector6d gradient = g;
       gradient.tail<3>() = X_CW_.rotation.conjugate() * g.tail<3>();
       gradient -= predicted.information * mode.shift;
-      Vector6d d = information.llt().solve(gradient);
+      Vector6d d = geometry::Cholesky6(information).solve(gradient);
       if (!d.allFinite()) break;
       d *= std::min(limited(d.head<3>().norm(), 0.25), limited(d.tail<3>().norm(), 0.03));
       mode.X_WO = geometry::box_plus(mode.X_WO, d);
       mode.shift = geometry::box_minus(mode.X_WO, X_WO_predicted);
       if (d.head<3>().norm() < 1e-4 && d.tail<3>().norm() < 1e-5 && t == 1.0) break;
     }
-    const Eigen::LLT<Matrix6d> llt(information);
-    const Matrix6d root = llt.matrixL();
-    mode.covariance = llt.solve(Matrix6d::Identity());
-    mode.log_determinant = -2.0 * root.diagonal().array().log().sum();
+    const geometry::Cholesky6 cholesky(information);
+    mode.covariance = cholesky.inverse();
+    mode.log_determinant = -2.0 * cholesky.factor().diagonal().array().log().sum();
     return mode;
   }
 

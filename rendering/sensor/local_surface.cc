@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/rendering/sensor/local_surface.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "chamfer.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::rendering {
 
@@ -64,7 +64,7 @@ std::optional<LocalSurface> local_surface(const geometry::DepthImage& depth, con
     ++used;
   }
   if (used < fewest) return std::nullopt;
-  const Vector3d plane = H.ldlt().solve(g);  // depth, its change a pixel to the right, and a pixel down
+  const Vector3d plane = geometry::solve_symmetric_3(H, g);  // depth, its change a pixel to the right, and a pixel down
   if (!plane.allFinite() || std::abs(plane[0] - middle) > options.same_surface) return std::nullopt;
   const Vector3d ray = camera.unproject(x, y, 1.0);
   const Vector3d right = plane[1] * ray + plane[0] / camera.fx * Vector3d::UnitX();

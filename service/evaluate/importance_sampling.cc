@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/importance_sampling.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::service {
 namespace {
@@ -18,7 +19,7 @@ constexpr double kSmallestEffective = 20.0;  // samples that a fit may rest on
 /// covariance alone.
 class Student {
  public:
-  explicit Student(const ImportanceProposal& proposal) : mean_(proposal.mean), root_(proposal.covariance.llt()) {}
+  explicit Student(const ImportanceProposal& proposal) : mean_(proposal.mean), root_(proposal.covariance) {}
 
   Vector6d draw(core::RandomStream& stream, double* log_density) const {
     Vector6d z;
@@ -27,12 +28,12 @@ class Student {
     for (int i = 0; i < kFreedom / 2; ++i) exponentials -= std::log(stream.uniform());
     z /= std::sqrt(2.0 * exponentials / kFreedom);
     *log_density = -0.5 * (kFreedom + 6) * std::log1p(z.squaredNorm() / kFreedom);
-    return mean_ + root_.matrixL() * z;
+    return mean_ + root_.factor().triangularView<Eigen::Lower>() * z;
   }
 
  private:
   Vector6d mean_;
-  Eigen::LLT<Matrix6d> root_;
+  geometry::Cholesky6 root_;
 };
 
 /// Weights of the samples to the power `power`, and what they say of mean and covariance.

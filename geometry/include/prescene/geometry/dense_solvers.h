@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eigen's decompositions of matrices of any size or of 6 x 6, compiled once: each costs seconds in every source that
-// instantiates it.
+// Eigen's decompositions of matrices of any size and of the sizes of poses, compiled once: each costs seconds in every
+// source that instantiates it.
 //
 //   const SymmetricEigen eigen = symmetric_eigen(covariance);
 //   const Eigen::MatrixXd root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
@@ -41,6 +41,26 @@ struct SymmetricEigen6 {
 };
 SymmetricEigen6 symmetric_eigen_6(const Matrix6d& A);
 Vector6d symmetric_eigenvalues_6(const Matrix6d& A);
+
+/// A = L L^T of a symmetric matrix of six degrees of freedom, of which the lower triangle is read (LLT).
+class Cholesky6 {
+ public:
+  explicit Cholesky6(const Matrix6d& A);
+  /// False where A is not positive definite: the rest means nothing then.
+  bool positive_definite() const { return positive_definite_; }
+  /// L, zeros above its diagonal.
+  const Matrix6d& factor() const { return factor_; }
+  /// A^-1 b.
+  Vector6d solve(const Vector6d& b) const;
+  Matrix6d inverse() const;
+
+ private:
+  Matrix6d factor_;
+  bool positive_definite_;
+};
+
+/// x with A x = b for a symmetric, positive or negative semidefinite A of three rows (LDLT).
+Vector3d solve_symmetric_3(const Eigen::Matrix3d& A, const Vector3d& b);
 
 /// The smallest rotation that takes the direction of `from` to that of `to`, both not zero; of opposite directions one
 /// of the half turns, by a singular value decomposition (Quaterniond::FromTwoVectors).
