@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "benchmarks/collision_algorithms.h"
+#include "prescene/collision/batch_queries.h"
 #include "prescene/collision/distance_queries.h"
 #include "prescene/collision/dops/boxtree.h"
 #include "prescene/collision/dops/bvhlite_tree.h"

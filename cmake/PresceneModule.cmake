@@ -54,6 +54,7 @@ function(prescene_module name)
     add_library(${target} STATIC ${M_SOURCES} ${M_PRIVATE_HEADERS})
     target_link_libraries(${target} PUBLIC ${M_USES} ${M_LINKS} PRIVATE ${M_PRIVATE_USES} ${M_PRIVATE_LINKS})
     prescene_unity(${target})
+    prescene_precompile(${target} libraries Eigen3::Eigen tl::expected)
     set(scope PUBLIC)
   else()
     add_library(${target} INTERFACE)
@@ -102,13 +103,19 @@ function(prescene_module name)
   endif()
 endfunction()
 
-# For sources whose loops are worth more than -O2. Not in debug builds: with sanitizers they would take minutes each.
+# prescene_kernel_sources(<cc>... OPTIONS <option>...): sources whose loops are worth more than -O2, and options that they need
+# beside it. Not in debug builds: with sanitizers they would take minutes each.
 set(PRESCENE_KERNEL_OPTIONS "$<$<NOT:$<CONFIG:Debug>>:-O3>")
 # clang's sanitizers take up to a quarter of an hour for one of them. Fuzz targets are after what reads input; the asan
 # preset sees the kernels in every test.
 if(PRESCENE_FUZZERS)
   list(APPEND PRESCENE_KERNEL_OPTIONS -fno-sanitize=all)
 endif()
+function(prescene_kernel_sources)
+  cmake_parse_arguments(PARSE_ARGV 0 K "" "" "OPTIONS")
+  set_source_files_properties(${K_UNPARSED_ARGUMENTS} PROPERTIES SKIP_PRECOMPILE_HEADERS ON
+                              COMPILE_OPTIONS "${PRESCENE_KERNEL_OPTIONS};${K_OPTIONS}")
+endfunction()
 
 # prescene_simd_sources(<target>): its sources may be compiled once for each instruction set, through Highway. They then
 # include themselves by their name, so their folder is searched for headers. Left out are SSSE3, which is of no use beside
@@ -141,5 +148,6 @@ function(prescene_benchmark name)
   add_executable(bench_${name} ${B_SOURCES})
   target_link_libraries(bench_${name} PRIVATE ${B_USES} ${B_PRIVATE_LINKS} benchmark::benchmark)
   prescene_unity(bench_${name})
+  prescene_precompile(bench_${name} libraries Eigen3::Eigen tl::expected)
   set_target_properties(bench_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}")
 endfunction()

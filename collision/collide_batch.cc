@@ -7,7 +7,7 @@
 #include <bit>
 #include <cmath>
 
-#include "prescene/collision/triangle_queries.h"
+#include "prescene/collision/batch_queries.h"
 #include "prescene/core/check.h"
 
 #undef HWY_TARGET_INCLUDE

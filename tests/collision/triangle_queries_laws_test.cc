@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Collision queries against brute force by the exact test, and the laws that any answer obeys.
+#include "prescene/collision/batch_queries.h"
 #include "prescene/collision/triangle_queries.h"
 
 #include <gmock/gmock.h>

@@ -16,6 +16,7 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/collision/batch_queries.h"
 #include "prescene/collision/dops/boxtree.h"
 #include "prescene/collision/dops/bvhlite_tree.h"
 #include "prescene/collision/dops/dop_tree.h"

@@ -32,12 +32,6 @@ extern const Transform X_CT, X_CW;
 extern const geometry::Pose X_AB, X_WA, X_WB, X_AB_start, X_AB_end, X_WC;
 extern const Eigen::Vector3d p_CQ;
 
-namespace body_set_h {
-extern const std::shared_ptr<const TriangleTree> cup_tree;
-extern const TriangleTree hand_tree;
-extern const geometry::Pose X_WH;
-}  // namespace body_set_h
-
 namespace hierarchy_h {
 extern const std::vector<Item> items;
 }

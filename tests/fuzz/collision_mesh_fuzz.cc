@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "prescene/collision/batch_queries.h"
 #include "prescene/collision/continuous_queries.h"
 #include "prescene/collision/distance_queries.h"
 #include "prescene/collision/exact_triangles.h"

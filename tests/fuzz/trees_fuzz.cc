@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "prescene/collision/batch_queries.h"
 #include "prescene/collision/continuous_queries.h"
 #include "prescene/collision/distance_queries.h"
 #include "prescene/collision/penetration.h"

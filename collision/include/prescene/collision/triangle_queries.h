@@ -13,7 +13,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "prescene/collision/query_scratch.h"
@@ -32,12 +31,6 @@ struct TrianglePair {
 /// Whether a triangle of A and a triangle of B have a point in common. `counts`, where given, is added to.
 bool collide(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB, QueryScratch& scratch,
              QueryCounts* counts = nullptr);
-
-/// The same for many configurations: touching[i] for X_AB[i] (of one length, checked). Taken sixteen at a time in the
-/// order given: the nearer to each other these are, the more of the work they share. Within 1 % of the size and 1
-/// degree that is most of it; far apart, single queries are faster.
-void collide(const TriangleTree& a, const TriangleTree& b, std::span<const Transform> X_AB, std::span<bool> touching,
-             QueryScratch& scratch, QueryCounts* counts = nullptr);
 
 /// The first such pair that is met; which one of several is not promised.
 std::optional<TrianglePair> first_pair(const TriangleTree& a, const TriangleTree& b, const Transform& X_AB,
