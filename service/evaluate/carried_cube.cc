@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/carried_cube.h"
 
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "cells.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using geometry::Pose;
 
-constexpr double kMetresPerUnit = 0.001;
+constexpr double kMetresPerDepthUnit = 0.001;
 constexpr double kFramesPerSecond = 30.0;  // likely: the stamps are unknown
 constexpr std::size_t kMostTextBytes = 1 << 20;
 constexpr const char* kObject = "cube";
@@ -47,11 +47,6 @@ std::vector<std::string_view> cells_of(std::string_view line, char separator) {
   return cells;
 }
 
-bool parse(std::string_view text, double* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(*value);
-}
-
 core::Result<std::string> read_text(const fs::path& file) {
   PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(file, kMostTextBytes));
   return std::string(bytes.begin(), bytes.end());
@@ -67,7 +62,7 @@ core::Result<std::vector<TrueFrame>> read_truth(const fs::path& file) {
     const auto cells = cells_of(line, ',');
     double v[7];
     bool good = cells.size() >= 9 && !cells[0].empty() && cells[0].size() <= 4;
-    for (std::size_t i = 0; good && i < 7; ++i) good = parse(cells[2 + i], &v[i]);
+    for (std::size_t i = 0; good && i < 7; ++i) good = parse_cell(cells[2 + i], &v[i]);
     if (!good)
       return core::invalid_input(file.string() + ", line " + std::to_string(number) +
                                  ": expected a frame, its stamp, a translation and a quaternion");
@@ -87,7 +82,7 @@ core::Result<geometry::PinholeCamera> read_camera(const fs::path& file, int widt
     for (const std::string_view cell : cells_of(line, ' ')) {
       double value = 0.0;
       if (cell.empty() || cell == "\r") continue;
-      if (!parse(cell, &value)) return core::invalid_input(file.string() + ": expected a matrix of 3 x 3 numbers");
+      if (!parse_cell(cell, &value)) return core::invalid_input(file.string() + ": expected a matrix of 3 x 3 numbers");
       values.push_back(value);
     }
   if (values.size() != 9) return core::invalid_input(file.string() + ": expected a matrix of 3 x 3 numbers");
@@ -146,7 +141,7 @@ core::Result<TrackingFigures> track_carried_cube(const fs::path& folder, std::ui
     belief::Observation observation;
     observation.stamp_ns = core::ns_of(1.0 + static_cast<double>(i) / kFramesPerSecond);
     PRESCENE_TRY(auto depth,
-                 interfaces::read_png_depth(folder / "depth" / (frames[i].number + ".png"), kMetresPerUnit));
+                 interfaces::read_png_depth(folder / "depth" / (frames[i].number + ".png"), kMetresPerDepthUnit));
     PRESCENE_TRY(auto color, interfaces::read_color(folder / "color" / (frames[i].number + ".jpg")));
     if (i == 0) {
       PRESCENE_TRY(camera, read_camera(folder / "cam_K.txt", depth.width(), depth.height()));

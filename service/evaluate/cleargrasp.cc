@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMetresPerUnit = 1e-4;  // of the depth images
+constexpr double kClearGraspUnit = 1e-4;  // of the depth images
 
 /// The painted twin without what is not of the mask.
 geometry::DepthImage painted_objects(const ClearGraspFrame& frame) {
@@ -89,11 +89,11 @@ std::optional<rendering::FrameTerms> background(const ClearGraspFrame& frame, co
   return terms;
 }
 
-core::Result<ClearGraspFrame> read_frame(const fs::path& folder) {
+core::Result<ClearGraspFrame> read_cleargrasp_frame(const fs::path& folder) {
   ClearGraspFrame frame;
   frame.name = folder.filename().string();
-  PRESCENE_TRY(frame.transparent, interfaces::read_png_depth(folder / "depth_transparent.png", kMetresPerUnit));
-  PRESCENE_TRY(frame.painted, interfaces::read_png_depth(folder / "depth_opaque.png", kMetresPerUnit));
+  PRESCENE_TRY(frame.transparent, interfaces::read_png_depth(folder / "depth_transparent.png", kClearGraspUnit));
+  PRESCENE_TRY(frame.painted, interfaces::read_png_depth(folder / "depth_opaque.png", kClearGraspUnit));
   PRESCENE_TRY(frame.mask, interfaces::read_png_label(folder / "mask.png"));
   for (const auto& [width, height] :
        {std::pair{frame.painted.width(), frame.painted.height()}, {frame.mask.width(), frame.mask.height()}})
@@ -134,7 +134,7 @@ core::Result<std::vector<ClearGraspFrame>> read_cleargrasp_frames(const fs::path
   std::sort(folders.begin(), folders.end());
   std::vector<ClearGraspFrame> frames;
   for (const fs::path& folder : folders) {
-    PRESCENE_TRY(ClearGraspFrame frame, read_frame(folder));
+    PRESCENE_TRY(ClearGraspFrame frame, read_cleargrasp_frame(folder));
     frames.push_back(std::move(frame));
   }
   return frames;

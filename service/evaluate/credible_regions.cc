@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/credible_regions.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +9,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
 #include "prescene/service/evaluate/importance_sampling.h"
@@ -72,7 +72,7 @@ class Posterior {
       information = prior_information + share * equations.H;
       if (step == kGaussNewtonSteps) break;
       const Vector6d gradient = share * equations.g - prior_information * geometry::box_minus(X_CO, mean);
-      const Vector6d d = information.llt().solve(gradient);
+      const Vector6d d = geometry::Cholesky6(information).solve(gradient);
       X_CO = geometry::box_plus(X_CO, d);
     }
     const Vector6d off = geometry::box_minus(truth, X_CO);
@@ -128,7 +128,7 @@ void measure(const FrameTerms& terms, const Posterior& posterior, const Pose& tr
     const LogDensity log_density = posterior.log_density(prior.mean, prior.information, share);
     ImportanceProposal start;
     start.mean = prior.true_point;
-    start.covariance = (prior.information + share * equations.H).inverse();
+    start.covariance = geometry::Cholesky6(prior.information + share * equations.H).inverse();
     const ImportanceSamples samples = sample_by_importance(log_density, start, options.sampling, stream);
     double log_true = 0.0;
     log_density(std::span(&prior.true_point, 1), std::span(&log_true, 1));

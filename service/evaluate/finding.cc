@@ -18,7 +18,7 @@ namespace prescene::service {
 namespace {
 
 constexpr double kRight = 0.02;       // m of ADD-S, the usual threshold of success
-constexpr double kSure = 0.5;         // confidence
+constexpr double kSurelyFound = 0.5;  // confidence
 constexpr int kSurfacePoints = 1000;  // that ADD-S is the mean of
 constexpr double kHalfHidden = 0.75;  // visible share below which an object counts as partly hidden
 
@@ -52,7 +52,7 @@ void count(const FoundObject& object, const std::string& group, std::vector<Find
   row->expected += object.expected ? 1 : 0;
   row->found += object.expected && object.right() ? 1 : 0;
   row->wrong += wrong ? 1 : 0;
-  row->sure_wrong += wrong && object.confidence >= kSure ? 1 : 0;
+  row->sure_wrong += wrong && object.confidence >= kSurelyFound ? 1 : 0;
 }
 
 }  // namespace

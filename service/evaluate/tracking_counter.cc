@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/tracking_counter.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::service {
@@ -15,7 +15,7 @@ using geometry::Pose;
 
 constexpr double kVisibleShare = 0.5;
 constexpr double kHiddenShare = 0.1;
-constexpr double kSure = 0.99;
+constexpr double kSurelyRight = 0.99;
 constexpr double kChiSquared90 = 6.2513886;  // 3 degrees of freedom
 constexpr double kStillShift = 1e-4;         // m: a truth that moves less between two frames stands still
 constexpr double kStillTurn = 1e-3;          // rad
@@ -41,7 +41,7 @@ Difference difference(const Pose& estimate, const Pose& reference, const geometr
 bool region_holds(const ObjectSummary& object, const Pose& X_WO) {
   const Eigen::Matrix3d covariance = object.covariance.bottomRightCorner<3, 3>() + 1e-10 * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d d = X_WO.translation - object.X_WO.translation;
-  return d.dot(covariance.llt().solve(d)) <= kChiSquared90;
+  return d.dot(geometry::solve_symmetric_3(covariance, d)) <= kChiSquared90;
 }
 
 }  // namespace
@@ -69,8 +69,8 @@ TrackingFigures TrackingCounter::figures() const {
       const auto bin = std::min<std::size_t>(9, static_cast<std::size_t>(10.0 * std::max(0.0, estimate->confidence)));
       ++f.by_confidence[bin];
       f.right_by_confidence[bin] += right;
-      f.sure += estimate->confidence >= kSure;
-      f.sure_right += estimate->confidence >= kSure && right;
+      f.sure += estimate->confidence >= kSurelyRight;
+      f.sure_right += estimate->confidence >= kSurelyRight && right;
       if (!object.present) continue;
       if (object.visible_share < kHiddenShare && estimate->state != belief::TrackState::kLost) {
         ++f.hidden;

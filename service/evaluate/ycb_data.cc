@@ -2,11 +2,11 @@
 #include "prescene/service/evaluate/ycb_data.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <functional>
 #include <string_view>
 
+#include "cells.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
@@ -17,8 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using geometry::Pose;
 
-constexpr std::size_t kMaxTextBytes = std::size_t{64} << 20;
-constexpr double kMetresPerUnit = 1e-4;  // of the depth images
+constexpr std::size_t kMaxYcbTextBytes = std::size_t{64} << 20;
+constexpr double kYcbUnit = 1e-4;  // of the depth images
 
 /// Splits at any of `separators`, leaving out empty parts.
 std::vector<std::string_view> split(std::string_view text, std::string_view separators) {
@@ -32,18 +32,13 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
   return parts;
 }
 
-bool parse(std::string_view text, double* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(*value);
-}
-
 std::string place(const fs::path& file, std::size_t line) { return file.string() + ", line " + std::to_string(line); }
 
 /// Calls `row(fields)` for each line with its fields, `first` lines skipped; a false answer is an error of that line.
 core::Status for_each_line(const fs::path& file, std::string_view separators, std::size_t first,
                            const std::string& wanted,
                            const std::function<bool(const std::vector<std::string_view>&)>& row) {
-  PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(file, kMaxTextBytes));
+  PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(file, kMaxYcbTextBytes));
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   std::size_t number = 0;
   for (std::string_view line : split(text, "\n")) {
@@ -61,7 +56,7 @@ core::Result<std::vector<YcbObject>> read_true_poses(const fs::path& file) {
         if (cells.size() != 17) return false;
         Eigen::Matrix4d matrix;
         for (int i = 0; i < 16; ++i)
-          if (!parse(cells[static_cast<std::size_t>(i + 1)], &matrix(i / 4, i % 4))) return false;
+          if (!parse_cell(cells[static_cast<std::size_t>(i + 1)], &matrix(i / 4, i % 4))) return false;
         const geometry::Matrix3d R = matrix.topLeftCorner<3, 3>();
         if (!(R * R.transpose()).isIdentity(1e-3) || R.determinant() < 0.0) return false;
         objects.push_back({std::string(cells[0]), Pose::from_matrix(matrix)});
@@ -70,10 +65,10 @@ core::Result<std::vector<YcbObject>> read_true_poses(const fs::path& file) {
   return objects;
 }
 
-core::Result<YcbFrame> read_frame(const fs::path& folder) {
+core::Result<YcbFrame> read_ycb_frame(const fs::path& folder) {
   YcbFrame frame;
   frame.name = folder.filename().string();
-  PRESCENE_TRY(frame.depth, interfaces::read_png_depth(folder / "depth.png", kMetresPerUnit));
+  PRESCENE_TRY(frame.depth, interfaces::read_png_depth(folder / "depth.png", kYcbUnit));
   PRESCENE_TRY(frame.color, interfaces::read_png_color(folder / "color.png"));
   PRESCENE_TRY(frame.objects, read_true_poses(folder / "gt_poses.csv"));
   if (frame.color.width() != frame.depth.width() || frame.color.height() != frame.depth.height())
@@ -99,7 +94,7 @@ core::Result<std::vector<YcbFrame>> read_ycb_frames(const fs::path& dir) {
   std::sort(folders.begin(), folders.end());
   std::vector<YcbFrame> frames;
   for (const fs::path& folder : folders) {
-    PRESCENE_TRY(YcbFrame frame, read_frame(folder));
+    PRESCENE_TRY(YcbFrame frame, read_ycb_frame(folder));
     frames.push_back(std::move(frame));
   }
   return frames;
@@ -117,7 +112,7 @@ core::Result<std::vector<geometry::Vector3d>> read_ycb_points(const fs::path& di
     geometry::Vector3d p;
     if (cells.size() != 3) return false;
     for (int i = 0; i < 3; ++i)
-      if (!parse(cells[static_cast<std::size_t>(i)], &p[i])) return false;
+      if (!parse_cell(cells[static_cast<std::size_t>(i)], &p[i])) return false;
     points.push_back(p);
     return true;
   }));
@@ -131,7 +126,7 @@ core::Result<YcbTrack> read_ycb_track(const fs::path& file) {
     double v[7];
     if (cells.size() != 7) return false;
     for (std::size_t i = 0; i < 7; ++i)
-      if (!parse(cells[i], &v[i])) return false;
+      if (!parse_cell(cells[i], &v[i])) return false;
     if (v[4] == 0.0 && v[5] == 0.0 && v[6] == 0.0) {
       track.push_back(std::nullopt);
       return true;
@@ -165,7 +160,8 @@ core::Result<std::vector<YcbExpectedAuc>> read_expected_auc(const fs::path& dir)
                                          "method,object,poses,missing,ADD AUC,ADD-S AUC,...", [&](const auto& cells) {
                                            if (cells.size() < 6) return false;
                                            YcbExpectedAuc row{std::string(cells[0]), std::string(cells[1]), 0.0, 0.0};
-                                           if (!parse(cells[4], &row.add) || !parse(cells[5], &row.adds)) return false;
+                                           if (!parse_cell(cells[4], &row.add) || !parse_cell(cells[5], &row.adds))
+                                             return false;
                                            rows.push_back(std::move(row));
                                            return true;
                                          }));

@@ -296,7 +296,7 @@ core::Result<YcbReport> evaluate_ycb_video(const fs::path& dir, std::uint64_t se
 
 namespace {
 
-nlohmann::ordered_json number(double value) {
+nlohmann::ordered_json finite_or_null(double value) {
   return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
 }
 
@@ -304,8 +304,8 @@ nlohmann::ordered_json section_json(const YcbSection& section, bool amortised) {
   nlohmann::ordered_json json;
   json["n"] = section.n;
   json["share_adds_below_2cm"] = section.share_adds_below_2cm;
-  json["median_adds_m"] = number(section.median_adds_m);
-  json["median_add_m"] = number(section.median_add_m);
+  json["median_adds_m"] = finite_or_null(section.median_adds_m);
+  json["median_add_m"] = finite_or_null(section.median_add_m);
   json["ms_per_object"] = section.ms_per_object;
   if (amortised) {
     json["found"] = section.found;
@@ -317,8 +317,8 @@ nlohmann::ordered_json section_json(const YcbSection& section, bool amortised) {
                                {"object", object.object},
                                {"n", object.n},
                                {"share_adds_below_2cm", object.share_adds_below_2cm},
-                               {"median_adds_m", number(object.median_adds_m)},
-                               {"median_add_m", number(object.median_add_m)}});
+                               {"median_adds_m", finite_or_null(object.median_adds_m)},
+                               {"median_add_m", finite_or_null(object.median_add_m)}});
   return json;
 }
 

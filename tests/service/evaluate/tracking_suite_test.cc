@@ -128,8 +128,8 @@ TEST(TrackingSuite, TracksASequenceOfEachKindThatIsAskedFor) {
 }
 
 TEST(TrackingSuite, ACubeInAHandOfNoModelIsTrackedOrHonestlyNot) {
-  const auto data = tests::data_dir("carried_cube");
-  if (!data) GTEST_SKIP() << tests::missing_data_message(kCarriedCube);
+  const auto data = prescene::tests::data_dir("carried_cube");
+  if (!data) GTEST_SKIP() << prescene::tests::missing_data_message(kCarriedCube);
   core::ThreadPool pool(1);
   TrackingOptions options;
   options.sequences = 2;

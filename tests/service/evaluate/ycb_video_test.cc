@@ -51,7 +51,7 @@ TEST(PoseAuc, SharesAndMedians) {
 TEST(YcbData, NamesOfTracks) { EXPECT_EQ(object_of_track("0050_003_cracker_box.txt"), "003_cracker_box"); }
 
 TEST(YcbData, ReadsTracksWithMissesAndAnyScaleOfQuaternion) {
-  const tests::ScratchDir scratch;
+  const prescene::tests::ScratchDir scratch;
   const auto file = scratch.path() / "0050_x.txt";
   std::ofstream(file) << "2 0 0 0 0.1 0.2 0.3\n1 0 0 0 0 0 0\n";
   const auto track = read_ycb_track(file);
@@ -64,7 +64,7 @@ TEST(YcbData, ReadsTracksWithMissesAndAnyScaleOfQuaternion) {
 }
 
 TEST(YcbData, NamesThePlaceOfABrokenLine) {
-  const tests::ScratchDir scratch;
+  const prescene::tests::ScratchDir scratch;
   const auto file = scratch.path() / "0050_x.txt";
   for (const char* line : {"1 0 0 0 0 0\n", "1 0 0 0 0 0 x\n", "0 0 0 0 0 0 1\n", "nan 0 0 0 0 0 1\n"}) {
     std::ofstream(file) << "1 0 0 0 0 0 1\n" << line;
@@ -75,7 +75,7 @@ TEST(YcbData, NamesThePlaceOfABrokenLine) {
 }
 
 TEST(YcbVideo, SaysWhichFolderIsMissing) {
-  const tests::ScratchDir scratch;
+  const prescene::tests::ScratchDir scratch;
   core::ThreadPool threads(1);
   const auto report = evaluate_ycb_video(scratch.path(), 1, threads);
   ASSERT_FALSE(report.ok());
