@@ -107,24 +107,29 @@ void ParticleFilter::note_failed_rendering(StepResult& result) {
   result.rendering_failure = std::move(failures.first);
 }
 
-void ParticleFilter::follow_supports(const belief::Observation& observation, StepResult& result) const {
+void ParticleFilter::follow_supports(const belief::Observation& observation, StepResult& result) {
   Belief& belief = result.belief;
-  if (belief.scene->supports.empty() && settings_.initialise.add_support) {
+  const SampledDepth sampled =
+      sample_depth(*observation.frame.depth, observation.frame.camera, settings_.initialise.detection.segmentation);
+  const bool first = belief.step == 1;
+  const bool searches = first && std::any_of(belief.scene->objects.begin(), belief.scene->objects.end(),
+                                             [&](const auto& o) { return has_wide_prior(o, settings_.initialise); });
+  if (settings_.initialise.add_support && (belief.scene->supports.empty() || searches)) {
     const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
-    if (auto support = support_from_frame(observation, belief.scene->gravity_W, settings_.initialise, stream)) {
+    const std::vector<belief::Support> found =
+        supports_from_frame(sampled, observation.X_WC, *belief.scene, settings_.initialise, meshes_, stream);
+    if (!found.empty()) {
       auto scene = std::make_shared<belief::Scene>(*belief.scene);
-      scene->supports.push_back(*std::move(support));
+      scene->supports.insert(scene->supports.end(), found.begin(), found.end());
       belief.scene = std::move(scene);
     }
   }
-  const SampledDepth sampled =
-      sample_depth(*observation.frame.depth, observation.frame.camera, settings_.initialise.detection.segmentation);
   if (const auto lowest = lowest_surface(sampled, observation.X_WC, belief.scene->gravity_W))
     belief.lowest_seen = std::min(*lowest, belief.lowest_seen.value_or(*lowest));
   for (std::size_t i = 0; i < belief.scene->supports.size(); ++i) {
     auto measured = measure_support(sampled, observation.X_WC, belief.scene->supports[i], settings_.supports);
     if (!measured) continue;
-    if (measured->support == kFoundSupport) {
+    if (is_found_support(measured->support)) {
       const double gain = std::max(1.0 / static_cast<double>(belief.step), settings_.supports.least_gain);
       auto scene = std::make_shared<belief::Scene>(*belief.scene);
       correct_support(*measured, gain, scene->supports[i]);

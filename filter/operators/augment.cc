@@ -199,15 +199,14 @@ int new_objects(const FilterFrame& frame, const belief::Observation& observation
                 const core::RandomStream& stream, belief::Belief& belief) {
   const SegmentationOptions& segmentation = options.detection.segmentation;
   const SampledDepth sampled = sample_depth(*observation.frame.depth, observation.frame.camera, segmentation);
-  const auto region = region_of(sampled, frame.X_CW, belief.scene->gravity_W, segmentation, stream);
-  if (!region) return 0;
   std::vector<WantedModel> wanted;
   for (const belief::ObjectModel& model : belief.scene->models) wanted.push_back({target_of(model, frame, tools), 1});
   DetectionOptions detection = options.detection;
   detection.min_log_ratio = std::max(detection.min_log_ratio, options.new_log_ratio);
   rendering::FrameTerms terms;
   with_known_surfaces(frame.terms, known, &terms);
-  const std::vector<Detection> found = detect(terms, known, sampled, *region, wanted, detection, tools, stream);
+  const Surroundings surroundings = surroundings_in(frame, sampled, *belief.scene, wanted, segmentation, stream);
+  const std::vector<Detection> found = detect(terms, known, sampled, surroundings, wanted, detection, tools, stream);
   if (found.empty()) return 0;
   auto scene = std::make_shared<belief::Scene>(*belief.scene);
   for (const Detection& detection_found : found) {

@@ -17,7 +17,7 @@ using belief::Particle;
 constexpr int kSpreadDraws = 64;            // enough to tell a wide prior from a narrow one
 constexpr double kMissingExistence = 0.2;   // of an object that was looked for and not found
 constexpr double kBoxMargin = 0.05;         // m that a find may lie outside of where the scene says
-constexpr double kSupportThickness = 0.02;  // m, of a support that is made of the first frame's plane
+constexpr double kSupportThickness = 0.02;  // m, of a support that is made of a plane of the first frame
 
 std::vector<double> uniforms(int count, core::RandomStream& stream) {
   std::vector<double> u(static_cast<std::size_t>(count));
@@ -67,6 +67,52 @@ void place(const Pose& X_WO, core::TimeNs stamp_ns, const rendering::PoseEvidenc
   object.visible_share = evidence.visible_share();
   object.frames_unseen = 0;
   object.last_seen_ns = stamp_ns;
+}
+
+/// What up is; without gravity, the normal of the plane that most points lie on, or what the camera takes for it.
+Vector3d up_in(const SampledDepth& sampled, const Pose& X_WC, const Vector3d& gravity_W,
+               const SegmentationOptions& options, const core::RandomStream& stream) {
+  if (gravity_W.norm() > 1e-9) return -gravity_W.normalized();
+  const std::optional<SupportPlane> plane = find_support_plane(sampled, options, stream);
+  return X_WC.rotation * (plane ? plane->region.plane_C.normal : -Vector3d::UnitY());
+}
+
+/// A box under the region, its frame's z along the normal, x along a side of the smallest rectangle about the outline.
+belief::Support support_of(const rendering::SupportRegion& region, const Pose& X_WC, double thickness) {
+  const Vector3d z = X_WC.rotation * region.plane_C.normal;
+  std::vector<Vector3d> corners;
+  for (const Vector3d& p : region.outline_C) corners.push_back(X_WC * p);
+  double smallest = std::numeric_limits<double>::infinity();
+  geometry::Matrix3d R_WS = geometry::Matrix3d::Identity();
+  geometry::Box extent;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vector3d edge = corners[(i + 1) % corners.size()] - corners[i];
+    const Vector3d x = (edge - z * z.dot(edge)).normalized();
+    geometry::Matrix3d R;
+    R << x, z.cross(x), z;
+    geometry::Box box;
+    for (const Vector3d& p : corners) box.extend(Vector3d(R.transpose() * p));
+    const double area = box.sizes().x() * box.sizes().y();
+    if (area < smallest) smallest = area, R_WS = R, extent = box;
+  }
+  belief::Support support;
+  const Vector3d size(extent.sizes().x(), extent.sizes().y(), thickness);
+  support.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{size}, Pose::identity()});
+  support.X_WS.rotation = geometry::Quaterniond(R_WS).normalized();
+  support.X_WS.translation = R_WS * extent.center() - 0.5 * thickness * z;
+  return support;
+}
+
+/// The upper face of a support that was found in a frame, in C.
+rendering::SupportRegion upper_face(const belief::Support& support, const Pose& X_CW) {
+  const auto& shape = std::get<belief::PrimitiveShape>(support.collision.front());
+  const Vector3d half = 0.5 * std::get<geometry::BoxShape>(shape.primitive).size;
+  const Pose X_CS = X_CW * support.X_WS;
+  rendering::SupportRegion face;
+  face.plane_C = geometry::transformed({Vector3d::UnitZ(), -half.z()}, X_CS);
+  for (const auto& [x, y] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}})
+    face.outline_C.push_back(X_CS * Vector3d(x * half.x(), y * half.y(), half.z()));
+  return face;
 }
 
 }  // namespace
@@ -134,43 +180,44 @@ belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, st
   return belief;
 }
 
-std::optional<rendering::SupportRegion> region_of(const SampledDepth& sampled, const Pose& X_CW,
-                                                  const Vector3d& gravity_W, const SegmentationOptions& options,
-                                                  const core::RandomStream& stream) {
-  std::optional<Vector3d> up_C;
-  if (gravity_W.norm() > 1e-9) up_C = X_CW.rotation * -gravity_W.normalized();
-  const std::optional<SupportPlane> plane = find_support_plane(sampled, options, stream, up_C);
-  if (!plane) return std::nullopt;
-  return plane->region;
+Surroundings surroundings_in(const FilterFrame& frame, const SampledDepth& sampled, const belief::Scene& scene,
+                             std::span<const WantedModel> wanted, const SegmentationOptions& options,
+                             const core::RandomStream& stream) {
+  const Vector3d up_W = up_in(sampled, frame.X_WC, scene.gravity_W, options, stream);
+  const auto on_supports = pixels_on(sampled, frame.X_WC, up_W, *frame.surfaces, options);
+  const std::vector<FlatPatch> patches =
+      find_flat_patches(sampled, frame.X_CW.rotation * up_W, on_supports, least_support_area(wanted), options, stream);
+  std::vector<rendering::SupportRegion> upper_faces;
+  for (const belief::Support& support : scene.supports)
+    if (is_found_support(support.name)) upper_faces.push_back(upper_face(support, frame.X_CW));
+  return surroundings_of(sampled, frame.X_WC, up_W, *frame.surfaces, on_supports, upper_faces, patches, options);
 }
 
-std::optional<belief::Support> support_from_frame(const belief::Observation& observation, const Vector3d& gravity_W,
-                                                  const InitialiseOptions& options, const core::RandomStream& stream) {
-  const SampledDepth sampled =
-      sample_depth(*observation.frame.depth, observation.frame.camera, options.detection.segmentation);
-  const auto region = region_of(sampled, observation.X_WC.inverse(), gravity_W, options.detection.segmentation, stream);
-  if (!region || region->outline_C.size() < 3) return std::nullopt;
-  // A frame on the plane, z along its normal, x along the outline's longest edge.
-  const Vector3d z = observation.X_WC.rotation * region->plane_C.normal;
-  std::vector<Vector3d> corners;
-  for (const Vector3d& p : region->outline_C) corners.push_back(observation.X_WC * p);
-  Vector3d x = Vector3d::Zero();
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Vector3d edge = corners[(i + 1) % corners.size()] - corners[i];
-    if (edge.norm() > x.norm()) x = edge;
+std::vector<belief::Support> supports_from_frame(const SampledDepth& sampled, const Pose& X_WC,
+                                                 const belief::Scene& scene, const InitialiseOptions& options,
+                                                 MeshCache& meshes, const core::RandomStream& stream) {
+  std::vector<WantedModel> models;
+  for (const belief::ObjectModel& model : scene.models)
+    models.push_back({{meshes.get(model.visual, model.collision, MeshDetail::kLikelihood), {}, -1}, 1});
+  const SegmentationOptions& segmentation = options.detection.segmentation;
+  const Vector3d up_W = up_in(sampled, X_WC, scene.gravity_W, segmentation, stream);
+  const SupportSurfaces known(scene, meshes);
+  const auto on_supports = pixels_on(sampled, X_WC, up_W, known, segmentation);
+  std::vector<belief::Support> supports;
+  for (const FlatPatch& patch : find_flat_patches(sampled, X_WC.rotation.conjugate() * up_W, on_supports,
+                                                  least_support_area(models), segmentation, stream)) {
+    if (!patch.level || !patch.large) continue;
+    belief::Support support = support_of(patch.region, X_WC, kSupportThickness);
+    support.name = kFoundSupport;
+    const auto taken = [&](const std::string& name) {
+      return belief::find_support(scene, name).has_value() ||
+             std::any_of(supports.begin(), supports.end(), [&](const auto& other) { return other.name == name; });
+    };
+    for (int number = 2; taken(support.name); ++number)
+      support.name = std::string(kFoundSupport) + "_" + std::to_string(number);
+    supports.push_back(std::move(support));
   }
-  x = (x - z * z.dot(x)).normalized();
-  geometry::Matrix3d R_WS;
-  R_WS << x, z.cross(x), z;
-  geometry::Box extent;
-  for (const Vector3d& p : corners) extent.extend(Vector3d(R_WS.transpose() * p));
-  const Vector3d size(extent.sizes().x(), extent.sizes().y(), kSupportThickness);
-  belief::Support support;
-  support.name = kFoundSupport;
-  support.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{size}, Pose::identity()});
-  support.X_WS.rotation = geometry::Quaterniond(R_WS).normalized();
-  support.X_WS.translation = R_WS * extent.center() - 0.5 * kSupportThickness * z;
-  return support;
+  return supports;
 }
 
 FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& observation,
@@ -196,26 +243,23 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
 
   const SegmentationOptions& segmentation = options.detection.segmentation;
   const SampledDepth sampled = sample_depth(*observation.frame.depth, observation.frame.camera, segmentation);
-  const auto region = region_of(sampled, frame.X_CW, scene.gravity_W, segmentation, stream);
-  std::vector<Detection> found;
   std::vector<WantedModel> wanted;
   std::vector<int> model_of_wanted;
-  if (region) {
-    for (const std::size_t i : wide) {
-      const auto known_model = std::find(model_of_wanted.begin(), model_of_wanted.end(), scene.objects[i].model);
-      if (known_model != model_of_wanted.end()) {
-        ++wanted[static_cast<std::size_t>(known_model - model_of_wanted.begin())].count;
-        continue;
-      }
-      model_of_wanted.push_back(scene.objects[i].model);
-      wanted.push_back({target_of(scene.model_of(scene.objects[i]), frame, tools), 1});
+  for (const std::size_t i : wide) {
+    const auto known_model = std::find(model_of_wanted.begin(), model_of_wanted.end(), scene.objects[i].model);
+    if (known_model != model_of_wanted.end()) {
+      ++wanted[static_cast<std::size_t>(known_model - model_of_wanted.begin())].count;
+      continue;
     }
-    rendering::FrameTerms terms;
-    with_known_surfaces(frame.terms, known, &terms);
-    found = detect(terms, known, sampled, *region, wanted, options.detection, tools, stream);
-  } else {
-    report.no_support = true;
+    model_of_wanted.push_back(scene.objects[i].model);
+    wanted.push_back({target_of(scene.model_of(scene.objects[i]), frame, tools), 1});
   }
+  const Surroundings surroundings = surroundings_in(frame, sampled, scene, wanted, segmentation, stream);
+  report.no_support = surroundings.solid.empty() && surroundings.steps.empty();
+  rendering::FrameTerms terms;
+  with_known_surfaces(frame.terms, known, &terms);
+  const std::vector<Detection> found =
+      detect(terms, known, sampled, surroundings, wanted, options.detection, tools, stream);
   std::vector<bool> used(found.size(), false);
   for (const std::size_t i : wide) {
     ObjectBelief& object = belief.objects[i];
@@ -230,6 +274,7 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
       used[k] = true;
       ++report.found;
       place(X_WO, frame.stamp_ns, found[k].evidence, options, stream.at(1, static_cast<std::uint32_t>(i)), object);
+      object.existence *= found[k].probability;
       break;
     }
   }

@@ -17,7 +17,6 @@ namespace {
 using belief::Particle;
 using geometry::Matrix3d;
 
-constexpr double kMatch = 0.008;             // m: a measurement so near to the pose's surface is taken for it
 constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
 constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
 constexpr double kLastGate = 0.012;          // m; ... in the last steps
@@ -253,35 +252,6 @@ geometry::Matrix6d information_in_world(const Matrix6d& H_C, const geometry::Qua
 
 double supported_evidence(const rendering::PoseEvidence& evidence, double outline, const WeightOptions& options) {
   return worth(evidence.log_ratio_per_visible_pixel(), outline, options);
-}
-
-double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step) {
-  const int width = terms.camera.width, height = terms.camera.height;
-  const auto matches = [&](int x, int y) {
-    const double z = terms.depth(x, y), d = object_depth(x, y);
-    return d > 0.0 && z > 0.0 && std::abs(z - d) < std::max(kMatch, 3.0 * terms.model.hit_sigma(d, 1.0));
-  };
-  int ends = 0, goes_on = 0;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const double z = terms.depth(x, y);
-      if (z == 0.0 || matches(x, y)) continue;
-      // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side
-      // as often as not: judge by those two away.
-      double edge = 0.0;
-      int nearest = 9;
-      for (int dy = -2; dy <= 2; ++dy)
-        for (int dx = -2; dx <= 2; ++dx) {
-          if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height || !matches(x + dx, y + dy)) continue;
-          const int distance = dx * dx + dy * dy;
-          if (distance < nearest) nearest = distance, edge = terms.depth(x + dx, y + dy);
-        }
-      if (edge == 0.0 || nearest < 4 || z < edge - step) continue;
-      const double expected = terms.absent_peak(x, y);
-      const bool known = expected > 0.0 && std::abs(z - expected) < 0.5 * step;
-      (known || z > edge + step ? ends : goes_on)++;
-    }
-  return ends + goes_on == 0 ? 1.0 : static_cast<double>(ends) / (ends + goes_on);
 }
 
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,

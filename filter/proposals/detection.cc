@@ -2,42 +2,84 @@
 #include "prescene/filter/proposals/detection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
+#include <limits>
 
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
 namespace {
 
-constexpr int kKept = 3;    // best poses of a cluster and model that compete
-constexpr int kRounds = 2;  // the second looks at what the first left unexplained
-// m below the support's plane that a pose may reach: planes and meshes are off by 15 mm.
-constexpr double kMostSinking = 0.03;
+constexpr int kKept = 4;                // best poses of a cluster and model that compete
+constexpr int kRounds = 2;              // the second looks at what the first left unexplained
+constexpr double kMinOutline = 0.7;     // share of the outline at which the measured surface ends (outline_support) ...
+constexpr double kOutlineStep = 0.02;   // m; ... by at least so much
+constexpr double kMinEvidence = 4.0;    // nats per visible pixel
+constexpr double kMinVisible = 0.35;    // of the pixels that a pose shows, known things in front or not
+constexpr double kMostSinking = 0.03;   // m that a pose may reach into a support: planes and meshes are off by 15 mm
+constexpr double kMostFloating = 0.03;  // m between the lowest points and what they stand on
+constexpr double kMostOverlap = 0.1;    // share of an object that others may cut off (SupportSurfaces::overlap), ...
+constexpr double kContact = 0.012;      // m; ... each side of it so much smaller
+constexpr double kFloatingCost = 60.0;  // nats that a pose costs which stands on nothing known, ...
+constexpr double kFloatingShare = 0.7;  // ... and a share of its log ratio
+constexpr double kStandingStarts = 0.3;  // share of the starts with a side of the model's box down
+constexpr int kFloatingClusters = 3;     // clusters that are over no support and yet looked at
 // m; a measurement so little in front of a known surface, or up to twice as much behind it, is explained.
 constexpr double kExplainedDepth = 0.015;
+// Log odds of a find, see probability_right: logistic regression on simulated rooms (docs/studies/tracking.md).
+constexpr double kOddsAtFull = 1.9;         // of an object with the usual log ratio that matches as well as expected
+constexpr double kUsualLogRatio = 200.0;    // nats
+constexpr double kOddsOfSize = 1.3;         // per factor e of the log ratio
+constexpr double kOddsOfLack = 13.8;        // per share of the expected evidence that is missing
+constexpr double kLeastSupportArea = 0.05;  // m^2; a smaller flat patch may be a face of an object
+constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much larger than the largest face of an object
 // Joint refinement of what is accepted.
 constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
+constexpr double kNoiseGrowth = 0.7;    // 1/m^2: beyond 1.2 m, tolerances grow with the squared depth as noise does
+constexpr double kHitPower = 8.0;       // how much a pose's score suffers from pixels that do not match
+constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
 
 struct Proposal {
   int model = 0;
   PoseCandidate candidate;
+  double cost = 0.0;  ///< nats
+
+  /// A wrong model that explains much of a large thing badly must not go before a right one that explains little well.
+  double score() const {
+    return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kHitPower) - cost;
+  }
+  void weigh(bool stands) {
+    cost = stands ? 0.0 : kFloatingCost + kFloatingShare * std::max(0.0, candidate.evidence.log_ratio);
+  }
 };
 
-bool acceptable(const rendering::PoseEvidence& evidence, const DetectionOptions& options) {
-  return evidence.log_ratio > options.min_log_ratio && evidence.hit_share() >= options.min_hit_share;
+bool acceptable(const rendering::PoseEvidence& evidence, double cost, const DetectionOptions& options) {
+  return evidence.log_ratio - cost > options.min_log_ratio && evidence.hit_share() >= options.min_hit_share &&
+         evidence.log_ratio_per_visible_pixel() >= kMinEvidence && evidence.visible >= kMinVisible * evidence.in_view;
 }
 
-/// Whether an object at this pose can stand on the support: over it, and not sunk into it.
-bool possible(const SearchTarget& target, const Pose& X_CO, const rendering::SupportRegion& support) {
-  if (!stands_on(support, X_CO * target.centre())) return false;
-  return std::all_of(target.mesh->vertices.begin(), target.mesh->vertices.end(), [&](const auto& vertex) {
-    return support.plane_C.signed_distance(X_CO * vertex.template cast<double>()) > -kMostSinking;
+/// Whether one of the lowest points of an object at X_WO is right above a surface, or a little below.
+bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
+            std::span<const SupportSurfaces* const> surfaces) {
+  std::vector<Vector3d> points;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const auto& vertex : target.mesh->vertices) {
+    points.push_back(X_WO * vertex.cast<double>());
+    lowest = std::min(lowest, up_W.dot(points.back()));
+  }
+  return std::any_of(points.begin(), points.end(), [&](const Vector3d& p) {
+    if (up_W.dot(p) > lowest + kLowestPoints) return false;
+    return std::any_of(surfaces.begin(), surfaces.end(), [&](const SupportSurfaces* surface) {
+      return surface->crosses(p + kMostSinking * up_W, p - kMostFloating * up_W);
+    });
   });
 }
 
 /// The best poses of each wanted model in each cluster, ordered by cluster, model, rank.
 std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<const Cluster> clusters,
-                              const rendering::SupportRegion& support, std::span<const WantedModel> wanted,
+                              const Surroundings& surroundings, std::span<const WantedModel> wanted,
                               std::span<const int> left, const DetectionOptions& options, const FilterTools& tools,
                               const core::RandomStream& stream, std::uint64_t round) {
   struct Task {
@@ -45,6 +87,7 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<cons
     int model;
     std::vector<PoseCandidate> found;
   };
+  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
   std::vector<Task> tasks;
   for (const Cluster& cluster : clusters)
     for (std::size_t model = 0; model < wanted.size(); ++model)
@@ -55,16 +98,26 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<cons
     const SearchTarget& target = wanted[static_cast<std::size_t>(task.model)].target;
     core::RandomStream draws = stream;
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
-    const std::vector<Pose> starts = cluster_starts(*task.cluster, target, options.starts, mine);
+    const std::vector<Pose> starts = cluster_starts(*task.cluster, target, up_C, kStandingStarts, options.starts, mine);
     task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
-    std::erase_if(task.found, [&](const PoseCandidate& c) { return !possible(target, c.X_CO, support); });
-    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
+    std::erase_if(task.found, [&](const PoseCandidate& c) {
+      return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
+    });
+    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(std::max(1, kKept))));
   });
   std::vector<Proposal> proposals;
   for (const Task& task : tasks)
     for (const PoseCandidate& candidate : task.found)
-      if (acceptable(candidate.evidence, options)) proposals.push_back({task.model, candidate});
+      if (acceptable(candidate.evidence, 0.0, options)) proposals.push_back({task.model, candidate});
   return proposals;
+}
+
+/// The things that were found, as surfaces.
+SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC) {
+  SupportSurfaces surfaces;
+  for (const Detection& detection : found)
+    surfaces.add(*wanted[static_cast<std::size_t>(detection.model)].target.mesh, X_WC * detection.X_CO);
+  return surfaces;
 }
 
 std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,
@@ -77,19 +130,52 @@ std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, st
 }
 
 /// Accepts the strongest proposal, puts it into the frame, judges the others again, until none is acceptable.
-void accept_greedily(std::vector<Proposal> proposals, std::span<const WantedModel> wanted,
-                     const DetectionOptions& options, const FilterTools& tools, rendering::FrameTerms& terms,
-                     geometry::DepthImage& known, std::vector<int>& left, std::vector<Detection>& found) {
-  while (!proposals.empty()) {
-    const auto best = std::max_element(proposals.begin(), proposals.end(), [](const auto& a, const auto& b) {
-      return a.candidate.evidence.log_ratio < b.candidate.evidence.log_ratio;
+void accept_greedily(std::vector<Proposal> proposals, const Surroundings& surroundings,
+                     std::span<const WantedModel> wanted, const DetectionOptions& options, const FilterTools& tools,
+                     rendering::FrameTerms& terms, geometry::DepthImage& known, std::vector<int>& left,
+                     std::vector<Detection>& found) {
+  SupportSurfaces things = surfaces_of(found, wanted, surroundings.X_WC);
+  const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+  const auto weigh_standing = [&] {
+    tools.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
+      Proposal& p = proposals[i];
+      const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
+      const Pose X_WO = surroundings.X_WC * p.candidate.X_CO;
+      p.weigh(stands(target, X_WO, surroundings.up_W, ground));
     });
+    // What stands on nothing now may stand on what is found next.
+    std::erase_if(proposals, [&](const Proposal& p) { return !acceptable(p.candidate.evidence, 0.0, options); });
+  };
+  std::vector<Proposal> waiting;
+  weigh_standing();
+  while (!proposals.empty()) {
+    const auto best = std::max_element(proposals.begin(), proposals.end(),
+                                       [](const auto& a, const auto& b) { return a.score() < b.score(); });
+    if (!acceptable(best->candidate.evidence, best->cost, options)) {
+      proposals.erase(best);
+      continue;
+    }
     const auto model = static_cast<std::size_t>(best->model);
+    const SearchTarget& target = wanted[model].target;
+    const Pose X_WO = surroundings.X_WC * best->candidate.X_CO;
+    const geometry::DepthImage depth = depth_of(target, best->candidate.X_CO, terms.camera, *tools.renderer);
+    if (things.overlap(*target.mesh, X_WO, kContact) > kMostOverlap) {
+      proposals.erase(best);
+      continue;
+    }
+    if (outline_support(terms, depth, kOutlineStep) < kMinOutline) {
+      // Its surface may end where a neighbour is that is not found yet.
+      waiting.push_back(*best);
+      proposals.erase(best);
+      continue;
+    }
     found.push_back({best->model, best->candidate.X_CO, best->candidate.evidence});
     --left[model];
-    const geometry::DepthImage depth = depth_of(wanted[model].target, found.back().X_CO, terms.camera, *tools.renderer);
     merge_nearest(depth, &known);
     with_known_surfaces(terms, depth, &terms);
+    things.add(*target.mesh, X_WO);
+    std::move(waiting.begin(), waiting.end(), std::back_inserter(proposals));
+    waiting.clear();
     std::erase_if(proposals, [&](const Proposal& p) { return left[static_cast<std::size_t>(p.model)] == 0; });
     tools.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
       const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
@@ -97,7 +183,7 @@ void accept_greedily(std::vector<Proposal> proposals, std::span<const WantedMode
       const auto h = hypothesis(wanted[static_cast<std::size_t>(p.model)].target, p.candidate.X_CO);
       tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&p.candidate.evidence, 1));
     });
-    std::erase_if(proposals, [&](const Proposal& p) { return !acceptable(p.candidate.evidence, options); });
+    weigh_standing();
   }
 }
 
@@ -123,13 +209,48 @@ void settle(const rendering::FrameTerms& terms, std::span<const WantedModel> wan
     if (better) found[i].X_CO = refined.front().X_CO;
     found[i].evidence = better ? refined.front().evidence : before;
     depths[i] = depth_of(target, found[i].X_CO, terms.camera, *tools.renderer);
+    found[i].outline = outline_support(mine, depths[i], kOutlineStep);
+  }
+}
+
+/// Gives each find the probability that it is right.
+void judge(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const FilterTools& tools,
+           std::vector<Detection>& found) {
+  const std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    rendering::FrameTerms mine = terms;
+    for (std::size_t j = 0; j < found.size(); ++j)
+      if (j != i) with_known_surfaces(mine, depths[j], &mine);
+    const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
+    found[i].probability =
+        probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer));
+  }
+}
+
+/// Takes back what is no longer acceptable now that the others are where they are.
+void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const DetectionOptions& options,
+               std::vector<int>& left, std::vector<Detection>& found) {
+  for (std::size_t i = found.size(); i-- > 0;) {
+    std::vector<Detection> others = found;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const SupportSurfaces things = surfaces_of(others, wanted, surroundings.X_WC);
+    const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+    Detection& detection = found[i];
+    const auto model = static_cast<std::size_t>(detection.model);
+    const Pose X_WO = surroundings.X_WC * detection.X_CO;
+    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground);
+    Proposal proposal{detection.model, {detection.X_CO, detection.evidence}};
+    proposal.weigh(detection.stands);
+    if (acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kMinOutline) continue;
+    ++left[model];
+    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
 
 }  // namespace
 
-std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& target, int count,
-                                 const core::RandomStream& stream) {
+std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& target, const Vector3d& up_C,
+                                 double standing_share, int count, const core::RandomStream& stream) {
   core::RandomStream draws = stream;
   std::vector<Pose> starts;
   for (int i = 0; i < count; ++i) {
@@ -139,6 +260,15 @@ std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& tar
         seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
     Pose X_CO;
     X_CO.rotation = geometry::uniform_rotation(draws);
+    if (draws.uniform() < standing_share) {
+      // Turned by the least angle that brings the axis nearest to up there: which axis, and the turn about up, stay
+      // uniform.
+      const geometry::Matrix3d R = X_CO.rotation.toRotationMatrix();
+      Eigen::Index axis = 0;
+      (R.transpose() * up_C).cwiseAbs().maxCoeff(&axis);
+      const Vector3d nearest = R.col(axis) * (R.col(axis).dot(up_C) < 0.0 ? -1.0 : 1.0);
+      X_CO.rotation = (geometry::Quaterniond::FromTwoVectors(nearest, up_C) * X_CO.rotation).normalized();
+    }
     X_CO.translation = centre - X_CO.rotation * target.centre();
     starts.push_back(X_CO);
   }
@@ -156,21 +286,65 @@ geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, cons
       const Eigen::Vector2d pixel =
           camera.project(sampled.points_C[static_cast<std::size_t>(y * explained.width() + x)]);
       const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+      const double near = tolerance * std::max(1.0, kNoiseGrowth * z * z);
       // The neighbours' surfaces count too: outlines are no sharper than a reduced pixel.
       for (int dv = -1; dv <= 1; ++dv)
         for (int du = -1; du <= 1; ++du) {
           if (u + du < 0 || v + dv < 0 || u + du >= known.width() || v + dv >= known.height()) continue;
           const float surface = known(u + du, v + dv);
-          if (surface > 0.0f && z > surface - tolerance && z < surface + 2.0 * tolerance) explained(x, y) = 1;
+          if (surface > 0.0f && z > surface - near && z < surface + 2.0 * near) explained(x, y) = 1;
         }
     }
   return explained;
 }
 
-std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry::DepthImage& known,
-                              const SampledDepth& sampled, const rendering::SupportRegion& support,
+namespace {
+
+/// Walls and sides of supports as they are measured: they are no evidence of an object.
+geometry::DepthImage walls_in(const rendering::FrameTerms& terms, const SampledDepth& sampled,
+                              const Surroundings& surroundings) {
+  geometry::DepthImage walls(terms.camera.width, terms.camera.height);
+  for (int y = 0; y < walls.height(); ++y)
+    for (int x = 0; x < walls.width(); ++x) {
+      if (!(terms.depth(x, y) > 0.0f)) continue;
+      const Eigen::Vector2d pixel = sampled.camera.project(terms.camera.unproject(x, y, 1.0));
+      const int u = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, sampled.camera.width - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, sampled.camera.height - 1);
+      if (surroundings.background(u, v) == kWall) walls(x, y) = terms.depth(x, y);
+    }
+  return walls;
+}
+
+}  // namespace
+
+double probability_right(const rendering::PoseEvidence& evidence, double expected_evidence) {
+  if (!(evidence.log_ratio > 0.0) || !(expected_evidence > 0.0)) return 0.0;
+  // Infinite: what to expect is not known.
+  const double share =
+      std::isfinite(expected_evidence) ? evidence.log_ratio_per_visible_pixel() / expected_evidence : 1.0;
+  const double log_odds = kOddsAtFull + kOddsOfSize * std::log(evidence.log_ratio / kUsualLogRatio) -
+                          kOddsOfLack * std::max(0.0, 1.0 - share);
+  return 1.0 / (1.0 + std::exp(-log_odds));
+}
+
+double least_support_area(std::span<const WantedModel> wanted) {
+  double largest = 0.0;
+  for (const WantedModel& model : wanted) {
+    geometry::Box box;
+    for (const auto& vertex : model.target.mesh->vertices) box.extend(vertex.cast<double>());
+    if (box.isEmpty()) continue;
+    const Vector3d size = box.sizes();
+    largest = std::max(largest, size.prod() / std::max(size.minCoeff(), 1e-6));
+  }
+  return std::max(kLeastSupportArea, kFacesOfASupport * largest);
+}
+
+std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const geometry::DepthImage& known,
+                              const SampledDepth& sampled, const Surroundings& surroundings,
                               std::span<const WantedModel> wanted, const DetectionOptions& options,
                               const FilterTools& tools, const core::RandomStream& stream) {
+  rendering::FrameTerms terms;
+  with_known_surfaces(frame_terms, walls_in(frame_terms, sampled, surroundings), &terms);
   std::vector<int> left;
   for (const WantedModel& model : wanted) left.push_back(model.count);
   rendering::FrameTerms explained_terms = terms;
@@ -178,15 +352,27 @@ std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry
       known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
   std::vector<Detection> found;
   for (int round = 0; round < kRounds; ++round) {
-    const auto mask = explained_pixels(sampled, explained_depth, terms.camera, kExplainedDepth);
-    std::vector<Cluster> clusters = find_clusters(sampled, support, mask, options.segmentation);
+    auto mask = explained_pixels(sampled, explained_depth, terms.camera, kExplainedDepth);
+    for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] |= surroundings.background.data()[i];
+    // What is over the main support first, then over others; of the rest only some.
+    std::vector<Cluster> clusters;
+    for (const int where : {kMainSupport, kOtherSupport, kNoSupport}) {
+      auto rest = mask;
+      for (std::size_t i = 0; i < mask.size(); ++i)
+        if (surroundings.over_support.data()[i] != where) rest.data()[i] = 1;
+      std::vector<Cluster> more = find_clusters(sampled, rest, options.segmentation);
+      if (where == kNoSupport && static_cast<int>(more.size()) > kFloatingClusters) more.resize(kFloatingClusters);
+      std::move(more.begin(), more.end(), std::back_inserter(clusters));
+    }
     if (static_cast<int>(clusters.size()) > options.max_clusters)
       clusters.resize(static_cast<std::size_t>(options.max_clusters));
-    std::vector<Proposal> proposals = propose(explained_terms, clusters, support, wanted, left, options, tools, stream,
-                                              static_cast<std::uint64_t>(round));
+    std::vector<Proposal> proposals = propose(explained_terms, clusters, surroundings, wanted, left, options, tools,
+                                              stream, static_cast<std::uint64_t>(round));
     if (proposals.empty()) continue;
-    accept_greedily(std::move(proposals), wanted, options, tools, explained_terms, explained_depth, left, found);
+    accept_greedily(std::move(proposals), surroundings, wanted, options, tools, explained_terms, explained_depth, left,
+                    found);
     settle(terms, wanted, options, tools, stream, found);
+    take_back(surroundings, wanted, options, left, found);
     explained_terms = terms;
     explained_depth = known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
     for (const geometry::DepthImage& depth : depths_of(found, wanted, terms.camera, tools)) {
@@ -194,6 +380,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry
       with_known_surfaces(explained_terms, depth, &explained_terms);
     }
   }
+  judge(terms, wanted, tools, found);
   return found;
 }
 

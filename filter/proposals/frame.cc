@@ -7,6 +7,7 @@
 namespace prescene::filter {
 namespace {
 
+constexpr double kMatch = 0.008;          // m: a measurement so near to the pose's surface is taken for it
 constexpr double kClearlyInFront = 0.02;  // m: a support nearer to the object than this may be what it stands on
 
 core::Status render_depth(const rendering::RenderScene& scene, const geometry::PinholeCamera& camera, const Pose& X_WC,
@@ -162,6 +163,35 @@ rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const
   rendering::FrameTerms terms;
   with_known_surfaces(frame.terms, known, &terms);
   return terms;
+}
+
+double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step) {
+  const int width = terms.camera.width, height = terms.camera.height;
+  const auto matches = [&](int x, int y) {
+    const double z = terms.depth(x, y), d = object_depth(x, y);
+    return d > 0.0 && z > 0.0 && std::abs(z - d) < std::max(kMatch, 3.0 * terms.model.hit_sigma(d, 1.0));
+  };
+  int ends = 0, goes_on = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double z = terms.depth(x, y);
+      if (z == 0.0 || matches(x, y)) continue;
+      // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side
+      // as often as not: judge by those two away.
+      double edge = 0.0;
+      int nearest = 9;
+      for (int dy = -2; dy <= 2; ++dy)
+        for (int dx = -2; dx <= 2; ++dx) {
+          if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height || !matches(x + dx, y + dy)) continue;
+          const int distance = dx * dx + dy * dy;
+          if (distance < nearest) nearest = distance, edge = terms.depth(x + dx, y + dy);
+        }
+      if (edge == 0.0 || nearest < 4 || z < edge - step) continue;
+      const double expected = terms.absent_peak(x, y);
+      const bool known = expected > 0.0 && std::abs(z - expected) < 0.5 * step;
+      (known || z > edge + step ? ends : goes_on)++;
+    }
+  return ends + goes_on == 0 ? 1.0 : static_cast<double>(ends) / (ends + goes_on);
 }
 
 }  // namespace prescene::filter

@@ -17,7 +17,8 @@ using Eigen::Vector2d;
 
 constexpr int kPlaneDraws = 400;           // triples of points tried
 constexpr double kLeastPlaneShare = 0.08;  // of the measured points; less is no support
-constexpr double kOutlineMargin = 0.01;    // m that a support's outline is widened by
+// 1/m^2: the tolerance of a plane is so many times the squared depth where that is more than 1.
+constexpr double kInlierGrowth = 0.7;
 
 bool measured(const Vector3d& p) { return p.z() > 0.0; }
 
@@ -26,6 +27,32 @@ std::array<Vector3d, 2> plane_axes(const Vector3d& normal) {
   const Vector3d helper = std::abs(normal.x()) < 0.7 ? Vector3d::UnitX() : Vector3d::UnitY();
   const Vector3d x = helper.cross(normal).normalized();
   return {x, normal.cross(x)};
+}
+
+/// Pixels of the plane of whose 3 x 3 neighbourhood two thirds are on the plane and nothing is off it: thin bridges to
+/// other things are cut, single holes are not.
+std::vector<std::uint8_t> eroded_inliers(const SampledDepth& sampled, const geometry::Plane& plane, double inlier) {
+  const int width = sampled.camera.width, height = sampled.camera.height;
+  const auto point = [&](int x, int y) -> const Vector3d& {
+    return sampled.points_C[static_cast<std::size_t>(y * width + x)];
+  };
+  const auto on_plane = [&](const Vector3d& p) { return std::abs(plane.signed_distance(p)) < inlier; };
+  std::vector<std::uint8_t> eroded(static_cast<std::size_t>(width * height), 0);
+  for (int y = 1; y + 1 < height; ++y)
+    for (int x = 1; x + 1 < width; ++x) {
+      int on = 0, off = 0;
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+          if (measured(point(x + dx, y + dy))) (on_plane(point(x + dx, y + dy)) ? on : off)++;
+      eroded[static_cast<std::size_t>(y * width + x)] = measured(point(x, y)) && on >= 6 && off == 0;
+    }
+  return eroded;
+}
+
+}  // namespace
+
+double tolerance_at(const SegmentationOptions& options, double depth) {
+  return options.plane_inlier * std::max(1.0, kInlierGrowth * depth * depth);
 }
 
 std::optional<geometry::Plane> plane_through(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
@@ -41,10 +68,8 @@ std::optional<geometry::Plane> plane_through(const Vector3d& a, const Vector3d& 
   return plane;
 }
 
-/// Labels of 4-connected pixels for which `inside` holds and `joined` holds between neighbours; pixels of each
-/// component in ascending order, components in the order of their first pixel.
-template <class Inside, class Joined>
-std::vector<std::vector<int>> components(int width, int height, const Inside& inside, const Joined& joined) {
+std::vector<std::vector<int>> connected_pixels(int width, int height, const std::function<bool(int)>& inside,
+                                               const std::function<bool(int, int)>& joined) {
   std::vector<std::uint8_t> seen(static_cast<std::size_t>(width * height), 0);
   std::vector<std::vector<int>> result;
   std::vector<int> stack;
@@ -73,28 +98,6 @@ std::vector<std::vector<int>> components(int width, int height, const Inside& in
   }
   return result;
 }
-
-/// Pixels of the plane of whose 3 x 3 neighbourhood two thirds are on the plane and nothing is off it: thin bridges to
-/// other things are cut, single holes are not.
-std::vector<std::uint8_t> eroded_inliers(const SampledDepth& sampled, const geometry::Plane& plane, double inlier) {
-  const int width = sampled.camera.width, height = sampled.camera.height;
-  const auto point = [&](int x, int y) -> const Vector3d& {
-    return sampled.points_C[static_cast<std::size_t>(y * width + x)];
-  };
-  const auto on_plane = [&](const Vector3d& p) { return std::abs(plane.signed_distance(p)) < inlier; };
-  std::vector<std::uint8_t> eroded(static_cast<std::size_t>(width * height), 0);
-  for (int y = 1; y + 1 < height; ++y)
-    for (int x = 1; x + 1 < width; ++x) {
-      int on = 0, off = 0;
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx)
-          if (measured(point(x + dx, y + dy))) (on_plane(point(x + dx, y + dy)) ? on : off)++;
-      eroded[static_cast<std::size_t>(y * width + x)] = measured(point(x, y)) && on >= 6 && off == 0;
-    }
-  return eroded;
-}
-
-}  // namespace
 
 geometry::Plane fit_plane(std::span<const Vector3d> points) {
   Vector3d mean = Vector3d::Zero();
@@ -227,7 +230,7 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
   support.rms = std::sqrt(squares / std::max(1, support.inliers));
 
   const std::vector<std::uint8_t> on_plane = eroded_inliers(sampled, best, options.plane_inlier);
-  const auto patches = components(
+  const auto patches = connected_pixels(
       sampled.camera.width, sampled.camera.height, [&](int i) { return on_plane[static_cast<std::size_t>(i)] != 0; },
       [](int, int) { return true; });
   const auto largest = std::max_element(patches.begin(), patches.end(),
@@ -235,23 +238,20 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
   if (largest == patches.end() || largest->size() < 10) return std::nullopt;
   std::vector<Vector3d> patch;
   for (const int i : *largest) patch.push_back(sampled.points_C[static_cast<std::size_t>(i)]);
-  support.region.outline_C = convex_outline(best, patch, kOutlineMargin);
+  support.region.outline_C = convex_outline(best, patch, kSupportOutlineMargin);
   return support;
 }
 
-std::vector<Cluster> find_clusters(const SampledDepth& sampled, const rendering::SupportRegion& support,
-                                   const geometry::Image<std::uint8_t>& explained, const SegmentationOptions& options) {
+std::vector<Cluster> find_clusters(const SampledDepth& sampled, const geometry::Image<std::uint8_t>& explained,
+                                   const SegmentationOptions& options) {
   const auto inside = [&](int i) {
-    const Vector3d& p = sampled.points_C[static_cast<std::size_t>(i)];
-    if (!measured(p) || (!explained.empty() && explained.data()[i] != 0)) return false;
-    const double height = support.plane_C.signed_distance(p);
-    return height > options.min_height && height < options.max_height && stands_on(support, p);
+    return measured(sampled.points_C[static_cast<std::size_t>(i)]) && (explained.empty() || explained.data()[i] == 0);
   };
   const auto joined = [&](int i, int j) {
     return std::abs(sampled.depth.data()[i] - sampled.depth.data()[j]) < options.depth_step;
   };
   std::vector<Cluster> clusters;
-  for (std::vector<int>& pixels : components(sampled.camera.width, sampled.camera.height, inside, joined)) {
+  for (std::vector<int>& pixels : connected_pixels(sampled.camera.width, sampled.camera.height, inside, joined)) {
     if (static_cast<int>(pixels.size()) < options.min_cluster_pixels) continue;
     Cluster cluster;
     for (const int i : pixels) cluster.points_C.push_back(sampled.points_C[static_cast<std::size_t>(i)]);

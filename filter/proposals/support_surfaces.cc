@@ -33,19 +33,35 @@ bool boxes_meet(const geometry::Box& box, const Vector3d& p, const Vector3d& q) 
 }  // namespace
 
 SupportSurfaces::SupportSurfaces(const belief::Scene& scene, MeshCache& meshes) {
-  for (const belief::Support& support : scene.supports) {
-    const rendering::MeshHandle mesh = meshes.get(support.visual, support.collision, MeshDetail::kLikelihood);
-    Part part;
-    for (const auto& corners : mesh->triangles) {
-      Vector3d p[3];
-      for (int i = 0; i < 3; ++i) {
-        p[i] = support.X_WS * mesh->vertices[corners[static_cast<std::size_t>(i)]].cast<double>();
-        part.box.extend(p[i]);
-      }
-      part.triangles.push_back({p[0], p[1] - p[0], p[2] - p[0]});
+  for (const belief::Support& support : scene.supports)
+    add(*meshes.get(support.visual, support.collision, MeshDetail::kLikelihood), support.X_WS);
+}
+
+void SupportSurfaces::add(const rendering::RenderMesh& mesh, const geometry::Pose& X_WM) {
+  Part part;
+  for (const auto& corners : mesh.triangles) {
+    Vector3d p[3];
+    for (int i = 0; i < 3; ++i) {
+      p[i] = X_WM * mesh.vertices[corners[static_cast<std::size_t>(i)]].cast<double>();
+      part.box.extend(p[i]);
     }
-    if (!part.triangles.empty()) parts_.push_back(std::move(part));
+    part.triangles.push_back({p[0], p[1] - p[0], p[2] - p[0]});
   }
+  if (!part.triangles.empty()) parts_.push_back(std::move(part));
+}
+
+void SupportSurfaces::add(const rendering::SupportRegion& region, const geometry::Pose& X_WC) {
+  Part part;
+  std::vector<Vector3d> corners;
+  for (const Vector3d& p_C : region.outline_C) {
+    corners.push_back(X_WC * p_C);
+    part.box.extend(corners.back());
+  }
+  for (std::size_t i = 1; i + 1 < corners.size(); ++i)
+    part.triangles.push_back({corners[0], corners[i] - corners[0], corners[i + 1] - corners[0]});
+  // Of no thickness: nothing is inside.
+  part.closed = false;
+  if (!part.triangles.empty()) parts_.push_back(std::move(part));
 }
 
 int SupportSurfaces::crossings(const Part& part, const Vector3d& p, const Vector3d& q) const {
@@ -61,7 +77,7 @@ bool SupportSurfaces::crosses(const Vector3d& p_W, const Vector3d& q_W) const {
 
 bool SupportSurfaces::inside(const Vector3d& p_W) const {
   return std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) {
-    if (!part.box.contains(p_W)) return false;
+    if (!part.closed || !part.box.contains(p_W)) return false;
     // A direction that runs along no edge of things built at right angles.
     const Vector3d away = p_W + 2.0 * part.box.diagonal().norm() * Vector3d(0.2673, 0.5345, 0.8018);
     return crossings(part, p_W, away) % 2 == 1;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 namespace prescene::filter {
@@ -65,6 +66,14 @@ Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Po
 }
 
 }  // namespace
+
+bool is_found_support(const std::string& name) {
+  const std::string_view base = kFoundSupport;
+  if (name == base) return true;
+  const std::size_t digits = base.size() + 1;
+  return name.rfind(std::string(base) + "_", 0) == 0 && name.size() > digits &&
+         name.find_first_not_of("0123456789", digits) == std::string::npos;
+}
 
 std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, const Pose& X_WC,
                                                   const belief::Support& support,

@@ -78,23 +78,37 @@ class Bench {
 /// What is known of a frame before any object is looked for: its support plane, found in the depth image.
 struct PreparedFrame {
   filter::SampledDepth sampled;
-  rendering::SupportRegion support;
+  filter::Surroundings surroundings;
   rendering::FrameTerms terms;
 };
 
-core::Status prepare(const YcbFrame& frame, const core::RandomStream& stream, PreparedFrame* prepared) {
+/// `least_area` of a support, m^2.
+core::Status prepare(const YcbFrame& frame, double least_area, const core::RandomStream& stream,
+                     PreparedFrame* prepared) {
   const filter::SegmentationOptions segmentation;
   prepared->sampled = filter::sample_depth(frame.depth, frame.camera, segmentation);
   const auto plane = filter::find_support_plane(prepared->sampled, segmentation, stream);
   if (!plane) return core::data_loss(frame.name + ": no support plane in the depth image");
-  prepared->support = plane->region;
+  const geometry::Vector3d up = plane->region.plane_C.normal;
+  const auto patches = filter::find_flat_patches(prepared->sampled, up, {}, least_area, segmentation, stream);
+  std::vector<rendering::SupportRegion> supports = {plane->region};
+  for (const filter::FlatPatch& patch : patches)
+    if (patch.level && patch.large) supports.push_back(patch.region);
+  prepared->surroundings =
+      filter::surroundings_of(prepared->sampled, Pose::identity(), up, {}, {}, {}, patches, segmentation);
   rendering::FrameTermsInput input;
   input.camera = frame.camera;
   input.depth = frame.depth.view();
-  input.supports = std::span(&prepared->support, 1);
+  input.supports = supports;
   rendering::FrameTermsOptions options;
   options.tempering.weight.effective_pixels = kLabelPixels;
   return make_frame_terms(input, options, rendering::SensorModel(), &prepared->terms);
+}
+
+std::vector<filter::WantedModel> wanted_in(const YcbFrame& frame, const Bench& bench) {
+  std::vector<filter::WantedModel> wanted;
+  for (const YcbObject& object : frame.objects) wanted.push_back({bench.model(object.name).target, 1});
+  return wanted;
 }
 
 void report_progress(const core::ProgressSink& sink, double fraction, const std::string& text) {
@@ -139,7 +153,8 @@ core::Result<YcbSection> evaluate_disturbed(const fs::path& dir, std::uint64_t s
   for (std::size_t f = 0; f < bench.frames().size(); ++f) {
     const YcbFrame& frame = bench.frames()[f];
     PreparedFrame prepared;
-    PRESCENE_RETURN_IF_ERROR(prepare(frame, stream.for_purpose(core::Purpose::kDetection).at(f), &prepared));
+    PRESCENE_RETURN_IF_ERROR(prepare(frame, filter::least_support_area(wanted_in(frame, bench)),
+                                     stream.for_purpose(core::Purpose::kDetection).at(f), &prepared));
     for (const YcbObject& object : frame.objects) {
       const Model& model = bench.model(object.name);
       std::vector<double> adds, add;
@@ -186,11 +201,10 @@ core::Result<YcbSection> evaluate_amortised(const fs::path& dir, std::uint64_t s
     const core::Stopwatch watch;
     PreparedFrame prepared;
     const core::RandomStream mine = stream.for_purpose(core::Purpose::kDetection).at(f);
-    PRESCENE_RETURN_IF_ERROR(prepare(frame, mine, &prepared));
-    std::vector<filter::WantedModel> wanted;
-    for (const YcbObject& object : frame.objects) wanted.push_back({bench.model(object.name).target, 1});
+    const std::vector<filter::WantedModel> wanted = wanted_in(frame, bench);
+    PRESCENE_RETURN_IF_ERROR(prepare(frame, filter::least_support_area(wanted), mine, &prepared));
     const std::vector<filter::Detection> found =
-        filter::detect(prepared.terms, {}, prepared.sampled, prepared.support, wanted, {}, bench.tools(), mine);
+        filter::detect(prepared.terms, {}, prepared.sampled, prepared.surroundings, wanted, {}, bench.tools(), mine);
     seconds += watch.seconds();
     for (std::size_t i = 0; i < frame.objects.size(); ++i) {
       const YcbObject& object = frame.objects[i];

@@ -31,7 +31,7 @@ rendering::RenderScene scene_at(const belief::Scene& scene, const BeliefSummary&
     X_WG.push_back(known == observation.robot.end() ? belief::pose_at(body, 0.0) : known->second);
   }
   for (const belief::Support& support : scene.supports) {
-    if (support.name != filter::kFoundSupport) continue;
+    if (!filter::is_found_support(support.name)) continue;
     drawn.instances.push_back({meshes.get(support.visual, support.collision, filter::MeshDetail::kDisplay),
                                support.X_WS, filter::material_of(belief::SurfaceKind::kOpaque, support.color)});
     ++*objects;

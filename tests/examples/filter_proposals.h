@@ -2,6 +2,7 @@
 // What the examples in the headers of filter/proposals take for granted.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "prescene/core/random.h"
 #include "prescene/filter/proposals/detection.h"
 #include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/frame_surfaces.h"
 #include "prescene/filter/proposals/segmentation.h"
 #include "prescene/filter/proposals/support_tracking.h"
 #include "prescene/rendering/renderer.h"
@@ -37,7 +39,7 @@ extern const std::vector<Pose> X_WG;
 extern const geometry::DepthImage known;
 
 namespace detection_h {
-extern const rendering::SupportRegion support;
+extern const Surroundings surroundings;
 extern const std::vector<WantedModel> wanted;
 extern const DetectionOptions options;
 }  // namespace detection_h
@@ -46,6 +48,13 @@ namespace frame_h {
 extern const FrameColors colors;
 extern const FrameOptions options;
 }  // namespace frame_h
+
+namespace frame_surfaces_h {
+extern const Vector3d up_C, up_W;
+extern const SupportSurfaces supports;
+extern const double least_area;
+extern const SegmentationOptions options;
+}  // namespace frame_surfaces_h
 
 namespace learned_colors_h {
 extern const rendering::ColorHistogram object_histogram, rest_histogram;
@@ -76,6 +85,7 @@ struct Frame {
   geometry::PinholeCamera camera;
 };
 extern const Frame frame;
+extern const geometry::Image<std::uint8_t> explained;
 extern const SegmentationOptions options;
 }  // namespace segmentation_h
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/initialise.h"
@@ -29,7 +30,8 @@ TEST(ClusterStarts, PutTheCentreOnTheRayOfASeenPointAndUpToItsRadiusBehind) {
   Cluster cluster;
   cluster.points_C = {{0.1, 0.2, 0.8}, {-0.3, 0.1, 1.2}, {0.0, 0.0, 0.5}, {0.2, -0.4, 1.0}};
   constexpr int kStarts = 2000;
-  const std::vector<Pose> starts = cluster_starts(cluster, target, kStarts, {3, core::Purpose::kDetection});
+  const std::vector<Pose> starts =
+      cluster_starts(cluster, target, Vector3d::UnitZ(), 0.0, kStarts, {3, core::Purpose::kDetection});
   ASSERT_EQ(starts.size(), static_cast<std::size_t>(kStarts));
   std::array<int, 4> of_point{};
   std::array<double, 4> deepest{};
@@ -61,7 +63,8 @@ TEST(ClusterStarts, PutTheCentreOnTheRayOfASeenPointAndUpToItsRadiusBehind) {
   }
   EXPECT_LT(mean.cwiseAbs().maxCoeff(), 0.065);
   EXPECT_LT((squares.array() - 1.0 / 3.0).abs().maxCoeff(), 0.034);
-  const std::vector<Pose> fewer = cluster_starts(cluster, target, 5, {3, core::Purpose::kDetection});
+  const std::vector<Pose> fewer =
+      cluster_starts(cluster, target, Vector3d::UnitZ(), 0.0, 5, {3, core::Purpose::kDetection});
   EXPECT_TRUE(std::equal(fewer.begin(), fewer.end(), starts.begin()));
 }
 
@@ -135,17 +138,18 @@ class KnownObjects : public ::testing::Test {
     frame_ = backends_.frame_of(scene_, observation_);
     const DetectionOptions options;
     sampled_ = sample_depth(*observation_.frame.depth, observation_.frame.camera, options.segmentation);
-    const auto region =
-        region_of(sampled_, frame_.X_CW, scene_->gravity_W, options.segmentation, {1, core::Purpose::kDetection});
-    ASSERT_TRUE(region.has_value());
-    region_ = *region;
+    std::vector<WantedModel> all;
+    for (const belief::ObjectModel& model : models) all.push_back(wanted(model));
+    surroundings_ =
+        surroundings_in(frame_, sampled_, *scene_, all, options.segmentation, {1, core::Purpose::kDetection});
+    ASSERT_FALSE(surroundings_.solid.empty());
   }
   WantedModel wanted(const belief::ObjectModel& model, int count = 1) {
     return {target_of(model, frame_, backends_.tools), count};
   }
   std::vector<Detection> found(const std::vector<WantedModel>& models, const DetectionOptions& options = {},
                                const rendering::FrameTerms* terms = nullptr, const geometry::DepthImage& known = {}) {
-    return detect(terms ? *terms : frame_.terms, known, sampled_, region_, models, options, backends_.tools,
+    return detect(terms ? *terms : frame_.terms, known, sampled_, surroundings_, models, options, backends_.tools,
                   {5, core::Purpose::kDetection});
   }
   double distance(const Detection& detection, const Pose& X_WO, const SearchTarget& target) const {
@@ -165,7 +169,7 @@ class KnownObjects : public ::testing::Test {
   std::shared_ptr<const belief::Scene> scene_;
   FilterFrame frame_;
   SampledDepth sampled_;
-  rendering::SupportRegion region_;
+  Surroundings surroundings_;
 };
 
 TEST_F(KnownObjects, EachIsFoundWhereItIsAndWhatIsNotThereIsNot) {
@@ -205,7 +209,7 @@ TEST_F(KnownObjects, BitsDoNotDependOnThreads) {
   const std::vector<WantedModel> models = {{target_of(models_[0], frame_, one.tools), 1},
                                            {target_of(models_[2], frame_, one.tools), 1}};
   const std::vector<Detection> again =
-      detect(frame_.terms, {}, sampled_, region_, models, {}, one.tools, {5, core::Purpose::kDetection});
+      detect(frame_.terms, {}, sampled_, surroundings_, models, {}, one.tools, {5, core::Purpose::kDetection});
   ASSERT_EQ(again.size(), two.size());
   for (std::size_t i = 0; i < two.size(); ++i) {
     EXPECT_EQ(again[i].model, two[i].model);
@@ -265,6 +269,26 @@ TEST_F(KnownObjects, AsManyOfAKindAreFoundAsMayBe) {
   EXPECT_EQ(one[0] + one[1], 1);
   EXPECT_EQ(places(2), (std::array<int, 2>{1, 1}));
   EXPECT_EQ(places(3), (std::array<int, 2>{1, 1}));
+}
+
+TEST(ProbabilityRight, GrowsWithTheEvidenceAndWithWhatIsThereOfTheExpected) {
+  rendering::PoseEvidence evidence;
+  evidence.visible = 40;
+  evidence.log_ratio = evidence.visible_log_ratio = 200.0;
+  const double matched = probability_right(evidence, 5.0);
+  EXPECT_GT(matched, 0.5);
+  EXPECT_LT(matched, 1.0);
+  // More than expected is no better than as expected.
+  EXPECT_EQ(probability_right(evidence, 2.5), matched);
+  EXPECT_LT(probability_right(evidence, 6.0), matched);
+  EXPECT_LT(probability_right(evidence, 10.0), 0.1);
+  evidence.visible = 400;
+  evidence.log_ratio = evidence.visible_log_ratio = 2000.0;
+  EXPECT_GT(probability_right(evidence, 5.0), matched);
+  // Where what to expect is not known, the evidence alone says it.
+  EXPECT_EQ(probability_right(evidence, std::numeric_limits<double>::infinity()), probability_right(evidence, 5.0));
+  evidence.log_ratio = -1.0;
+  EXPECT_EQ(probability_right(evidence, 5.0), 0.0);
 }
 
 }  // namespace

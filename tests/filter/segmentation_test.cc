@@ -7,6 +7,7 @@
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/proposals/frame_surfaces.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter_tests {
@@ -54,7 +55,12 @@ TEST_F(OnTheTable, FindsTheTableAndWhatStandsOnIt) {
   EXPECT_NEAR(plane_W.offset, 0.0, 0.003);
   EXPECT_LT(support->rms, 0.005);
 
-  const std::vector<Cluster> clusters = find_clusters(sampled_, support->region, {}, options_);
+  const Vector3d up_C = sequence_.X_WC.rotation.conjugate() * Vector3d::UnitZ();
+  const std::vector<FlatPatch> patches =
+      find_flat_patches(sampled_, up_C, {}, 0.05, options_, {1, core::Purpose::kDetection});
+  geometry::Image<std::uint8_t> explained =
+      surroundings_of(sampled_, sequence_.X_WC, Vector3d::UnitZ(), {}, {}, {}, patches, options_).background;
+  const std::vector<Cluster> clusters = find_clusters(sampled_, explained, options_);
   ASSERT_EQ(clusters.size(), 2u);
   EXPECT_GE(clusters[0].pixels.size(), clusters[1].pixels.size());
   for (const Cluster& cluster : clusters) {
@@ -63,9 +69,8 @@ TEST_F(OnTheTable, FindsTheTableAndWhatStandsOnIt) {
       mean += sequence_.X_WC * p / static_cast<double>(cluster.points_C.size());
     EXPECT_LT(std::min((mean - Vector3d(0.0, -0.12, 0.09)).norm(), (mean - Vector3d(0.05, 0.12, 0.055)).norm()), 0.06);
   }
-  geometry::Image<std::uint8_t> explained(sampled_.camera.width, sampled_.camera.height);
   for (const int i : clusters[0].pixels) explained.data()[i] = 1;
-  EXPECT_EQ(find_clusters(sampled_, support->region, explained, options_).size(), 1u);
+  EXPECT_EQ(find_clusters(sampled_, explained, options_).size(), 1u);
 }
 
 TEST_F(OnTheTable, UpIsObeyed) {
@@ -79,8 +84,11 @@ TEST_F(OnTheTable, UpIsObeyed) {
 }
 
 TEST_F(OnTheTable, BecomesASupportOfTheScene) {
-  const auto support = support_from_frame(observation_, {0.0, 0.0, -9.81}, {}, {1, core::Purpose::kDetection});
-  ASSERT_TRUE(support.has_value());
+  MeshCache meshes;
+  const std::vector<belief::Support> supports =
+      supports_from_frame(sampled_, sequence_.X_WC, belief::Scene(), {}, meshes, {1, core::Purpose::kDetection});
+  ASSERT_EQ(supports.size(), 1u);
+  const belief::Support* support = &supports.front();
   const auto& shape = std::get<belief::PrimitiveShape>(support->collision.front());
   const auto& box = std::get<geometry::BoxShape>(shape.primitive);
   const Vector3d top = support->X_WS * Vector3d(0.0, 0.0, 0.5 * box.size.z());

@@ -27,6 +27,15 @@ class TableOnTheMove : public ::testing::Test {
   Backends backends_;
 };
 
+TEST(FoundSupports, AreKnownByTheirNamesAndNoOtherIs) {
+  EXPECT_TRUE(is_found_support("support_plane"));
+  EXPECT_TRUE(is_found_support("support_plane_2"));
+  EXPECT_TRUE(is_found_support("support_plane_13"));
+  for (const char* other : {"", "table", "support", "support_planet", "support_plane_", "support_plane_left",
+                            "support_plane_2b", "my_support_plane"})
+    EXPECT_FALSE(is_found_support(other)) << other;
+}
+
 TEST_F(TableOnTheMove, IsMeasuredWhereItIs) {
   for (const double angle : {-0.4, 0.0, 0.7}) {
     const Pose X_WC = moved_camera(angle);

@@ -122,7 +122,7 @@ class ParticleFilter {
   struct FrameStep;
 
   void note_failed_rendering(StepResult& result);
-  void follow_supports(const belief::Observation& observation, StepResult& result) const;
+  void follow_supports(const belief::Observation& observation, StepResult& result);
   void first_look(FrameStep& step);
   void weigh_all(FrameStep& step, double dt);
   void recover_all(FrameStep& step);

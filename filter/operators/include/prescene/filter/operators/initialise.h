@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Operator 1, initialise: the first belief, from what the scene says of each object's start or, where it says too
-// little, from the first frame alone: support plane, clusters above it, poses proposed per model, refined.
+// little, from the first frame alone: supports, clusters that they do not explain, poses proposed per model, refined.
 //
 //   belief::Belief belief = belief_from_priors(scene, seed, stamp_ns, options);  // no frame needed
 //   find_in_frame(frame, observation, options, tools, stream, belief);  // objects whose place the scene leaves open
 #pragma once
 
 #include <memory>
-#include <optional>
+#include <span>
+#include <vector>
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
@@ -32,7 +33,8 @@ struct InitialiseOptions {
   double first_turn = 0.06;
   /// probability. That an object is there which the scene names and places. Range 0 to 1. Chosen.
   double prior_existence = 0.95;
-  /// switch. A scene without supports gets the plane of the first frame as one. Range true or false. Chosen.
+  /// switch. Supports that the scene does not name and the frame shows become its own: where it names none, or where
+  /// objects are looked for. Range true or false. Chosen.
   bool add_support = true;
   /// Of objects that are looked for in the first frame; its segmentation serves supports, too.
   DetectionOptions detection;
@@ -45,9 +47,12 @@ belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, st
 /// Whether the scene leaves the object's place or rotation too open to start from.
 bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& options);
 
-/// The support that the frame shows, as a box of the plane's extent; nothing if there is none. Gravity says what is up.
-std::optional<belief::Support> support_from_frame(const belief::Observation& observation, const Vector3d& gravity_W,
-                                                  const InitialiseOptions& options, const core::RandomStream& stream);
+/// The supports that the frame shows and the scene does not know, each as a box of its plane's extent, the one that
+/// most pixels show first. Gravity says what is up; what is no larger than a face of the scene's models is not taken
+/// for one.
+std::vector<belief::Support> supports_from_frame(const SampledDepth& sampled, const Pose& X_WC,
+                                                 const belief::Scene& scene, const InitialiseOptions& options,
+                                                 MeshCache& meshes, const core::RandomStream& stream);
 
 struct FindReport {
   int looked_for = 0;
@@ -59,10 +64,10 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
                          const InitialiseOptions& options, const FilterTools& tools, const core::RandomStream& stream,
                          belief::Belief& belief);
 
-/// The support region to cluster above, in C: the largest plane of the frame that faces up.
-std::optional<rendering::SupportRegion> region_of(const SampledDepth& sampled, const Pose& X_CW,
-                                                  const Vector3d& gravity_W, const SegmentationOptions& options,
-                                                  const core::RandomStream& stream);
+/// What objects can stand on in a frame: the scene's supports and what else the frame shows.
+Surroundings surroundings_in(const FilterFrame& frame, const SampledDepth& sampled, const belief::Scene& scene,
+                             std::span<const WantedModel> wanted, const SegmentationOptions& options,
+                             const core::RandomStream& stream);
 
 /// `count` particles about a pose of known spread: the first at the pose itself, at rest.
 std::vector<belief::Particle> particles_about(const Pose& X_WO, belief::MotionMode mode, int count,

@@ -42,7 +42,7 @@ struct WeightOptions {
 /// What became of one particle.
 struct ParticleWeight {
   rendering::PoseEvidence evidence;  ///< At its new mean.
-  double outline = 1.0;              ///< Share of its outline with an edge, see outline_support.
+  double outline = 1.0;              ///< Share of its outline with an edge, see outline_support in proposals/frame.h.
   bool hidden = false;
 };
 
@@ -74,12 +74,6 @@ struct WeightReport {
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
                     std::vector<belief::Particle>& particles, const WeightContext& context = {});
-
-/// Share of the edge of what matches an object (its rendered depth in terms.camera) at which the measured surface ends:
-/// just outside, it is further away, or known to be something else. A surface that goes on, past the outline or in
-/// front of the rest of the object, is not the object, however well it matches. 1 when no pixel can tell (hidden by
-/// nearer things, or missing).
-double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step);
 
 /// Evidence per visible pixel, scaled by what the outline is worth.
 double supported_evidence(const rendering::PoseEvidence& evidence, double outline, const WeightOptions& options);

@@ -103,4 +103,10 @@ using rendering::merge_nearest;
 rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,
                                        const Vector3d& p_CQ, double radius);
 
+/// Share of the edge of what matches an object (its rendered depth in terms.camera) at which the measured surface ends:
+/// just outside, it is further away, or known to be something else. A surface that goes on, past the outline or in
+/// front of the rest of the object, is not the object, however well it matches. 1 when no pixel can tell (hidden by
+/// nearer things, or missing).
+double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step);
+
 }  // namespace prescene::filter

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands on what in a depth image: the support plane, and the clusters of points above it.
+// The parts of a depth image: the plane that most points lie on, and the clusters of points that nothing explains.
 //
 //   SampledDepth sampled = sample_depth(frame.depth, frame.camera, options);
 //   auto support = find_support_plane(sampled, options, stream);
-//   for (const Cluster& cluster : find_clusters(sampled, support->region, {}, options)) ...
+//   for (const Cluster& cluster : find_clusters(sampled, explained, options)) ...
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -19,6 +20,9 @@ namespace prescene::filter {
 
 using geometry::Pose;
 using geometry::Vector3d;
+
+/// m that the outline of a support which is found in a frame is widened by.
+inline constexpr double kSupportOutlineMargin = 0.01;
 
 struct SegmentationOptions {
   /// pixels. The image is sampled to about this width. Range 40 to 640. Chosen.
@@ -50,6 +54,11 @@ struct SampledDepth {
 SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                           const SegmentationOptions& options);
 
+/// How near to a plane a measurement at this depth (m) must be to lie on it, m: noise grows with the squared depth.
+double tolerance_at(const SegmentationOptions& options, double depth);
+
+/// The plane through three points in C, its normal turned towards the camera; nothing where they lie on a line.
+std::optional<geometry::Plane> plane_through(const Vector3d& a_C, const Vector3d& b_C, const Vector3d& c_C);
 /// The plane of least squares through points in C (at least three), its normal turned towards the camera.
 geometry::Plane fit_plane(std::span<const Vector3d> points_C);
 
@@ -65,15 +74,19 @@ std::optional<SupportPlane> find_support_plane(const SampledDepth& sampled, cons
                                                const core::RandomStream& stream,
                                                const std::optional<Vector3d>& up_C = std::nullopt);
 
-/// Connected measured pixels that stand on a support and are explained by nothing else.
+/// The 4-connected parts of an image of this size: pixels (y * width + x) for which `inside` holds, neighbours for
+/// which `joined` holds too. Pixels of each part in ascending order, parts in the order of their first pixel.
+std::vector<std::vector<int>> connected_pixels(int width, int height, const std::function<bool(int)>& inside,
+                                               const std::function<bool(int, int)>& joined);
+
+/// Connected measured pixels that nothing explains.
 struct Cluster {
   std::vector<int> pixels;         ///< y * width + x of the sampled camera, ascending.
   std::vector<Vector3d> points_C;  ///< Of these pixels.
 };
-/// Pixels min_height to max_height above the support and inside its outline, largest cluster first. Pixels where
-/// `explained` (sampled camera's size; empty = nothing) is not zero are left out.
-std::vector<Cluster> find_clusters(const SampledDepth& sampled, const rendering::SupportRegion& support,
-                                   const geometry::Image<std::uint8_t>& explained, const SegmentationOptions& options);
+/// Largest cluster first. Pixels where `explained` (sampled camera's size; empty = nothing) is not zero are left out.
+std::vector<Cluster> find_clusters(const SampledDepth& sampled, const geometry::Image<std::uint8_t>& explained,
+                                   const SegmentationOptions& options);
 
 /// Whether the point's foot on the region's plane lies inside its outline; always, where there is none.
 bool stands_on(const rendering::SupportRegion& support, const Vector3d& p_CQ);

@@ -10,14 +10,19 @@
 
 #include "prescene/belief/scene.h"
 #include "prescene/filter/proposals/render_scene.h"
+#include "prescene/rendering/sensor/likelihood_batch.h"
 
 namespace prescene::filter {
 
-/// The triangles of a scene's supports, in W. Immutable; safe from several threads.
+/// The triangles of a scene's supports, in W. Safe to read from several threads.
 class SupportSurfaces {
  public:
   SupportSurfaces() = default;
   SupportSurfaces(const belief::Scene& scene, MeshCache& meshes);
+
+  /// Adds a flat region that is known in C, and a thing.
+  void add(const rendering::SupportRegion& region, const geometry::Pose& X_WC);
+  void add(const rendering::RenderMesh& mesh, const geometry::Pose& X_WM);
 
   bool empty() const { return parts_.empty(); }
 
@@ -38,6 +43,7 @@ class SupportSurfaces {
   struct Part {
     std::vector<Triangle> triangles;
     geometry::Box box;
+    bool closed = true;
   };
   int crossings(const Part& part, const geometry::Vector3d& p, const geometry::Vector3d& q) const;
 

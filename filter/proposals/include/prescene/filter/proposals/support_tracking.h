@@ -13,8 +13,10 @@
 
 namespace prescene::filter {
 
-/// The name of a support that was found in a frame.
+/// The name of the first support that was found in a frame; the others are support_plane_2 and so on.
 inline constexpr const char* kFoundSupport = "support_plane";
+/// Whether a support of this name was found, and not given by the scene.
+bool is_found_support(const std::string& name);
 
 struct SupportTrackingOptions {
   /// m. From the believed plane: measurements further off belong to something else. Range 0.001 to 0.1. Chosen.
