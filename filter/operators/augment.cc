@@ -22,6 +22,7 @@ constexpr SearchOptions kRecoverySearch = {.refine = {.steps = 10}, .polish_cand
 constexpr double kExplained = 0.015;     // m; measurements so near to a known surface are explained
 constexpr double kLeastShown = 0.08;     // share of the pixels in view that must not be hidden for a find to count ...
 constexpr double kLeastHits = 0.5;       // ... and share of those that must match
+constexpr double kMostOverlap = 0.25;    // share of a find that may be inside of a support: its plane has errors, too
 constexpr double kInjectedShare = 0.5;   // of the particles are put at the find, the least probable ones
 constexpr int kHiddenDraws = 160;        // places that are tried for what may have gone where it cannot be seen
 constexpr double kHiddenFurthest = 0.3;  // m; their standard deviation grows no further
@@ -107,6 +108,9 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
   if (e.log_ratio < options.accept_log_ratio || e.log_ratio < current.log_ratio + options.min_gain) return false;
   if (shown < kLeastShown || e.hit_share() < kLeastHits) return false;
+  const Pose X_WO = frame.X_WC * found.X_CO;
+  // A support that is a little higher than the scene says looks like the top of something inside it.
+  if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;
   const double outline =
       outline_support(terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer), weighting.outline_step);
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
@@ -116,7 +120,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   // Far from where it was, what is seen has to speak for itself.
   const double scale = far ? 1.0 : evidence_scale(expected_evidence_of(terms, target, found.X_CO, *tools.renderer));
   if (supported_evidence(e, outline, weighting) < scale * needed) return false;
-  inject(frame.X_WC * found.X_CO, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
+  inject(X_WO, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
   return true;
 }
 

@@ -144,6 +144,28 @@ TEST_F(ABox, IsNotRecoveredWhereItIsNotAndNothingChanges) {
   EXPECT_EQ(object, before);
 }
 
+TEST_F(ABox, IsNotRecoveredInsideASupportThatLooksLikeItsTop) {
+  see(Pose::from_translation({0.0, 0.0, 5.0}));
+  // The table is 5 mm higher than the scene says, and so is all of it the top of a flat box that lies in the table.
+  geometry::DepthImage higher = *observation_.frame.depth;
+  const Vector3d up_C = frame_.X_CW.rotation * Vector3d::UnitZ();
+  const Vector3d p_CT = frame_.X_CW * Vector3d(0.0, 0.0, 0.005);
+  for (int y = 0; y < higher.height(); ++y)
+    for (int x = 0; x < higher.width(); ++x) {
+      const Vector3d ray = observation_.frame.camera.unproject(x, y, 1.0);
+      if (higher(x, y) > 0.0F) higher(x, y) = static_cast<float>(up_C.dot(p_CT) / up_C.dot(ray));
+    }
+  observation_.frame.depth = std::make_shared<const geometry::DepthImage>(std::move(higher));
+  frame_ = backends_.frame_of(sequence_.scene, observation_);
+  target_ = target_of(sequence_.scene->models[0], frame_, backends_.tools);
+  // The search begins near there.
+  ObjectBelief object = believed_at(Pose::from_translation({0.02, 0.10, -0.085}), observation_.stamp_ns);
+  AugmentOptions eager;
+  eager.accept_evidence = 0.1;
+  eager.accept_log_ratio = 1.0;
+  EXPECT_FALSE(recovered(object, eager));
+}
+
 TEST_F(ABox, IsNotRecoveredFromWhereItIsExplainedAsWell) {
   see(X_WO_);
   ObjectBelief object = believed_at(kElsewhere, kLongAgo);
