@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
 #include "prescene/core/check.h"
 #include "prescene/core/hash.h"
 #include "prescene/core/random.h"
@@ -226,7 +228,7 @@ std::string to_string(MotionMode mode) {
 bool operator==(const Belief& a, const Belief& b) {
   const bool same_scene = a.scene == b.scene || (a.scene && b.scene && *a.scene == *b.scene);
   return same_scene && a.step == b.step && a.seed == b.seed && a.stamp_ns == b.stamp_ns && a.objects == b.objects &&
-         a.robot == b.robot && a.X_WC == b.X_WC && a.lowest_seen == b.lowest_seen;
+         a.robot == b.robot && a.X_WC == b.X_WC && a.lowest_seen == b.lowest_seen && a.pushes == b.pushes;
 }
 
 ObjectEstimate estimate(const ObjectBelief& object, const geometry::SymmetryGroup& symmetry) {
@@ -370,6 +372,7 @@ std::uint64_t content_hash(const Belief& belief) {
   for (const Pose& pose : belief.robot) hash_pose(hasher, pose);
   hash_pose(hasher, belief.X_WC);
   if (belief.lowest_seen) hasher.value(*belief.lowest_seen);
+  for (const Action& push : belief.pushes) hasher.text(json_text(to_json(push)));
   return hasher.digest();
 }
 

@@ -194,6 +194,7 @@ Json to_json(const Belief& belief) {
   Json json{{"step", belief.step},           {"seed", belief.seed},       {"stamp_ns", belief.stamp_ns},
             {"objects", std::move(objects)}, {"robot", std::move(robot)}, {"X_WC", to_json(belief.X_WC)}};
   if (belief.lowest_seen) json["lowest_seen"] = *belief.lowest_seen;
+  for (const Action& push : belief.pushes) json["pushes"].push_back(to_json(push));
   return json;
 }
 
@@ -216,6 +217,12 @@ core::Result<Belief> belief_from_json(const Json& value, std::shared_ptr<const S
       for (const JsonAt& item : robot->items()) belief.robot.push_back(pose_from(item));
     if (const auto camera = fields.require("X_WC")) belief.X_WC = pose_from(*camera);
     if (const auto lowest = fields.find("lowest_seen")) belief.lowest_seen = lowest->number();
+    if (const auto pushes = fields.find("pushes")) {
+      for (const JsonAt& item : pushes->items()) {
+        belief.pushes.push_back(action_from(item));
+        if (!std::holds_alternative<Push>(belief.pushes.back().what)) item.fail("only a push goes on between frames");
+      }
+    }
   }
   if (!errors.ok()) return errors.status();
   return belief;

@@ -142,6 +142,8 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
   request.stop.stop_at_rest = false;
   // The world of a robot has no edge: what is far from its origin falls like everything else.
   request.stop.world_radius = std::numeric_limits<double>::infinity();
+  request.actions = belief.pushes;
+  for (belief::Action& push : request.actions) push.time -= dt - falling.front().duration;
   std::vector<belief::Trajectory> runs(starts.size());
   simulator.run(starts, request, stream, 0, threads, runs);
   for (std::size_t i = 0; i < falling.size(); ++i) {
@@ -155,8 +157,9 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     Particle& particle = object.particles[falling[i].particle];
     particle.X_WO = geometry::normalized(end.X_WO);
     particle.V_WO = end.V_WO;
-    if (object.state != belief::TrackState::kTracked && settle_draws[i] < options.settle_probability &&
-        is_slow(particle))
+    particle.mode = MotionMode::kMoving;
+    const double settles = falling[i].woken ? 1.0 : options.settle_probability;
+    if (object.state != belief::TrackState::kTracked && settle_draws[i] < settles && is_slow(particle))
       settle(particle);
     ++report.simulated;
   }
@@ -168,9 +171,7 @@ struct Ball {
   double radius;
 };
 Ball ball_about(const belief::Belief& belief, const ObjectBelief& object, const Pose& X_WO) {
-  const belief::ObjectModel& model = belief::model_of(belief, object);
-  const Vector3d centre = centre_of(*belief.scene, object);
-  return {X_WO * centre, model.visual ? geometry::radius_about(*model.visual, centre) : 0.0};
+  return {X_WO * centre_of(*belief.scene, object), radius_of(*belief.scene, object)};
 }
 
 /// By falling object, the objects that may have to do with its motion in this step: those that one of its particles
@@ -238,6 +239,13 @@ bool is_present(const ObjectBelief& object) {
 Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
   const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
   return model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
+}
+
+double radius_of(const belief::Scene& scene, const ObjectBelief& object) {
+  const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
+  const Vector3d centre = centre_of(scene, object);
+  return model.visual ? geometry::radius_about(*model.visual, centre)
+                      : geometry::radius_about(belief::collision_mesh(model), centre);
 }
 
 void clear_twist(Particle& particle) {

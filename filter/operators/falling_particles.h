@@ -17,12 +17,15 @@ struct Falling {
   double duration;       ///< s
   Pose X_WO;             ///< Where constant velocity takes it, ...
   geometry::Twist V_WO;  ///< ... and how fast it is then.
+  bool woken = false;    ///< It rested, and something may push it: it rests on where physics does not move it.
 };
 
 /// Whether the object is believed to be there at all.
 bool is_present(const belief::ObjectBelief& object);
 /// The middle of an object, in O.
 Vector3d centre_of(const belief::Scene& scene, const belief::ObjectBelief& object);
+/// m, of the ball about that middle that holds it.
+double radius_of(const belief::Scene& scene, const belief::ObjectBelief& object);
 /// Takes velocity and what is known of it from a particle.
 void clear_twist(belief::Particle& particle);
 /// Slower than what settles.

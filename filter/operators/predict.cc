@@ -26,6 +26,8 @@ constexpr double kPhysicsAfterRelease = 1.0;  // in the step in which an object 
 // By this share the covariance of a resting pose that is seen grows in a frame: errors of the camera that stay from
 // frame to frame (calibration, a pattern in the depth) do not average out.
 constexpr double kStillForgetting = 0.1;
+constexpr std::size_t kMostPushes = 16;  // that simulators take; the newest count
+constexpr double kStillBody = 1e-4;      // m, rad; a body of the robot that moves by less in a step stands still
 
 /// Adds the noise of dt, in the error coordinates (rotation, translation, angular, linear).
 void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covariance) {
@@ -119,6 +121,62 @@ void apply_grasps(const belief::Control& control, belief::Belief& belief) {
   }
 }
 
+/// A ball that something fills which moves in this step, at its begin and its end.
+struct Mover {
+  Vector3d p_from_W;
+  Vector3d p_to_W;
+  double radius;
+};
+
+Vector3d position_of(const belief::Push& push, double since_begin) {
+  return push.from + std::clamp(since_begin / push.duration, 0.0, 1.0) * (push.to - push.from);
+}
+
+/// Takes the pushes of the control into the belief, with times from the step's start.
+void begin_pushes(const belief::Control& control, double dt, belief::Belief& belief) {
+  for (const belief::Action& action : control.actions) {
+    const auto* push = std::get_if<belief::Push>(&action.what);
+    if (push == nullptr || !(push->duration > 0.0) || !(push->radius > 0.0)) continue;
+    if (belief.pushes.size() >= kMostPushes) belief.pushes.erase(belief.pushes.begin());
+    belief.pushes.push_back(action);
+    belief.pushes.back().time = std::clamp(action.time, 0.0, dt);
+  }
+}
+
+/// The step is over: times are from its end, and what is done is forgotten.
+void end_pushes(double dt, belief::Belief& belief) {
+  for (belief::Action& action : belief.pushes) action.time -= dt;
+  std::erase_if(belief.pushes, [](const belief::Action& action) {
+    return action.time + std::get<belief::Push>(action.what).duration <= 0.0;
+  });
+}
+
+/// What is known to move in this step: pushes, and bodies of the robot.
+std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose> X_WG, double dt) {
+  std::vector<Mover> movers;
+  for (const belief::Action& action : belief.pushes) {
+    const auto& push = std::get<belief::Push>(action.what);
+    movers.push_back({position_of(push, -action.time), position_of(push, dt - action.time), push.radius});
+  }
+  for (std::size_t i = 0; i < X_WG.size(); ++i) {
+    if (geometry::box_minus(X_WG[i], belief.robot[i]).norm() < kStillBody) continue;
+    geometry::Box box;
+    for (const Vector3d& vertex : belief::collision_mesh(belief.scene->robot[i].collision).vertices) box.extend(vertex);
+    if (!box.isEmpty())
+      movers.push_back({belief.robot[i] * box.center(), X_WG[i] * box.center(), 0.5 * box.diagonal().norm()});
+  }
+  return movers;
+}
+
+/// Whether one of them may touch the ball in the step.
+bool may_touch(const std::vector<Mover>& movers, const Vector3d& p_W, double radius) {
+  return std::any_of(movers.begin(), movers.end(), [&](const Mover& mover) {
+    const Vector3d path = mover.p_to_W - mover.p_from_W, to = p_W - mover.p_from_W;
+    const double at = path.squaredNorm() > 0.0 ? std::clamp(to.dot(path) / path.squaredNorm(), 0.0, 1.0) : 0.0;
+    return (to - at * path).norm() < radius + mover.radius;
+  });
+}
+
 /// The modes of one object's particles for this step.
 void change_modes(const PredictOptions& options, bool tracked, bool in_hand, bool has_physics,
                   core::RandomStream& stream, ObjectBelief& object) {
@@ -178,6 +236,8 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
   PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
   PRESCENE_CHECK(dt > 0.0);
   apply_grasps(control, belief);
+  begin_pushes(control, dt, belief);
+  const std::vector<Mover> movers = movers_of(belief, X_WG, dt);
 
   std::vector<Falling> falling;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
@@ -188,6 +248,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
     change_modes(options, tracked, hand.has_value(), static_cast<bool>(simulators), draws, object);
     const Vector3d centre = centre_of(*belief.scene, object);
+    const double radius = radius_of(*belief.scene, object);
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
       double left = dt;
@@ -209,6 +270,9 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       if (particle.mode == MotionMode::kResting) {
         if (tracked) particle.covariance.topLeftCorner<6, 6>() *= 1.0 + kStillForgetting;
         add_noise(options.resting, dt, particle.covariance);
+        // Nothing shows whether what is out of sight is touched: physics says it.
+        if (!tracked && simulators && is_present(object) && may_touch(movers, particle.X_WO * centre, radius))
+          falling.push_back({i, k, dt, particle.X_WO, particle.V_WO, true});
       } else if (left > 0.0) {
         // What is seen and may be still goes nowhere in one step that its velocity does not say.
         const bool idle = tracked && !released && may_be_still(particle);
@@ -225,6 +289,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     if (released) set_holder(i, std::nullopt, belief);
   }
   PredictReport report = move_on(belief, std::move(falling), X_WG, dt, options, simulators, stream, threads);
+  end_pushes(dt, belief);
   belief.robot.assign(X_WG.begin(), X_WG.end());
   return report;
 }

@@ -281,6 +281,9 @@ Belief random_belief(RandomStream& stream, std::shared_ptr<const Scene> scene) {
   for (int i = random_below(stream, 3); i > 0; --i) belief.robot.push_back(random_pose(stream));
   belief.X_WC = random_pose(stream);
   if (random_below(stream, 2) == 1) belief.lowest_seen = stream.uniform(-1.0, 1.0);
+  for (int i = random_below(stream, 3); i > 0; --i)
+    belief.pushes.push_back({stream.uniform(-1.0, 0.0),
+                             Push{random_vector(stream), random_vector(stream), stream.uniform(0.1, 2.0), 0.02, {}}});
   return belief;
 }
 

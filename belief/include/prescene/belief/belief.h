@@ -95,6 +95,8 @@ struct Belief {
   /// Height, against gravity from W's origin, of the lowest surface that any frame showed, m: what falls out of sight
   /// falls no further if nothing else is known to be there.
   std::optional<double> lowest_seen;
+  /// Pushes that controls began and that go on at `stamp_ns`, with times from then, s (so at most 0).
+  std::vector<Action> pushes;
 };
 /// Scenes compare by content.
 bool operator==(const Belief& a, const Belief& b);
