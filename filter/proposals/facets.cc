@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "prescene/filter/proposals/pose_search.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::filter {
 namespace {
 
 constexpr double kLeastFacetCosine = 0.8660254;  // 30 degrees: sharper edges are edges
+constexpr double kRidge = 1e-9;                  // of the information, so that it can be inverted
 constexpr double kMostFacetCosine = 0.9998477;   // 1 degree: flatter ones are parts of one face
 
 }  // namespace
@@ -63,7 +65,22 @@ void without_facets(double facet_lever, const geometry::Quaterniond& R_CO, const
   geometry::Vector6d g_Q = A.transpose() * g;
   const double spurious = facet_lever * facet_lever * H_Q.bottomRightCorner<3, 3>().trace();
   for (int axis = 0; axis < 3; ++axis) {
-    const double kept = H_Q(axis, axis) > 0.0 ? std::sqrt(std::max(0.0, 1.0 - spurious / H_Q(axis, axis))) : 1.0;
+    // What is known of the turn while everything else may follow it: a round part that is not centred at Q turns and
+    // moves, so that the diagonal alone is mostly about where it is.
+    geometry::Matrix6d ridged = H_Q;
+    ridged.diagonal() *= 1.0 + kRidge;
+    ridged.diagonal().array() += kRidge * H_Q.trace() / 6.0;
+    const geometry::Cholesky6 cholesky(ridged);
+    if (!cholesky.positive_definite()) continue;
+    const geometry::Matrix6d covariance = cholesky.inverse();
+    const double turn = covariance.row(axis) * g_Q;
+    const double information = 1.0 / covariance(axis, axis);
+    const double taken = std::min(spurious, information);
+    H_Q(axis, axis) -= taken;
+    g_Q[axis] -= taken * turn;  // the turn that the equations ask for stays, with less weight
+    // The rest goes with what ties the turn to the place: other terms may know the place.
+    const double rest = spurious - taken;
+    const double kept = H_Q(axis, axis) > rest ? std::sqrt(1.0 - rest / H_Q(axis, axis)) : 0.0;
     H_Q.row(axis) *= kept;
     H_Q.col(axis) *= kept;
     g_Q[axis] *= kept;

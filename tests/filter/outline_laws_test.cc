@@ -100,11 +100,14 @@ TEST(FacetLever, IsThatOfTheFlatsOfARoundThing) {
   }
 }
 
-TEST(WithoutFacets, TakesTheSquareOfTheLeverAndNoMore) {
-  // A can of pixels on its wall, each on a facet: rows of information as depth residuals have them.
-  Matrix6d H = Matrix6d::Zero();
-  Vector6d g = Vector6d::Zero();
-  const double lever = 0.002;
+/// What is known of a turn about z while everything else may follow it.
+double information_of_turn(const Matrix6d& H) {
+  const Matrix6d covariance = (H + 1e-9 * H.trace() * Matrix6d::Identity()).inverse();
+  return 1.0 / covariance(2, 2);
+}
+
+/// A can of pixels on its wall, each on a facet: rows of information as depth residuals have them.
+void add_can(double lever, Matrix6d& H, Vector6d& g) {
   for (int i = 0; i < 4000; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / 4000.0;
     const double error =
@@ -116,6 +119,13 @@ TEST(WithoutFacets, TakesTheSquareOfTheLeverAndNoMore) {
     H += row * row.transpose();
     g += 0.001 * row;
   }
+}
+
+TEST(WithoutFacets, TakesTheSquareOfTheLeverAndNoMore) {
+  const double lever = 0.002;
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+  add_can(lever, H, g);
   Matrix6d corrected = H;
   without_facets(lever, geometry::Quaterniond::Identity(), Vector3d::Zero(), corrected, g);
   EXPECT_LT(corrected(2, 2), 0.02 * H(2, 2));
@@ -123,6 +133,38 @@ TEST(WithoutFacets, TakesTheSquareOfTheLeverAndNoMore) {
   EXPECT_NEAR(corrected(3, 3), H(3, 3), 1e-9 * H(3, 3));
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(corrected);
   EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-9 * eigen.eigenvalues().maxCoeff());
+}
+
+TEST(WithoutFacets, DoesNotDependOnWhereTheAxisIs) {
+  // A mug's middle is beside the axis of its round part: a turn about it moves that part.
+  const double lever = 0.002;
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+  add_can(lever, H, g);
+  for (const double beside : {0.0, 0.014, -0.05}) {
+    Matrix6d corrected = H;
+    Vector6d g_corrected = g;
+    without_facets(lever, geometry::Quaterniond::Identity(), Vector3d(beside, 0.0, 0.0), corrected, g_corrected);
+    EXPECT_LT(information_of_turn(corrected), 0.02 * information_of_turn(H)) << beside;
+    EXPECT_NEAR(corrected(3, 3), H(3, 3), 1e-9 * H(3, 3));
+  }
+}
+
+TEST(WithoutFacets, LeavesTheStepThatTheEquationsAskFor) {
+  const double lever = 0.002;
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+  add_can(lever, H, g);
+  // A handle that says how it is turned, and more than facets do.
+  for (int i = 0; i < 200; ++i) {
+    Vector6d row;
+    row << Vector3d(0.055, 0.0, 0.002 * (i % 20)).cross(Vector3d::UnitY()), Vector3d::UnitY();
+    H += row * row.transpose();
+    g += 0.002 * row;
+  }
+  const Vector6d step = H.ldlt().solve(g);
+  without_facets(lever, geometry::Quaterniond::Identity(), Vector3d(0.014, 0.0, 0.0), H, g);
+  EXPECT_NEAR((H.ldlt().solve(g) - step).norm(), 0.0, 1e-6 * step.norm());
 }
 
 }  // namespace

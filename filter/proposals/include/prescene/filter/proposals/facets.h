@@ -14,8 +14,9 @@ namespace prescene::filter {
 double facet_lever(const rendering::RenderMesh& mesh);
 
 /// Takes from Gauss-Newton equations (coordinates of rendering::PoseLinearisation) what facets alone say of rotations
-/// about the axes of the body through p_OQ: errors of the levers add their square to the information. H stays positive
-/// semi-definite.
+/// about the axes of the body through p_OQ, wherever the axis of the round part is: errors of the levers add their
+/// square to the information. It is taken from what is known of such a turn with everything else free to follow, so
+/// that H stays positive semi-definite.
 void without_facets(double facet_lever, const geometry::Quaterniond& R_CO, const geometry::Vector3d& p_OQ,
                     geometry::Matrix6d& H, geometry::Vector6d& g);
 
