@@ -13,6 +13,10 @@ namespace {
 
 using belief::MotionMode;
 using belief::Particle;
+using filter::MotionNoise;
+using filter::predict;
+using filter::PredictOptions;
+using geometry::Vector3d;
 
 constexpr double kStep30Hz = 1.0 / 30.0;
 constexpr double kChiSquared90 = 6.2514;  // 3 degrees of freedom
