@@ -237,7 +237,10 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
   PRESCENE_CHECK(dt > 0.0);
   apply_grasps(control, belief);
   begin_pushes(control, dt, belief);
-  const std::vector<Mover> movers = movers_of(belief, X_WG, dt);
+  const bool all_tracked = std::all_of(belief.objects.begin(), belief.objects.end(), [](const ObjectBelief& object) {
+    return object.state == belief::TrackState::kTracked;
+  });
+  const std::vector<Mover> movers = all_tracked ? std::vector<Mover>() : movers_of(belief, X_WG, dt);
 
   std::vector<Falling> falling;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
@@ -248,7 +251,9 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
     change_modes(options, tracked, hand.has_value(), static_cast<bool>(simulators), draws, object);
     const Vector3d centre = centre_of(*belief.scene, object);
-    const double radius = radius_of(*belief.scene, object);
+    // Nothing shows whether what is out of sight is touched: physics says it.
+    const bool may_be_pushed = !tracked && simulators && is_present(object) && !movers.empty();
+    const double radius = may_be_pushed ? radius_of(*belief.scene, object) : 0.0;
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
       double left = dt;
@@ -270,8 +275,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       if (particle.mode == MotionMode::kResting) {
         if (tracked) particle.covariance.topLeftCorner<6, 6>() *= 1.0 + kStillForgetting;
         add_noise(options.resting, dt, particle.covariance);
-        // Nothing shows whether what is out of sight is touched: physics says it.
-        if (!tracked && simulators && is_present(object) && may_touch(movers, particle.X_WO * centre, radius))
+        if (may_be_pushed && may_touch(movers, particle.X_WO * centre, radius))
           falling.push_back({i, k, dt, particle.X_WO, particle.V_WO, true});
       } else if (left > 0.0) {
         // What is seen and may be still goes nowhere in one step that its velocity does not say.
