@@ -37,7 +37,6 @@ constexpr double kLeastSupportArea = 0.05;  // m^2; a smaller flat patch may be 
 constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much larger than the largest face of an object
 // Joint refinement of what is accepted.
 constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
-constexpr double kNoiseGrowth = 0.7;    // 1/m^2: beyond 1.2 m, tolerances grow with the squared depth as noise does
 constexpr double kHitPower = 8.0;       // how much a pose's score suffers from pixels that do not match
 constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
 
@@ -103,7 +102,7 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<cons
     std::erase_if(task.found, [&](const PoseCandidate& c) {
       return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
     });
-    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(std::max(1, kKept))));
+    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
   });
   std::vector<Proposal> proposals;
   for (const Task& task : tasks)
@@ -286,7 +285,7 @@ geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, cons
       const Eigen::Vector2d pixel =
           camera.project(sampled.points_C[static_cast<std::size_t>(y * explained.width() + x)]);
       const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
-      const double near = tolerance * std::max(1.0, kNoiseGrowth * z * z);
+      const double near = tolerance * tolerance_growth(z);
       // The neighbours' surfaces count too: outlines are no sharper than a reduced pixel.
       for (int dv = -1; dv <= 1; ++dv)
         for (int du = -1; du <= 1; ++du) {

@@ -18,7 +18,7 @@ using Eigen::Vector2d;
 constexpr int kPlaneDraws = 400;           // triples of points tried
 constexpr double kLeastPlaneShare = 0.08;  // of the measured points; less is no support
 // 1/m^2: the tolerance of a plane is so many times the squared depth where that is more than 1.
-constexpr double kInlierGrowth = 0.7;
+constexpr double kToleranceGrowth = 0.7;
 
 bool measured(const Vector3d& p) { return p.z() > 0.0; }
 
@@ -51,8 +51,10 @@ std::vector<std::uint8_t> eroded_inliers(const SampledDepth& sampled, const geom
 
 }  // namespace
 
+double tolerance_growth(double depth) { return std::max(1.0, kToleranceGrowth * depth * depth); }
+
 double tolerance_at(const SegmentationOptions& options, double depth) {
-  return options.plane_inlier * std::max(1.0, kInlierGrowth * depth * depth);
+  return options.plane_inlier * tolerance_growth(depth);
 }
 
 std::optional<geometry::Plane> plane_through(const Vector3d& a, const Vector3d& b, const Vector3d& c) {

@@ -54,7 +54,10 @@ struct SampledDepth {
 SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::PinholeCamera& camera,
                           const SegmentationOptions& options);
 
-/// How near to a plane a measurement at this depth (m) must be to lie on it, m: noise grows with the squared depth.
+/// How much larger tolerances are at this depth (m) than nearby: beyond 1.2 m they grow with the squared depth, as
+/// noise does.
+double tolerance_growth(double depth);
+/// How near to a plane a measurement at this depth (m) must be to lie on it, m.
 double tolerance_at(const SegmentationOptions& options, double depth);
 
 /// The plane through three points in C, its normal turned towards the camera; nothing where they lie on a line.
