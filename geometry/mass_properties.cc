@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/geometry/mass_properties.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 #include <string>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::geometry {
 namespace {
@@ -173,8 +173,8 @@ MassProperties with_mass(const MassProperties& body, double mass) {
 }
 
 PrincipalInertia principal_inertia(const MassProperties& body) {
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(0.5 * (body.I_BBcm_B + body.I_BBcm_B.transpose()));
-  PrincipalInertia result{solver.eigenvalues(), solver.eigenvectors()};
+  const auto [moments, axes] = symmetric_eigen_3(0.5 * (body.I_BBcm_B + body.I_BBcm_B.transpose()));
+  PrincipalInertia result{moments, axes};
   // An eigenvector's sign is free: the largest component is made positive, then the third axis right-handed.
   for (int i = 0; i < 2; ++i) {
     Eigen::Index largest = 0;

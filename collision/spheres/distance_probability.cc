@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/spheres/distance_probability.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::collision {
 
@@ -151,9 +151,8 @@ double isotropic_distance_probability(double distance, double deviation, double 
 
 double distance_probability(const Eigen::Vector3d& mean, const Eigen::Matrix3d& covariance, double radius) {
   if (radius <= 0.0) return radius == 0.0 && mean.isZero(0.0) && covariance.trace() <= 0.0 ? 1.0 : 0.0;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
-  axes.compute(covariance);  // computeDirect loses the small ones of eigenvalues that differ much
-  const Eigen::Vector3d variance = axes.eigenvalues().cwiseMax(0.0);
+  const auto [values, vectors] = geometry::symmetric_eigen_3(covariance);
+  const Eigen::Vector3d variance = values.cwiseMax(0.0);
   const double largest = std::sqrt(variance[2]);
   const double distance = mean.norm();
   const double slack = radius - distance;
@@ -161,7 +160,7 @@ double distance_probability(const Eigen::Vector3d& mean, const Eigen::Matrix3d& 
   if (std::abs(slack) >= 5.7 * largest) return slack >= 0.0 ? 1.0 : 0.0;
   if (variance[0] > 0.9999 * variance[2])
     return isotropic_distance_probability(distance, std::sqrt(variance[1]), radius);
-  const Eigen::Vector3d along = axes.eigenvectors().transpose() * mean;
+  const Eigen::Vector3d along = vectors.transpose() * mean;
   const double scale = 1.0 / (radius * radius);
   Quadratic q{};
   for (int i = 0; i < 3; ++i) {

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -266,7 +267,7 @@ std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& tar
       Eigen::Index axis = 0;
       (R.transpose() * up_C).cwiseAbs().maxCoeff(&axis);
       const Vector3d nearest = R.col(axis) * (R.col(axis).dot(up_C) < 0.0 ? -1.0 : 1.0);
-      X_CO.rotation = (geometry::Quaterniond::FromTwoVectors(nearest, up_C) * X_CO.rotation).normalized();
+      X_CO.rotation = (geometry::rotation_between(nearest, up_C) * X_CO.rotation).normalized();
     }
     X_CO.translation = centre - X_CO.rotation * target.centre();
     starts.push_back(X_CO);

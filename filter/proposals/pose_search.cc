@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/filter/proposals/pose_search.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -35,7 +35,7 @@ Vector6d bounded_step(const rendering::PoseLinearisation& equations, const Matri
   const double scale = 1e-3 * H.diagonal().tail<3>().mean();
   H.diagonal().tail<3>().array() += scale + 1e-9;
   H.diagonal().head<3>().array() += scale * radius * radius + 1e-9;
-  Vector6d d = H.ldlt().solve(g);
+  Vector6d d = geometry::solve_symmetric_6(H, g);
   if (!d.allFinite()) return Vector6d::Zero();
   const double turn = d.head<3>().norm(), shift = d.tail<3>().norm();
   const double factor = std::min({1.0, kMostTurn / std::max(turn, 1e-12), kMostShift / std::max(shift, 1e-12)});

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/filter/proposals/segmentation.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/polygon.h"
 
 namespace prescene::filter {
@@ -107,9 +107,8 @@ geometry::Plane fit_plane(std::span<const Vector3d> points) {
   mean /= static_cast<double>(points.size());
   geometry::Matrix3d scatter = geometry::Matrix3d::Zero();
   for (const Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<geometry::Matrix3d> solver(scatter);
   geometry::Plane plane;
-  plane.normal = solver.eigenvectors().col(0);
+  plane.normal = geometry::symmetric_eigen_3(scatter).vectors.col(0);
   plane.offset = -plane.normal.dot(mean);
   if (plane.offset < 0.0) {
     plane.normal = -plane.normal;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Centres of mass and inertias that don't go with the shape they belong to: mostly a slip of units.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "prescene/core/text.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "read_scene_parts.h"
 
 namespace prescene::interfaces {
@@ -71,8 +71,8 @@ void check_mass_distribution(const MassPlaces& at, const ObjectModel& model, Pro
   if (!at.inertia || problems.errors().size() > before) return;
 
   const double mass = belief::mean(model.mass), size = bounds.diagonal().norm();
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(model.unit_inertia, Eigen::EigenvaluesOnly);
-  const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
+  const Vector3d moments = geometry::symmetric_eigen_3(model.unit_inertia).values;
+  const double least = moments[0], largest = moments[2];
   // No mass is farther from its centre than the farthest corner; of all bodies of this mass and no longer than the
   // shape, a needle of the densest metal turns most easily.
   const double farthest = farthest_corner(bounds, center);

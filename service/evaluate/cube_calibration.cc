@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/cube_calibration.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 #include <sstream>
 
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/service/evaluate/forecast_scores.h"
 #include "prescene/simulation/calibration/coordinate_search.h"
 
@@ -79,7 +80,7 @@ core::Result<CubeMeasurements> measure_cube(const std::vector<CubeToss>& tosses,
       z(static_cast<Eigen::Index>(i)) = (toss.frames[i].X_WO * geometry::Vector3d(0, 0, model.center_of_mass_z)).z();
     }
     const Eigen::Matrix3d normal = columns.transpose() * columns;
-    const double c = normal.ldlt().solve(columns.transpose() * z)(2);
+    const double c = geometry::solve_symmetric_3(normal, columns.transpose() * z)(2);
     const double precision = 1.0 / normal.inverse()(2, 2);
     weight += precision;
     weighted += precision * -2.0 * c;

@@ -42,5 +42,31 @@ TEST(SymmetricEigen6, ValuesAndVectorsMakeTheMatrix) {
   }
 }
 
+TEST(SymmetricEigen3, ValuesAndVectorsMakeTheMatrix) {
+  core::RandomStream stream(3, core::Purpose::kTest);
+  for (int i = 0; i < 100; ++i) {
+    Matrix3d A;
+    for (double& x : A.reshaped()) x = stream.normal();
+    A = (A + A.transpose()).eval();
+    const auto [values, vectors] = symmetric_eigen_3(A);
+    EXPECT_NEAR((vectors * values.asDiagonal() * vectors.transpose() - A).norm(), 0.0, 1e-12 * A.norm());
+    for (Eigen::Index k = 1; k < 3; ++k) EXPECT_LE(values[k - 1], values[k]);
+  }
+}
+
+TEST(SolveSymmetric, SolvesSystemsOfThreeAndSixRows) {
+  core::RandomStream stream(4, core::Purpose::kTest);
+  for (int i = 0; i < 100; ++i) {
+    Matrix6d root;
+    for (double& x : root.reshaped()) x = stream.normal();
+    const Matrix6d A = root * root.transpose() + 1e-3 * Matrix6d::Identity();
+    Vector6d b;
+    for (double& x : b) x = stream.normal();
+    EXPECT_NEAR((A * solve_symmetric_6(A, b) - b).norm(), 0.0, 1e-9 * b.norm());
+    const Matrix3d A_3 = A.topLeftCorner<3, 3>();
+    EXPECT_NEAR((A_3 * solve_symmetric_3(A_3, b.head<3>()) - b.head<3>()).norm(), 0.0, 1e-9 * b.norm());
+  }
+}
+
 }  // namespace
 }  // namespace prescene::geometry

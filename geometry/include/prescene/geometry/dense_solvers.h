@@ -42,6 +42,14 @@ struct SymmetricEigen6 {
 SymmetricEigen6 symmetric_eigen_6(const Matrix6d& A);
 Vector6d symmetric_eigenvalues_6(const Matrix6d& A);
 
+/// As symmetric_eigen, for matrices of three rows: not by the closed form, which loses small ones of values that differ
+/// much (SelfAdjointEigenSolver::compute).
+struct SymmetricEigen3 {
+  Vector3d values;
+  Matrix3d vectors;
+};
+SymmetricEigen3 symmetric_eigen_3(const Matrix3d& A);
+
 /// A = L L^T of a symmetric matrix of six degrees of freedom, of which the lower triangle is read (LLT).
 class Cholesky6 {
  public:
@@ -59,11 +67,12 @@ class Cholesky6 {
   bool positive_definite_;
 };
 
-/// x with A x = b for a symmetric, positive or negative semidefinite A of three rows (LDLT).
-Vector3d solve_symmetric_3(const Eigen::Matrix3d& A, const Vector3d& b);
+/// x with A x = b for a symmetric, positive or negative semidefinite A of three or six rows (LDLT).
+Vector3d solve_symmetric_3(const Matrix3d& A, const Vector3d& b);
+Vector6d solve_symmetric_6(const Matrix6d& A, const Vector6d& b);
 
 /// The smallest rotation that takes the direction of `from` to that of `to`, both not zero; of opposite directions one
-/// of the half turns, by a singular value decomposition (Quaterniond::FromTwoVectors).
+/// of the half turns (as Quaterniond::FromTwoVectors, without its singular value decomposition).
 Quaterniond rotation_between(const Vector3d& from, const Vector3d& to);
 
 }  // namespace prescene::geometry
