@@ -30,6 +30,12 @@ SymmetricEigen3 symmetric_eigen_3(const Matrix3d& A) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+Vector3d symmetric_eigenvalues_3_direct(const Matrix3d& A) {
+  Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
+  solver.computeDirect(A, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues();
+}
+
 Cholesky6::Cholesky6(const Matrix6d& A) {
   const Eigen::LLT<Matrix6d> llt(A);
   positive_definite_ = llt.info() == Eigen::Success;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/collision/spheres/relative_uncertainty.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -32,9 +30,7 @@ constexpr double kSizeFails = RelativeUncertainty::kRemainderFails / 4;
 constexpr double kFloatRounding = 2e-6;
 
 double largest_eigenvalue(const Matrix3d& m) {
-  Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
-  solver.computeDirect(m, Eigen::EigenvaluesOnly);
-  return std::max(0.0, solver.eigenvalues()[2]) + 1e-7 * m.cwiseAbs().maxCoeff();
+  return std::max(0.0, geometry::symmetric_eigenvalues_3_direct(m)[2]) + 1e-7 * m.cwiseAbs().maxCoeff();
 }
 
 Matrix3d rotation_of(const Transform& X) {
@@ -114,8 +110,7 @@ core::Result<RelativeUncertainty> RelativeUncertainty::make(const UncertainPose&
     joined.topRightCorner<3, 6>() = R_AB * result.factor_b_.topRows<3>();
     joined.bottomRightCorner<3, 6>() =
         geometry::cross_matrix(p_AB) * joined.topRightCorner<3, 6>() + result.factor_b_.bottomRows<3>();
-    const Eigen::HouseholderQR<Eigen::Matrix<double, 12, 6>> triangle(joined.transpose());
-    result.factor_ = triangle.matrixQR().topRows<6>().triangularView<Eigen::Upper>().transpose();
+    result.factor_ = geometry::triangular_factor(joined.transpose()).transpose();
     result.covariance_ = result.factor_ * result.factor_.transpose();
   }
   result.set_growth(a, b);

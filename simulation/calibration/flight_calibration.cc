@@ -4,7 +4,6 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -44,7 +43,8 @@ core::Status check(const FlightPrior& prior) {
       return core::invalid_input(std::string("the prior's deviation of the ") + name + " is not positive");
   }
   const Matrix3d& J = prior.unit_inertia;
-  if ((J - J.transpose()).cwiseAbs().maxCoeff() > 1e-9 * J.cwiseAbs().maxCoeff() || J.llt().info() != Eigen::Success)
+  if ((J - J.transpose()).cwiseAbs().maxCoeff() > 1e-9 * J.cwiseAbs().maxCoeff() ||
+      !(geometry::symmetric_eigen_3(J).values[0] > 0.0))
     return core::invalid_input("the prior's inertia is not symmetric and positive definite");
   return core::ok_status();
 }
@@ -214,13 +214,13 @@ class FlightFit {
     Eigen::MatrixXd shared(rows, kFlightParameters);
     shared << parts[0], parts[1], parts[2];
     const Jacobian& own = parts[3];
-    const Eigen::MatrixXd own_information = own.transpose() * own;
-    const Eigen::MatrixXd coupling = shared.transpose() * own;
+    const Eigen::MatrixXd own_information = geometry::product(own.transpose(), own);
+    const Eigen::MatrixXd coupling = geometry::product(shared.transpose(), own);
     Say say;
-    say.information =
-        shared.transpose() * shared - coupling * geometry::solve_symmetric(own_information, coupling.transpose());
-    say.score =
-        shared.transpose() * errors - coupling * geometry::solve_symmetric(own_information, own.transpose() * errors);
+    say.information = geometry::product(shared.transpose(), shared) -
+                      geometry::product(coupling, geometry::solve_symmetric(own_information, coupling.transpose()));
+    say.score = shared.transpose() * errors -
+                geometry::product(coupling, geometry::solve_symmetric(own_information, own.transpose() * errors));
     return say;
   }
 
@@ -240,7 +240,7 @@ class FlightFit {
       const Parameters score = geometry::solve(others, say.score);
       spread += score * score.transpose();
     }
-    return inverse * spread * inverse;
+    return geometry::product(geometry::product(inverse, spread), inverse);
   }
 
   const FlightPrior& prior_;

@@ -18,6 +18,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using geometry::product;
 
 // Steps within a round: the linear functions are cheap, but hold about the trials only.
 constexpr int kSteps = 12;
@@ -68,7 +69,7 @@ MatrixXd trials_in(const Neighbourhood& around, const Problem& problem, Index co
     for (Index i = 0; i < n; ++i) z[i] = core::inverse_normal_cdf(uniform[static_cast<std::size_t>(i)]);
     VectorXd value = around.center + around.factor * z;
     for (Index i = 0; i < n; ++i) value[i] = reflected(value[i], problem.low[i], problem.high[i]);
-    trials.row(trial) = around.factor.triangularView<Eigen::Lower>().solve(value - around.center).transpose();
+    trials.row(trial) = geometry::solve_lower(around.factor, value - around.center).transpose();
   }
   return trials;
 }
@@ -91,20 +92,20 @@ Step step_from(const VectorXd& u, const PointResponse& response, const Neighbour
   const auto cases = static_cast<double>(slopes.rows());
   // Directions in which the scores do not rise tell nothing.
   const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(response.curvature(u));
-  const MatrixXd H = eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
+  const MatrixXd H = product(eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal(), eigen.vectors.transpose());
   const VectorXd slope = slopes.colwise().mean().transpose();
   const MatrixXd centred = slopes.rowwise() - slope.transpose();
   // No freedom is taken off for the parameters: jumps of the simulation, which the trials see as slopes, widen the
   // spread of the slopes by as much (docs/reference/calibration.md has the count).
-  MatrixXd B = centred.transpose() * centred / (cases * (cases - 1.0));
+  MatrixXd B = product(centred.transpose(), centred) / (cases * (cases - 1.0));
   B *= std::pow(student_factor(cases - 1.0), 2);
   B.diagonal().array() += 1e-12 * B.trace() + 1e-300;
   const MatrixXd weights = geometry::solve_symmetric(B, H).transpose();  // H B^-1
-  const MatrixXd prior = around.factor.transpose() * problem.precision.asDiagonal() * around.factor;
+  const MatrixXd prior = product(around.factor.transpose() * problem.precision.asDiagonal(), around.factor);
   const VectorXd pull = around.factor.transpose() *
                         problem.precision.cwiseProduct(problem.prior_mean - around.center - around.factor * u);
   Step step;
-  step.covariance = geometry::inverse(weights * H + prior);
+  step.covariance = geometry::inverse(product(weights, H) + prior);
   step.covariance = 0.5 * (step.covariance + step.covariance.transpose()).eval();
   step.move = step.covariance * (pull - weights * slope);
   return step;
@@ -125,8 +126,8 @@ Neighbourhood about(const VectorXd& center, const Neighbourhood& before, const M
   const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(0.5 * (in_u + in_u.transpose()));
   const VectorXd lengths =
       (reach * eigen.values.cwiseMax(0.0).cwiseSqrt()).cwiseMax(1.0 / kMostChange).cwiseMin(kMostChange);
-  const MatrixXd factor = before.factor * eigen.vectors * lengths.asDiagonal();
-  MatrixXd spread = factor * factor.transpose();
+  const MatrixXd factor = product(before.factor, eigen.vectors) * lengths.asDiagonal();
+  MatrixXd spread = product(factor, factor.transpose());
   spread.diagonal() += least.cwiseAbs2();
   return {center, geometry::cholesky_factor(spread)};
 }
@@ -144,7 +145,8 @@ RoundEstimate estimate_of(const PointResponse& response, const Neighbourhood& ar
     step = step_from(u, response, around, problem);
     u = shortened(u + shortened(step.move, kLongestStep), kLongestMove);
   }
-  return {around.center + around.factor * u, around.factor * step.covariance * around.factor.transpose()};
+  return {around.center + around.factor * u,
+          product(product(around.factor, step.covariance), around.factor.transpose())};
 }
 
 /// Their mean; its error by how much they differ is added. Of rounds that did not settle, which may follow each other,

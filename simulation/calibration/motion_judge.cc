@@ -44,7 +44,7 @@ EndErrors end_errors(std::size_t frames, double step, int degree) {
   for (Eigen::Index i = 0; i < n; ++i) {
     for (int d = 1; d <= degree; ++d) powers(i, d) = powers(i, d - 1) * static_cast<double>(i + 1 - n);
   }
-  const Eigen::MatrixXd covariance = geometry::inverse(powers.transpose() * powers);
+  const Eigen::MatrixXd covariance = geometry::inverse(geometry::product(powers.transpose(), powers));
   return {std::sqrt(covariance(0, 0)), std::sqrt(covariance(1, 1)) / step};
 }
 

@@ -58,8 +58,9 @@ PointResponse::PointResponse(const Observations& observations, const MatrixXd& t
       table.row(trial) =
           Eigen::Map<const Eigen::RowVectorXd>(simulated[static_cast<std::size_t>(trial)].data() + view * rows, rows);
     }
-    const MatrixXd coefficients = inverse * table;
-    const double variance = (table - design * coefficients).squaredNorm() / (freedom * static_cast<double>(rows));
+    const MatrixXd coefficients = geometry::product(inverse, table);
+    const double variance =
+        (table - geometry::product(design, coefficients)).squaredNorm() / (freedom * static_cast<double>(rows));
     middles_.emplace_back(coefficients.row(0).transpose());
     MatrixXd response = coefficients.bottomRows(parameters_).transpose();
     // What chance alone makes of a response is taken off [James & Stein 1961]: it would look like information.

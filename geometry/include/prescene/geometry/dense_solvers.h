@@ -20,6 +20,8 @@ struct SymmetricEigen {
 /// Of a symmetric matrix, of which the lower triangle is read (SelfAdjointEigenSolver).
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& A);
 
+/// A B.
+Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 /// X with A X = B for a symmetric, positive or negative semidefinite A (LDLT).
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 /// The X with the least |A X - B| for an A of full column rank and no fewer rows than columns (ColPivHouseholderQR).
@@ -31,6 +33,8 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& A);
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
 /// The lower triangular L with L L^T = A, of a symmetric, positive definite matrix (LLT).
 Eigen::MatrixXd cholesky_factor(const Eigen::MatrixXd& A);
+/// The upper triangular R of A = Q R with an orthogonal Q, of no fewer rows than columns (HouseholderQR).
+Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& A);
 /// L^-1 B of a lower triangular L.
 Eigen::MatrixXd solve_lower(const Eigen::MatrixXd& L, const Eigen::MatrixXd& B);
 
@@ -49,6 +53,8 @@ struct SymmetricEigen3 {
   Matrix3d vectors;
 };
 SymmetricEigen3 symmetric_eigen_3(const Matrix3d& A);
+/// The values by the closed form, which is faster: errors of some 1e-8 of the largest one (computeDirect).
+Vector3d symmetric_eigenvalues_3_direct(const Matrix3d& A);
 
 /// A = L L^T of a symmetric matrix of six degrees of freedom, of which the lower triangle is read (LLT).
 class Cholesky6 {
