@@ -81,9 +81,11 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   options.keep_contacts = detail.keep_contacts;
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
   if (!detail.to_rest && !foresight.variables.empty())
-    foresight.certifier = simulation::make_certifier(
-        foresight.scene, foresight.variables, foresight.request,
-        {.shapes = context.shapes, .edge_rounding = context.edge_rounding, .cancellation = cancellation});
+    foresight.certifier =
+        simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
+                                   {.shapes = context.shapes,
+                                    .edge_rounding = context.edge_rounding * foresight.simulator->length_scale(),
+                                    .cancellation = cancellation});
   options.certifier = foresight.certifier.get();
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,

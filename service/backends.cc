@@ -9,6 +9,7 @@
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
+#include "prescene/simulation/similarity.h"
 
 namespace prescene::service {
 namespace {
@@ -108,8 +109,17 @@ StepperCounts Backends::stepper_counts() const { return stepper_log_->counts(); 
 
 core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator(const belief::Scene& scene,
                                                                               double step_factor) {
+  const simulation::Similarity similarity = simulation::similarity_of(scene);
   simulation::BulletOptions options = settings_.bullet;
+  if (scene.step) options.step = *scene.step / similarity.time();
   options.step *= step_factor;
+  if (similarity.length == 1.0) return make_simulator_as_it_is(scene, options);
+  PRESCENE_TRY(auto simulator, make_simulator_as_it_is(simulation::scaled(scene, similarity.inverse()), options));
+  return simulation::make_scaled_simulator(std::move(simulator), similarity);
+}
+
+core::Result<std::unique_ptr<simulation::Simulator>> Backends::make_simulator_as_it_is(
+    const belief::Scene& scene, const simulation::BulletOptions& options) {
   if (settings_.stepper == Stepper::kBullet) return simulation::make_bullet_simulator(scene, shapes_, options);
   auto lockstep = simulation::make_lockstep_simulator(scene, shapes_, lockstep_options(options));
   if (settings_.stepper == Stepper::kLockstep) {

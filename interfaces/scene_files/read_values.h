@@ -19,6 +19,7 @@ inline constexpr NumberRange kMass{1e-6, 1e5, "give kg, more than 0 and at most 
 inline constexpr NumberRange kDensity{0.1, 25000.0, "give kg/m^3 (water 1000, wood 600, steel 7850)"};
 inline constexpr NumberRange kTime{0.0, 1e5, "give seconds between 0 and 1e5", "s"};
 inline constexpr NumberRange kDuration{1e-4, 3600.0, "give seconds, more than 0 and at most 3600", "s"};
+inline constexpr NumberRange kStep{1e-5, 0.02, "give 'auto' or seconds between 0.00001 and 0.02", "s"};
 inline constexpr NumberRange kAngleDeg{-36000.0, 36000.0, "give degrees", "deg"};
 inline constexpr NumberRange kSpeed{-1000.0, 1000.0, "give m/s between -1000 and 1000"};
 inline constexpr NumberRange kTurnRate{-1000.0, 1000.0, "give rad/s between -1000 and 1000", "rad"};

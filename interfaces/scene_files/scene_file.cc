@@ -95,6 +95,8 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   binder.read("name", scene.name);
   read_gravity(binder, scene);
   binder.read("duration", scene.duration, kDuration);
+  const LocatedValue* step = binder.find("step");
+  if (step != nullptr && step->text != "auto") binder.read("step", scene.step, kStep);
   binder.read("stop_at_rest", scene.stop_at_rest);
 
   const LocatedValue* models = binder.find("models");

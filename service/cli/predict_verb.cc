@@ -9,6 +9,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
+#include "prescene/interfaces/bytes/text.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/pictures/heat_map_picture.h"
@@ -24,6 +25,7 @@ struct PredictOptions {
   std::string scene;
   std::string report;
   std::string stepper = "automatic";
+  std::string step;
   std::string heat_map;
   belief::Effort effort;
   double max_seconds = 0.0;
@@ -32,6 +34,12 @@ struct PredictOptions {
   bool model_error = false;
   double duration = 0.0;
 };
+
+std::optional<double> step_of(const std::string& text) {
+  double step = 0.0;
+  if (!interfaces::parse_number(text, &step) || step < 1e-5 || step > 0.02) return std::nullopt;
+  return step;
+}
 
 nlohmann::ordered_json document_of(const belief::Scene& scene, std::uint64_t seed, const belief::Answer& answer) {
   nlohmann::ordered_json document = {{"scene", scene.name}, {"seed", seed}};
@@ -149,7 +157,12 @@ core::Status run(const PredictOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_apart("--heat-map", options.heat_map, "--report", options.report));
-  PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
+  PRESCENE_TRY(auto scene, load_scene(options.scene, context.log()));
+  if (!options.step.empty()) {
+    auto with_step = std::make_shared<belief::Scene>(*scene);
+    with_step->step = options.step == "auto" ? std::nullopt : step_of(options.step);
+    scene = std::move(with_step);
+  }
   BackendSettings settings;
   if (options.stepper == "bullet") settings.stepper = Stepper::kBullet;
   if (options.stepper == "lockstep") settings.stepper = Stepper::kLockstep;
@@ -227,6 +240,15 @@ Verb add_predict_verb(CLI::App& app) {
           "where it can, else bullet, and the answer says why")
       ->check(CLI::IsMember({"automatic", "bullet", "lockstep"}))
       ->capture_default_str();
+  verb->add_option("--step", options->step,
+                   "Of the simulation, s, or auto: by the size of the smallest object; instead of the scene's")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            return text == "auto" || step_of(text)
+                       ? std::string()
+                       : "'" + text + "' is neither auto nor a step between 0.00001 and 0.02 s";
+          },
+          "auto|SECONDS"));
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
       ->check(file_name());
   verb->footer("Example: prescene predict scenarios/milk_on_bin.yaml --json --seed 1");

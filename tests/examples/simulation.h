@@ -24,6 +24,10 @@ extern const geometry::TriangleMesh mesh;
 extern const Decomposer decomposer;
 }  // namespace shape_store_h
 
+namespace similarity_h {
+extern std::unique_ptr<Simulator> simulator;
+}  // namespace similarity_h
+
 namespace simulator_h {
 core::Result<std::unique_ptr<Simulator>> make_simulator(const belief::Scene& scene);
 extern const std::vector<belief::WorldState> starts;

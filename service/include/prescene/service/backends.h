@@ -55,10 +55,12 @@ class Backends {
   core::ThreadPool& pool() { return pool_; }
   filter::MeshCache& meshes() { return meshes_; }
 
-  /// Its steps are `step_factor` (> 0) times as long as BackendSettings::bullet says. Simulator::stepper() says who it
-  /// is. Fails as make_bullet_simulator does: kInvalidInput for shapes without thickness and for a step out of range,
-  /// kUnsupported for a triangle surface that moves. With Stepper::kLockstep, kUnsupported names what of the scene
-  /// can't be simulated in lockstep.
+  /// Its steps are `step_factor` (> 0) times as long as the scene says, or else BackendSettings::bullet. Things that
+  /// are smaller or larger than those of a household are simulated as similar ones that are not
+  /// (prescene/simulation/similarity.h): the settings are then theirs. Simulator::stepper() says who it is. Fails as
+  /// make_bullet_simulator does: kInvalidInput for shapes without thickness and for a step out of range, kUnsupported
+  /// for a triangle surface that moves. With Stepper::kLockstep, kUnsupported names what of the scene can't be
+  /// simulated in lockstep.
   core::Result<std::unique_ptr<simulation::Simulator>> make_simulator(const belief::Scene& scene,
                                                                       double step_factor = 1.0);
   /// The same as a function; the backends must outlive it.
@@ -73,6 +75,9 @@ class Backends {
 
  private:
   class StepperLog;
+
+  core::Result<std::unique_ptr<simulation::Simulator>> make_simulator_as_it_is(
+      const belief::Scene& scene, const simulation::BulletOptions& options);
 
   core::ThreadPool& pool_;
   BackendSettings settings_;

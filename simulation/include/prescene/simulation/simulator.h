@@ -122,6 +122,9 @@ class Simulator {
 
   /// Of every step, s; 0 = it takes none.
   virtual double step_size() const { return 0.0; }
+  /// True lengths over those of MechanicsOptions: other than 1 where similar things of household size are simulated
+  /// (prescene/simulation/similarity.h).
+  virtual double length_scale() const { return 1.0; }
   virtual std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                                   const core::RandomStream& stream) const = 0;
 };
