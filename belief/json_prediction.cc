@@ -138,6 +138,7 @@ Json paths_json(const std::vector<ObjectPath>& paths) {
 Json stepper_json(const Basis& basis) {
   Json json{{"name", basis.stepper}};
   if (!basis.not_lockstep.empty()) json["not_lockstep"] = basis.not_lockstep;
+  if (basis.hull_error > 0.0) json["hull_error"] = basis.hull_error;
   return json;
 }
 

@@ -18,6 +18,7 @@ void account(const Foresight& foresight, belief::Basis& basis) {
   const simulation::StepperUse stepper = foresight.simulator->stepper();
   basis.stepper = stepper.name;
   basis.not_lockstep = stepper.not_lockstep;
+  basis.hull_error = stepper.hull_error;
   basis.certificates = {foresight.certifier != nullptr, estimate.certificates.certified, estimate.certificates.audited,
                         estimate.certificates.mismatches, estimate.certificates.switched_off};
   for (const simulation::InstanceRecord& record : estimate.instances) {

@@ -49,7 +49,11 @@ class ScaledSimulator : public Simulator {
       : simulator_(std::move(simulator)), to_true_(to_true) {}
 
   core::Status supports(const RunRequest& request) const override { return simulator_->supports(inside(request)); }
-  StepperUse stepper() const override { return simulator_->stepper(); }
+  StepperUse stepper() const override {
+    StepperUse use = simulator_->stepper();
+    use.hull_error *= to_true_.length;
+    return use;
+  }
   double step_size() const override { return simulator_->step_size() * to_true_.time(); }
   double length_scale() const override { return simulator_->length_scale() * to_true_.length; }
 

@@ -7,6 +7,7 @@
 
 #include "prescene/collision/mesh.h"
 #include "prescene/collision/spheres/surface_spheres.h"
+#include "prescene/core/check.h"
 #include "prescene/core/hash.h"
 #include "prescene/core/parallel.h"
 
@@ -125,6 +126,26 @@ core::Result<std::shared_ptr<const ConvexParts>> ShapeStore::convex_parts(const 
                                                                           const DecompositionSettings& settings) {
   const Key key{geometry::content_hash(mesh), settings_hash(use, settings)};
   return find_or_build(parts_, key, [&] { return build_parts(mesh, use, settings, decomposer_); });
+}
+
+core::Result<std::shared_ptr<const std::vector<RoundedPolytope>>> ShapeStore::rounded_parts(
+    const TriangleMesh& mesh, belief::MeshUse use, const DecompositionSettings& settings,
+    const std::vector<double>& radii, const PolytopeLimits& limits) {
+  PRESCENE_TRY(const auto parts, convex_parts(mesh, use, settings));
+  PRESCENE_CHECK(radii.size() == parts->size());
+  core::Hasher hasher;
+  hasher.value(settings_hash(use, settings)).value(limits.vertices).value(limits.corners);
+  for (const double radius : radii) hasher.value(radius);
+  const Key key{geometry::content_hash(mesh), hasher.digest()};
+  return find_or_build(rounded_, key, [&]() -> core::Result<std::vector<RoundedPolytope>> {
+    std::vector<RoundedPolytope> result;
+    for (std::size_t i = 0; i < parts->size(); ++i) {
+      core::Result<RoundedPolytope> part = rounded((*parts)[i], radii[i], limits);
+      if (!part) return part.status().at("convex part " + std::to_string(i + 1));
+      result.push_back(*std::move(part));
+    }
+    return result;
+  });
 }
 
 core::Result<std::shared_ptr<const collision::SurfaceSpheres>> ShapeStore::surface_spheres(

@@ -107,6 +107,9 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
     if (open) text += deciding_text(inputs, predicted.instances);
   }
   text += cost_text(predicted);
+  if (predicted.hull_error > 0.0)
+    text += "Note: Hulls of many vertices are simplified by up to " + fixed_text(1e3 * predicted.hull_error, 2) +
+            " mm; '--stepper bullet' takes them as they are.\n";
   if (!predicted.not_lockstep.empty())
     text += "Note: Simulated by Bullet's stepper, which is 3 to 7 times slower than the lockstep stepper, because " +
             predicted.not_lockstep + ".\n";

@@ -18,6 +18,7 @@ struct CompiledLockstep {
   LockstepScene lanes;
   std::vector<geometry::Quaterniond> R_OP;  ///< Principal axes, by object.
   std::vector<int> robot_bodies;            ///< In lanes.bodies, by robot body; -1: it has no shape.
+  double hull_error = 0.0;                  ///< m: the largest of all parts.
   std::vector<double> pushers;              ///< Their radii; the last of lanes.bodies.
 
   int pusher_body(std::size_t pusher) const { return static_cast<int>(lanes.bodies.size() - pushers.size() + pusher); }

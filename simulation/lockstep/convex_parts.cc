@@ -12,7 +12,7 @@ namespace {
 using geometry::Matrix3d;
 using geometry::Pose;
 
-constexpr std::size_t kMostVertices = 64;
+constexpr PolytopeLimits kLimits{64, kMaxLoop};
 
 /// Where a body's parts go: from the frame that shapes are given in to that of the lanes.
 struct Placement {
@@ -67,20 +67,23 @@ ConvexPart primitive_part(const geometry::Primitive& primitive, const Placement&
   return part;
 }
 
-core::Result<ConvexPart> hull_part(const ConvexPolytope& hull, const Placement& X, double rounding) {
+/// Empty if it takes more vertices or corners than lanes have room for.
+std::optional<RoundedPolytope> rounded_as_it_is(const ConvexPolytope& hull, double radius) {
+  if (hull.vertices.size() > 2 * kLimits.vertices) return std::nullopt;  // to find its core would take long
+  RoundedPolytope result{hull, 0.0, 0.0};
+  if (std::optional<ConvexPolytope> smaller = inset(hull, radius)) {
+    result.core = std::move(*smaller);
+    result.radius = radius;
+  }
+  return within(result.core, kLimits) ? std::optional(std::move(result)) : std::nullopt;
+}
+
+ConvexPart hull_part(const ConvexPolytope& hull, const RoundedPolytope& rounded, const Placement& X) {
   ConvexPart part;
   part.kind = CoreKind::kHull;
-  part.radius = rounded_edge(rounding, hull.inner_radius());
-  ConvexPolytope core = hull;
-  if (std::optional<ConvexPolytope> smaller = inset(hull, part.radius)) {
-    core = std::move(*smaller);
-  } else {
-    part.radius = 0.0;
-  }
-  if (core.vertices.size() > kMostVertices) {
-    return core::unsupported("a hull has " + std::to_string(core.vertices.size()) + " vertices, more than " +
-                             std::to_string(kMostVertices) + ", which are not simulated in lockstep");
-  }
+  part.radius = rounded.radius;
+  part.hull_error = rounded.error;
+  const ConvexPolytope& core = rounded.core;
   Eigen::AlignedBox3d box;
   for (const Vector3d& v : hull.vertices) box.extend(X.R * v + X.p);
   const Vector3d center = box.center();
@@ -90,10 +93,6 @@ core::Result<ConvexPart> hull_part(const ConvexPolytope& hull, const Placement& 
   for (const Vector3d& v : core.vertices) part.vertices.push_back(plain(Vector3d(X.R * v + X.p - center)));
   for (const ConvexPolytope::Face& face : core.faces) {
     const std::size_t corners = face.loop.size();
-    if (corners > static_cast<std::size_t>(kMaxLoop)) {
-      return core::unsupported("a side of a hull has " + std::to_string(corners) + " corners, more than " +
-                               std::to_string(kMaxLoop) + ", which are not simulated in lockstep");
-    }
     part.normals.push_back(plain(Vector3d(X.R * face.normal)));
     part.corner_counts.push_back(static_cast<int>(corners));
     part.longest_loop = std::max(part.longest_loop, static_cast<int>(corners));
@@ -126,9 +125,18 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
         "stepper");
   }
   PRESCENE_TRY(const auto hulls, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
+  std::vector<double> radii;
+  std::vector<std::optional<RoundedPolytope>> cores;
   for (const ConvexPolytope& hull : *hulls) {
-    PRESCENE_TRY(ConvexPart part, hull_part(hull, placed(mesh.X_OS), rounding));
-    parts.push_back(std::move(part));
+    radii.push_back(rounded_edge(rounding, hull.inner_radius()));
+    cores.push_back(rounded_as_it_is(hull, radii.back()));
+  }
+  std::shared_ptr<const std::vector<RoundedPolytope>> simplified;
+  for (std::size_t i = 0; i < cores.size(); ++i) {
+    if (!cores[i] && !simplified) {
+      PRESCENE_TRY(simplified, shapes.rounded_parts(*mesh.mesh, mesh.use, decomposition, radii, kLimits));
+    }
+    parts.push_back(hull_part((*hulls)[i], cores[i] ? *cores[i] : (*simplified)[i], placed(mesh.X_OS)));
   }
   return core::ok_status();
 }

@@ -53,6 +53,7 @@ struct ConvexPart {
   std::vector<int> corner_counts;                   ///< By face.
   std::vector<std::array<double, 3>> face_corners;  ///< kMaxLoop by face, the last one repeated.
   int longest_loop = 0;
+  double hull_error = 0.0;  ///< m, of hulls that are simplified to fit (RoundedPolytope::error).
 };
 
 struct FixedPart {

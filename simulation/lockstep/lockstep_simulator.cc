@@ -199,7 +199,7 @@ class LockstepSimulator : public Simulator {
   explicit LockstepSimulator(std::shared_ptr<const CompiledLockstep> scene) : scene_(std::move(scene)) {}
 
   core::Status supports(const RunRequest& request) const override { return check_pushers(request.actions); }
-  StepperUse stepper() const override { return {"lockstep", ""}; }
+  StepperUse stepper() const override { return {"lockstep", "", scene_->hull_error}; }
 
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
            InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,

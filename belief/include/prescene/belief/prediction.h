@@ -193,6 +193,7 @@ struct Basis {
   double step = 0.0;           ///< s of one simulated step; 0 = unknown.
   std::string stepper;         ///< Who simulated: "lockstep" or "bullet"; "" = unknown.
   std::string not_lockstep;    ///< Why the faster "lockstep" could not, where it was tried first; else "".
+  double hull_error = 0.0;     ///< m: how far simulated hulls lie inside the scene's; 0 = they are the scene's.
   CertificateSummary certificates;
   /// Share of instances in which things were in each other by more than 2 mm (they are parted gently), and the deepest
   /// of it, m.

@@ -17,6 +17,7 @@
 
 #include "prescene/belief/object_model.h"
 #include "prescene/simulation/convex_polytope.h"
+#include "prescene/simulation/simplified_polytope.h"
 
 namespace prescene::collision {
 struct SurfaceSpheres;
@@ -60,6 +61,12 @@ class ShapeStore {
   /// and kSpheres.
   core::Result<std::shared_ptr<const ConvexParts>> convex_parts(const geometry::TriangleMesh& mesh, belief::MeshUse use,
                                                                 const DecompositionSettings& settings);
+  /// Each of convex_parts() with round edges, within `limits`; `radii[i]` (m) is wished for the i-th.
+  core::Result<std::shared_ptr<const std::vector<RoundedPolytope>>> rounded_parts(const geometry::TriangleMesh& mesh,
+                                                                                  belief::MeshUse use,
+                                                                                  const DecompositionSettings& settings,
+                                                                                  const std::vector<double>& radii,
+                                                                                  const PolytopeLimits& limits);
   /// The spheres that stand for a mesh under kSpheres (collision/spheres/surface_spheres.h). Fails with kInvalidInput
   /// when the mesh is open, inside out or empty, or a setting is out of range.
   core::Result<std::shared_ptr<const collision::SurfaceSpheres>> surface_spheres(
@@ -86,6 +93,7 @@ class ShapeStore {
   Decomposer decomposer_;
   mutable std::mutex mutex_;
   Slots<ConvexParts> parts_;
+  Slots<std::vector<RoundedPolytope>> rounded_;
   Slots<collision::SurfaceSpheres> spheres_;
   Slots<StaticMesh> meshes_;
   std::size_t built_ = 0;

@@ -102,6 +102,7 @@ class InstanceNumbers {
 struct StepperUse {
   std::string name;          ///< "lockstep" or "bullet"; "" = another, which has no name.
   std::string not_lockstep;  ///< Why it is not "lockstep", where that was asked for first; else "".
+  double hull_error = 0.0;   ///< m: how far hulls lie inside the scene's because they are simplified; 0 = none is.
 };
 
 class Simulator {
