@@ -165,8 +165,11 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   Impl* raw = impl.get();
   const auto on_answer = [raw](const std::string& answer) {  // on two threads
     raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
-    const std::lock_guard lock(raw->answered_mutex);
-    raw->answered.push_back(answer);
+    {
+      const std::lock_guard lock(raw->answered_mutex);
+      raw->answered.push_back(answer);
+    }
+    if (raw->settings.on_answer) raw->settings.on_answer(answer);
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
   impl->worker = std::make_unique<QueryWorker>(
@@ -306,6 +309,7 @@ void LiveService::Impl::look_after_frames() {
       if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
       note_idle(step->idle_controls);
       publish();
+      if (settings.on_step) settings.on_step(*step, tracker->belief());
     }
   } catch (const std::exception& error) {
     note_failure("a frame", error);
@@ -404,8 +408,11 @@ void LiveService::Impl::publish_diagnostics() {
   check_sent(node->publish(
       diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(core::wall_now_ns()), ""},
                                                   {to_diagnostic(now, last_reported, settings.dds.node_name)}}));
+  if (settings.on_health) settings.on_health(health_text(now));
   last_reported = now;
 }
+
+void LiveService::ask(std::string question_json) { impl_->worker->ask(std::move(question_json)); }
 
 core::Status LiveService::run(const core::Cancellation& cancellation) {
   Impl& impl = *impl_;

@@ -6,8 +6,10 @@
 // refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its rate.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/dds/dds_node.h"
@@ -23,6 +25,12 @@ struct LiveSettings {
   QueryWorkerSettings worker;
   double marker_rate = 5.0;  ///< Markers a second, at most.
   double diagnostics_rate = 1.0;
+  /// For who looks on, all optional: what they do delays the service, so that they only hand over. Called on the
+  /// thread of the belief after each step, with its belief; on those of the questions with each answer; and with each
+  /// round of diagnostics, with a sentence on how the service is.
+  std::function<void(const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief)> on_step = {};
+  std::function<void(const std::string& answer)> on_answer = {};
+  std::function<void(const std::string& health)> on_health = {};
 };
 
 class LiveService {
@@ -38,6 +46,8 @@ class LiveService {
   /// Works until cancelled, then closes the recording. A recording that fails on the way (a full disk) ends there,
   /// while tracking goes on; the status then tells of it.
   core::Status run(const core::Cancellation& cancellation);
+  /// A question as if it had come over the bus, from any thread; its answer goes there, too. See QueryWorker::ask.
+  void ask(std::string question_json);
 
  private:
   struct Impl;
