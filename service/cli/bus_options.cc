@@ -77,6 +77,21 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
       "named image_rect...");
 }
 
+void add_web_options(CLI::App& verb, const std::string& prefix, ViewOptions& view) {
+  auto* group = verb.add_option_group("Web", "Who may look");
+  group
+      ->add_option("--" + prefix + "address", view.address,
+                   "Numeric address to listen on; other machines reach others than the default, and need the token")
+      ->check(utf8_text())
+      ->capture_default_str();
+  group->add_option("--" + prefix + "token", view.token,
+                    "Secret that the page's address holds; default: a random one where other machines reach it");
+  group
+      ->add_option("--" + prefix + "origin", view.allowed_origins,
+                   "Origin of a page of somebody else's that may connect, as https://app.example.org; repeatable")
+      ->check(utf8_text());
+}
+
 void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice) {
   const std::map<std::string, rendering::Weigher> names = {{"automatic", rendering::Weigher::kAutomatic},
                                                            {"processor", rendering::Weigher::kProcessor},

@@ -5,6 +5,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/view/live_view.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -15,8 +16,25 @@ struct ServeOptions {
   std::string record;
   LiveSettings settings;
   BackendSettings backends;
+  ViewOptions view;
   const CLI::App* verb = nullptr;
 };
+
+/// The page, and what the service hands over to it; null where none was asked for.
+core::Result<std::unique_ptr<LiveView>> open_view(ServeOptions& options,
+                                                  const std::shared_ptr<const belief::Scene>& scene,
+                                                  VerbContext& context) {
+  if (options.verb->count("--view") == 0) return std::unique_ptr<LiveView>();
+  PRESCENE_TRY(auto view, LiveView::create(scene, options.view, context.log()));
+  LiveView* raw = view.get();
+  options.settings.on_step = [raw](const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief) {
+    raw->show({belief, step.observation, step.record.seconds, step.record.degraded});
+  };
+  options.settings.on_answer = [raw](const std::string& answer) { raw->answer(answer); };
+  options.settings.on_health = [raw](const std::string& health) { raw->set_health(health); };
+  core::log(context.log(), core::LogLevel::kInfo, "to be seen at " + view->url());
+  return view;
+}
 
 core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(validate(options.settings.tracker.topics));
@@ -32,9 +50,14 @@ core::Status run(ServeOptions& options, VerbContext& context) {
                                                           belief::json_text(to_json(options.settings.tracker))}));
   }
   Backends backends(context.pool(), options.backends);
+  PRESCENE_TRY(const auto view, open_view(options, scene, context));
   PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,
                                                        std::move(recording), context.log()));
-  PRESCENE_RETURN_IF_ERROR(service->run(context.cancellation()));
+  LiveService* asked = service.get();
+  if (view) view->set_asker([asked](std::string question) { asked->ask(std::move(question)); });
+  const core::Status ran = service->run(context.cancellation());
+  if (view) view->set_asker({});
+  PRESCENE_RETURN_IF_ERROR(ran);
   context.print({{"scene", scene->name}, {"recording", options.record}}, "");
   return core::ok_status();
 }
@@ -57,13 +80,18 @@ Verb add_serve_verb(CLI::App& app) {
                    "Time that any question may take, s; they are answered one after the other")
       ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();
+  verb->add_option("--view", options->view.port,
+                   "Port of a page for the browser that shows the belief live; 0 = any that is free")
+      ->check(CLI::Range(0, 65535));
+  add_web_options(*verb, "view-", options->view);
   add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
   add_camera_options(*verb, options->settings.tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;
   verb->footer(
       "Runs until Ctrl-C. Topics: docs/reference/ros2.md\n"
-      "Example: prescene serve --scene scenarios/milk_on_bin.yaml");
+      "Examples: prescene serve --scene scenarios/milk_on_bin.yaml\n"
+      "          prescene serve --scene scenarios/milk_on_bin.yaml --view 8765");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 

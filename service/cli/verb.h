@@ -19,6 +19,7 @@
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/rendering/gpu/likelihood_choice.h"
 #include "prescene/service/tracking/tracker_settings.h"
+#include "prescene/service/view/view_server.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
 class App;
@@ -94,6 +95,7 @@ Verb add_record_verb(CLI::App& app);
 Verb add_replay_verb(CLI::App& app);
 Verb add_serve_verb(CLI::App& app);
 Verb add_ask_verb(CLI::App& app);
+Verb add_view_verb(CLI::App& app);
 
 /// --domain and --ros-distro.
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
@@ -104,6 +106,8 @@ core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds);
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
 /// --world-frame and --camera-pose.
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
+/// --view-address, --view-token and --view-origin, with `prefix` in place of "view-"; the port is the verb's own.
+void add_web_options(CLI::App& verb, const std::string& prefix, ViewOptions& view);
 /// --likelihood and --graphics-device.
 void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice);
 /// `settings` (of a recording) with those of the options above that were on the command line.

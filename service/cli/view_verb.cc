@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "prescene/service/recording/replay_input.h"
+#include "prescene/service/view/recording_view.h"
+#include "verb.h"
+
+namespace prescene::service {
+namespace {
+
+struct ViewVerbOptions {
+  std::string recording;
+  std::string scene;
+  RecordingReadOptions read;
+  double depth_scale = 0.001;
+  double frame_rate = 30.0;
+  TrackerSettings tracker;
+  BackendSettings backends;
+  interfaces::DdsOptions dds;
+  ViewOptions view;
+  const CLI::App* verb = nullptr;
+};
+
+void wait_for_stop(const core::Cancellation& cancellation) {
+  constexpr std::chrono::milliseconds kLook(50);
+  while (!cancellation.requested()) std::this_thread::sleep_for(kLook);
+}
+
+/// What of a replay somebody who looks at it should know.
+std::vector<std::string> remarks_of(const ReplaySummary& summary) {
+  std::vector<std::string> remarks;
+  if (!summary.loss.empty()) remarks.push_back(summary.loss);
+  if (summary.refused > 0)
+    remarks.push_back(counted(summary.refused, "message") + " refused, the first: " + summary.first_refusal);
+  if (summary.different > 0)
+    remarks.push_back(counted(summary.different, "step") + " of " + std::to_string(summary.compared) +
+                      " differ from the recorded ones");
+  for (const auto& [what, steps] : summary.degraded) remarks.push_back(counted(steps, "step") + ": " + what);
+  return remarks;
+}
+
+void print_ready(const std::string& url, int port, const std::string& what, VerbContext& context) {
+  context.print({{"url", url}, {"port", port}, {"showing", what}, {"state", "ready"}},
+                "open " + url + " in a browser; Ctrl-C ends\n");
+}
+
+core::Status view_recording(ViewVerbOptions& options, VerbContext& context) {
+  PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.recording, options.scene, options.depth_scale,
+                                                           options.frame_rate, options.read},
+                                                          context.log()));
+  TrackerSettings settings = options.tracker;
+  if (input.has_settings()) {
+    PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
+    settings = with_given(*options.verb, std::move(recorded), options.tracker);
+  }
+  Backends backends(context.pool(), options.backends);
+  const std::uint64_t seed =
+      context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
+  PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
+  RecordingViewOptions view_options;
+  view_options.view = options.view;
+  view_options.title = std::filesystem::path(options.recording).filename().string();
+  PRESCENE_TRY(const auto view, RecordingView::create(input.scene(), view_options, backends, context.log()));
+  print_ready(view->url(), view->port(), options.recording, context);
+  const core::ProgressSink bar = context.progress("replaying");
+  const core::ProgressSink progress = [&](const core::Progress& at) {
+    view->set_progress(at.fraction);
+    if (bar) bar(at);
+  };
+  const core::Result<ReplaySummary> summary =
+      input.replay(*tracker, context.cancellation(), progress, view->step_sink(), {});
+  context.end_progress();
+  if (!summary) return summary.status();
+  if (summary->cancelled) return core::ok_status();
+  PRESCENE_RETURN_IF_ERROR(check_steps(*summary, settings.topics).at(options.recording));
+  view->finish(remarks_of(*summary));
+  core::log(context.log(), core::LogLevel::kInfo, counted(summary->steps, "step") + " to be looked at");
+  wait_for_stop(context.cancellation());
+  return core::ok_status();
+}
+
+/// kInvalidInput for an option that would do nothing.
+core::Status check_options(const ViewVerbOptions& options) {
+  std::error_code none;
+  const bool is_folder = std::filesystem::is_directory(options.recording, none);
+  for (const char* name : {"--depth-scale", "--frame-rate"})
+    if (!is_folder && options.verb->count(name) > 0)
+      return core::invalid_input(std::string(name) + " is for folders of images, and " + options.recording +
+                                 " is none: leave it out");
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_view_verb(CLI::App& app) {
+  auto* verb = app.add_subcommand("view", "Show a recording in the browser: camera, scene, objects, questions");
+  auto options = std::make_shared<ViewVerbOptions>();
+  verb->add_option("RECORDING", options->recording,
+                   "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
+      ->required();
+  verb->add_option("--port", options->view.port, "Port of the page; 0 = any that is free")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  verb->add_option(
+          "--scene", options->scene,
+          "Scene file; default: the one that the recording holds; a folder without one is searched for its support")
+      ->check(file_name());
+  verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
+      ->check(positive_number())
+      ->capture_default_str();
+  verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
+      ->check(positive_number())
+      ->capture_default_str();
+  verb->add_flag("--salvage", options->read.salvage,
+                 "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
+  add_web_options(*verb, "", options->view);
+  add_bus_options(*verb, options->dds, options->tracker.topics);
+  add_camera_options(*verb, options->tracker.assembler);
+  add_likelihood_options(*verb, options->backends.likelihood);
+  options->verb = verb;
+  verb->footer("Example: prescene view milk.mcap");
+  return {verb, [options](VerbContext& context) -> core::Status {
+            PRESCENE_RETURN_IF_ERROR(check_options(*options));
+            PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
+            return view_recording(*options, context);
+          }};
+}
+
+}  // namespace prescene::service

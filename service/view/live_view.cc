@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/view/live_view.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "picture_pace.h"
+#include "prescene/belief/json.h"
+#include "prescene/service/view/view_history.h"
+#include "question_ids.h"
+
+namespace prescene::service {
+namespace {
+
+using interfaces::WebClient;
+using interfaces::WebDelivery;
+using nlohmann::ordered_json;
+
+constexpr double kPicturesPerSecond = 15.0, kStripsPerSecond = 0.5, kIdlePerSecond = 0.5;
+constexpr std::size_t kMostLiveStrips = 64;
+constexpr int kViewNice = 10;  // who looks on does not take the processor from who tracks
+
+/// Of the calling thread; on Linux a thread has a priority of its own.
+void lower_priority() { static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kViewNice)); }
+
+}  // namespace
+
+struct LiveView::Impl {
+  std::unique_ptr<ViewServer> server;
+
+  std::mutex asker_mutex;
+  std::function<void(std::string)> asker;
+
+  std::mutex mutex;  // guards what is handed over
+  std::condition_variable changed;
+  std::optional<ShownStep> waiting;
+  std::string health;
+  bool health_changed = false;
+  bool stop = false;
+
+  std::mutex shown_mutex;  // guards what a page that opens is given
+  interfaces::WebMessagePtr scene, step, picture;
+  ViewHistory history;
+  std::vector<interfaces::WebMessagePtr> strips;
+
+  // Of the view's thread.
+  std::uint64_t next_index = 0;
+  std::shared_ptr<const belief::Scene> last_scene;
+  std::uint64_t scene_hash = 0, revision = 0;
+  Pace picture_pace{kPicturesPerSecond}, strip_pace{kStripsPerSecond}, idle_pace{kIdlePerSecond};
+  std::thread thread;
+
+  void work();
+  void show(const ShownStep& shown);
+  void show_picture(const ShownStep& shown, std::uint64_t index, bool watched);
+  void open(WebClient client);
+  void take(WebClient client, const std::string& op, const ordered_json& request);
+
+  ~Impl() {
+    {
+      const std::lock_guard lock(mutex);
+      stop = true;
+    }
+    changed.notify_all();
+    if (thread.joinable()) thread.join();
+    server.reset();
+  }
+};
+
+core::Result<std::unique_ptr<LiveView>> LiveView::create(std::shared_ptr<const belief::Scene> scene,
+                                                         const ViewOptions& options, const core::LogSink& log) {
+  auto impl = std::make_unique<Impl>();
+  Impl* raw = impl.get();
+  impl->scene = view_text(scene_document(*scene), WebDelivery::kEach);
+  impl->scene_hash = scene_shape_hash(*scene);
+  impl->last_scene = std::move(scene);
+  ViewHandlers handlers;
+  handlers.on_open = [raw](WebClient client) { raw->open(client); };
+  handlers.on_request = [raw](WebClient client, const std::string& op, const ordered_json& request) {
+    raw->take(client, op, request);
+  };
+  PRESCENE_TRY(auto server, ViewServer::create(options, std::move(handlers), log));
+  {
+    const std::lock_guard lock(raw->shown_mutex);  // a page may be opening already
+    impl->server = std::move(server);
+  }
+  impl->thread = std::thread([raw] { raw->work(); });
+  return std::unique_ptr<LiveView>(new LiveView(std::move(impl)));
+}
+
+LiveView::LiveView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LiveView::~LiveView() = default;
+
+std::string LiveView::url() const { return impl_->server->url(); }
+int LiveView::port() const { return impl_->server->port(); }
+interfaces::WebCounts LiveView::counts() const { return impl_->server->counts(); }
+
+void LiveView::set_asker(std::function<void(std::string)> asker) {
+  const std::lock_guard lock(impl_->asker_mutex);
+  impl_->asker = std::move(asker);
+}
+
+void LiveView::show(ShownStep step) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->waiting = std::move(step);
+  }
+  impl_->changed.notify_one();
+}
+
+void LiveView::set_health(const std::string& text) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->health_changed = impl_->health_changed || impl_->health != text;
+    impl_->health = text;
+  }
+  impl_->changed.notify_one();
+}
+
+void LiveView::answer(const std::string& answer) {
+  if (const auto asked = asker_of(answer)) impl_->server->send(asked->client, answer_message(*asked, answer));
+}
+
+void LiveView::Impl::open(WebClient client) {
+  const std::lock_guard lock(shown_mutex);
+  if (!server) return;
+  server->send(client, view_text({{"op", "hello"}, {"mode", "live"}}, WebDelivery::kEach));
+  server->send(client, scene);
+  server->send(client, view_text(to_json(history), WebDelivery::kEach));
+  for (const auto& strip : strips) server->send(client, strip);
+  if (step) server->send(client, step);
+  if (picture) server->send(client, picture);
+}
+
+void LiveView::Impl::take(WebClient client, const std::string& op, const ordered_json& request) {
+  if (op != "ask") return;
+  PageQuestion asked{client, 0};
+  const auto question = question_text(asked, request);
+  const std::lock_guard lock(asker_mutex);
+  if (question && asker) return asker(*question);
+  const core::Status why = question ? core::unavailable("the service ends") : question.status();
+  server->send(client, answer_message(asked, belief::json_text(belief::error_to_json(why))));
+}
+
+void LiveView::Impl::work() {
+  lower_priority();
+  for (;;) {
+    std::optional<ShownStep> shown;
+    std::optional<std::string> health_text;
+    {
+      std::unique_lock lock(mutex);
+      changed.wait(lock, [&] { return stop || waiting || health_changed; });
+      if (stop) return;
+      shown = std::exchange(waiting, std::nullopt);
+      if (std::exchange(health_changed, false)) health_text = health;
+    }
+    try {
+      if (shown) show(*shown);
+      if (health_text) server->send_to_all(view_text({{"op", "health"}, {"text", *health_text}}, WebDelivery::kNewest));
+    } catch (const std::exception&) {  // no memory: the next step is shown, or the one after it
+    }
+  }
+}
+
+void LiveView::Impl::show(const ShownStep& shown) {
+  const BeliefSummary summary = summary_of(*shown.belief);
+  const std::uint64_t index = next_index++;
+  interfaces::WebMessagePtr new_history;
+  {
+    const std::lock_guard lock(shown_mutex);
+    history.add(summary, index);
+    if (history.revision() != revision) new_history = view_text(to_json(history), WebDelivery::kEach);
+    revision = history.revision();
+  }
+  if (new_history) server->send_to_all(new_history);
+  const bool watched = server->has_clients();
+  if (!watched && !idle_pace.due()) return;  // a page that opens is to find something
+  if (shown.belief->scene != last_scene) {
+    last_scene = shown.belief->scene;
+    const std::uint64_t hash = scene_shape_hash(*last_scene);
+    if (hash != scene_hash) {
+      auto message = view_text(scene_document(*last_scene), WebDelivery::kEach);
+      server->send_to_all(message);
+      const std::lock_guard lock(shown_mutex);
+      scene = std::move(message);
+      scene_hash = hash;
+    }
+  }
+  ordered_json document = step_document(shown, summary, index);
+  {
+    const std::lock_guard lock(shown_mutex);
+    document["time"] = history.seconds_of(summary.stamp_ns);
+  }
+  auto message = view_text(document, WebDelivery::kNewest);
+  server->send_to_all(message);
+  {
+    const std::lock_guard lock(shown_mutex);
+    step = std::move(message);
+  }
+  show_picture(shown, index, watched);
+}
+
+void LiveView::Impl::show_picture(const ShownStep& shown, std::uint64_t index, bool watched) {
+  if (strip_pace.due()) {
+    const std::string jpeg = picture_jpeg(shown.observation, kStripWidth, kStripQuality);
+    auto message = view_picture(ViewPictureKind::kStrip, index, jpeg, WebDelivery::kEach);
+    server->send_to_all(message);
+    const std::lock_guard lock(shown_mutex);
+    strips.push_back(std::move(message));
+    if (strips.size() > kMostLiveStrips) strips.erase(strips.begin());
+  }
+  if (watched && !picture_pace.due()) return;
+  const std::string jpeg = picture_jpeg(shown.observation, kPictureWidth, kPictureQuality);
+  if (jpeg.empty()) return;
+  auto message = view_picture(ViewPictureKind::kFrame, index, jpeg, WebDelivery::kNewest);
+  server->send_to_all(message);
+  const std::lock_guard lock(shown_mutex);
+  picture = std::move(message);
+}
+
+}  // namespace prescene::service

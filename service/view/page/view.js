@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+// The live view: talks to the program, and shows a step of the belief. docs/reference/live_view.md has the messages.
+
+import { seriesColor, css } from './drawing.js';
+import { OverlayView, SpaceView } from './scene3d.js';
+import { ObjectList, Trends, answerContent, make, outcomeColors } from './panels.js';
+
+const $ = (id) => document.getElementById(id);
+const page = {
+  mode: 'live', scene: null, step: null, steps: 0, done: true, selected: null, ghosts: true, overlay: true, shownAnswer: null,
+  playing: false, following: true, waitingFor: null, wanted: null, colors: new Map(), indexes: new Map(), strips: new Map(),
+};
+let socket = null, nextNumber = 1, retry = 500, drawing = false;
+const asked = new Map();  // number -> {text, element, answer}
+
+const dark = () => document.documentElement.dataset.theme === 'dark';
+const space = new SpaceView($('space'), $('labels'), (x, y) => { const name = page.step && space.pick(page.step, x, y); if (name) select(name); });
+const overlay = new OverlayView($('outlines'));
+const list = new ObjectList($('object-list'), select);
+const trends = new Trends($('charts'), (index) => seek(index));
+const photo = $('photo').getContext('2d');
+if (!space.works) $('labels').replaceChildren(make('p', { className: 'hint', textContent: 'This browser has no WebGL 2: the scene is not drawn' }));
+
+// --- talking to the program
+
+function connect() {
+  socket = new WebSocket((location.protocol === 'https:' ? 'wss://' : 'ws://') + location.host + '/', 'prescene.view.v1');
+  socket.binaryType = 'arraybuffer';
+  socket.onopen = () => { retry = 500; setState('connected', 'good'); };
+  socket.onclose = () => {
+    setState('not connected', 'bad');
+    Object.assign(page, { waitingFor: null });
+    setTimeout(connect, retry);
+    retry = Math.min(8000, 2 * retry);
+  };
+  socket.onmessage = ({ data }) => typeof data === 'string' ? take(JSON.parse(data)) : takePicture(data);
+}
+function say(request) {
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
+}
+function setState(text, kind) {
+  $('state').textContent = text;
+  $('state').className = 'badge ' + kind;
+}
+
+const receivers = {
+  hello({ mode, title }) {
+    page.mode = mode;
+    $('source').textContent = title ?? '';
+    document.title = (title ? title + ' - ' : '') + 'Prescene';
+    for (const id of ['play', 'back', 'on', 'speed', 'scrub']) $(id).disabled = mode === 'live';
+    $('play').disabled = false;
+    $('play').textContent = mode === 'live' ? 'Pause' : 'Play';
+    page.playing = mode === 'live';
+    page.following = true;
+    page.strips.clear();
+    setState(mode === 'live' ? 'live' : 'recording', 'good');
+  },
+  scene(scene) {
+    page.scene = scene;
+    if (page.mode === 'live') $('source').textContent = scene.name;
+    space.setScene(scene);
+    overlay.setScene(scene);
+    redraw();
+  },
+  history({ columns, rows }) { trends.setHistory(columns, rows); redraw(); },
+  rows({ rows }) { trends.addRows(rows); redraw(); },
+  step(step) {
+    page.waitingFor = null;
+    if (page.mode === 'live') {
+      page.steps = step.index + 1;
+      const row = trends.rowOf(step);
+      if (row) trends.addRows([row]);
+      if (!page.playing && page.step) return;
+    }
+    showStep(step);
+    if (page.wanted !== null && page.wanted !== step.index) request(page.wanted);
+    else page.wanted = null;
+  },
+  extent({ steps, done, progress, remarks }) {
+    const first = page.steps === 0 && steps > 0;
+    Object.assign(page, { steps, done });
+    $('scrub').max = Math.max(0, steps - 1);
+    setState(done ? 'recording' : 'replaying ' + Math.round(100 * progress) + ' %', done ? 'good' : 'warn');
+    $('health').textContent = remarks.join(' ');
+    $('health').title = remarks.join('\n');
+    if (first) request(0);
+    else if (page.step && page.mode === 'recording' && !page.reconnected) drawStrip();
+    redraw();
+  },
+  answer({ number, answer }) { showAnswer(number, answer); },
+  health({ text }) { $('health').textContent = text; $('health').title = text; },
+};
+function take(message) {
+  const receive = receivers[message.op];
+  if (receive) receive(message);
+}
+
+async function takePicture(data) {
+  const view = new DataView(data), kind = view.getUint8(0), index = Number(view.getBigUint64(8, true));
+  if (kind === 1 && page.mode === 'live' && !page.playing && page.step) return;
+  let picture;
+  try { picture = await createImageBitmap(new Blob([new Uint8Array(data, 16)], { type: 'image/jpeg' })); } catch { return; }
+  if (kind === 2) { page.strips.set(index, picture); if (page.strips.size > 140) page.strips.delete(page.strips.keys().next().value); drawStrip(); return; }
+  const { canvas } = photo;
+  if (canvas.width !== picture.width || canvas.height !== picture.height) { canvas.width = picture.width; canvas.height = picture.height; }
+  photo.drawImage(picture, 0, 0);
+  page.pictureSize = [picture.width, picture.height];
+  $('photo-hint').hidden = true;
+  redraw();
+}
+
+// --- showing
+
+function showStep(step) {
+  page.step = step;
+  step.objects.forEach((o) => {
+    if (page.colors.has(o.name)) return;
+    page.indexes.set(o.name, page.colors.size);
+    page.colors.set(o.name, seriesColor(page.colors.size));
+  });
+  if (!step.objects.some((o) => o.name === page.selected)) page.selected = step.objects.length ? step.objects[0].name : null;
+  redraw();
+}
+function select(name) { page.selected = name; redraw(); }
+
+// At most once a frame of the screen, however much has come.
+function redraw() {
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    const { step } = page;
+    layoutPicture();
+    if (!step) return;
+    const shown = page.shownAnswer && page.shownAnswer.predict ? { predict: page.shownAnswer.predict, outcomeColors: outcomeColors(page.shownAnswer.predict) } : null;
+    space.draw(step, { dark: dark(), ghosts: page.ghosts, selected: page.selected, colors: page.colors, answer: shown });
+    if (page.overlay) overlay.draw(step, page.indexes);
+    else overlay.clear();
+    list.show(step.objects, page.colors, page.selected);
+    trends.show(step, page.colors, page.selected, dark());
+    $('scrub').value = page.mode === 'live' ? $('scrub').max : step.index;
+    $('clock').textContent = step.time.toFixed(2) + ' s, step ' + step.step;
+  });
+}
+
+// The picture and its outlines fill the panel, undistorted.
+function layoutPicture() {
+  const box = $('camera'), size = page.pictureSize ?? (page.step ? [page.step.camera.width, page.step.camera.height] : [4, 3]);
+  const factor = Math.min(box.clientWidth / size[0], box.clientHeight / size[1]), w = size[0] * factor, h = size[1] * factor;
+  for (const canvas of [$('photo'), $('outlines')]) {
+    canvas.style.width = w + 'px';
+    canvas.style.height = h + 'px';
+    canvas.style.left = (box.clientWidth - w) / 2 + 'px';
+    canvas.style.top = (box.clientHeight - h) / 2 + 'px';
+  }
+}
+
+function drawStrip() {
+  const strip = $('strip'), entries = [...page.strips].sort((a, b) => a[0] - b[0]);
+  if (!entries.length) return;
+  const first = page.mode === 'live' ? entries[0][0] : 0, last = Math.max(page.steps - 1, entries[entries.length - 1][0], first + 1);
+  const height = strip.clientHeight, width = height * entries[0][1].width / entries[0][1].height;
+  const places = Math.max(1, Math.floor(strip.clientWidth / width)), nodes = [];
+  for (let i = 0; i < places; ++i) {
+    const wanted = first + (i + 0.5) / places * (last - first);
+    const [, picture] = entries.reduce((a, b) => Math.abs(b[0] - wanted) < Math.abs(a[0] - wanted) ? b : a);
+    const canvas = make('canvas', { width: picture.width, height: picture.height });
+    canvas.getContext('2d').drawImage(picture, 0, 0);
+    canvas.style.left = i * strip.clientWidth / places + 'px';
+    canvas.style.width = strip.clientWidth / places + 'px';
+    nodes.push(canvas);
+  }
+  strip.replaceChildren(...nodes);
+}
+
+// --- time
+
+// One request at a time: the next is sent when its step has come, and only the newest wish counts.
+function request(index) {
+  if (page.mode === 'live') return;
+  index = Math.max(0, Math.min(page.steps - 1, index));
+  page.wanted = index;
+  if (page.waitingFor !== null) return;
+  page.waitingFor = index;
+  say({ op: 'show', index });
+}
+function seek(index) {
+  if (page.mode === 'live') return;
+  setPlaying(false);
+  request(index);
+}
+function setPlaying(playing) {
+  page.playing = playing;
+  $('play').textContent = playing ? 'Pause' : page.mode === 'live' ? 'Resume' : 'Play';
+  if (!playing || page.mode === 'live') return;
+  if (page.step && page.step.index >= page.steps - 1) request(0);
+  let last = performance.now(), time = page.step ? page.step.time : 0;
+  const tick = (now) => {
+    if (!page.playing || page.mode === 'live') return;
+    time += (now - last) / 1000 * Number($('speed').value);
+    last = now;
+    if (page.waitingFor === null && page.step) {
+      const at = page.step.index;
+      if (at >= page.steps - 1 && page.done) return setPlaying(false);
+      // The history says when each step was, so that speed is true to the recording.
+      let next = trends.indexAt(time);
+      if (next < at && time > page.step.time) next = at;
+      if (next !== at) request(next);
+      if (Math.abs(page.step.time - time) > 1) time = page.step.time;
+    }
+    requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+}
+const move = (steps) => { if (page.step && page.mode !== 'live') seek(page.step.index + steps); };
+
+// --- questions
+
+function ask(text, question) {
+  const number = nextNumber++, step = page.step;
+  const element = make('div', { className: 'answer' }, make('h3', {}, make('span', { textContent: text }), make('small', { textContent: step ? step.time.toFixed(2) + ' s' : '' })), make('p', { textContent: 'is being worked out ...' }));
+  $('answers').prepend(element);
+  while ($('answers').children.length > 20) $('answers').lastChild.remove();
+  asked.set(number, { element, answer: null });
+  element.addEventListener('click', () => showInScene(number));
+  const request = { op: 'ask', number, question };
+  if (step && page.mode === 'recording') request.index = step.index;
+  say(request);
+}
+function showAnswer(number, answer) {
+  const of = asked.get(number);
+  if (!of) return;
+  of.answer = answer;
+  while (of.element.children.length > 1) of.element.lastChild.remove();
+  try { of.element.append(...answerContent(answer)); } catch (error) { of.element.append(make('p', { className: 'bad', textContent: 'The answer has another form than expected: ' + error.message })); }
+  if (answer.step !== undefined && page.step && answer.step !== page.step.step && page.mode === 'recording')
+    of.element.append(make('p', { textContent: 'Of the belief at step ' + answer.step }));
+  if (answer.predict) showInScene(number);
+}
+function showInScene(number) {
+  const of = asked.get(number), already = page.shownAnswer === of.answer;
+  for (const { element } of asked.values()) element.classList.remove('shown');
+  page.shownAnswer = already ? null : of.answer;
+  of.element.classList.toggle('shown', !already && !!of.answer);
+  redraw();
+}
+const questions = {
+  where: () => ask(page.selected ? 'Where is ' + page.selected + '?' : 'Where is everything?', { where: page.selected ? { object: page.selected } : {} }),
+  stays: () => page.selected && ask('Does ' + page.selected + ' stay?', { stability: { object: page.selected } }),
+  release: () => page.selected && ask('What if ' + page.selected + ' is let go?', { predict: { actions: [{ time: 0, release: { object: page.selected } }] } }),
+};
+
+// --- buttons and keys
+
+function toggle(name) {
+  page[name] = !page[name];
+  $(name).setAttribute('aria-pressed', page[name]);
+  redraw();
+}
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  redraw();
+}
+const remembered = (() => { try { return localStorage.getItem('theme'); } catch { return null; } })();
+setTheme(remembered ?? (matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light'));
+function swapTheme() {
+  setTheme(dark() ? 'light' : 'dark');
+  try { localStorage.setItem('theme', document.documentElement.dataset.theme); } catch { /* a browser that keeps nothing */ }
+}
+const whole = () => { if (page.step) { space.frame(page.step); redraw(); } };
+const fromCamera = () => { if (page.step) { space.fromCamera(page.step); redraw(); } };
+
+$('ghosts').onclick = () => toggle('ghosts');
+$('overlay').onclick = () => toggle('overlay');
+$('frame').onclick = whole;
+$('theme').onclick = swapTheme;
+$('help').onclick = () => $('keys').showModal();
+$('play').onclick = () => setPlaying(!page.playing);
+$('back').onclick = () => move(-1);
+$('on').onclick = () => move(1);
+$('scrub').oninput = () => seek(Number($('scrub').value));
+$('ask-where').onclick = questions.where;
+$('ask-stays').onclick = questions.stays;
+$('ask-release').onclick = questions.release;
+$('ask-own').onclick = () => {
+  let question;
+  try { question = JSON.parse($('ask-text').value); } catch (error) { question = null; }
+  if (question && typeof question === 'object' && !Array.isArray(question)) ask(Object.keys(question).join(', '), question);
+  else $('answers').prepend(make('div', { className: 'answer' }, make('p', { className: 'bad', textContent: 'A question is a JSON object, as {"where": {}}' })));
+};
+$('space').addEventListener('turned', redraw);
+new ResizeObserver(() => { redraw(); drawStrip(); }).observe(document.querySelector('main'));
+
+const keys = {
+  ' ': () => setPlaying(!page.playing), ArrowLeft: (e) => move(e.shiftKey ? -10 : -1), ArrowRight: (e) => move(e.shiftKey ? 10 : 1),
+  Home: () => seek(0), End: () => seek(page.steps - 1), g: () => toggle('ghosts'), o: () => toggle('overlay'), f: whole, c: fromCamera,
+  t: swapTheme, w: questions.where, s: questions.stays, r: questions.release, '?': () => $('keys').showModal(),
+};
+addEventListener('keydown', (e) => {
+  if (e.ctrlKey || e.altKey || e.metaKey || e.target.closest('textarea, select, dialog')) return;
+  if (e.target.closest('button, summary, input') && (e.key === ' ' || e.key === 'Enter' || e.key.startsWith('Arrow'))) return;
+  const digit = Number(e.key);
+  if (digit >= 1 && page.step && page.step.objects[digit - 1]) return select(page.step.objects[digit - 1].name);
+  const act = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
+  if (!act) return;
+  e.preventDefault();
+  act(e);
+});
+
+// The token stays out of the history and of what is read over one's shoulder: the cookie has it.
+if (new URLSearchParams(location.search).has('token')) history.replaceState(null, '', location.pathname);
+connect();

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "question_ids.h"
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "prescene/belief/json.h"
+
+namespace prescene::service {
+namespace {
+
+constexpr std::string_view kIdPrefix = "view-";
+
+}  // namespace
+
+core::Result<std::string> question_text(PageQuestion& asked, const nlohmann::ordered_json& request) {
+  const auto number = request.find("number");
+  const auto question = request.find("question");
+  if (number == request.end() || !number->is_number_unsigned() || question == request.end() || !question->is_object())
+    return core::invalid_input("ask: not {\"number\": n, \"question\": {...}}");
+  asked.number = number->get<std::uint64_t>();
+  nlohmann::ordered_json with_id = {
+      {"id", std::string(kIdPrefix) + std::to_string(asked.client) + "-" + std::to_string(asked.number)}};
+  for (const auto& [key, value] : question->items())
+    if (key != "id") with_id[key] = value;
+  return belief::json_text(with_id);
+}
+
+std::optional<PageQuestion> asker_of(std::string_view answer) {
+  constexpr std::string_view kBegin = R"({"id":")";
+  if (!answer.starts_with(kBegin)) return std::nullopt;
+  answer.remove_prefix(kBegin.size());
+  if (!answer.starts_with(kIdPrefix)) return std::nullopt;
+  answer.remove_prefix(kIdPrefix.size());
+  PageQuestion asked;
+  const char* end = answer.data() + std::min<std::size_t>(answer.size(), 64);
+  const auto client = std::from_chars(answer.data(), end, asked.client);
+  if (client.ec != std::errc() || client.ptr == end || *client.ptr != '-') return std::nullopt;
+  const auto number = std::from_chars(client.ptr + 1, end, asked.number);
+  if (number.ec != std::errc() || number.ptr == end || *number.ptr != '"') return std::nullopt;
+  return asked;
+}
+
+interfaces::WebMessagePtr answer_message(const PageQuestion& asked, std::string_view answer) {
+  std::string text = R"({"op":"answer","number":)" + std::to_string(asked.number) + R"(,"answer":)";
+  text.append(answer);
+  text += '}';
+  return interfaces::make_web_message(interfaces::WebSocketKind::kText, text, interfaces::WebDelivery::kEach);
+}
+
+}  // namespace prescene::service

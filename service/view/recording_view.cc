@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/view/recording_view.h"
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "picture_pace.h"
+#include "prescene/belief/json.h"
+#include "prescene/service/view/step_store.h"
+#include "prescene/service/view/view_history.h"
+#include "recording_answers.h"
+
+namespace prescene::service {
+namespace {
+
+using interfaces::WebClient;
+using interfaces::WebDelivery;
+using interfaces::WebMessagePtr;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMostStrips = 64;
+constexpr double kExtentsPerSecond = 5.0;
+
+}  // namespace
+
+struct RecordingView::Impl {
+  explicit Impl(const RecordingViewOptions& of) : options(of), beliefs(of.most_belief_bytes) {}
+
+  RecordingViewOptions options;
+  std::unique_ptr<StepStore> store;
+
+  std::mutex mutex;  // guards what pages are given when they open, and the beliefs
+  WebMessagePtr scene;
+  ViewHistory history;
+  std::uint64_t revision = 0;
+  ordered_json new_rows = ordered_json::array();
+  struct Strip {
+    std::uint64_t index;
+    WebMessagePtr message;
+  };
+  std::vector<Strip> strips;
+  std::uint64_t strip_stride = 10;
+  KeptBeliefs beliefs;
+  double progress = 0.0;
+  bool done = false;
+  std::vector<std::string> remarks;
+
+  // Of the replay's thread.
+  std::shared_ptr<const belief::Scene> last_scene;
+  std::uint64_t scene_hash = 0;
+  Pace extent_pace{kExtentsPerSecond};
+
+  std::unique_ptr<RecordingAnswers> answers;
+  std::unique_ptr<ViewServer> server;
+
+  ~Impl() {
+    if (answers) answers->stop();  // it sends through the server,
+    server.reset();                // which takes questions for it
+  }
+
+  void open(WebClient client);
+  void take(WebClient client, const std::string& op, const ordered_json& request);
+  void ask(WebClient client, const ordered_json& request);
+  void show(WebClient client, std::uint64_t index);
+  core::Status add(const ShownStep& step);
+  void add_strip(const ShownStep& step, std::uint64_t index);
+  void send_new_scene(const ShownStep& step);
+  void send_news();
+  ordered_json extent() const;
+};
+
+core::Result<std::unique_ptr<RecordingView>> RecordingView::create(std::shared_ptr<const belief::Scene> scene,
+                                                                   const RecordingViewOptions& options,
+                                                                   Backends& backends, const core::LogSink& log) {
+  auto impl = std::make_unique<Impl>(options);
+  Impl* raw = impl.get();
+  PRESCENE_TRY(impl->store, StepStore::create());
+  impl->scene = view_text(scene_document(*scene), WebDelivery::kEach);
+  impl->scene_hash = scene_shape_hash(*scene);
+  impl->last_scene = std::move(scene);
+  impl->answers = std::make_unique<RecordingAnswers>(options, backends,
+                                                     [raw](const PageQuestion& asked, const std::string& answer) {
+                                                       raw->server->send(asked.client, answer_message(asked, answer));
+                                                     });
+  ViewHandlers handlers;
+  handlers.on_open = [raw](WebClient client) { raw->open(client); };
+  handlers.on_request = [raw](WebClient client, const std::string& op, const ordered_json& request) {
+    raw->take(client, op, request);
+  };
+  {
+    const std::lock_guard lock(raw->mutex);  // a page that opens waits for the server to be there
+    PRESCENE_TRY(impl->server, ViewServer::create(options.view, std::move(handlers), log));
+  }
+  return std::unique_ptr<RecordingView>(new RecordingView(std::move(impl)));
+}
+
+RecordingView::RecordingView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RecordingView::~RecordingView() = default;
+
+std::string RecordingView::url() const { return impl_->server->url(); }
+int RecordingView::port() const { return impl_->server->port(); }
+interfaces::WebCounts RecordingView::counts() const { return impl_->server->counts(); }
+
+StepSink RecordingView::step_sink() {
+  return [this](const TrackerStep& step, const Tracker& tracker) {
+    return add({tracker.belief(), step.observation, step.record.seconds, step.record.degraded});
+  };
+}
+
+core::Status RecordingView::add(const ShownStep& step) { return impl_->add(step); }
+
+void RecordingView::set_progress(double fraction) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->progress = fraction;
+}
+
+void RecordingView::finish(const std::vector<std::string>& remarks) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->progress = 1.0;
+    impl_->done = true;
+    impl_->remarks = remarks;
+    if (const std::uint64_t left_out = impl_->store->pictures_left_out(); left_out > 0)
+      impl_->remarks.push_back("The pictures of " + std::to_string(left_out) +
+                               " steps were left out for want of room.");
+  }
+  impl_->send_news();
+}
+
+ordered_json RecordingView::Impl::extent() const {
+  return {{"op", "extent"}, {"steps", store->size()}, {"progress", progress}, {"done", done}, {"remarks", remarks}};
+}
+
+void RecordingView::Impl::open(WebClient client) {
+  const std::lock_guard lock(mutex);
+  if (!server) return;
+  server->send(client,
+               view_text({{"op", "hello"}, {"mode", "recording"}, {"title", options.title}}, WebDelivery::kEach));
+  server->send(client, scene);
+  server->send(client, view_text(to_json(history), WebDelivery::kEach));
+  for (const Strip& strip : strips) server->send(client, strip.message);
+  server->send(client, view_text(extent(), WebDelivery::kEach));
+}
+
+void RecordingView::Impl::take(WebClient client, const std::string& op, const ordered_json& request) {
+  if (op == "ask") return ask(client, request);
+  const auto index = request.find("index");
+  if (op == "show" && index != request.end() && index->is_number_unsigned()) show(client, index->get<std::uint64_t>());
+}
+
+void RecordingView::Impl::show(WebClient client, std::uint64_t index) {
+  const auto entry = store->read(index);
+  if (!entry) return;
+  using interfaces::make_web_message;
+  // The step is last: when it is there, the page has all of it and may ask for the next.
+  if (!entry->picture.empty())
+    server->send(client, view_picture(ViewPictureKind::kFrame, index, entry->picture, WebDelivery::kEach));
+  server->send(client, make_web_message(interfaces::WebSocketKind::kText, entry->text, WebDelivery::kEach));
+}
+
+void RecordingView::Impl::ask(WebClient client, const ordered_json& request) {
+  PageQuestion asked{client, 0};
+  auto question = question_text(asked, request);
+  if (!question) {
+    server->send(client, answer_message(asked, error_answer("", question.status())));
+    return;
+  }
+  const auto index = request.find("index");
+  std::shared_ptr<const belief::Belief> belief;
+  if (index != request.end() && index->is_number_unsigned()) {
+    const std::lock_guard lock(mutex);
+    belief = beliefs.at(index->get<std::uint64_t>());
+  }
+  answers->ask(asked, *std::move(question), std::move(belief));
+}
+
+core::Status RecordingView::Impl::add(const ShownStep& step) {
+  const BeliefSummary summary = summary_of(*step.belief);
+  const std::uint64_t index = store->size();
+  send_new_scene(step);
+  ordered_json document = step_document(step, summary, index);
+  {
+    const std::lock_guard lock(mutex);
+    if (history.add(summary, index)) new_rows.push_back(to_json(history.rows().back()));
+    document["time"] = history.seconds_of(summary.stamp_ns);
+    beliefs.add(index, step.belief);
+  }
+  PRESCENE_RETURN_IF_ERROR(
+      store->add(belief::json_text(document), picture_jpeg(step.observation, kPictureWidth, kPictureQuality)));
+  add_strip(step, index);
+  if (extent_pace.due()) send_news();
+  return core::ok_status();
+}
+
+void RecordingView::Impl::add_strip(const ShownStep& step, std::uint64_t index) {
+  if (index % strip_stride != 0) return;
+  const std::string jpeg = picture_jpeg(step.observation, kStripWidth, kStripQuality);
+  auto message = view_picture(ViewPictureKind::kStrip, index, jpeg, WebDelivery::kEach);
+  server->send_to_all(message);
+  const std::lock_guard lock(mutex);
+  strips.push_back({index, std::move(message)});
+  if (strips.size() <= kMostStrips) return;
+  strip_stride *= 2;
+  std::erase_if(strips, [this](const Strip& strip) { return strip.index % strip_stride != 0; });
+}
+
+void RecordingView::Impl::send_new_scene(const ShownStep& step) {
+  if (step.belief->scene == last_scene) return;
+  last_scene = step.belief->scene;
+  const std::uint64_t hash = scene_shape_hash(*last_scene);
+  if (hash == scene_hash) return;
+  auto message = view_text(scene_document(*last_scene), WebDelivery::kEach);
+  server->send_to_all(message);
+  const std::lock_guard lock(mutex);
+  scene = std::move(message);
+  scene_hash = hash;
+}
+
+void RecordingView::Impl::send_news() {
+  WebMessagePtr rows, news;
+  {
+    const std::lock_guard lock(mutex);
+    const bool anew = history.revision() != revision;
+    revision = history.revision();
+    if (anew) {
+      rows = view_text(to_json(history), WebDelivery::kEach);
+    } else if (!new_rows.empty()) {
+      rows = view_text({{"op", "rows"}, {"rows", new_rows}}, WebDelivery::kEach);
+    }
+    new_rows = ordered_json::array();
+    news = view_text(extent(), WebDelivery::kEach);
+  }
+  if (rows) server->send_to_all(rows);
+  server->send_to_all(news);
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/view/view_content.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "prescene/belief/json.h"
+#include "prescene/core/hash.h"
+#include "prescene/core/random.h"
+#include "prescene/geometry/triangle_mesh.h"
+#include "prescene/interfaces/images/jpeg.h"
+#include "prescene/service/pictures/belief_overlay.h"
+
+namespace prescene::service {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kMostTriangles = 3000;
+constexpr int kMostGhosts = 24;
+constexpr int kRegionPoints = 160;
+
+double rounded(double value, double unit) { return std::isfinite(value) ? std::round(value / unit) * unit : 0.0; }
+
+/// Tenths of a millimetre are more than a page shows; so are they short as text.
+ordered_json pose_numbers(const geometry::Pose& X) {
+  const geometry::Vector3d& p = X.translation;
+  const geometry::Quaterniond& q = X.rotation;
+  return {rounded(p.x(), 1e-4), rounded(p.y(), 1e-4), rounded(p.z(), 1e-4), rounded(q.w(), 1e-5),
+          rounded(q.x(), 1e-5), rounded(q.y(), 1e-5), rounded(q.z(), 1e-5)};
+}
+
+ordered_json color_numbers(const belief::Color& color) { return {color.r, color.g, color.b}; }
+
+ordered_json mesh_document(const geometry::TriangleMesh& whole) {
+  const geometry::TriangleMesh mesh = geometry::simplified(whole, kMostTriangles);
+  const double unit = 1e-4 * std::max(1e-3, geometry::bounding_box(mesh).sizes().maxCoeff());
+  std::vector<double> vertices;
+  for (const geometry::Vector3d& vertex : mesh.vertices)
+    for (Eigen::Index i = 0; i < 3; ++i) vertices.push_back(static_cast<float>(rounded(vertex[i], unit)));
+  std::vector<std::uint32_t> triangles;
+  for (const auto& triangle : mesh.triangles) triangles.insert(triangles.end(), triangle.begin(), triangle.end());
+  return {{"vertices", vertices}, {"triangles", triangles}};
+}
+
+template <class Body>
+ordered_json body_document(const Body& body, const geometry::Pose& pose) {
+  return {{"name", body.name},
+          {"color", color_numbers(body.color)},
+          {"mesh", mesh_document(body.visual ? *body.visual : belief::collision_mesh(body.collision))},
+          {"pose", pose_numbers(pose)}};
+}
+
+/// Particles by their weights, each as often as its share of `count` is: the same ones for the same belief.
+template <class Use>
+void for_each_by_weight(const std::vector<belief::Particle>& particles, int count, const Use& use) {
+  double sum = 0.0, next = 0.5;
+  for (const belief::Particle& particle : particles) {
+    sum += count * std::exp(particle.log_weight);
+    for (; next < sum; next += 1.0) use(particle);
+  }
+}
+
+/// Without those that could not be told from the mean where it is drawn.
+ordered_json ghosts_of(const belief::ObjectBelief& object, const geometry::Pose& mean) {
+  constexpr double kSamePosition = 0.003, kSameTurn = 0.05;  // m, rad
+  ordered_json ghosts = ordered_json::array();
+  const belief::Particle* last = nullptr;
+  for_each_by_weight(object.particles, kMostGhosts, [&](const belief::Particle& particle) {
+    const bool repeated = std::exchange(last, &particle) == &particle;
+    const geometry::Pose& X = particle.X_WO;
+    if (repeated || ((X.translation - mean.translation).norm() < kSamePosition &&
+                     X.rotation.angularDistance(mean.rotation) < kSameTurn))
+      return;
+    ghosts.push_back(pose_numbers(X));
+  });
+  return ghosts;
+}
+
+/// Positions drawn from the mixture of the particles' Gaussians.
+ordered_json region_of(const belief::ObjectBelief& object, core::RandomStream stream) {
+  std::vector<double> numbers;
+  for_each_by_weight(object.particles, kRegionPoints, [&](const belief::Particle& particle) {
+    const geometry::Matrix3d covariance = particle.covariance.block<3, 3>(3, 3);
+    const Eigen::LLT<geometry::Matrix3d> root(covariance + 1e-10 * geometry::Matrix3d::Identity());
+    geometry::Vector3d p = particle.X_WO.translation;
+    if (root.info() == Eigen::Success) {
+      const double a = stream.normal(), b = stream.normal(), c = stream.normal();
+      p += geometry::Vector3d(root.matrixL() * geometry::Vector3d(a, b, c));
+    }
+    for (Eigen::Index i = 0; i < 3; ++i) numbers.push_back(rounded(p[i], 1e-3));
+  });
+  return numbers;
+}
+
+ordered_json parameters_of(const ObjectSummary& object) {
+  ordered_json parameters = ordered_json::array();
+  for (const belief::ParameterEstimate& parameter : object.parameters)
+    parameters.push_back({{"name", parameter.name},
+                          {"mean", rounded(parameter.mean, 1e-5)},
+                          {"deviation", rounded(parameter.standard_deviation, 1e-5)},
+                          {"low", rounded(parameter.low, 1e-5)},
+                          {"high", rounded(parameter.high, 1e-5)}});
+  return parameters;
+}
+
+ordered_json object_document(const ObjectSummary& summary, const belief::ObjectBelief& object,
+                             const belief::Belief& belief, std::size_t index) {
+  const double spread = std::sqrt(std::max(0.0, summary.covariance.block<3, 3>(3, 3).trace()));
+  ordered_json document = {{"name", summary.name},
+                           {"state", belief::to_string(summary.state)},
+                           {"confidence", rounded(summary.confidence, 1e-4)},
+                           {"existence", rounded(summary.existence, 1e-4)},
+                           {"pose", pose_numbers(summary.X_WO)},
+                           {"spread", rounded(spread, 1e-5)},
+                           {"speed", rounded(summary.V_WO.linear.norm(), 1e-4)},
+                           {"visible_share", rounded(summary.visible_share, 1e-3)},
+                           {"parameters", parameters_of(summary)},
+                           {"lessons", summary.lessons},
+                           {"ghosts", ghosts_of(object, summary.X_WO)}};
+  if (summary.state != belief::TrackState::kTracked)
+    document["region"] = region_of(object, core::RandomStream(belief.seed, core::Purpose::kEvaluation, belief.step,
+                                                              static_cast<std::uint32_t>(index)));
+  return document;
+}
+
+geometry::ColorImage reduced(const geometry::ColorImage& image, int factor) {
+  geometry::ColorImage small(image.width() / factor, image.height() / factor);
+  for (int y = 0; y < small.height(); ++y) {
+    for (int x = 0; x < small.width(); ++x) {
+      std::array<int, 3> sum{};
+      for (int v = 0; v < factor; ++v)
+        for (int u = 0; u < factor; ++u)
+          for (std::size_t c = 0; c < 3; ++c) sum[c] += image(factor * x + u, factor * y + v)[c];
+      for (std::size_t c = 0; c < 3; ++c) small(x, y)[c] = static_cast<std::uint8_t>(sum[c] / (factor * factor));
+    }
+  }
+  return small;
+}
+
+}  // namespace
+
+ordered_json scene_document(const belief::Scene& scene) {
+  ordered_json document = {{"op", "scene"},
+                           {"name", scene.name},
+                           {"gravity", {scene.gravity_W.x(), scene.gravity_W.y(), scene.gravity_W.z()}},
+                           {"models", ordered_json::array()},
+                           {"objects", ordered_json::array()},
+                           {"supports", ordered_json::array()},
+                           {"robot", ordered_json::array()}};
+  for (const belief::ObjectModel& model : scene.models)
+    document["models"].push_back(
+        {{"name", model.name},
+         {"color", color_numbers(model.color)},
+         {"mesh", mesh_document(model.visual ? *model.visual : belief::collision_mesh(model))}});
+  for (const belief::SceneObject& object : scene.objects)
+    document["objects"].push_back({{"name", object.name}, {"model", scene.model_of(object).name}});
+  for (const belief::Support& support : scene.supports)
+    document["supports"].push_back(body_document(support, support.X_WS));
+  for (const belief::KinematicBody& body : scene.robot)
+    document["robot"].push_back(body_document(body, belief::pose_at(body, 0.0)));
+  return document;
+}
+
+std::uint64_t scene_shape_hash(const belief::Scene& scene) {
+  core::Hasher hasher;
+  // Meshes are shared and never changed: the same one is at the same place as long as the scene lives.
+  const auto add = [&hasher](const auto& named) { hasher.text(named.name).value(named.collision.size()); };
+  for (const belief::ObjectModel& model : scene.models) add(model);
+  for (const belief::SceneObject& object : scene.objects) hasher.text(object.name).value(object.model);
+  for (const belief::Support& support : scene.supports) {
+    add(support);
+    for (const belief::CollisionShape& shape : support.collision) {
+      const geometry::Box box = geometry::bounding_box(belief::collision_mesh({shape}));
+      for (Eigen::Index i = 0; i < 3; ++i) hasher.value(rounded(box.sizes()[i], 0.02));
+    }
+  }
+  for (const belief::KinematicBody& body : scene.robot) add(body);
+  return hasher.digest();
+}
+
+ordered_json step_document(const ShownStep& step, const BeliefSummary& summary, std::uint64_t index) {
+  const belief::Belief& belief = *step.belief;
+  ordered_json objects = ordered_json::array();
+  for (std::size_t i = 0; i < summary.objects.size(); ++i)
+    objects.push_back(object_document(summary.objects[i], belief.objects[i], belief, i));
+  ordered_json robot = ordered_json::array(), supports = ordered_json::array();
+  for (const geometry::Pose& X_WG : belief.robot) robot.push_back(pose_numbers(X_WG));
+  for (const belief::Support& support : belief.scene->supports) supports.push_back(pose_numbers(support.X_WS));
+  const geometry::PinholeCamera& camera = step.observation.frame.camera;
+  return {{"op", "step"},
+          {"index", index},
+          {"step", belief.step},
+          {"stamp_ns", belief.stamp_ns},
+          {"objects", objects},
+          {"camera",
+           {{"pose", pose_numbers(step.observation.X_WC)},
+            {"width", camera.width},
+            {"height", camera.height},
+            {"fx", camera.fx},
+            {"fy", camera.fy},
+            {"cx", camera.cx},
+            {"cy", camera.cy}}},
+          {"robot", robot},
+          {"supports", supports},
+          {"seconds", rounded(step.seconds, 1e-5)},
+          {"degraded", step.degraded}};
+}
+
+std::string picture_jpeg(const belief::Observation& observation, int most_width, int quality) {
+  if (!observation.frame.color && !observation.frame.depth) return "";
+  const geometry::ColorImage whole = picture_of(observation);
+  const int factor = (whole.width() + most_width - 1) / most_width;
+  if (whole.height() < factor) return "";
+  const geometry::ColorImage small = factor > 1 ? reduced(whole, factor) : geometry::ColorImage();
+  const auto bytes = interfaces::encode_jpeg(factor > 1 ? small.view() : whole.view(), quality);
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace prescene::service
