@@ -58,7 +58,7 @@ export class ObjectList {
         for (const q of object.parameters)
           lines.push([q.name.replaceAll('_', ' '), q.mean.toFixed(3) + ' ± ' + q.deviation.toFixed(3) + unitOf(q.name)]);
         if (object.parameters.length)
-          lines.push(['learned from', object.lessons === 1 ? '1 motion' : object.lessons + ' motions']);
+          lines.push(['learned from', object.lessons === 0 ? 'nothing yet' : object.lessons === 1 ? '1 motion' : object.lessons + ' motions']);
       }
       const text = JSON.stringify(lines);
       if (facts.text === text) continue;
@@ -95,7 +95,7 @@ class Chart {
     }
     const ink = dark ? '#a0a8b6' : '#5d6675', faint = dark ? '#343a45' : '#d9dce2', bottom = h - 16;
     const X = (t) => left + (t - range[0]) / Math.max(1e-9, range[1] - range[0]) * (w - left - 4);
-    const Y = (v) => 4 + (high - v) / (high - low) * (bottom - 8);
+    const Y = (v) => 8 + (high - v) / (high - low) * (bottom - 12);
     g.font = '11px system-ui, "DejaVu Sans", sans-serif';
     g.lineWidth = 1;
     for (let i = 0; i <= 2; ++i) {
@@ -190,9 +190,28 @@ export class Trends {
   }
 }
 
-// Colour of each outcome, the same in bars and in the scene.
-export function outcomeColors(predict) {
-  return new Map(predict.outcomes.map((o, i) => [o.name, seriesColor(i)]));
+// Colour of each outcome, by its place in its group: the same in bars and in the scene.
+const outcomeKey = ({ group, name, outcome }) => (group ?? '') + '/' + (name ?? outcome);
+function outcomeColors(predict) {
+  const places = new Map(), colors = new Map();
+  for (const outcome of predict.outcomes) {
+    const place = places.get(outcome.group) ?? 0;
+    places.set(outcome.group, place + 1);
+    colors.set(outcomeKey(outcome), seriesColor(place));
+  }
+  return colors;
+}
+
+// Of a prediction, what the scene shows: the ends and the runs of the outcomes that exclude each other, those of the
+// first group of them.
+export function shownEnds(predict) {
+  const first = predict.outcomes.find((o) => o.group) ?? predict.outcomes[0], colors = outcomeColors(predict);
+  if (!first) return { runs: [], ends: [] };
+  const colorOf = (name) => colors.get(outcomeKey({ group: first.group, name })) ?? [128, 128, 128];
+  return {
+    runs: (predict.typical_runs ?? []).filter((run) => run.group === first.group).map((run) => ({ run, color: colorOf(run.outcome) })),
+    ends: (predict.final_poses ?? []).map((end) => ({ end, colorOf })),
+  };
 }
 
 function outcomeRow({ name, probability, interval }, color) {
@@ -223,7 +242,7 @@ export function answerContent(answer) {
       if (outcome.group !== group) nodes.push(make('div', { className: 'group', textContent: outcome.group || 'each by itself' }));
       group = outcome.group;
       if (outcome.probability < 0.005 && outcome.name === 'other') continue;
-      nodes.push(outcomeRow(outcome, colors.get(outcome.name)));
+      nodes.push(outcomeRow(outcome, colors.get(outcomeKey(outcome))));
     }
   } else note(JSON.stringify(answer).slice(0, 600));
   const based = stability ?? predict;

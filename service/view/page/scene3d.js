@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the scene with WebGL: in space, and as outlines over the camera's picture.
 
-import { cross, css, dot, inverseRigid, lookAt, multiply, normalized, perspective, pinhole, poseMatrix, scale, seriesColor,
+import { cross, css, inverseRigid, lookAt, multiply, normalized, perspective, pinhole, poseMatrix, scale, seriesColor,
   sub, add, transform, warmColor, warmOpacity } from './drawing.js';
 
 const meshVertex = `#version 300 es
@@ -203,7 +203,7 @@ export class SpaceView {
     return multiply(perspective(0.8, canvas.width / canvas.height, 0.02 * this.orbit.distance, 60 * this.orbit.distance),
       lookAt(this.eye(), this.orbit.target, [0, 0, 1]));
   }
-  // `colors` by object; `answer` is a prediction of which the ends are drawn.
+  // `colors` by object; `answer` is what shownEnds() takes from a prediction.
   draw(step, { dark, ghosts, selected, colors, answer }) {
     if (!this.works || !this.scene || !step) return;
     if (this.needsFrame) this.frame(step);
@@ -223,7 +223,7 @@ export class SpaceView {
     }
     this.drawCamera(step, clip, dark);
     gl.depthMask(false);
-    if (answer) this.drawAnswer(answer, clip, colors);
+    if (answer) this.drawAnswer(answer, clip);
     step.objects.forEach((object) => {
       const color = colors.get(object.name), key = modelKey(scene, object.name);
       if (object.state !== 'tracked' && object.state !== 'lost') painter.drawMesh(key, object.pose, clip, shade(color, 0.5));
@@ -247,35 +247,35 @@ export class SpaceView {
     this.painter.drawPaint(this.painter.gl.LINES, numbers, clip);
   }
   // Where things end: the heat map on the lowest end, final poses by their weights, and the typical runs.
-  drawAnswer({ predict, outcomeColors }, clip) {
+  drawAnswer({ runs, ends }, clip) {
     const { painter } = this, { gl } = painter;
-    for (const run of predict.typical_runs ?? []) {
-      const color = outcomeColors.get(run.outcome);
-      if (!color) continue;
-      const states = run.trajectory.states, count = states.length ? states[0].objects.length : 0;
-      for (let k = 0; k < count; ++k) {
-        const numbers = [];
-        states.forEach((s, i) => { if (i) for (const of of [states[i - 1], s]) numbers.push(...of.objects[k].X_WO.position, ...shade(color, 0.9)); });
-        painter.drawPaint(gl.LINES, numbers, clip);
-      }
+    for (const { run, color } of runs) {
+      const { states } = run.trajectory, count = states.length ? states[0].objects.length : 0, numbers = [];
+      for (let k = 0; k < count; ++k)
+        for (let i = 1; i < states.length; ++i)
+          for (const of of [states[i - 1], states[i]]) numbers.push(...of.objects[k].X_WO.position, ...shade(color, 0.9));
+      painter.drawPaint(gl.LINES, numbers, clip);
     }
-    for (const end of predict.final_poses ?? []) {
-      const heat = end.heat_map, most = Math.sqrt(Math.max(...heat.mass, 1e-12)), numbers = [];
-      const z = Math.min(...end.components.map((c) => c.mean.position[2]), end.mean_position[2]) - 0.002;
-      for (let y = 0; y < heat.ny; ++y)
-        for (let x = 0; x < heat.nx; ++x) {
-          const value = Math.sqrt(heat.mass[y * heat.nx + x]) / most;
-          if (!(value > 0.02)) continue;
-          const color = shade(warmColor(value), warmOpacity(value)), x0 = heat.x0 + x * heat.cell, y0 = heat.y0 + y * heat.cell;
-          const p = (i, j) => [x0 + i * heat.cell, y0 + j * heat.cell, z, ...color];
-          numbers.push(...p(0, 0), ...p(1, 0), ...p(1, 1), ...p(0, 0), ...p(1, 1), ...p(0, 1));
-        }
-      painter.drawPaint(gl.TRIANGLES, numbers, clip);
+    for (const { end, colorOf } of ends) {
+      this.drawHeatMap(end, clip);
       for (const part of end.components.slice(0, 12)) {
-        const { position, rotation } = part.mean, color = outcomeColors.get(part.outcome) ?? [128, 128, 128];
-        painter.drawMesh(modelKey(this.scene, end.object), [...position, ...rotation.quaternion_wxyz], clip, shade(color, Math.min(0.75, 0.12 + 2.5 * part.weight)));
+        const { position, rotation } = part.mean, alpha = Math.min(0.7, 0.1 + 2 * part.weight);
+        painter.drawMesh(modelKey(this.scene, end.object), [...position, ...rotation.quaternion_wxyz], clip, shade(colorOf(part.outcome), alpha));
       }
     }
+  }
+  // Between the middles of the cells the mass goes over evenly.
+  drawHeatMap({ heat_map: { cell, x0, y0, nx, ny, mass }, components, mean_position }, clip) {
+    const most = Math.sqrt(Math.max(...mass, 1e-12)), numbers = [];
+    const z = Math.min(...components.map((c) => c.mean.position[2]), mean_position[2]) - 0.002;
+    const at = (x, y) => x < 0 || y < 0 || x >= nx || y >= ny ? 0 : Math.sqrt(mass[y * nx + x]) / most;
+    const corner = (x, y) => { const value = at(x, y); return [x0 + (x + 0.5) * cell, y0 + (y + 0.5) * cell, z, ...shade(warmColor(value), warmOpacity(value))]; };
+    for (let y = -1; y < ny; ++y)
+      for (let x = -1; x < nx; ++x) {
+        if (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1) < 0.02) continue;
+        numbers.push(...corner(x, y), ...corner(x + 1, y), ...corner(x + 1, y + 1), ...corner(x, y), ...corner(x + 1, y + 1), ...corner(x, y + 1));
+      }
+    this.painter.drawPaint(this.painter.gl.TRIANGLES, numbers, clip);
   }
   drawLabels(step, selected, colors) {
     const { canvas } = this.painter, spans = [];

@@ -3,7 +3,7 @@
 
 import { seriesColor, css } from './drawing.js';
 import { OverlayView, SpaceView } from './scene3d.js';
-import { ObjectList, Trends, answerContent, make, outcomeColors } from './panels.js';
+import { ObjectList, Trends, answerContent, make, shownEnds } from './panels.js';
 
 const $ = (id) => document.getElementById(id);
 const page = {
@@ -133,7 +133,7 @@ function redraw() {
     const { step } = page;
     layoutPicture();
     if (!step) return;
-    const shown = page.shownAnswer && page.shownAnswer.predict ? { predict: page.shownAnswer.predict, outcomeColors: outcomeColors(page.shownAnswer.predict) } : null;
+    const shown = page.shownAnswer && page.shownAnswer.predict ? shownEnds(page.shownAnswer.predict) : null;
     space.draw(step, { dark: dark(), ghosts: page.ghosts, selected: page.selected, colors: page.colors, answer: shown });
     if (page.overlay) overlay.draw(step, page.indexes);
     else overlay.clear();
