@@ -39,6 +39,39 @@ double number_or(const ordered_json& object, const char* key, double otherwise) 
   return found != object.end() && found->is_number() ? found->get<double>() : otherwise;
 }
 
+geometry::Vector3d vector_or_zero(const ordered_json& object, const char* key) {
+  geometry::Vector3d vector = geometry::Vector3d::Zero();
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_array() || found->size() != 3) return vector;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const ordered_json& value = (*found)[static_cast<std::size_t>(i)];
+    if (value.is_number()) vector[i] = value.get<double>();
+  }
+  return vector;
+}
+
+/// What was learned, where the sender says so.
+void read_learned(const ordered_json& json, ObjectSummary& object) {
+  constexpr std::size_t kMostParameters = 64;
+  if (const auto twist = json.find("twist"); twist != json.end() && twist->is_object())
+    object.V_WO = {vector_or_zero(*twist, "angular"), vector_or_zero(*twist, "linear")};
+  if (const auto lessons = json.find("lessons"); lessons != json.end() && lessons->is_number_unsigned())
+    object.lessons = static_cast<int>(std::min<std::uint64_t>(lessons->get<std::uint64_t>(), 1'000'000'000));
+  const auto parameters = json.find("parameters");
+  if (parameters == json.end() || !parameters->is_array()) return;
+  for (const ordered_json& one : *parameters) {
+    if (object.parameters.size() >= kMostParameters || !one.is_object()) return;
+    const auto name = one.find("name");
+    if (name == one.end() || !name->is_string()) continue;
+    belief::ParameterEstimate& read = object.parameters.emplace_back();
+    read.name = name->get<std::string>();
+    read.mean = number_or(one, "mean", 0.0);
+    read.standard_deviation = number_or(one, "standard_deviation", 0.0);
+    read.low = number_or(one, "low", 0.0);
+    read.high = number_or(one, "high", 0.0);
+  }
+}
+
 core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
   const core::Status bad = core::invalid_input("belief: an object without name, state or pose");
   if (!json.is_object()) return bad;
@@ -61,6 +94,7 @@ core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
   object.existence = number_or(json, "existence", 0.0);
   object.evidence_per_pixel = number_or(json, "evidence_per_pixel", 0.0);
   object.visible_share = number_or(json, "visible_share", 0.0);
+  read_learned(json, object);
   const auto covariance = json.find("covariance");
   if (covariance != json.end() && covariance->is_array() && covariance->size() == 36) {
     for (Eigen::Index i = 0; i < 36; ++i) {
