@@ -25,6 +25,7 @@ core::Result<std::unique_ptr<LiveView>> open_view(ServeOptions& options,
                                                   const std::shared_ptr<const belief::Scene>& scene,
                                                   VerbContext& context) {
   if (options.verb->count("--view") == 0) return std::unique_ptr<LiveView>();
+  options.view.world_frame = options.settings.tracker.assembler.world_frame;
   PRESCENE_TRY(auto view, LiveView::create(scene, options.view, context.log()));
   LiveView* raw = view.get();
   options.settings.on_step = [raw](const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief) {

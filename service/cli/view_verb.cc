@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "prescene/service/load_scene.h"
 #include "prescene/service/recording/replay_input.h"
+#include "prescene/service/view/bus_view.h"
 #include "prescene/service/view/recording_view.h"
 #include "verb.h"
 
@@ -83,12 +85,35 @@ core::Status view_recording(ViewVerbOptions& options, VerbContext& context) {
   return core::ok_status();
 }
 
+core::Status view_bus(ViewVerbOptions& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
+  std::shared_ptr<const belief::Scene> scene;
+  if (!options.scene.empty()) {
+    PRESCENE_TRY(scene, load_scene(options.scene, context.log()));
+  }
+  PRESCENE_TRY(const auto view, BusView::create(scene, {options.dds, options.tracker, options.view}, context.log()));
+  print_ready(view->url(), view->port(), "DDS domain " + std::to_string(options.dds.domain), context);
+  view->run(context.cancellation());
+  return core::ok_status();
+}
+
 /// kInvalidInput for an option that would do nothing.
 core::Status check_options(const ViewVerbOptions& options) {
+  const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
+  if (options.recording.empty()) {
+    for (const char* name : {"--depth-scale", "--frame-rate", "--salvage", "--likelihood", "--graphics-device"})
+      if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out, or name one");
+    return core::ok_status();
+  }
+  for (const char* name : {"--domain", "--ros-distro"})
+    if (given(name))
+      return core::invalid_input(std::string(name) +
+                                 " is for what is on the bus, and a recording needs none of it: "
+                                 "leave it out");
   std::error_code none;
   const bool is_folder = std::filesystem::is_directory(options.recording, none);
   for (const char* name : {"--depth-scale", "--frame-rate"})
-    if (!is_folder && options.verb->count(name) > 0)
+    if (!is_folder && given(name))
       return core::invalid_input(std::string(name) + " is for folders of images, and " + options.recording +
                                  " is none: leave it out");
   return core::ok_status();
@@ -97,17 +122,19 @@ core::Status check_options(const ViewVerbOptions& options) {
 }  // namespace
 
 Verb add_view_verb(CLI::App& app) {
-  auto* verb = app.add_subcommand("view", "Show a recording in the browser: camera, scene, objects, questions");
+  auto* verb = app.add_subcommand("view", "Show a recording, or a running `serve`, in the browser");
   auto options = std::make_shared<ViewVerbOptions>();
-  verb->add_option("RECORDING", options->recording,
-                   "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
-      ->required();
+  verb->add_option(
+          "RECORDING", options->recording,
+          "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv; default: what is on the bus")
+      ->check(file_name());
   verb->add_option("--port", options->view.port, "Port of the page; 0 = any that is free")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   verb->add_option(
           "--scene", options->scene,
-          "Scene file; default: the one that the recording holds; a folder without one is searched for its support")
+          "Scene file; default: the one that the recording holds; a folder without one is searched for its support; of "
+          "what is on the bus, only what its markers show is drawn")
       ->check(file_name());
   verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
       ->check(positive_number())
@@ -122,11 +149,13 @@ Verb add_view_verb(CLI::App& app) {
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;
-  verb->footer("Example: prescene view milk.mcap");
+  verb->footer(
+      "Examples: prescene view milk.mcap\n"
+      "          prescene view --scene scenarios/milk_on_bin.yaml");
   return {verb, [options](VerbContext& context) -> core::Status {
             PRESCENE_RETURN_IF_ERROR(check_options(*options));
             PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
-            return view_recording(*options, context);
+            return options->recording.empty() ? view_bus(*options, context) : view_recording(*options, context);
           }};
 }
 

@@ -86,7 +86,7 @@ core::Result<std::unique_ptr<LiveView>> LiveView::create(std::shared_ptr<const b
   handlers.on_request = [raw](WebClient client, const std::string& op, const ordered_json& request) {
     raw->take(client, op, request);
   };
-  PRESCENE_TRY(auto server, ViewServer::create(options, std::move(handlers), log));
+  PRESCENE_TRY(auto server, ViewServer::create(options, true, std::move(handlers), log));
   {
     const std::lock_guard lock(raw->shown_mutex);  // a page may be opening already
     impl->server = std::move(server);
@@ -170,7 +170,7 @@ void LiveView::Impl::work() {
 }
 
 void LiveView::Impl::show(const ShownStep& shown) {
-  const BeliefSummary summary = summary_of(*shown.belief);
+  const BeliefSummary summary = summary_of(shown);
   const std::uint64_t index = next_index++;
   interfaces::WebMessagePtr new_history;
   {
@@ -180,6 +180,7 @@ void LiveView::Impl::show(const ShownStep& shown) {
     revision = history.revision();
   }
   if (new_history) server->send_to_all(new_history);
+  server->publish_step(shown, summary);
   const bool watched = server->has_clients();
   if (!watched && !idle_pace.due()) return;  // a page that opens is to find something
   if (shown.belief->scene != last_scene) {

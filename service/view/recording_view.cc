@@ -89,7 +89,7 @@ core::Result<std::unique_ptr<RecordingView>> RecordingView::create(std::shared_p
   };
   {
     const std::lock_guard lock(raw->mutex);  // a page that opens waits for the server to be there
-    PRESCENE_TRY(impl->server, ViewServer::create(options.view, std::move(handlers), log));
+    PRESCENE_TRY(impl->server, ViewServer::create(options.view, false, std::move(handlers), log));
   }
   return std::unique_ptr<RecordingView>(new RecordingView(std::move(impl)));
 }
@@ -175,7 +175,7 @@ void RecordingView::Impl::ask(WebClient client, const ordered_json& request) {
 }
 
 core::Status RecordingView::Impl::add(const ShownStep& step) {
-  const BeliefSummary summary = summary_of(*step.belief);
+  const BeliefSummary summary = summary_of(step);
   const std::uint64_t index = store->size();
   send_new_scene(step);
   ordered_json document = step_document(step, summary, index);

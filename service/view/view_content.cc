@@ -183,6 +183,8 @@ std::uint64_t scene_shape_hash(const belief::Scene& scene) {
   return hasher.digest();
 }
 
+BeliefSummary summary_of(const ShownStep& step) { return step.summary ? *step.summary : summary_of(*step.belief); }
+
 ordered_json step_document(const ShownStep& step, const BeliefSummary& summary, std::uint64_t index) {
   const belief::Belief& belief = *step.belief;
   ordered_json objects = ordered_json::array();

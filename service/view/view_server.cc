@@ -4,12 +4,15 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "foxglove_server.h"
 #include "page_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
+
+using interfaces::WebClient;
 
 constexpr const char* kSubprotocol = "prescene.view.v1";
 constexpr std::size_t kMostRequestBytes = std::size_t{64} << 10;
@@ -33,8 +36,8 @@ interfaces::WebMessagePtr view_picture(ViewPictureKind kind, std::uint64_t index
   return interfaces::make_web_message(interfaces::WebSocketKind::kBinary, payload, delivery);
 }
 
-core::Result<std::unique_ptr<ViewServer>> ViewServer::create(const ViewOptions& options, ViewHandlers handlers,
-                                                             const core::LogSink& log) {
+core::Result<std::unique_ptr<ViewServer>> ViewServer::create(const ViewOptions& options, bool foxglove,
+                                                             ViewHandlers handlers, const core::LogSink& log) {
   interfaces::WebServerOptions web;
   web.address = options.address;
   web.port = options.port;
@@ -45,22 +48,75 @@ core::Result<std::unique_ptr<ViewServer>> ViewServer::create(const ViewOptions& 
   if (web.token.empty() && !interfaces::is_loopback(web.address)) {
     PRESCENE_TRY(web.token, interfaces::random_web_token());
   }
+  std::unique_ptr<ViewServer> view(new ViewServer());
+  ViewServer* raw = view.get();
+  view->handlers_ = std::move(handlers);
+  view->world_frame_ = options.world_frame;
+  if (foxglove) {
+    view->foxglove_ = std::make_unique<FoxgloveServer>();
+    const auto& names = FoxgloveServer::subprotocols();
+    web.subprotocols.insert(web.subprotocols.end(), names.begin(), names.end());
+  }
+  const std::lock_guard starting(view->starting_);
   interfaces::WebHandlers web_handlers;
-  web_handlers.on_open = [on_open = std::move(handlers.on_open)](interfaces::WebClient client, const std::string&) {
-    if (on_open) on_open(client);
-  };
-  web_handlers.on_close = std::move(handlers.on_close);
-  web_handlers.on_message = [on_request = std::move(handlers.on_request)](interfaces::WebClient client,
-                                                                          interfaces::WebSocketMessage&& message) {
+  web_handlers.on_open = [raw](WebClient client, const std::string& subprotocol) { raw->open(client, subprotocol); };
+  web_handlers.on_message = [raw](WebClient client, interfaces::WebSocketMessage&& message) {
     try {
-      const nlohmann::ordered_json request = parse_or_discard(message.payload, kMostRequestBytes);
-      if (!request.is_object() || !request.contains("op") || !request["op"].is_string()) return;
-      if (on_request) on_request(client, request["op"].get<std::string>(), request);
+      if (message.kind == interfaces::WebSocketKind::kText) raw->take(client, message.payload);
     } catch (const std::exception&) {  // of another form than it should be, or no memory: it gets no answer
     }
   };
-  PRESCENE_TRY(auto server, interfaces::WebServer::create(web, page_files(), std::move(web_handlers), log));
-  return std::unique_ptr<ViewServer>(new ViewServer(std::move(server)));
+  web_handlers.on_close = [raw](WebClient client) { raw->close(client); };
+  PRESCENE_TRY(view->server_, interfaces::WebServer::create(web, page_files(), std::move(web_handlers), log));
+  return view;
+}
+
+ViewServer::~ViewServer() = default;
+
+void ViewServer::open(WebClient client, const std::string& subprotocol) {
+  { const std::lock_guard started(starting_); }
+  const bool is_page = !FoxgloveServer::speaks(subprotocol);
+  {
+    const std::lock_guard lock(mutex_);  // before it is told how things are, so that it misses no news
+    (is_page ? pages_ : foxgloves_).insert(client);
+  }
+  if (is_page && handlers_.on_open) handlers_.on_open(client);
+  if (!is_page) foxglove_->open(client, [this](WebClient to, const auto& message) { send(to, message); });
+}
+
+void ViewServer::take(WebClient client, const std::string& text) {
+  bool is_page = false;
+  {
+    const std::lock_guard lock(mutex_);
+    is_page = pages_.contains(client);
+  }
+  if (!is_page) return foxglove_->take(client, text, [this](WebClient to, const auto& message) { send(to, message); });
+  const nlohmann::ordered_json request = parse_or_discard(text, kMostRequestBytes);
+  if (!request.is_object() || !request.contains("op") || !request["op"].is_string()) return;
+  if (handlers_.on_request) handlers_.on_request(client, request["op"].get<std::string>(), request);
+}
+
+void ViewServer::close(WebClient client) {
+  bool was_page = false;
+  {
+    const std::lock_guard lock(mutex_);
+    was_page = pages_.erase(client) > 0;
+    foxgloves_.erase(client);
+  }
+  if (!was_page) foxglove_->close(client);
+}
+
+void ViewServer::send_to_all(const interfaces::WebMessagePtr& message) {
+  const std::lock_guard lock(mutex_);
+  for (const WebClient page : pages_) server_->send(page, message);
+}
+
+void ViewServer::publish_step(const ShownStep& step, const BeliefSummary& summary) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (foxgloves_.empty()) return;
+  }
+  foxglove_->publish(step, summary, world_frame_, [this](WebClient to, const auto& message) { send(to, message); });
 }
 
 }  // namespace prescene::service

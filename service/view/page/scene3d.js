@@ -178,6 +178,10 @@ export class SpaceView {
   frame(step) {
     const points = step.objects.filter((o) => o.state !== 'lost').map((o) => o.pose.slice(0, 3));
     for (const pose of step.robot) points.push(pose.slice(0, 3));
+    step.supports.forEach((pose, i) => {  // not a floor: it would make all else small
+      const mesh = this.painter.meshes.get('support ' + i);
+      if (mesh && mesh.radius < 0.5) points.push(pose.slice(0, 3));
+    });
     if (!points.length) return;
     const low = points[0].map((_, k) => Math.min(...points.map((p) => p[k])));
     const high = points[0].map((_, k) => Math.max(...points.map((p) => p[k])));
@@ -240,6 +244,7 @@ export class SpaceView {
   }
   drawCamera(step, clip, dark) {
     const { pose, width, height, fx, fy, cx, cy } = step.camera, m = poseMatrix(pose), reach = 0.12;
+    if (!width) return;
     const corner = (u, v) => transform(m, [(u - cx) / fx * reach, (v - cy) / fy * reach, reach]).slice(0, 3);
     const eye = pose.slice(0, 3), c = [corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)];
     const color = shade(dark ? [200, 205, 215] : [70, 76, 88], 0.9), numbers = [];
@@ -386,6 +391,7 @@ export class OverlayView {
     const { painter, scene } = this, { gl } = painter;
     if (!gl || !scene) return;
     this.clear();
+    if (!step.camera.width) return;
     const clip = multiply(pinhole(step.camera), inverseRigid(poseMatrix(step.camera.pose)));
     const seen = step.objects.filter((o) => o.state === 'tracked' || o.state === 'doubtful');
     const hidden = step.objects.filter((o) => o.state === 'unseen');

@@ -48,8 +48,7 @@ const receivers = {
     page.mode = mode;
     $('source').textContent = title ?? '';
     document.title = (title ? title + ' - ' : '') + 'Prescene';
-    for (const id of ['play', 'back', 'on', 'speed', 'scrub']) $(id).disabled = mode === 'live';
-    $('play').disabled = false;
+    for (const id of ['back', 'on', 'speed', 'scrub']) $(id).hidden = mode === 'live';
     $('play').textContent = mode === 'live' ? 'Pause' : 'Play';
     page.playing = mode === 'live';
     page.following = true;
@@ -85,7 +84,7 @@ const receivers = {
     $('health').textContent = remarks.join(' ');
     $('health').title = remarks.join('\n');
     if (first) request(0);
-    else if (page.step && page.mode === 'recording' && !page.reconnected) drawStrip();
+    else if (page.step) drawStrip();
     redraw();
   },
   answer({ number, answer }) { showAnswer(number, answer); },
@@ -146,7 +145,7 @@ function redraw() {
 
 // The picture and its outlines fill the panel, undistorted.
 function layoutPicture() {
-  const box = $('camera'), size = page.pictureSize ?? (page.step ? [page.step.camera.width, page.step.camera.height] : [4, 3]);
+  const box = $('camera'), size = page.pictureSize ?? (page.step && page.step.camera.width ? [page.step.camera.width, page.step.camera.height] : [4, 3]);
   const factor = Math.min(box.clientWidth / size[0], box.clientHeight / size[1]), w = size[0] * factor, h = size[1] * factor;
   for (const canvas of [$('photo'), $('outlines')]) {
     canvas.style.width = w + 'px';

@@ -20,7 +20,9 @@ struct ShownStep {
   belief::Observation observation;
   double seconds = 0.0;  ///< Wall time that the step took.
   std::vector<std::string> degraded;
+  std::shared_ptr<const BeliefSummary> summary = {};  ///< As published; null = that of `belief`.
 };
+BeliefSummary summary_of(const ShownStep& step);
 
 /// {"op": "scene", "name", "gravity", "models": [{"name", "color", "mesh"}], "objects": [{"name", "model"}],
 /// "supports": [{"name", "color", "mesh", "pose"}], "robot": the same}. A mesh is {"vertices": [x, y, z, ...],

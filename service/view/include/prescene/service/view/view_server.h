@@ -6,7 +6,9 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -24,7 +26,12 @@ struct ViewOptions {
   int port = kViewPort;               ///< 0 = any that is free.
   std::string token;                  ///< Empty: one is made up where the address needs it.
   std::vector<std::string> allowed_origins;
+  std::string world_frame = "world";  ///< As messages of ROS name it.
 };
+
+class FoxgloveServer;
+struct BeliefSummary;
+struct ShownStep;
 
 /// First byte of a binary message to the page; seven bytes of 0, a little-endian index (u64) and a JPEG follow.
 enum class ViewPictureKind : std::uint8_t {
@@ -46,9 +53,10 @@ struct ViewHandlers {
 
 class ViewServer {
  public:
-  /// Errors of WebServer::create, with the address.
-  static core::Result<std::unique_ptr<ViewServer>> create(const ViewOptions& options, ViewHandlers handlers,
-                                                          const core::LogSink& log);
+  /// Errors of WebServer::create. With `foxglove`, whoever speaks its protocol is served too, by publish_step().
+  static core::Result<std::unique_ptr<ViewServer>> create(const ViewOptions& options, bool foxglove,
+                                                          ViewHandlers handlers, const core::LogSink& log);
+  ~ViewServer();
 
   std::string url() const { return server_->url(); }
   int port() const { return server_->port(); }
@@ -56,11 +64,25 @@ class ViewServer {
   /// Whether anybody looks: what nobody sees need not be made.
   bool has_clients() const { return server_->counts().clients > 0; }
   void send(interfaces::WebClient client, const interfaces::WebMessagePtr& message) { server_->send(client, message); }
-  void send_to_all(const interfaces::WebMessagePtr& message) { server_->send_to_all(message); }
+  /// To all pages.
+  void send_to_all(const interfaces::WebMessagePtr& message);
+  /// To those who speak Foxglove's protocol and subscribed; always from the same thread.
+  void publish_step(const ShownStep& step, const BeliefSummary& summary);
 
  private:
-  explicit ViewServer(std::unique_ptr<interfaces::WebServer> server) : server_(std::move(server)) {}
-  std::unique_ptr<interfaces::WebServer> server_;
+  ViewServer() = default;
+  void open(interfaces::WebClient client, const std::string& subprotocol);
+  void take(interfaces::WebClient client, const std::string& text);
+  void close(interfaces::WebClient client);
+
+  ViewHandlers handlers_;
+  std::string world_frame_;
+  std::unique_ptr<FoxgloveServer> foxglove_;
+  std::mutex mutex_;                       // guards who is which,
+  std::set<interfaces::WebClient> pages_;  // as steps are sent from other threads
+  std::set<interfaces::WebClient> foxgloves_;
+  std::mutex starting_;                            // held until server_ is set: a client may come before
+  std::unique_ptr<interfaces::WebServer> server_;  // last: its thread ends first
 };
 
 }  // namespace prescene::service

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "foxglove_server.h"
+
+#include <algorithm>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "picture_pace.h"
+#include "prescene/belief/json.h"
+#include "prescene/core/clock.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/interfaces/ros_messages/schemas.h"
+#include "prescene/service/outside_json.h"
+#include "prescene/service/tracking/topics.h"
+
+namespace prescene::service {
+namespace {
+
+using interfaces::WebClient;
+using interfaces::WebDelivery;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMostSubscriptions = 100;  // of one client
+constexpr const char* kCameraFrame = "prescene_camera";
+constexpr std::uint8_t kMessageData = 1;
+enum class StatusLevel { kInfo = 0, kWarning = 1, kError = 2 };
+
+/// Of BeliefSummary, for those who lay out panels by it.
+constexpr const char* kBeliefSchema = R"({"type": "object", "properties": {
+  "step": {"type": "integer"}, "stamp_ns": {"type": "integer"},
+  "objects": {"type": "array", "items": {"type": "object", "properties": {
+    "name": {"type": "string"}, "model": {"type": "string"}, "state": {"type": "string"},
+    "confidence": {"type": "number"}, "existence": {"type": "number"},
+    "pose": {"type": "object", "properties": {
+      "position": {"type": "array", "items": {"type": "number"}},
+      "rotation": {"type": "object", "properties": {
+        "quaternion_wxyz": {"type": "array", "items": {"type": "number"}}}}}},
+    "covariance": {"type": "array", "items": {"type": "number"}},
+    "twist": {"type": "object", "properties": {
+      "angular": {"type": "array", "items": {"type": "number"}},
+      "linear": {"type": "array", "items": {"type": "number"}}}},
+    "evidence_per_pixel": {"type": "number"}, "visible_share": {"type": "number"},
+    "parameters": {"type": "array", "items": {"type": "object", "properties": {
+      "name": {"type": "string"}, "mean": {"type": "number"}, "standard_deviation": {"type": "number"},
+      "low": {"type": "number"}, "high": {"type": "number"}}}},
+    "lessons": {"type": "integer"}, "learned_ns": {"type": "integer"}}}}}})";
+
+template <class Message>
+std::string cdr_text(const Message& message) {
+  const std::vector<std::uint8_t> bytes = interfaces::encode_cdr(message);
+  return {bytes.begin(), bytes.end()};
+}
+
+interfaces::WebMessagePtr text_of(const ordered_json& document) {
+  return interfaces::make_web_message(interfaces::WebSocketKind::kText, belief::json_text(document),
+                                      WebDelivery::kEach);
+}
+
+ordered_json status_document(StatusLevel level, const std::string& text) {
+  return {{"op", "status"}, {"level", static_cast<int>(level)}, {"message", text}};
+}
+
+interfaces::RosTfMessage tf_of(const ShownStep& step, const BeliefSummary& summary, const std::string& world_frame) {
+  interfaces::RosTfMessage tf;
+  const auto add = [&](const std::string& child, const geometry::Pose& X_WF) {
+    tf.transforms.push_back(
+        interfaces::to_ros_transform(interfaces::FrameTransform{world_frame, child, summary.stamp_ns, X_WF}));
+  };
+  add(kCameraFrame, step.observation.X_WC);
+  for (const ObjectSummary& object : summary.objects)
+    if (object.state != belief::TrackState::kLost) add("prescene/" + object.name, object.X_WO);
+  return tf;
+}
+
+bool is_u32(const ordered_json& number) {
+  return number.is_number_unsigned() && number.get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max();
+}
+
+}  // namespace
+
+const std::vector<std::string>& FoxgloveServer::subprotocols() {
+  static const std::vector<std::string> names = {"foxglove.sdk.v1", "foxglove.websocket.v1"};
+  return names;
+}
+
+bool FoxgloveServer::speaks(const std::string& subprotocol) {
+  return std::find(subprotocols().begin(), subprotocols().end(), subprotocol) != subprotocols().end();
+}
+
+ordered_json FoxgloveServer::channel_list() {
+  ordered_json channels = ordered_json::array();
+  const auto add = [&](Channel channel, const std::string& topic, const char* encoding, const std::string& schema_name,
+                       const char* schema_encoding, const std::string& schema) {
+    channels.push_back({{"id", static_cast<std::uint32_t>(channel)},
+                        {"topic", topic},
+                        {"encoding", encoding},
+                        {"schemaName", schema_name},
+                        {"schema", schema},
+                        {"schemaEncoding", schema_encoding}});
+  };
+  const auto add_ros = [&](Channel channel, const std::string& topic, const interfaces::RosType& type) {
+    add(channel, topic, "cdr", std::string(type.name), "ros2msg", interfaces::ros2msg_schema(type));
+  };
+  add(kBelief, kBeliefTopic, "json", "prescene.Belief", "jsonschema", kBeliefSchema);
+  add_ros(kMarkers, kMarkersTopic, interfaces::ros_type<interfaces::RosMarkerArray>());
+  add_ros(kTf, "/tf", interfaces::ros_type<interfaces::RosTfMessage>());
+  add_ros(kDetections, kDetectionsTopic, interfaces::ros_type<interfaces::RosDetection3dArray>());
+  add_ros(kPicture, "/prescene/camera/image/compressed", interfaces::ros_type<interfaces::RosCompressedImage>());
+  add_ros(kCameraInfo, "/prescene/camera/camera_info", interfaces::ros_type<interfaces::RosCameraInfo>());
+  return channels;
+}
+
+void FoxgloveServer::open(WebClient client, const Send& send) {
+  {
+    const std::lock_guard lock(mutex_);
+    subscriptions_[client];
+  }
+  send(client, text_of({{"op", "serverInfo"},
+                        {"name", "prescene"},
+                        {"capabilities", ordered_json::array()},
+                        {"supportedEncodings", {"cdr", "json"}},
+                        {"metadata", ordered_json::object()},
+                        {"sessionId", std::to_string(core::wall_now_ns())}}));
+  send(client, text_of({{"op", "advertise"}, {"channels", channel_list()}}));
+}
+
+void FoxgloveServer::close(WebClient client) {
+  const std::lock_guard lock(mutex_);
+  subscriptions_.erase(client);
+}
+
+void FoxgloveServer::take(WebClient client, const std::string& text, const Send& send) {
+  const ordered_json request = parse_or_discard(text);
+  if (!request.is_object() || !request.contains("op") || !request["op"].is_string())
+    return send(client, text_of(status_document(StatusLevel::kError, "not a JSON object with \"op\"")));
+  const std::string op = request["op"].get<std::string>();
+  if (op == "subscribe") return subscribe(client, request, send);
+  if (op == "unsubscribe") return unsubscribe(client, request);
+  send(client,
+       text_of(status_document(StatusLevel::kWarning, "this server only publishes: there is no such operation")));
+}
+
+void FoxgloveServer::subscribe(WebClient client, const ordered_json& request, const Send& send) {
+  const auto wanted = request.find("subscriptions");
+  std::string problem = wanted != request.end() && wanted->is_array() ? "" : "subscribe: \"subscriptions\" is no list";
+  if (problem.empty()) {
+    const std::lock_guard lock(mutex_);
+    auto& known = subscriptions_[client];
+    for (const ordered_json& one : *wanted) {
+      const bool good = one.is_object() && one.contains("id") && is_u32(one["id"]) && one.contains("channelId") &&
+                        is_u32(one["channelId"]) && one["channelId"].get<std::uint32_t>() < kChannels;
+      if (!good) {
+        problem = "subscribe: not {\"id\", \"channelId\"} of a channel that is advertised";
+      } else if (known.size() >= kMostSubscriptions) {
+        problem = "subscribe: no more than " + std::to_string(kMostSubscriptions) + " subscriptions";
+      } else {
+        known[one["id"].get<std::uint32_t>()] = static_cast<Channel>(one["channelId"].get<std::uint32_t>());
+      }
+    }
+  }
+  if (!problem.empty()) send(client, text_of(status_document(StatusLevel::kError, problem)));
+}
+
+void FoxgloveServer::unsubscribe(WebClient client, const ordered_json& request) {
+  const auto ids = request.find("subscriptionIds");
+  if (ids == request.end() || !ids->is_array()) return;
+  const std::lock_guard lock(mutex_);
+  auto& known = subscriptions_[client];
+  for (const ordered_json& id : *ids)
+    if (is_u32(id)) known.erase(id.get<std::uint32_t>());
+}
+
+std::string FoxgloveServer::payload_of(Channel channel, const ShownStep& step, const BeliefSummary& summary,
+                                       const std::string& world_frame) {
+  const belief::Scene& scene = *step.belief->scene;
+  const interfaces::RosHeader camera_header{interfaces::to_ros_time(summary.stamp_ns), kCameraFrame};
+  switch (channel) {
+    case kBelief:
+      return belief::json_text(to_json(summary));
+    case kMarkers:
+      if (scene_of_meshes_ != step.belief->scene) {
+        meshes_ = marker_meshes(scene);
+        scene_of_meshes_ = step.belief->scene;
+      }
+      return cdr_text(markers_of(summary, scene, meshes_, world_frame));
+    case kTf:
+      return cdr_text(tf_of(step, summary, world_frame));
+    case kDetections:
+      return cdr_text(detections_of(summary, scene, world_frame));
+    case kPicture: {
+      // Whole: the camera info is of this size.
+      const std::string jpeg = picture_jpeg(step.observation, step.observation.frame.camera.width, kPictureQuality);
+      return cdr_text(interfaces::RosCompressedImage{camera_header, "jpeg", {jpeg.begin(), jpeg.end()}});
+    }
+    case kCameraInfo:
+      return cdr_text(interfaces::to_ros_camera_info(step.observation.frame.camera, camera_header));
+    case kChannels:
+      break;
+  }
+  return "";
+}
+
+void FoxgloveServer::publish(const ShownStep& step, const BeliefSummary& summary, const std::string& world_frame,
+                             const Send& send) {
+  std::vector<std::pair<WebClient, std::map<std::uint32_t, Channel>>> wanted;
+  {
+    const std::lock_guard lock(mutex_);
+    wanted.assign(subscriptions_.begin(), subscriptions_.end());
+  }
+  std::array<std::string, kChannels> payloads;
+  const core::TimeNs now_ns = core::wall_now_ns();
+  for (const auto& [client, subscriptions] : wanted) {
+    for (const auto& [id, channel] : subscriptions) {
+      std::string& payload = payloads.at(channel);
+      if (payload.empty()) payload = payload_of(channel, step, summary, world_frame);
+      std::string message(1, static_cast<char>(kMessageData));
+      for (unsigned shift = 0; shift < 32; shift += 8) message += static_cast<char>((id >> shift) & 0xffU);
+      for (unsigned shift = 0; shift < 64; shift += 8)
+        message += static_cast<char>((static_cast<std::uint64_t>(now_ns) >> shift) & 0xffU);
+      message += payload;
+      send(client, interfaces::make_web_message(interfaces::WebSocketKind::kBinary, message, WebDelivery::kNewest));
+    }
+  }
+}
+
+}  // namespace prescene::service

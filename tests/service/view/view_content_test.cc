@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/view/view_content.h"
+
+#include <cmath>
+
+#include "prescene/service/view/view_history.h"
+#include "tests/service/view/page_client.h"
+
+namespace prescene::service::view_content_test {
+namespace {
+
+/// Many particles about x = 0, a quarter of the weight at x = 1.
+ShownStep spread_step(belief::TrackState state) {
+  const ShownStep shown = tests::shown_step(3);
+  auto belief = std::make_shared<belief::Belief>(*shown.belief);
+  belief::ObjectBelief& box = belief->objects[0];
+  box.state = state;
+  box.particles.resize(100, box.particles[0]);
+  for (std::size_t i = 0; i < box.particles.size(); ++i) {
+    box.particles[i].log_weight = std::log(0.01);
+    box.particles[i].X_WO.translation = {i % 4 == 0 ? 1.0 : 0.0, 0.01 * static_cast<double>(i), 0.0};
+    box.particles[i].covariance.block<3, 3>(3, 3) = 1e-4 * geometry::Matrix3d::Identity();
+  }
+  return {belief, shown.observation, shown.seconds, {}};
+}
+
+TEST(ViewContent, GhostsAndRegionFollowTheWeights) {
+  const ShownStep unseen = spread_step(belief::TrackState::kUnseen);
+  const auto document = step_document(unseen, summary_of(*unseen.belief), 9);
+  const auto& box = document["objects"][0];
+  EXPECT_EQ(document["index"], 9);
+  EXPECT_EQ(box["state"], "unseen");
+  EXPECT_EQ(box["ghosts"].size(), 24U);
+  int far = 0;
+  for (const auto& ghost : box["ghosts"]) far += ghost[0] == 1.0 ? 1 : 0;
+  EXPECT_NEAR(far, 6, 1);
+  // Positions of the region: 160, with the mean and the spread in x of the mixture (0.25, and 0.433 with 0.01 of each
+  // particle); the errors are four standard deviations of what 160 draws by weight could give, were they independent.
+  ASSERT_EQ(box["region"].size(), 480U);
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < 480; i += 3) {
+    const double x = box["region"][i].get<double>();
+    sum += x;
+    squares += (x - 0.25) * (x - 0.25);
+  }
+  EXPECT_NEAR(sum / 160.0, 0.25, 4.0 * 0.433 / std::sqrt(160.0));
+  EXPECT_NEAR(squares / 160.0, 0.1876, 4.0 * 0.2165 / std::sqrt(160.0));
+  EXPECT_EQ(document, step_document(unseen, summary_of(*unseen.belief), 9));
+  const ShownStep tracked = spread_step(belief::TrackState::kTracked);
+  EXPECT_FALSE(step_document(tracked, summary_of(*tracked.belief), 9)["objects"][0].contains("region"));
+}
+
+TEST(ViewContent, ScenesAreTheSameWhateverTheirPoses) {
+  const auto belief = tests::belief_of(tests::kBoxScene);
+  belief::Scene scene = *belief->scene;
+  const std::uint64_t hash = scene_shape_hash(scene);
+  scene.supports[0].X_WS.translation.x() += 0.1;
+  EXPECT_EQ(scene_shape_hash(scene), hash);
+  scene.supports.push_back(scene.supports[0]);
+  EXPECT_NE(scene_shape_hash(scene), hash);
+  const auto document = scene_document(scene);
+  EXPECT_EQ(document["supports"].size(), 2U);
+  EXPECT_EQ(document["models"][0]["mesh"]["triangles"].size() % 3, 0U);
+}
+
+TEST(ViewContent, PicturesAreMadeSmallerByWholeFactors) {
+  const auto observation = tests::shown_step(1).observation;
+  EXPECT_FALSE(picture_jpeg(observation, 40, 80).empty());
+  EXPECT_FALSE(picture_jpeg(observation, 13, 80).empty());
+  EXPECT_EQ(picture_jpeg({}, 40, 80), "");
+}
+
+BeliefSummary summary_at(std::uint64_t step) { return summary_of(*tests::shown_step(step).belief); }
+
+TEST(ViewHistory, OfALongRunEveryFewStepsAreKept) {
+  ViewHistory history(100);
+  for (std::uint64_t i = 0; i < 1000; ++i) history.add(summary_at(i), i);
+  EXPECT_LE(history.rows().size(), 100U);
+  EXPECT_GE(history.rows().size(), 50U);
+  for (std::size_t i = 0; i < history.rows().size(); ++i) {
+    EXPECT_EQ(history.rows()[i].index, 16 * i);
+    EXPECT_NEAR(history.rows()[i].time, 1.6 * static_cast<double>(i), 1e-9);
+  }
+}
+
+TEST(ViewHistory, BeginsAnewWhereTheClockWentBack) {
+  ViewHistory history;
+  history.add(summary_at(5), 0);
+  history.add(summary_at(6), 1);
+  const std::uint64_t revision = history.revision();
+  history.add(summary_at(2), 2);
+  EXPECT_EQ(history.rows().size(), 1U);
+  EXPECT_NE(history.revision(), revision);
+}
+
+}  // namespace
+}  // namespace prescene::service::view_content_test
