@@ -29,7 +29,7 @@ TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
   EXPECT_EQ(run_program({"--help"}).exit_code, 0);
   EXPECT_EQ(run_program({"--version"}).exit_code, 0);
   for (const char* verb :
-       {"validate", "predict", "inspect", "record", "replay", "serve", "ask", "evaluate", "calibrate"}) {
+       {"validate", "predict", "inspect", "record", "replay", "serve", "ask", "view", "evaluate", "calibrate"}) {
     const Finished help = run_program({verb, "--help"});
     EXPECT_EQ(help.exit_code, 0) << verb;
     EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;

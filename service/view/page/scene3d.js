@@ -190,12 +190,20 @@ export class SpaceView {
     const eye = step.camera.pose.slice(0, 3), from = sub(eye, this.orbit.target);
     this.orbit.yaw = Math.atan2(from[1], from[0]) + 0.5;
     this.orbit.pitch = 0.5;
-    this.needsFrame = false;
+    this.needsFrame = this.turned = false;
+  }
+  isOutOfSight(step) {
+    const clip = this.clipFromWorld();
+    return step.objects.some((o) => {
+      const [x, y, , w] = transform(clip, o.pose.slice(0, 3));
+      return o.state === 'tracked' && (w <= 0 || Math.max(Math.abs(x), Math.abs(y)) > 0.85 * w);
+    });
   }
   // From where the camera of the robot is.
   fromCamera(step) {
     const m = poseMatrix(step.camera.pose), eye = step.camera.pose.slice(0, 3), ahead = [m[8], m[9], m[10]];
     const distance = Math.max(0.3, Math.hypot(...sub(eye, this.orbit.target)));
+    this.turned = true;
     this.orbit = { target: add(eye, scale(ahead, distance)), distance, yaw: Math.atan2(-ahead[1], -ahead[0]), pitch: Math.asin(Math.max(-1, Math.min(1, -ahead[2]))) };
   }
   eye() {
@@ -210,9 +218,10 @@ export class SpaceView {
   // `colors` by object; `answer` is what shownEnds() takes from a prediction.
   draw(step, { dark, ghosts, selected, colors, answer }) {
     if (!this.works || !this.scene || !step) return;
-    if (this.needsFrame) this.frame(step);
     const { painter, scene } = this, { gl } = painter;
     painter.fit();
+    // Until somebody turns the scene, what is tracked stays in sight.
+    if (this.needsFrame || (!this.turned && this.isOutOfSight(step))) this.frame(step);
     const back = dark ? [0.102, 0.118, 0.145] : [0.914, 0.925, 0.945];
     gl.clearColor(...back, 1);
     gl.enable(gl.DEPTH_TEST);
@@ -225,6 +234,7 @@ export class SpaceView {
       const model = scene.models.find((m) => 'model ' + m.name === modelKey(scene, object.name));
       if (object.state === 'tracked' && model) painter.drawMesh(modelKey(scene, object.name), object.pose, clip, [...model.color, 1]);
     }
+    if (!scene.supports.length) this.drawGrid(clip, dark);
     this.drawCamera(step, clip, dark);
     gl.depthMask(false);
     if (answer) this.drawAnswer(answer, clip);
@@ -241,6 +251,15 @@ export class SpaceView {
       }
     });
     this.drawLabels(step, selected, colors);
+  }
+  // Where no support is known, the plane z = 0 in tenths of a metre.
+  drawGrid(clip, dark) {
+    const [x, y] = this.orbit.target.map((c) => Math.round(10 * c) / 10), numbers = [];
+    for (let i = -10; i <= 10; ++i) {
+      const color = shade(dark ? [120, 130, 145] : [140, 148, 160], i % 5 === 0 ? 0.7 : 0.3), c = i / 10;
+      numbers.push(x + c, y - 1, 0, ...color, x + c, y + 1, 0, ...color, x - 1, y + c, 0, ...color, x + 1, y + c, 0, ...color);
+    }
+    this.painter.drawPaint(this.painter.gl.LINES, numbers, clip);
   }
   drawCamera(step, clip, dark) {
     const { pose, width, height, fx, fy, cx, cy } = step.camera, m = poseMatrix(pose), reach = 0.12;
@@ -324,7 +343,7 @@ export class SpaceView {
       const per = 0.85 * this.orbit.distance / canvas.clientHeight;
       this.orbit.target = add(this.orbit.target, add(scale(right, -dx * per), scale(up, dy * per)));
     };
-    const changed = () => canvas.dispatchEvent(new Event('turned'));
+    const changed = () => { this.turned = true; canvas.dispatchEvent(new Event('turned')); };
     canvas.addEventListener('pointerdown', (e) => { pointers.set(e.pointerId, [e.clientX, e.clientY]); canvas.setPointerCapture(e.pointerId); moved = 0; });
     canvas.addEventListener('pointermove', (e) => {
       const before = pointers.get(e.pointerId);

@@ -6,7 +6,7 @@
 //   PRESCENE_TRY(const auto view, RecordingView::create(input.scene(), {.title = "milk.mcap"}, backends, log));
 //   PRESCENE_TRY(auto summary, input.replay(*tracker, cancellation, progress, view->step_sink(), {}));
 //   view->finish(remarks);
-//   ... view->url(), until somebody stops it
+//   ... view->url()
 #pragma once
 
 #include <memory>
