@@ -25,6 +25,12 @@ struct NumericAddress {
   std::string host;
 };
 
+/// What others call this machine: all addresses of it have no name of their own.
+std::string this_host() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "localhost";
+}
+
 std::optional<NumericAddress> numeric_address(const std::string& text, int port) {
   const std::string numbers = text == "localhost" ? "127.0.0.1" : text;
   NumericAddress address;
@@ -36,7 +42,7 @@ std::optional<NumericAddress> numeric_address(const std::string& text, int port)
     std::memcpy(&address.bytes, &v4, sizeof v4);
     address.size = sizeof v4;
     address.is_loopback = (ntohl(v4.sin_addr.s_addr) >> 24U) == 127;
-    address.host = numbers;
+    address.host = v4.sin_addr.s_addr == htonl(INADDR_ANY) ? this_host() : numbers;
     return address;
   }
   if (inet_pton(AF_INET6, numbers.c_str(), &v6.sin6_addr) == 1) {
@@ -45,7 +51,7 @@ std::optional<NumericAddress> numeric_address(const std::string& text, int port)
     std::memcpy(&address.bytes, &v6, sizeof v6);
     address.size = sizeof v6;
     address.is_loopback = IN6_IS_ADDR_LOOPBACK(&v6.sin6_addr) != 0;
-    address.host = "[" + numbers + "]";
+    address.host = IN6_IS_ADDR_UNSPECIFIED(&v6.sin6_addr) != 0 ? this_host() : "[" + numbers + "]";
     return address;
   }
   return std::nullopt;

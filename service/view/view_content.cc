@@ -66,13 +66,14 @@ void for_each_by_weight(const std::vector<belief::Particle>& particles, int coun
 }
 
 /// Without those that could not be told from the mean where it is drawn.
-ordered_json ghosts_of(const belief::ObjectBelief& object, const geometry::Pose& mean) {
+ordered_json ghosts_of(const belief::ObjectBelief& object, const geometry::Pose& mean,
+                       const geometry::SymmetryGroup& symmetry) {
   constexpr double kSamePosition = 0.003, kSameTurn = 0.05;  // m, rad
   ordered_json ghosts = ordered_json::array();
   const belief::Particle* last = nullptr;
   for_each_by_weight(object.particles, kMostGhosts, [&](const belief::Particle& particle) {
     const bool repeated = std::exchange(last, &particle) == &particle;
-    const geometry::Pose& X = particle.X_WO;
+    const geometry::Pose X = geometry::closest_equivalent(particle.X_WO, mean, symmetry);
     if (repeated || ((X.translation - mean.translation).norm() < kSamePosition &&
                      X.rotation.angularDistance(mean.rotation) < kSameTurn))
       return;
@@ -110,6 +111,10 @@ ordered_json parameters_of(const ObjectSummary& object) {
 
 ordered_json object_document(const ObjectSummary& summary, const belief::ObjectBelief& object,
                              const belief::Belief& belief, std::size_t index) {
+  const auto model = static_cast<std::size_t>(object.model);
+  const auto& models = belief.scene->models;
+  const geometry::SymmetryGroup symmetry =
+      model < models.size() ? models[model].symmetry : geometry::SymmetryGroup::none();
   const double spread = std::sqrt(std::max(0.0, summary.covariance.block<3, 3>(3, 3).trace()));
   ordered_json document = {{"name", summary.name},
                            {"state", belief::to_string(summary.state)},
@@ -121,7 +126,7 @@ ordered_json object_document(const ObjectSummary& summary, const belief::ObjectB
                            {"visible_share", rounded(summary.visible_share, 1e-3)},
                            {"parameters", parameters_of(summary)},
                            {"lessons", summary.lessons},
-                           {"ghosts", ghosts_of(object, summary.X_WO)}};
+                           {"ghosts", ghosts_of(object, summary.X_WO, symmetry)}};
   if (summary.state != belief::TrackState::kTracked)
     document["region"] = region_of(object, core::RandomStream(belief.seed, core::Purpose::kEvaluation, belief.step,
                                                               static_cast<std::uint32_t>(index)));

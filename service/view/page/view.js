@@ -298,7 +298,8 @@ const keys = {
 };
 addEventListener('keydown', (e) => {
   if (e.ctrlKey || e.altKey || e.metaKey || e.target.closest('textarea, select, dialog')) return;
-  if (e.target.closest('button, summary, input') && (e.key === ' ' || e.key === 'Enter' || e.key.startsWith('Arrow'))) return;
+  if (e.target.closest('button, summary') && (e.key === ' ' || e.key === 'Enter')) return;
+  if (e.target.closest('input') && (e.key.startsWith('Arrow') || e.key === 'Home' || e.key === 'End')) return;
   const digit = Number(e.key);
   if (digit >= 1 && page.step && page.step.objects[digit - 1]) return select(page.step.objects[digit - 1].name);
   const act = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
