@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "json_achieve.h"
 #include "json_motion.h"
 #include "json_values.h"
 #include "prescene/belief/json.h"
@@ -51,8 +52,7 @@ void read_number(JsonObject& fields, const std::string& key, const ScalarRange& 
   if (const std::optional<double> number = read_number(fields, key, range)) to = *number;
 }
 
-Effort effort_from(const JsonAt& at) {
-  Effort effort;
+Effort effort_from(const JsonAt& at, Effort effort = {}) {
   JsonObject fields(at);
   read_number(fields, "tolerance", kTolerances, effort.tolerance);
   read_number(fields, "confidence", kConfidences, effort.confidence);
@@ -139,9 +139,15 @@ struct QueryJson {
   Json operator()(const ViewQuery& view) const {
     return {{"actions", actions_json(view.actions)}, {"time", view.time}};
   }
+  Json operator()(const AchieveQuery& achieve) const {
+    Json json = achieve_json(achieve);
+    if (achieve.duration) json["duration"] = *achieve.duration;
+    json["effort"] = effort_json(achieve.effort);
+    return json;
+  }
 };
 
-const std::vector<std::string> kTasks{"where", "predict", "stability", "view"};
+const std::vector<std::string> kTasks{"where", "predict", "stability", "view", "achieve"};
 
 PredictQuery predict_from(JsonObject& fields) {
   PredictQuery predict;
@@ -171,6 +177,13 @@ ViewQuery view_from(JsonObject& fields) {
   view.actions = actions_from(fields);
   read_number(fields, "time", kViewTimes, view.time);
   return view;
+}
+
+AchieveQuery achieve_query_from(JsonObject& fields) {
+  AchieveQuery achieve = achieve_from(fields);
+  achieve.duration = read_number(fields, "duration", kDurations);
+  if (const auto at = fields.find("effort")) achieve.effort = effort_from(*at, achieve.effort);
+  return achieve;
 }
 
 // Rows from the top without padding, little-endian, in base64; `encoding` as in ROS.
@@ -221,6 +234,7 @@ struct AnswerJson {
             {"label_names", view.label_names},           {"presence", image_json(view.presence, "32FC1")},
             {"failed_instances", view.failed_instances}, {"remarks", view.remarks}};
   }
+  Json operator()(const AchieveAnswer& achieve) const { return achieve_answer_json(achieve); }
 };
 
 }  // namespace
@@ -232,7 +246,9 @@ Json to_json(const Query& query) {
 core::Result<Query> query_from_json(std::string_view text) {
   PRESCENE_TRY(const Json document, parse_json(text, kLongestQuery));
   JsonErrors errors;
-  Query query;
+  // Read in place: what a move of the variant compiles to looks uninitialised to GCC.
+  core::Result<Query> read{Query{}};
+  Query& query = *read;
   {
     JsonObject object({document, "", errors});
     if (const auto id = object.find("id")) query.id = id->text();
@@ -246,11 +262,12 @@ core::Result<Query> query_from_json(std::string_view text) {
       if (what->first == "predict") query.what = predict_from(fields);
       if (what->first == "stability") query.what = stability_from(fields);
       if (what->first == "view") query.what = view_from(fields);
+      if (what->first == "achieve") query.what = achieve_query_from(fields);
     }
   }
   if (!errors.ok()) return errors.status();
   PRESCENE_RETURN_IF_ERROR(validate(query));
-  return query;
+  return read;
 }
 
 Json error_to_json(const core::Status& status) {

@@ -72,7 +72,63 @@ struct QueryCheck {
     PRESCENE_RETURN_IF_ERROR(check_count(view.actions.size(), kMostActions, "actions"));
     return check_number(view.time, kViewTimes).at("time");
   }
+  Status operator()(const AchieveQuery& achieve) const;
 };
+
+/// Both ends of a range, or neither; not empty.
+Status check_range(const ParameterRange& range) {
+  if (range.low.has_value() != range.high.has_value())
+    return core::invalid_input("one end of its range is missing: give both, or none");
+  if (!range.low) return {};
+  if (!std::isfinite(*range.low) || !std::isfinite(*range.high))
+    return core::invalid_input("an end of its range is not a number: give two numbers");
+  if (!(*range.low < *range.high))
+    return core::invalid_input("the range from " + core::rounded_text(*range.low) + " to " +
+                               core::rounded_text(*range.high) +
+                               " is empty: give the lower end first, or fix the parameter");
+  return {};
+}
+
+Status check_errors(const ActionErrors& errors) {
+  const auto check_deviations = [](const Vector3d& deviations, double most, const char* what) -> Status {
+    if (deviations.allFinite() && deviations.minCoeff() >= 0.0 && deviations.maxCoeff() <= most) return {};
+    return core::invalid_input(std::string(what) + ": give standard deviations of at least 0 and at most " +
+                               core::rounded_text(most));
+  };
+  PRESCENE_RETURN_IF_ERROR(check_deviations(errors.position, 10.0, "position"));
+  PRESCENE_RETURN_IF_ERROR(check_deviations(errors.rotation, 3.2, "rotation_deg"));
+  constexpr ScalarRange kDelays{0.0, 3600.0, "give seconds of at least 0; a normal distribution needs \"min\": 0",
+                                true};
+  PRESCENE_RETURN_IF_ERROR(check_scalar(errors.delay, kDelays).at("delay"));
+  PRESCENE_RETURN_IF_ERROR(check_scalar(errors.lateral_error, kLengthRange).at("lateral_error"));
+  if (!errors.disturbance) return {};
+  PRESCENE_RETURN_IF_ERROR(check_vector(errors.disturbance->linear, kSpeedRange).at("velocity"));
+  return check_vector(errors.disturbance->angular, kSpeedRange).at("angular_velocity");
+}
+
+Status QueryCheck::operator()(const AchieveQuery& achieve) const {
+  PRESCENE_RETURN_IF_ERROR(check_text(achieve.outcome, 2 * kLongestName + 1, "outcome: the name"));
+  PRESCENE_RETURN_IF_ERROR(check_text(achieve.object, kLongestName, "object: the name"));
+  PRESCENE_RETURN_IF_ERROR(check_text(achieve.support, kLongestName, "support: the name"));
+  PRESCENE_RETURN_IF_ERROR(check_text(achieve.action, kLongestName, "action: the name"));
+  if (achieve.wanted) {
+    Judged judged;
+    PRESCENE_RETURN_IF_ERROR(judged.add(*achieve.wanted).at("outcome"));
+    PRESCENE_RETURN_IF_ERROR(judged.check().at("outcome"));
+  }
+  PRESCENE_RETURN_IF_ERROR(check_count(achieve.free.size(), kMostFree, "free parameters"));
+  PRESCENE_RETURN_IF_ERROR(check_count(achieve.fixed.size(), kMostFree, "fixed parameters"));
+  for (const ParameterRange& range : achieve.free) {
+    PRESCENE_RETURN_IF_ERROR(check_text(range.name, kLongestName, "a parameter's name").at("free"));
+    PRESCENE_RETURN_IF_ERROR(check_range(range).at("free." + range.name));
+  }
+  for (const ParameterValue& value : achieve.fixed)
+    PRESCENE_RETURN_IF_ERROR(check_text(value.name, kLongestName, "a parameter's name").at("fixed"));
+  PRESCENE_RETURN_IF_ERROR(check_errors(achieve.errors).at("errors"));
+  PRESCENE_RETURN_IF_ERROR(check_number(achieve.probability, kWantedProbabilities).at("probability"));
+  if (achieve.duration) PRESCENE_RETURN_IF_ERROR(check_number(*achieve.duration, kDurations).at("duration"));
+  return validate(achieve.effort);
+}
 
 }  // namespace
 

@@ -12,6 +12,9 @@
 
 namespace prescene::queries {
 
+/// How far a hand backs off when nothing says how, m and s.
+inline constexpr double kRetreat = 0.1, kRetreatDuration = 0.3;
+
 struct Prior {
   std::shared_ptr<const belief::Scene> scene;
   simulation::StartDistribution starts;

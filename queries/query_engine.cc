@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "achieve.h"
 #include "predict.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
@@ -64,6 +65,10 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
         else if constexpr (std::is_same_v<Asked, belief::StabilityQuery>)
           put(within_time(what.effort, context,
                           [&](const QueryContext& limited) { return stability(make_prior(), what, limited); }),
+              answer);
+        else if constexpr (std::is_same_v<Asked, belief::AchieveQuery>)
+          put(within_time(what.effort, context,
+                          [&](const QueryContext& limited) { return achieve(make_prior(), what, limited); }),
               answer);
         else
           put(view(make_prior(), what, context), answer);

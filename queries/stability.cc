@@ -11,9 +11,6 @@
 namespace prescene::queries {
 namespace {
 
-/// How far a hand backs off when nothing says how, m and s.
-constexpr double kRetreat = 0.1, kRetreatDuration = 0.3;
-
 /// Lets go of the object now. The hand leaves as the scene's own release says, else straight away from the object.
 belief::Action release_now(const Prior& prior, std::size_t object) {
   const belief::SceneObject& held = prior.scene->objects[object];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "achieve_sections.h"
 #include "html_text.h"
 #include "prediction_sections.h"
 #include "prescene/geometry/polygon.h"
@@ -71,6 +72,10 @@ std::vector<ReportSection> sections_of(const belief::ViewAnswer& answer, const b
   ReportSection section{"What the camera will see", {std::move(pictures)}};
   for (const std::string& remark : answer.remarks) section.blocks.push_back(TextBlock{remark});
   return {std::move(section)};
+}
+
+std::vector<ReportSection> sections_of(const belief::AchieveAnswer& answer, const belief::Scene&) {
+  return achieve_sections(answer);
 }
 
 std::vector<ReportSection> sections_of(const std::monostate&, const belief::Scene&) { return {}; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include "achieve_options.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "verb.h"
@@ -58,6 +59,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
     return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n" +
            basis(*stability);
   }
+  if (const auto achieve = answer.find("achieve"); achieve != answer.end()) return achieve_text(*achieve);
   if (const auto predict = answer.find("predict"); predict != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"outcome", "group", "probability"}};
     for (const auto& outcome : predict->at("outcomes")) {

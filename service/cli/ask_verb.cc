@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "achieve_options.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/service/live/question_client.h"
@@ -17,6 +18,7 @@ struct AskOptions {
   std::string object;
   std::string json;
   std::optional<double> timeout;
+  AchieveOptions achieve;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
 };
@@ -30,6 +32,8 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     if (!question->is_object()) return core::invalid_input("--question: not a JSON object (docs/reference/queries.md)");
     return question;
   }
+  if (options.kind != "achieve" && !(options.achieve == AchieveOptions{}))
+    return core::invalid_input("--action, --free and what goes with them are of 'ask achieve': leave them out");
   const auto needs_object = [&]() -> core::Status {
     return options.object.empty() ? core::invalid_input("ask " + options.kind + " OBJECT: name the object")
                                   : core::ok_status();
@@ -47,7 +51,13 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     const nlohmann::ordered_json release = {{"time", 0.0}, {"release", {{"object", options.object}}}};
     return nlohmann::ordered_json{{"predict", {{"actions", nlohmann::ordered_json::array({release})}}}};
   }
-  return core::invalid_input("ask where | stability OBJECT | release OBJECT, or --question JSON");
+  if (options.kind == "achieve") {
+    AchieveOptions achieve = options.achieve;
+    achieve.outcome = options.object;
+    if (achieve.outcome.empty()) return core::invalid_input("ask achieve OUTCOME: name the outcome that is wanted");
+    return achieve_question(achieve);
+  }
+  return core::invalid_input("ask where | stability OBJECT | release OBJECT | achieve OUTCOME, or --question JSON");
 }
 
 core::Status run(AskOptions& options, VerbContext& context) {
@@ -67,18 +77,22 @@ core::Status run(AskOptions& options, VerbContext& context) {
 }  // namespace
 
 Verb add_ask_verb(CLI::App& app) {
-  auto* verb = app.add_subcommand("ask", "Ask a running `serve`: where | stability OBJECT | release OBJECT");
+  auto* verb =
+      app.add_subcommand("ask", "Ask a running `serve`: where | stability OBJECT | release OBJECT | achieve OUTCOME");
   auto options = std::make_shared<AskOptions>();
   verb->add_option("KIND", options->kind,
-                   "where: poses and confidence; stability: does it stay; release: what if it is let go")
+                   "where: poses and confidence; stability: does it stay; release: what if it is let go; "
+                   "achieve: how must it be done")
       ->check(utf8_text());
-  verb->add_option("OBJECT", options->object, "The object's name in the scene")->check(utf8_text());
+  verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
+      ->check(utf8_text());
   verb->add_option("--question", options->json, "Any question as JSON (docs/reference/queries.md) instead")
       ->check(utf8_text());
   verb->add_option(
           "--timeout", options->timeout,
           "How long to wait for an answer, s; default: 15, or 3 more than a --question's max_seconds if that is longer")
       ->check(in_range(belief::kWallSeconds));
+  add_achieve_options(*verb, options->achieve);
   options->verb = verb;
   add_domain_option(*verb, options->dds);
   verb->footer("Example: prescene ask stability carton");

@@ -36,6 +36,7 @@ void bound_effort(belief::Query& query, const QueryWorkerSettings& settings) {
   };
   if (auto* predict = std::get_if<belief::PredictQuery>(&query.what)) bound(predict->effort);
   if (auto* stability = std::get_if<belief::StabilityQuery>(&query.what)) bound(stability->effort);
+  if (auto* achieve = std::get_if<belief::AchieveQuery>(&query.what)) bound(achieve->effort);
 }
 
 core::Status too_many_wait(std::size_t count) {

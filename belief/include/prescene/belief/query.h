@@ -7,22 +7,14 @@
 #include <variant>
 #include <vector>
 
+#include "prescene/belief/achieve.h"
 #include "prescene/belief/belief.h"
+#include "prescene/belief/effort.h"
 #include "prescene/belief/prediction.h"
 #include "prescene/core/status.h"
 #include "prescene/geometry/image.h"
 
 namespace prescene::belief {
-
-/// Accuracy wanted and the limits of the work.
-struct Effort {
-  double tolerance = 0.02;   ///< Half width of the outcome intervals at which to stop.
-  double confidence = 0.95;  ///< Of the intervals.
-  int max_instances = 4096;
-  std::optional<double> max_seconds;   ///< Wall time; the answer says how many instances it was worth.
-  std::optional<int> exact_instances;  ///< Replay: run just this many.
-  friend bool operator==(const Effort&, const Effort&) = default;
-};
 
 /// Where is everything?
 struct WhereQuery {
@@ -69,7 +61,7 @@ struct ViewQuery {
 
 struct Query {
   std::string id;  ///< Given back in the answer.
-  std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery> what;
+  std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery> what;
   friend bool operator==(const Query&, const Query&) = default;
 };
 
@@ -117,7 +109,7 @@ struct Answer {
   std::string id;
   std::uint64_t step = 0;  ///< Of the belief that was asked.
   core::Status error;      ///< Not ok: could not be answered, and why.
-  std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer> what;
+  std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer, AchieveAnswer> what;
 
   friend bool operator==(const Answer&, const Answer&) = default;
 };

@@ -27,7 +27,9 @@ inline constexpr ScalarRange kMoves{1e-6, 1e3, "give metres between 1e-06 and 10
 inline constexpr ScalarRange kTurns{1e-6, 3.2, "give radians between 1e-06 and 3.2"};
 /// The same in degrees, for JSON.
 inline constexpr ScalarRange kTurnsDeg{6e-5, 183.0, "give degrees between 6e-05 and 183"};
+inline constexpr ScalarRange kWantedProbabilities{0.5, 0.999, "give a probability between 0.5 and 0.999, like 0.95"};
 inline constexpr int kMostPaths = 1000;
+inline constexpr std::size_t kMostFree = 16;
 inline constexpr std::size_t kMostActions = 256;
 /// Of single outcomes and of all groups' together; every one is judged in every instance.
 inline constexpr std::size_t kMostOutcomes = 256;

@@ -7,8 +7,9 @@
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
 //   if (!answer.error.ok()) ...
 //
-// Four questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
-// what will the camera see (observation anticipation). docs/reference/queries.md says what the answers mean.
+// Five questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
+// what will the camera see (observation anticipation); how must it be done, so that an outcome comes about (state
+// explanation). docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>
