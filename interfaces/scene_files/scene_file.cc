@@ -83,6 +83,20 @@ belief::DepthNoiseSettings read_depth_noise(const LocatedValue& value, Problems&
   return noise;
 }
 
+belief::EventWeights read_events(const LocatedValue& value, Problems& problems) {
+  belief::EventWeights events;
+  Binder binder(value, problems);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < belief::kEventKinds; ++i) {
+    binder.read(belief::kEventNames[i], events.weight[i],
+                {0.0, 1e6, "give a weight, at least 0: how probable it is, up to a common factor"});
+    sum += events.weight[i];
+  }
+  if (!(sum > 0.0))
+    problems.add(value.place, value.path, "every event has the weight 0", "give at least one that is more than 0");
+  return events;
+}
+
 void read_gravity(Binder& binder, Scene& scene) {
   const LocatedValue* at = binder.find("gravity");
   if (at) scene.gravity_W = read_vector(*at, binder.problems(), kGravity);
@@ -124,6 +138,7 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   if (const LocatedValue* at = binder.find("camera")) scene.camera = read_camera(*at, context);
   if (const LocatedValue* at = binder.find("depth_noise")) scene.depth_noise = read_depth_noise(*at, problems);
   if (const LocatedValue* at = binder.find("actions")) scene.actions = read_actions(*at, context);
+  if (const LocatedValue* at = binder.find("events")) read_events(*at, problems);  // kept by parse_event_weights
   const LocatedValue* outcomes = binder.find("outcomes");
   read_names(outcomes, problems);
   for_each_named(outcomes, problems, [&](const LocatedValue& value, const std::string& name) {
@@ -253,6 +268,16 @@ core::Result<Scene> parse_scene(std::string_view text, const std::string& file, 
   if (report) *report = {problems.errors(), problems.warnings()};
   if (!problems.empty()) return problems.status();
   return scene;
+}
+
+core::Result<belief::EventWeights> parse_event_weights(std::string_view text, const std::string& file) {
+  PRESCENE_TRY(const LocatedValue document, parse_yaml(text, file, YamlLimits{}));
+  Problems problems;
+  belief::EventWeights events;
+  for (std::size_t i = 0; i < document.keys.size(); ++i)
+    if (document.keys[i].name == "events") events = read_events(document.items[i], problems);
+  if (!problems.empty()) return problems.status();
+  return events;
 }
 
 core::Result<Scene> read_scene(const std::filesystem::path& path, const SceneFileOptions& options, FileReport* report) {

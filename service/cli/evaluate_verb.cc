@@ -9,6 +9,7 @@
 #include "prescene/service/evaluate/cleargrasp.h"
 #include "prescene/service/evaluate/credible_regions.h"
 #include "prescene/service/evaluate/cube_tosses.h"
+#include "prescene/service/evaluate/explained_events.h"
 #include "prescene/service/evaluate/finding.h"
 #include "prescene/service/evaluate/tracking_suite.h"
 #include "prescene/service/evaluate/ycb_video.h"
@@ -27,6 +28,7 @@ struct EvaluateOptions {
   int frames = 0;  // 0 = as many as the figure's own default
   TrackingOptions tracking;
   std::string keep;
+  ExplainedEventsOptions explain;
 };
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
@@ -122,7 +124,7 @@ core::Status run_tracking(const EvaluateOptions& options, VerbContext& context) 
 
 core::Status run(const EvaluateOptions& options, VerbContext& context) {
   if (options.name == "tracking") return run_tracking(options, context);
-  const bool simulated = options.name == "credible_regions" || options.name == "finding";
+  const bool simulated = options.name == "credible_regions" || options.name == "finding" || options.name == "explain";
   if (!simulated && options.data.empty())
     return core::invalid_input("evaluate " + options.name + " needs recorded data: name its folder with --data");
   const std::filesystem::path folder = std::filesystem::path(options.data) / options.name;
@@ -146,6 +148,13 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
                  evaluate_finding(finding, context.pool(), progress, &context.cancellation()));
     document = to_json(report);
     text = text_of(report);
+  } else if (options.name == "explain") {
+    PRESCENE_TRY(const ExplainedEventsReport report,
+                 evaluate_explained_events(options.explain, context.options().seed, context.pool(), progress,
+                                           &context.cancellation()));
+    document = to_json(report);
+    text = table(table_of(report)) + "expected calibration error " + fixed_text(expected_calibration_error(report), 3) +
+           "\n";
   } else if (options.name == "cleargrasp") {
     PRESCENE_TRY(const ClearGraspReport report,
                  evaluate_cleargrasp(folder, context.options().seed, progress, &context.cancellation()));
@@ -177,13 +186,16 @@ Verb add_evaluate_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
       "evaluate", "Figures on real data, and on simulated frames where the truth is known (docs/studies/accuracy.md)");
   auto options = std::make_shared<EvaluateOptions>();
-  verb->add_option("NAME", options->name,
-                   "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
-                   "the transparent material explains better than the opaque one), or, on simulated frames, which need "
-                   "no data: credible_regions (tempering), finding (objects without start poses, several supports), "
-                   "tracking (sequences of eleven kinds, and with --data a real cube in a robot's hand)")
+  verb->add_option(
+          "NAME", options->name,
+          "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
+          "the transparent material explains better than the opaque one), or, on simulated frames, which need "
+          "no data: credible_regions (tempering), finding (objects without start poses, several supports), "
+          "tracking (sequences of eleven kinds, and with --data a real cube in a robot's hand), explain (events that "
+          "nobody told of)")
       ->required()
-      ->check(CLI::IsMember({"cube_tosses", "ycb_video", "cleargrasp", "credible_regions", "finding", "tracking"}));
+      ->check(CLI::IsMember(
+          {"cube_tosses", "ycb_video", "cleargrasp", "credible_regions", "finding", "tracking", "explain"}));
   verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(CLI::IsMember({"calibrate", "report", "all"}))
@@ -196,6 +208,10 @@ Verb add_evaluate_verb(CLI::App& app) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   verb->add_option("--kind", options->tracking.kinds, "Of tracking: only sequences of this kind (may be repeated)");
+  verb->add_option("--episodes", options->explain.episodes, "Of explain: episodes, all kinds in turn")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  verb->add_option("--event", options->explain.kinds, "Of explain: only episodes of this kind (may be repeated)");
   verb->add_option("--rate", options->tracking.rate, "Of tracking: simulated frames a second")
       ->check(number_between(1.0, 120.0))
       ->capture_default_str();

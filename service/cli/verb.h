@@ -90,6 +90,7 @@ Verb add_validate_verb(CLI::App& app);
 Verb add_predict_verb(CLI::App& app);
 Verb add_inspect_verb(CLI::App& app);
 Verb add_evaluate_verb(CLI::App& app);
+Verb add_explain_verb(CLI::App& app);
 Verb add_calibrate_verb(CLI::App& app);
 Verb add_record_verb(CLI::App& app);
 Verb add_replay_verb(CLI::App& app);

@@ -19,6 +19,8 @@
 #include "prescene/service/load_scene.h"
 #include "prescene/service/recording/replay.h"
 #include "prescene/service/recording/simulated_recording.h"
+#include "scratch_folder.h"
+#include "suite_camera.h"
 
 namespace prescene::service {
 namespace {
@@ -26,45 +28,6 @@ namespace {
 namespace fs = std::filesystem;
 using core::fixed_text;
 using nlohmann::ordered_json;
-
-/// A camera that is not the tracker's own model of one: noisier, correlated over larger patches, with more of a fixed
-/// pattern, and more holes and flying pixels.
-void set_suite_camera(SimulatedRecordingOptions& options) {
-  options.sensor.sigma_per_depth_squared *= 1.2;
-  options.sensor.incidence_knee = 0.5;
-  options.camera.fixed_pattern_share = 0.35;
-  options.camera.correlated_share = 0.45;
-  options.camera.correlation_px = 20.0;
-  options.camera.edge_outlier = {0.30, 0.22, 0.10, 0.02};
-  options.camera.interior_outlier = 0.015;
-  options.camera.quantisation_per_depth_squared = 0.0018;
-  options.camera.color_noise = 4.0;
-}
-
-/// A folder of its own below the system's for temporary files, removed in the end.
-class ScratchFolder {
- public:
-  static core::Result<std::unique_ptr<ScratchFolder>> create() {
-    std::error_code error;
-    const fs::path below = fs::temp_directory_path(error);
-    if (error) return core::unavailable("there is no folder for temporary files: " + error.message());
-    std::string name = (below / "prescene_tracking_XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr)
-      return core::unavailable(below.string() + ": no folder can be made there: set TMPDIR to one with some 200 MB");
-    return std::unique_ptr<ScratchFolder>(new ScratchFolder(name));
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  explicit ScratchFolder(fs::path path) : path_(std::move(path)) {}
-  fs::path path_;
-};
 
 struct Sequence {
   std::string kind;

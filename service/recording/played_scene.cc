@@ -132,6 +132,13 @@ Scene scene_from(const Scene& whole, const Present& present, double time) {
 
 void apply(const UnannouncedChange& change, const WorldState& start, const Scene& scene, Present& present) {
   const auto i = static_cast<std::size_t>(*belief::find_object(scene, change.object));
+  if (change.added_velocity) {
+    if (!present[i]) return;
+    present[i]->V_WO.linear += change.added_velocity->linear;
+    present[i]->V_WO.angular += change.added_velocity->angular;
+    present[i]->mode = MotionMode::kMoving;
+    return;
+  }
   if (!change.X_WO) {
     present[i].reset();
     return;

@@ -28,8 +28,10 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
   if (input.scene_) return input;
   if (!options.scene_file.empty()) {
     PRESCENE_TRY(input.scene_, load_scene(options.scene_file, log));
+    PRESCENE_TRY(input.scene_text_, read_scene_text(options.scene_file));
   } else if (!input.info_.scene_text.empty()) {
     PRESCENE_TRY(input.scene_, load_scene_text(input.info_.scene_text, input.info_.scene_file, log));
+    input.scene_text_ = input.info_.scene_text;
   } else {
     return core::invalid_input(options.path.string() + " names no scene: give one with --scene FILE");
   }

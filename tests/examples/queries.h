@@ -7,6 +7,7 @@
 #include "prescene/belief/belief.h"
 #include "prescene/belief/query.h"
 #include "prescene/core/parallel.h"
+#include "prescene/queries/explain.h"
 #include "prescene/queries/query_engine.h"
 
 namespace prescene::queries::given_queries {
@@ -15,5 +16,9 @@ extern const decltype(QueryContext::make_simulator) make_simulator;
 extern core::ThreadPool pool;
 extern const std::shared_ptr<const belief::Belief> snapshot;
 extern const belief::Query query;
+
+namespace explain_h {
+extern const ExplainContext context;
+}  // namespace explain_h
 
 }  // namespace prescene::queries::given_queries

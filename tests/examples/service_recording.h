@@ -22,4 +22,10 @@ extern const StepSink on_step;
 extern const JsonSink on_json;
 }  // namespace replay_input_h
 
+namespace explained_h {
+extern const core::Cancellation cancellation;
+extern const core::ProgressSink progress;
+extern const std::uint64_t seed;
+}  // namespace explained_h
+
 }  // namespace prescene::service::given_service_recording

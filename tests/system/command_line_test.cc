@@ -28,8 +28,8 @@ ordered_json parsed(const Finished& finished) {
 TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
   EXPECT_EQ(run_program({"--help"}).exit_code, 0);
   EXPECT_EQ(run_program({"--version"}).exit_code, 0);
-  for (const char* verb :
-       {"validate", "predict", "inspect", "record", "replay", "serve", "ask", "view", "evaluate", "calibrate"}) {
+  for (const char* verb : {"validate", "predict", "inspect", "record", "replay", "explain", "serve", "ask", "achieve",
+                           "view", "evaluate", "calibrate"}) {
     const Finished help = run_program({verb, "--help"});
     EXPECT_EQ(help.exit_code, 0) << verb;
     EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;
@@ -52,6 +52,9 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
                                              {"record"},
                                              {"evaluate", "nothing", "--data", "."},
                                              {"calibrate", "cube_tosses"},
+                                             {"explain", "none.mcap", "--from", "1"},
+                                             {"explain", "none.mcap", "--from", "2", "--to", "1"},
+                                             {"explain", "none.mcap", "--from", "-1", "--to", "1"},
                                              {"serve", "--scene", "x", "--domain", "999"}}) {
     const Finished finished = run_program(args);
     EXPECT_EQ(finished.exit_code, 2) << finished.err;

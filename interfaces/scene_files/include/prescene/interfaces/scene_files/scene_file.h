@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "prescene/belief/event.h"
 #include "prescene/belief/scene.h"
 #include "prescene/core/status.h"
 #include "prescene/interfaces/scene_files/located_value.h"
@@ -49,5 +50,9 @@ core::Result<belief::Scene> read_scene(const std::filesystem::path& path, const 
 /// The same from text; `file` is its name in messages and where relative paths start.
 core::Result<belief::Scene> parse_scene(std::string_view text, const std::string& file,
                                         const SceneFileOptions& options = {}, FileReport* report = nullptr);
+
+/// How probable the scene holds events to be (its key `events`), those that it does not name at their defaults. The
+/// status of a failure is that of parse_scene for this key alone.
+core::Result<belief::EventWeights> parse_event_weights(std::string_view text, const std::string& file);
 
 }  // namespace prescene::interfaces

@@ -23,6 +23,9 @@ struct UnannouncedChange {
   /// Where it is from then on, at rest and in nobody's hand; empty = it is taken away. At time 0, empty: it is not
   /// there until it is put in.
   std::optional<geometry::Pose> X_WO;
+  /// Else: it stays where it is, is in nobody's hand any more, and its velocity changes by this: a blow, or a hand that
+  /// lets go. X_WO is not looked at.
+  std::optional<geometry::Twist> added_velocity = {};
 };
 
 /// "SECONDS:OBJECT", as of something that is taken away; kInvalidInput with the form that is expected.

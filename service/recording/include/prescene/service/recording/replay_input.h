@@ -33,6 +33,8 @@ class ReplayInput {
   static core::Result<ReplayInput> open(const ReplayInputOptions& options, const core::LogSink& log);
 
   const std::shared_ptr<const belief::Scene>& scene() const { return scene_; }
+  /// The text of the scene file; "" of a folder without one.
+  const std::string& scene_text() const { return scene_text_; }
   /// What it was made with, but for the topics, camera and filter of `settings` where it says nothing. kInvalidInput
   /// for recorded settings that make no sense.
   core::Result<TrackerSettings> recorded_settings() const;
@@ -49,6 +51,7 @@ class ReplayInput {
   RecordingReadOptions read_;
   std::optional<interfaces::FrameFolder> folder_;  // else a recording
   RecordingInfo info_;
+  std::string scene_text_;
   std::shared_ptr<const belief::Scene> scene_;
 };
 

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Events as paths: from a point of the standard normal prior of a schema's parameters to where every object is in each
+// frame of the window, by simulation where an event sets things in motion.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "prescene/belief/event.h"
+#include "prescene/queries/explain.h"
+#include "prescene/queries/tempered_smc.h"
+#include "prior.h"
+#include "seating.h"
+#include "window_likelihood.h"
+
+namespace prescene::queries {
+
+/// One schema with the objects that it happens to.
+struct Hypothesis {
+  belief::EventKind kind = belief::EventKind::kNothing;
+  std::size_t object = 0;              ///< Of the objects of EventPaths.
+  std::optional<std::size_t> partner;  ///< Of exchanged.
+  double prior = 0.0;                  ///< Of all hypotheses they sum to one.
+};
+
+/// The parameters at a point; what a schema does not have is 0.
+struct EventDraw {
+  double time = 0.0;                                          ///< s from the window's begin.
+  double direction = 0.0;                                     ///< rad from W's x towards W's y.
+  double height = 0.0;                                        ///< Share of the object's height.
+  double sideways = 0.0;                                      ///< Share of its half width.
+  double speed = 0.0;                                         ///< m/s
+  double duration = 0.0;                                      ///< s
+  geometry::Twist added;                                      ///< By a hand that lets go.
+  geometry::Vector3d shift = geometry::Vector3d::Zero();      ///< Of where it is put down, m.
+  double turn = 0.0;                                          ///< About the vertical, rad.
+  bool other_face = false;                                    ///< It is put down turned over, as it was tracked last.
+  geometry::Vector3d touched_W = geometry::Vector3d::Zero();  ///< Where it is touched; by simulate().
+  double touched_height = 0.0;                                ///< The same above its lowest point, m.
+  double mass = 0.0;                                          ///< Of the object, kg.
+};
+
+/// Of one object, what the tracker had of it after each frame of the window: proposals for events.
+struct SeenTrack {
+  std::vector<double> times;                      ///< s, of the frames in which it was tracked.
+  std::vector<belief::ObjectEstimate> estimates;  ///< In these.
+};
+
+/// What a track says of when and how an object began to move.
+struct TrackedMotion {
+  bool moved = false;   ///< It was tracked elsewhere than at the begin.
+  bool lost = false;    ///< It was not tracked any more, before it was tracked elsewhere.
+  double before = 0.0;  ///< s; still tracked where it was, ...
+  double after = 0.0;   ///< ... the next frame, in which it is not.
+  double onset = 0.0;   ///< s, between the two, by its speed.
+  double speed = 0.0;   ///< m/s, at first.
+  double until = 0.0;   ///< s, when it moves no more.
+  double back = 0.0;    ///< s, when it is tracked elsewhere first.
+  geometry::Vector3d first_step = geometry::Vector3d::Zero();  ///< m, within a third of a second from `after` on.
+  belief::Pose last;                                           ///< Where it was tracked last.
+};
+
+inline constexpr double kEventInterval = 1.0 / 60.0;  ///< s between the states of simulated instances.
+/// Between the states of a run; before the first and after the last, these.
+belief::Pose pose_in(const belief::Trajectory& run, std::size_t object, double time);
+/// W's x, laid flat: what directions count from.
+geometry::Vector3d horizontal_x(const geometry::Vector3d& up);
+
+class EventPaths {
+ public:
+  /// `window` must outlive it; times of `stamps` are those of the frames that weigh. Objects: those that are present at
+  /// the begin, then those that are not and are tracked at some later frame.
+  static core::Result<std::unique_ptr<EventPaths>> create(const ExplainWindow& window, const ExplainContext& context,
+                                                          const belief::EventPriors& priors, std::uint64_t seed);
+
+  const std::vector<belief::SceneObject>& objects() const { return objects_; }
+  std::size_t present() const { return prior_.scene->objects.size(); }
+  bool is_present(std::size_t object) const { return object < present(); }
+  const belief::Scene& scene() const { return *scene_; }
+  double duration() const { return duration_; }
+  const SeenTrack& track(std::size_t object) const { return tracks_[object]; }
+  bool is_held(std::size_t object) const;
+  /// Where it is at the begin, most probably; empty where it is not.
+  std::optional<belief::Pose> start_pose(std::size_t object) const;
+  /// Where what was not there is put in, but for its shift.
+  const belief::Pose& put_in_place(std::size_t object) const { return put_in_at_[object]; }
+  const belief::ObjectModel& model(std::size_t object) const { return scene_->model_of(objects_[object]); }
+
+  /// Times of the frames that weigh, s from the begin; before anything below.
+  void set_times(std::vector<double> times) { times_ = std::move(times); }
+  /// Where objects are in those frames if nothing happens, from the most probable start.
+  std::vector<ObjectPath> base();
+
+  int event_dimensions(const Hypothesis& hypothesis) const;
+  int dimensions(const Hypothesis& hypothesis) const;
+  /// A guess of the event's parameters from the track, into `target`.
+  void guess(const Hypothesis& hypothesis, TemperedTarget& target) const;
+  EventDraw decode(const Hypothesis& hypothesis, const LatentPoint& z) const;
+
+  /// paths[i] at points[i]; `draws`, where given, get the touched places too, `runs` the simulated instances from the
+  /// event on (kinds that are simulated; else empty ones).
+  void simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
+                std::span<EventDraw> draws = {}, std::span<belief::Trajectory> runs = {});
+
+  int simulated() const { return simulated_; }
+  int failed() const { return failed_; }
+  std::string stepper() const { return simulator_->stepper().name; }
+  const std::vector<std::string>& remarks() const { return remarks_; }
+
+ private:
+  EventPaths(const ExplainWindow& window, const ExplainContext& context, const belief::EventPriors& priors,
+             std::uint64_t seed, Prior prior);
+  void set_scene();
+  void take_actions();
+  void follow_tracks();
+  void note_directions();
+  TrackedMotion motion_of(std::size_t object) const;
+  belief::WorldState start_of(std::size_t object, const LatentPoint& z, std::size_t first) const;
+  std::vector<belief::Trajectory> run(std::span<const belief::WorldState> starts,
+                                      std::span<const std::vector<belief::Action>> actions);
+  std::vector<belief::Action> actions_from(double time) const;
+  bool touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const;
+  void begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
+                   std::vector<belief::Action>& actions, bool* possible) const;
+  std::optional<belief::Pose> put_down(const Hypothesis& hypothesis, const EventDraw& draw,
+                                       const belief::Pose& X_WO) const;
+
+  const ExplainWindow& window_;
+  const ExplainContext& context_;
+  belief::EventPriors priors_;
+  Prior prior_;
+  std::shared_ptr<const belief::Scene> scene_;  // with the robot's timeline and all models
+  std::unique_ptr<simulation::Simulator> simulator_;
+  std::unique_ptr<Seating> seating_;
+  belief::Belief present_;
+  std::vector<std::unique_ptr<belief::Belief>> alone_;            // each with one object
+  std::vector<std::unique_ptr<belief::BeliefSampler>> samplers_;  // of these
+  std::vector<geometry::TriangleMesh> shapes_;                    // of the objects, in O
+  std::vector<belief::SceneObject> objects_;
+  std::vector<SeenTrack> tracks_;
+  std::vector<double> directions_;       // by object: in which it was tracked to move, rad; directions count from it
+  std::vector<belief::Pose> put_in_at_;  // by object: where what was not there is put in, but for its shift
+  std::vector<belief::Action> actions_;  // known ones, times from the begin
+  std::vector<double> times_;
+  double duration_ = 0.0;
+  bool still_ = true;  // nothing moves by itself and nothing is done
+  std::vector<ObjectPath> base_;
+  core::RandomStream stream_;
+  int simulated_ = 0;
+  int failed_ = 0;
+  std::vector<std::string> remarks_;
+};
+
+}  // namespace prescene::queries

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+// How events begin, and the instances that follow.
+#include <algorithm>
+#include <cmath>
+
+#include "event_paths.h"
+#include "prescene/belief/body_names.h"
+#include "prescene/collision/ray_triangle.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::EventKind;
+using belief::Pose;
+using geometry::Vector3d;
+
+constexpr double kMovedPlace = 0.003;  // m and ...
+constexpr double kMovedTurn = 0.015;   // ... rad: what is further from the base counts as moved
+constexpr double kPusherGap = 1e-3;    // m between what pushes and the object, at first
+
+/// The state of a run at a time: the kept one before it.
+belief::WorldState state_in(const belief::Trajectory& run, double time) {
+  const auto later = std::upper_bound(run.states.begin(), run.states.end(), time + 1e-9,
+                                      [](double t, const belief::WorldState& state) { return t < state.time; });
+  belief::WorldState state = later == run.states.begin() ? *later : *std::prev(later);
+  if (later != run.states.begin() && later != run.states.end()) {  // velocities of what a hand carries
+    const belief::WorldState& before = *std::prev(later);
+    const double dt = later->time - before.time;
+    for (std::size_t i = 0; i < state.objects.size(); ++i) {
+      if (state.objects[i].mode != belief::MotionMode::kHeld || !(dt > 0.0)) continue;
+      const Pose& X_a = before.objects[i].X_WO;
+      const Pose& X_b = later->objects[i].X_WO;
+      state.objects[i].V_WO.linear = (X_b.translation - X_a.translation) / dt;
+      state.objects[i].V_WO.angular = geometry::log_rotation(X_b.rotation * X_a.rotation.conjugate()) / dt;
+    }
+  }
+  state.time = std::max(state.time, time - kEventInterval);
+  return state;
+}
+
+bool is_simulated(EventKind kind) {
+  return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped;
+}
+
+bool differs(const std::optional<Pose>& a, const std::optional<Pose>& b) {
+  if (a.has_value() != b.has_value()) return true;
+  if (!a) return false;
+  return (a->translation - b->translation).norm() > kMovedPlace ||
+         geometry::angle_between(a->rotation, b->rotation) > kMovedTurn;
+}
+
+}  // namespace
+
+Pose pose_in(const belief::Trajectory& run, std::size_t object, double time) {
+  const auto later = std::lower_bound(run.states.begin(), run.states.end(), time,
+                                      [](const belief::WorldState& state, double t) { return state.time < t; });
+  if (later == run.states.begin()) return later->objects[object].X_WO;
+  if (later == run.states.end()) return run.states.back().objects[object].X_WO;
+  const belief::WorldState& before = *std::prev(later);
+  const double span = later->time - before.time;
+  const double share = span > 0.0 ? (time - before.time) / span : 1.0;
+  return geometry::interpolate(before.objects[object].X_WO, later->objects[object].X_WO, share);
+}
+
+/// W's x, laid flat: what directions count from.
+Vector3d horizontal_x(const Vector3d& up) {
+  const Vector3d x = Vector3d::UnitX() - up * up.x();
+  return (x.norm() > 1e-6 ? x : Vector3d(Vector3d::UnitY() - up * up.y())).normalized();
+}
+
+bool EventPaths::touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const {
+  const Pose& X_WO = state.objects[object].X_WO;
+  const Vector3d up = belief::up_of(*scene_);
+  const Vector3d x = horizontal_x(up);
+  const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+  const Vector3d across = up.cross(along);
+  const Vector3d p_WCm = X_WO * state.objects[object].physical.center_of_mass;
+  double lowest = 1e300, highest = -1e300, half_width = 0.0, reach = 0.0;
+  for (const Vector3d& vertex : shapes_[object].vertices) {
+    const Vector3d p = X_WO * vertex;
+    lowest = std::min(lowest, up.dot(p));
+    highest = std::max(highest, up.dot(p));
+    half_width = std::max(half_width, std::abs(across.dot(p - p_WCm)));
+    reach = std::max(reach, (p - p_WCm).norm());
+  }
+  draw.touched_height = draw.height * (highest - lowest);
+  Vector3d target = p_WCm + draw.sideways * half_width * across;
+  target += (lowest + draw.touched_height - up.dot(target)) * up;
+  collision::Ray ray;
+  ray.origin = X_WO.inverse() * (target - 2.0 * reach * along);
+  ray.direction = X_WO.rotation.conjugate() * along;
+  const auto sheared = collision::shear(ray);
+  if (!sheared) return false;
+  double nearest = 1e300;
+  for (const auto& t : shapes_[object].triangles) {
+    const Vector3d &a = shapes_[object].vertices[t[0]], &b = shapes_[object].vertices[t[1]],
+                   &c = shapes_[object].vertices[t[2]];
+    const auto hit = collision::meet(*sheared, {a.cast<float>(), b.cast<float>(), c.cast<float>()});
+    if (!hit || hit->s >= nearest) continue;
+    nearest = hit->s;
+    draw.touched_W = X_WO * Vector3d(hit->weights[0] * a + hit->weights[1] * b + hit->weights[2] * c);
+  }
+  draw.mass = state.objects[object].physical.mass;
+  return nearest < 1e300;
+}
+
+void EventPaths::begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
+                             std::vector<belief::Action>& actions, bool* possible) const {
+  belief::ObjectState& object = state.objects[hypothesis.object];
+  *possible = true;
+  if (hypothesis.kind == EventKind::kSlipped) {
+    *possible = object.mode == belief::MotionMode::kHeld;
+    object.mode = belief::MotionMode::kMoving;
+    object.V_WO.linear += draw.added.linear;
+    object.V_WO.angular += draw.added.angular;
+    return;
+  }
+  const bool free = object.mode != belief::MotionMode::kHeld;
+  *possible = free && touch(hypothesis.object, state, draw);
+  const Vector3d up = belief::up_of(*scene_);
+  const Vector3d x = horizontal_x(up);
+  const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+  if (hypothesis.kind == EventKind::kPushed) {
+    belief::Push push;
+    push.radius = priors_.pusher_radius;
+    push.from = draw.touched_W - (push.radius + kPusherGap) * along;
+    push.to = push.from + draw.speed * draw.duration * along;
+    push.duration = draw.duration;
+    actions.push_back({0.0, push});
+    return;
+  }
+  object.mode = belief::MotionMode::kMoving;
+  const belief::ObjectModel& moved = model(hypothesis.object);
+  const geometry::Matrix3d R = object.X_WO.rotation.toRotationMatrix();
+  const Vector3d p_OCm_W = R * object.physical.center_of_mass;
+  const Vector3d arm = draw.touched_W - (object.X_WO.translation + p_OCm_W);
+  const Vector3d rate = (R * moved.unit_inertia * R.transpose()).inverse() * arm.cross(draw.speed * along);
+  object.V_WO.linear += draw.speed * along - rate.cross(p_OCm_W);
+  object.V_WO.angular += rate;
+}
+
+std::optional<Pose> EventPaths::put_down(const Hypothesis& hypothesis, const EventDraw& draw, const Pose& X_WO) const {
+  const SeenTrack& track = tracks_[hypothesis.object];
+  const Vector3d up = belief::up_of(*scene_);
+  Pose X = X_WO;
+  if (draw.other_face) {
+    if (track.estimates.empty()) return std::nullopt;
+    X.rotation = track.estimates.back().mode.rotation;
+  }
+  X.rotation = (geometry::exp_rotation(draw.turn * up) * X.rotation).normalized();
+  X.translation = X_WO.translation + draw.shift;
+  return X;
+}
+
+void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
+                          std::span<EventDraw> draws, std::span<belief::Trajectory> runs_out) {
+  const std::size_t n = points.size(), target = hypothesis.object;
+  const auto first = static_cast<std::size_t>(event_dimensions(hypothesis));
+  std::vector<belief::WorldState> starts(n);
+  std::vector<EventDraw> events(n);
+  std::vector<std::vector<belief::Action>> actions(n);
+  std::vector<std::uint8_t> possible(n, 1);
+  context_.simulation.pool->for_blocks(n, 8, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      events[i] = decode(hypothesis, points[i]);
+      starts[i] = start_of(target, points[i], first);
+    }
+  });
+  // What happens without the event, up to it.
+  std::vector<belief::Trajectory> before(n);
+  if (!still_ && is_present(target)) {
+    const std::vector<std::vector<belief::Action>> known(n, actions_from(0.0));
+    before = run(starts, known);
+  } else {
+    for (std::size_t i = 0; i < n; ++i) before[i].states = {starts[i]};
+  }
+  std::vector<belief::Trajectory> after(n);
+  if (is_simulated(hypothesis.kind)) {
+    std::vector<belief::WorldState> states(n);
+    context_.simulation.pool->for_blocks(n, 8, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        states[i] = state_in(before[i], events[i].time);
+        if (still_) states[i].time = events[i].time;
+        actions[i] = actions_from(states[i].time);
+        bool can_be = true;
+        begin_event(hypothesis, states[i], events[i], actions[i], &can_be);
+        possible[i] = can_be ? 1 : 0;
+      }
+    });
+    after = run(states, actions);
+  }
+  const std::size_t count = times_.size();
+  const auto make_path = [&](std::size_t i) {
+    ScenePath& path = paths[i];
+    path = {};
+    const EventDraw& event = events[i];
+    const bool simulated = is_simulated(hypothesis.kind);
+    path.impossible = possible[i] == 0 || before[i].end == belief::TrajectoryEnd::kDiverged ||
+                      (simulated && after[i].end == belief::TrajectoryEnd::kDiverged);
+    const auto add = [&](std::size_t object, ObjectPath poses, bool always) {
+      bool moves = always;
+      for (std::size_t k = 0; k < count && !moves; ++k) moves = differs(poses[k], base_[object][k]);
+      if (!moves) return;
+      path.moved.push_back(object);
+      path.paths.push_back(std::move(poses));
+    };
+    const auto quiet = [&](std::size_t object, double time) -> std::optional<Pose> {
+      if (!is_present(object)) return std::nullopt;
+      return pose_in(before[i], object, time);
+    };
+    for (std::size_t object = 0; object < objects_.size(); ++object) {
+      ObjectPath poses(count);
+      const bool is_target = object == target;
+      const bool is_partner = hypothesis.partner && object == *hypothesis.partner;
+      for (std::size_t k = 0; k < count; ++k) {
+        const double t = times_[k];
+        poses[k] = quiet(object, t);
+        if (t < event.time || hypothesis.kind == EventKind::kNothing) continue;
+        if (simulated) {
+          poses[k] = pose_in(after[i], object, t);
+        } else if (hypothesis.kind == EventKind::kTakenAway && is_target) {
+          poses[k].reset();
+        } else if (hypothesis.kind == EventKind::kExchanged && (is_target || is_partner)) {
+          poses[k] = quiet(is_target ? *hypothesis.partner : target, event.time);
+        } else if (is_target && hypothesis.kind == EventKind::kMoved) {
+          poses[k].reset();
+          if (t >= event.time + event.duration)
+            poses[k] = put_down(hypothesis, event, pose_in(before[i], object, event.time));
+        } else if (is_target && hypothesis.kind == EventKind::kPutIn) {
+          poses[k] = put_down(hypothesis, event, put_in_at_[object]);
+        }
+      }
+      add(object, std::move(poses), is_target);
+    }
+  };
+  context_.simulation.pool->for_blocks(n, 8, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) make_path(i);
+  });
+  for (std::size_t i = 0; i < n; ++i) {
+    failed_ += paths[i].impossible ? 1 : 0;
+    if (!draws.empty()) draws[i] = events[i];
+    if (!runs_out.empty() && is_simulated(hypothesis.kind)) runs_out[i] = std::move(after[i]);
+  }
+}
+
+}  // namespace prescene::queries

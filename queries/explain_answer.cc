@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "explain_answer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "explain_text.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::EventKind;
+using belief::Pose;
+
+constexpr double kWorthTelling = 0.002;  // probability from which on the parameters of an event are worked out
+
+/// Quantiles of weighted values.
+double value_quantile(std::vector<std::pair<double, double>> values, double share) {
+  std::sort(values.begin(), values.end());
+  double all = 0.0, sum = 0.0;
+  for (const auto& [value, weight] : values) all += weight;
+  for (const auto& [value, weight] : values)
+    if ((sum += weight) >= share * all) return value;
+  return values.empty() ? 0.0 : values.back().first;
+}
+
+class Teller {
+ public:
+  explicit Teller(Telling& telling)
+      : window_(telling.window),
+        events_(&telling.events),
+        likelihood_(&telling.likelihood),
+        times_(telling.times),
+        nothings_(telling.nothings),
+        judged_(telling.judged) {}
+
+  ExplainAnswer answer() {
+    ExplainAnswer answer;
+    std::vector<const Judged*> all;
+    for (Judged& nothing : nothings_) work_out(nothing);
+    for (Judged& judged : judged_) {
+      if (judged.probability >= kWorthTelling) work_out(judged);
+      all.push_back(&judged);
+    }
+    all.push_back(&nothings_.front());
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Judged* a, const Judged* b) { return a->probability > b->probability; });
+    for (const Judged* judged : all) answer.explanations.push_back(told(*judged));
+    std::vector<const Judged*> probable;
+    for (const Judged* judged : all)
+      if (judged->probability >= kWorthTelling) probable.push_back(judged);
+    for (std::size_t i = 0; i < events_->objects().size(); ++i) answer.objects.push_back(where(i, probable));
+    const auto frame_means = [&](const Judged* judged, std::size_t k) {
+      double nothing = 0.0;
+      for (const Judged& n : nothings_)
+        if (n.object == judged->object) nothing = n.frame_means[k];
+      return judged->hypothesis.kind == EventKind::kNothing || judged->frame_means.empty()
+                 ? 0.0
+                 : judged->frame_means[k] - nothing;
+    };
+    for (std::size_t k = 0; k < times_.size(); ++k) {
+      DecidingFrame frame;
+      frame.time = times_[k];
+      frame.against_nothing = frame_means(all[0], k);
+      const bool known = all.size() > 1 && (!all[1]->frame_means.empty());
+      frame.against_second = known ? frame.against_nothing - frame_means(all[1], k) : 0.0;
+      answer.frames.push_back(frame);
+    }
+    answer.duration = events_->duration();
+    answer.simulated = events_->simulated();
+    answer.failed = events_->failed();
+    answer.stepper = events_->stepper();
+    answer.remarks = events_->remarks();
+    answer.text = paragraph_of(answer);
+    return answer;
+  }
+
+ private:
+  /// What follows from the posterior of a hypothesis: its points, once more, with all that is told.
+  void work_out(Judged& judged) {
+    if (judged.hypothesis.kind == EventKind::kOther) return;
+    std::vector<LatentPoint> points;
+    for (const TemperedPoint& point : judged.posterior.points) points.push_back(point.z);
+    judged.paths.resize(points.size());
+    judged.draws.resize(points.size());
+    judged.runs.resize(points.size());
+    events_->simulate(judged.hypothesis, points, judged.paths, judged.draws, judged.runs);
+    std::vector<double> ratios(points.size() * times_.size());
+    likelihood_->evaluate(judged.paths, ratios);
+    judged.frame_means.assign(times_.size(), 0.0);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      for (std::size_t k = 0; k < times_.size(); ++k)
+        judged.frame_means[k] += judged.posterior.points[i].weight * ratios[i * times_.size() + k];
+  }
+
+  Explanation told(const Judged& judged) const {
+    Explanation e;
+    const EventKind kind = judged.hypothesis.kind;
+    e.kind = kind;
+    e.probability = judged.probability;
+    e.low = judged.low;
+    e.high = judged.high;
+    if (kind != EventKind::kNothing) {
+      e.object = events_->objects()[judged.object].name;
+      e.log_bayes_factor = judged.log_bayes;
+    }
+    if (judged.hypothesis.partner) e.partner = events_->objects()[*judged.hypothesis.partner].name;
+    if (judged.draws.empty() || kind == EventKind::kNothing) {
+      e.sentence = sentence_of(e, *events_, window_);
+      return e;
+    }
+    const auto value = [&](const auto& of, double centre = 0.0) {
+      std::vector<std::pair<double, double>> values;
+      EventValue result;
+      for (std::size_t i = 0; i < judged.draws.size(); ++i) {
+        if (judged.paths[i].impossible) continue;
+        const double weight = judged.posterior.points[i].weight;
+        values.emplace_back(of(judged.draws[i]) - centre, weight);
+      }
+      double all = 0.0;
+      for (const auto& [x, weight] : values) result.mean += weight * x, all += weight;
+      result.mean = centre + result.mean / std::max(1e-300, all);
+      result.low = centre + value_quantile(values, 0.05);
+      result.high = centre + value_quantile(values, 0.95);
+      return result;
+    };
+    e.time = value([](const EventDraw& d) { return d.time; });
+    if (kind == EventKind::kPushed || kind == EventKind::kBumped) {
+      double x = 0.0, y = 0.0;
+      for (std::size_t i = 0; i < judged.draws.size(); ++i) {
+        if (judged.paths[i].impossible) continue;
+        x += judged.posterior.points[i].weight * std::cos(judged.draws[i].direction);
+        y += judged.posterior.points[i].weight * std::sin(judged.draws[i].direction);
+      }
+      const double middle = std::atan2(y, x);
+      EventValue off =
+          value([&](const EventDraw& d) { return std::remainder(d.direction - middle, 2.0 * std::numbers::pi); });
+      const double degrees = 180.0 / std::numbers::pi;
+      e.towards = EventValue{degrees * middle, degrees * (middle + off.low), degrees * (middle + off.high)};
+      e.speed = value([](const EventDraw& d) { return d.speed; });
+      e.touched_at = value([](const EventDraw& d) { return d.touched_height; });
+      if (kind == EventKind::kBumped) e.impulse = value([](const EventDraw& d) { return d.speed * d.mass; });
+    }
+    add_effects(judged, e);
+    e.sentence = sentence_of(e, *events_, window_);
+    return e;
+  }
+
+  void add_effects(const Judged& judged, Explanation& e) const {
+    const geometry::Vector3d up = -events_->scene().gravity_W.normalized();
+    const auto start = events_->start_pose(judged.object);
+    if (!start) return;
+    std::size_t best = 0;
+    for (std::size_t i = 0; i < judged.paths.size(); ++i) {
+      const TemperedPoint& point = judged.posterior.points[i];
+      if (point.log_likelihood > judged.posterior.points[best].log_likelihood) best = i;
+      const ScenePath& path = judged.paths[i];
+      const auto at = std::find(path.moved.begin(), path.moved.end(), judged.object);
+      if (path.impossible || at == path.moved.end()) continue;
+      const auto& end = path.paths[static_cast<std::size_t>(at - path.moved.begin())].back();
+      if (!end) continue;
+      const geometry::Vector3d com = belief::mean(events_->model(judged.object).center_of_mass);
+      const double tilt =
+          std::acos(std::clamp((start->rotation.conjugate() * up).dot(end->rotation.conjugate() * up), -1.0, 1.0));
+      if (tilt > std::numbers::pi / 6.0) e.tips += point.weight;
+      if (up.dot(*start * com - *end * com) > 0.05) e.falls += point.weight;
+    }
+    if (!judged.runs.empty() && judged.runs[best].states.size() > 1) {
+      for (belief::Interval& interval : belief::timeline_of(events_->scene(), judged.runs[best]))
+        if (interval.subject == e.object || interval.other == e.object) e.timeline.push_back(std::move(interval));
+    }
+  }
+
+  WhereItIs where(std::size_t object, const std::vector<const Judged*>& all) const {
+    WhereItIs result;
+    result.object = events_->objects()[object].name;
+    std::vector<std::pair<geometry::Vector3d, double>> places;
+    double gone = 0.0, sum = 0.0;
+    const auto note = [&](const std::optional<Pose>& X_WO, double weight) {
+      sum += weight;
+      if (X_WO)
+        places.emplace_back(X_WO->translation, weight);
+      else
+        gone += weight;
+    };
+    for (const Judged* judged : all) {
+      if (judged->hypothesis.kind == EventKind::kOther) {
+        note(object == judged->object ? judged->other_path.back() : likelihood_->base()[object].back(),
+             judged->probability);
+        continue;
+      }
+      for (std::size_t i = 0; i < judged->paths.size(); ++i) {
+        const ScenePath& path = judged->paths[i];
+        if (path.impossible) continue;
+        const auto at = std::find(path.moved.begin(), path.moved.end(), object);
+        note(at == path.moved.end() ? likelihood_->base()[object].back()
+                                    : path.paths[static_cast<std::size_t>(at - path.moved.begin())].back(),
+             judged->probability * judged->posterior.points[i].weight);
+      }
+    }
+    result.present = sum > 0.0 ? 1.0 - gone / sum : 0.0;
+    double there = 0.0;
+    for (const auto& [p, weight] : places) result.mean += weight * p, there += weight;
+    if (there > 0.0) result.mean /= there;
+    std::vector<std::pair<double, double>> distances;
+    for (const auto& [p, weight] : places) distances.emplace_back((p - result.mean).norm(), weight);
+    result.radius_90 = value_quantile(distances, 0.9);
+    // Of an object that stays, hypotheses about others know only the most probable place: what the belief knows of it.
+    if (const auto index = belief::find_object(*window_.start, result.object); index && events_->is_present(object)) {
+      const auto estimate = belief::estimate(*window_.start, window_.start->objects[static_cast<std::size_t>(*index)]);
+      constexpr double kChi90 = 6.251;  // 90 % quantile of chi-squared with 3 degrees of freedom
+      result.radius_90 =
+          std::max(result.radius_90, std::sqrt(kChi90 * estimate.covariance.bottomRightCorner<3, 3>().trace() / 3.0));
+    }
+    const Judged& best = *all.front();
+    const ScenePath none;
+    const ScenePath* path = &none;
+    ScenePath tracked;
+    if (!best.paths.empty()) {
+      std::size_t most = 0;
+      for (std::size_t i = 0; i < best.paths.size(); ++i)
+        if (best.posterior.points[i].log_likelihood > best.posterior.points[most].log_likelihood) most = i;
+      path = &best.paths[most];
+    } else if (best.hypothesis.kind == EventKind::kOther) {
+      tracked = {{best.object}, {best.other_path}, false};
+      path = &tracked;
+    }
+    result.out_of_sight = result.present > 0.5 && likelihood_->visible_share(*path, times_.size() - 1, object) < 0.05;
+    return result;
+  }
+
+  const ExplainWindow& window_;
+  EventPaths* events_;
+  WindowLikelihood* likelihood_;
+  const std::vector<double>& times_;
+  std::vector<Judged>& nothings_;
+  std::vector<Judged>& judged_;
+};
+
+}  // namespace
+
+ExplainAnswer tell(Telling& telling) { return Teller(telling).answer(); }
+
+}  // namespace prescene::queries

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// From what was found of each hypothesis to the answer.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "event_paths.h"
+#include "prescene/queries/tempered_smc.h"
+#include "window_likelihood.h"
+
+namespace prescene::queries {
+
+/// A hypothesis with what was found of it.
+struct Judged {
+  Hypothesis hypothesis;
+  double log_bayes = 0.0;  // against nothing about the same object
+  double error = 0.0;      // of the hypothesis's own evidence
+  std::size_t object = 0;
+  TemperedResult posterior;      // empty of `other`
+  std::vector<ScenePath> paths;  // of its points, where it is probable enough
+  std::vector<EventDraw> draws;
+  std::vector<belief::Trajectory> runs;
+  std::vector<double> frame_means;                      // of the log ratio in each frame
+  std::vector<std::optional<belief::Pose>> other_path;  // of `other`
+  double probability = 0.0, low = 0.0, high = 1.0;
+};
+
+struct Telling {
+  const ExplainWindow& window;
+  EventPaths& events;
+  WindowLikelihood& likelihood;
+  const std::vector<double>& times;
+  std::vector<Judged>& nothings;  // by candidate; the first is told
+  std::vector<Judged>& judged;    // all others
+};
+
+/// All but the numbers of evaluations before, and remarks of the search.
+ExplainAnswer tell(Telling& telling);
+
+}  // namespace prescene::queries

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "explain_text.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "prescene/core/text.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::EventKind;
+using core::fixed_text;
+using geometry::Vector3d;
+
+std::string at_time(const Explanation& e) {
+  return e.time ? " at " + fixed_text(e.time->mean, 2) + " s (" + fixed_text(e.time->low, 2) + " to " +
+                      fixed_text(e.time->high, 2) + " s)"
+                : "";
+}
+
+/// As the camera sees it at the window's end.
+std::string towards_text(double degrees, const ExplainWindow& window) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const Vector3d d(std::cos(angle), std::sin(angle), 0.0);
+  const Vector3d d_C = window.frames.back().observation.X_WC.rotation.conjugate() * d;
+  if (std::abs(d_C.x()) >= Vector3d(0.0, d_C.y(), d_C.z()).norm())
+    return d_C.x() > 0.0 ? "to the right" : "to the left";
+  return d_C.z() > 0.0 ? "away from the camera" : "towards the camera";
+}
+
+std::string effects_text(const Explanation& e) {
+  std::string text;
+  if (e.tips >= 0.5) text += " and tipped over";
+  if (e.falls >= 0.5) text += e.tips >= 0.5 ? " and fell" : " and fell down";
+  return text;
+}
+
+std::string probability_text(double probability) {
+  return fixed_text(100.0 * probability, probability < 0.995 ? 0 : 1) + " %";
+}
+
+}  // namespace
+
+std::string sentence_of(const Explanation& e, const EventPaths& events, const ExplainWindow& window) {
+  static_cast<void>(events);
+  switch (e.kind) {
+    case EventKind::kNothing:
+      return "Nothing happened but what is known to have been done.";
+    case EventKind::kPushed:
+      return e.object + " was pushed" + (e.towards ? " " + towards_text(e.towards->mean, window) : "") + at_time(e) +
+             (e.speed ? ", at " + fixed_text(e.speed->mean, 2) + " m/s" : "") + effects_text(e) + ".";
+    case EventKind::kBumped:
+      return e.object + " was bumped" + (e.towards ? " " + towards_text(e.towards->mean, window) : "") + at_time(e) +
+             (e.impulse ? ", by " + fixed_text(e.impulse->mean, 3) + " N s" : "") + effects_text(e) + ".";
+    case EventKind::kSlipped:
+      return e.object + " slipped from the hand that held it, or was let go," + at_time(e) + effects_text(e) + ".";
+    case EventKind::kMoved:
+      return e.object + " was taken" + at_time(e) + " and put down elsewhere.";
+    case EventKind::kTakenAway:
+      return e.object + " was taken away" + at_time(e) + ".";
+    case EventKind::kPutIn:
+      return e.object + " was put in" + at_time(e) + ".";
+    case EventKind::kExchanged:
+      return e.object + " and " + e.partner + " changed places" + at_time(e) + ".";
+    case EventKind::kOther:
+      return e.object + " moved in a way that none of the known events explains.";
+  }
+  return {};
+}
+
+std::string paragraph_of(const ExplainAnswer& answer) {
+  if (answer.explanations.empty()) return {};
+  const Explanation& best = answer.explanations.front();
+  std::string text = best.sentence + " This is " + probability_text(best.probability) + " probable (" +
+                     probability_text(best.low) + " to " + probability_text(best.high) + ")";
+  if (answer.explanations.size() > 1 && answer.explanations[1].probability >= 0.01) {
+    const Explanation& second = answer.explanations[1];
+    text += "; the next best explanation has " + probability_text(second.probability) + ": " + second.sentence;
+  } else {
+    text += ".";
+  }
+  if (best.kind != EventKind::kNothing) {
+    const DecidingFrame* most = nullptr;
+    for (const DecidingFrame& frame : answer.frames)
+      if (most == nullptr || frame.against_nothing > most->against_nothing) most = &frame;
+    if (most != nullptr && most->against_nothing > 0.0)
+      text += " The frame at " + fixed_text(most->time, 2) + " s speaks most against nothing having happened (" +
+              fixed_text(most->against_nothing, 1) + " nats).";
+  }
+  for (const WhereItIs& object : answer.objects) {
+    if (!object.out_of_sight) continue;
+    text += " " + object.object + " is out of sight, with 90 % within " + fixed_text(100.0 * object.radius_90, 1) +
+            " cm of (" + fixed_text(object.mean.x(), 3) + ", " + fixed_text(object.mean.y(), 3) + ", " +
+            fixed_text(object.mean.z(), 3) + ") m.";
+  }
+  return text;
+}
+
+}  // namespace prescene::queries

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// Explanations in plain English.
+#pragma once
+
+#include <string>
+
+#include "event_paths.h"
+#include "prescene/queries/explain.h"
+
+namespace prescene::queries {
+
+/// What happened, if it is this: one sentence.
+std::string sentence_of(const Explanation& explanation, const EventPaths& events, const ExplainWindow& window);
+/// The answer as a paragraph.
+std::string paragraph_of(const ExplainAnswer& answer);
+
+}  // namespace prescene::queries

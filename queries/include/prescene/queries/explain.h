@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Observation explanation: which event makes the frames of a window most probable?
+//
+//   ExplainWindow window;                     // the belief at its begin, frames with the beliefs after them, actions
+//   PRESCENE_TRY(ExplainAnswer answer, explain(window, {.object = "carton"}, context));
+//   answer.explanations.front().sentence;     // "The carton was pushed at 2.31 s ..."
+//
+// Events are schemas with parameters (prescene/belief/event.h). For each schema and object, parameters are drawn, the
+// event is simulated from the belief at the window's begin, and the frames of the window weigh it by the tempered
+// likelihood; sequential Monte Carlo gives the posterior of the parameters and the evidence of the schema, evidence
+// times prior its probability. docs/reference/explain.md says what is assumed.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "prescene/belief/belief.h"
+#include "prescene/belief/event.h"
+#include "prescene/belief/observation.h"
+#include "prescene/belief/timeline.h"
+#include "prescene/filter/particle_filter.h"
+#include "prescene/queries/query_engine.h"
+
+namespace prescene::queries {
+
+/// A frame of the window with the belief after it: what was tracked only proposes parameters, the frame weighs them.
+struct WindowFrame {
+  belief::Observation observation;
+  std::shared_ptr<const belief::Belief> belief;
+};
+
+struct ExplainWindow {
+  std::shared_ptr<const belief::Belief> start;  ///< After the last frame at or before the window's begin.
+  std::vector<WindowFrame> frames;              ///< After that, in the order of their stamps.
+  /// What the robot was told to do in the window, by the clock of the frames.
+  std::vector<std::pair<core::TimeNs, belief::Action>> actions;
+};
+
+struct ExplainQuery {
+  std::string object;        ///< Events that happen to it; empty = to any object that the frames show to be elsewhere.
+  int frames = 10;           ///< That weigh; those between which most changes are taken. In [2, 64].
+  int runs = 4;              ///< Independent runs of a schema, whose scatter is its interval. In [2, 64].
+  int points = 24;           ///< Of each run. In [8, 4096].
+  double confidence = 0.95;  ///< Of the intervals.
+  std::uint64_t seed = 1;
+  belief::EventWeights weights;  ///< How probable events are before anything was seen.
+  belief::EventPriors priors;    ///< Of their parameters.
+};
+/// kInvalidInput naming what is out of range.
+core::Status validate(const ExplainQuery& query);
+
+struct ExplainContext {
+  QueryContext simulation;  ///< Needs make_simulator, make_renderer, pool and meshes.
+  rendering::LikelihoodBatch* likelihood = nullptr;
+  filter::FilterSettings settings;  ///< Of the tracker: colours, sensor, tempering.
+};
+
+/// A parameter of an event under the posterior.
+struct EventValue {
+  double mean = 0.0;
+  double low = 0.0, high = 0.0;  ///< 5 % of the posterior lie below, 5 % above.
+};
+
+struct Explanation {
+  belief::EventKind kind = belief::EventKind::kNothing;
+  std::string object;   ///< "" for nothing.
+  std::string partner;  ///< What it was exchanged with, else "".
+  double probability = 0.0;
+  double low = 0.0, high = 1.0;          ///< Interval of what more work would change.
+  double log_bayes_factor = 0.0;         ///< Against nothing, nats: of the evidences, without priors.
+  std::optional<EventValue> time;        ///< s from the window's begin.
+  std::optional<EventValue> towards;     ///< Horizontal direction of push or blow, degrees from W's x towards W's y.
+  std::optional<EventValue> speed;       ///< Of the push, or impulse over mass, m/s.
+  std::optional<EventValue> impulse;     ///< N s, of a blow.
+  std::optional<EventValue> touched_at;  ///< Height above the object's lowest point, m.
+  /// Shares of the posterior in which the object ends tilted by more than 30 degrees, or more than 5 cm lower.
+  double tips = 0.0, falls = 0.0;
+  belief::Timeline timeline;  ///< Of the most probable instance, about the object; s from the window's begin.
+  std::string sentence;
+};
+
+/// Where an object is at the window's end, over all explanations.
+struct WhereItIs {
+  std::string object;
+  double present = 1.0;  ///< Probability that it is there at all.
+  geometry::Vector3d mean = geometry::Vector3d::Zero();
+  double radius_90 = 0.0;     ///< m about the mean within which it is with 90 %, if it is there.
+  bool out_of_sight = false;  ///< The last frame shows less than 5 % of it.
+};
+
+struct DecidingFrame {
+  double time = 0.0;             ///< s from the window's begin.
+  double against_nothing = 0.0;  ///< Nats (tempered) that it speaks for the best explanation against nothing ...
+  double against_second = 0.0;   ///< ... and against the second best.
+};
+
+struct ExplainAnswer {
+  std::vector<Explanation> explanations;  ///< Most probable first; the probabilities sum to one.
+  std::vector<WhereItIs> objects;
+  std::vector<DecidingFrame> frames;  ///< In the order of time.
+  std::string text;                   ///< A paragraph.
+  std::vector<std::string> remarks;
+  double duration = 0.0;  ///< s, from the window's begin to its last frame.
+  int simulated = 0;      ///< Instances.
+  int evaluated = 0;      ///< Instances that were weighed.
+  int failed = 0;         ///< That became unstable, or were impossible.
+  std::string stepper;
+};
+
+/// kInvalidInput for a query out of range and a window without frames, kNotFound for an unknown object (with the
+/// nearest names), for one that is lost in the whole window, and where the belief holds no object; errors of the
+/// simulator and the renderer; kCancelled.
+core::Result<ExplainAnswer> explain(const ExplainWindow& window, const ExplainQuery& query,
+                                    const ExplainContext& context);
+
+}  // namespace prescene::queries

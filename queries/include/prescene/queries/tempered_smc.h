@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Posterior and evidence of a likelihood under a standard normal prior, by sequential Monte Carlo along a path of
+// tempered distributions [Neal 2001; Del Moral et al. 2006].
+//
+// The path leads from a proposal q to the posterior: q^(1-b) (N L)^b for b from 0 to 1, N the standard normal density.
+// Steps of b keep the effective sample size; after each, points are resampled and moved by Metropolis-Hastings.
+// Independent runs go side by side, so that one call of the likelihood serves all.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "prescene/core/progress.h"
+#include "prescene/core/random.h"
+
+namespace prescene::queries {
+
+using LatentPoint = std::vector<double>;
+
+struct TemperedTarget {
+  int dimensions = 0;  ///< Of a point.
+  int moved = 0;  ///< The first so many are proposed by `mean` and moved by random walks; the others are nuisances.
+  /// A guess of where the posterior is in the first `moved` coordinates, with deviations; empty = none. Half of the
+  /// first points are drawn there, the rest from the prior.
+  std::vector<double> guess_mean, guess_deviation;
+  /// log L of each point, -inf = impossible.
+  std::function<void(std::span<const LatentPoint> points, std::span<double> log_likelihoods)> evaluate;
+};
+
+struct TemperedOptions {
+  int runs = 4;                  ///< Independent ones: their scatter is the error of the evidence.
+  int points = 24;               ///< Of each.
+  double least_effective = 0.5;  ///< Share of the points that a step of b leaves as effective sample size.
+  int most_steps = 24;           ///< Of b; the last goes to 1 whatever it costs.
+  int last_moves = 2;            ///< Moves at b = 1; one at each b before.
+};
+
+struct TemperedPoint {
+  LatentPoint z;
+  double log_likelihood = 0.0;
+  double weight = 0.0;  ///< All sum to one.
+};
+
+struct TemperedResult {
+  std::vector<TemperedPoint> points;
+  std::vector<double> log_evidence;  ///< Of each run.
+  double mean_log_evidence = 0.0;    ///< log of the mean of the runs' evidence.
+  double error = 0.0;                ///< Standard error of that.
+  int evaluations = 0;               ///< Of the likelihood.
+  bool cut_short = false;            ///< The last step of b was larger than the effective sample size allows.
+};
+
+/// `stream` is used at (step of b, run and point).
+TemperedResult tempered_posterior(const TemperedTarget& target, const TemperedOptions& options,
+                                  const core::RandomStream& stream, const core::Cancellation* cancellation = nullptr);
+
+}  // namespace prescene::queries

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/queries/tempered_smc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace prescene::queries {
+namespace {
+
+constexpr double kGuessShare = 0.5;
+constexpr double kImpossible = -1e5;  // log L of what can't be: finite, so that paths go on
+constexpr double kNuisanceStep =
+    0.35;  // of a move in nuisances, which leaves their prior as it is [Cotter et al. 2013]
+constexpr double kLeastDeviation = 0.01;  // of a random walk
+constexpr double kWantedAcceptance = 0.25;
+
+double log_normal(std::span<const double> z) {
+  double sum = 0.0;
+  for (const double x : z) sum -= 0.5 * x * x;
+  return sum - 0.5 * std::log(2.0 * std::numbers::pi) * static_cast<double>(z.size());
+}
+
+double log_add(double a, double b) {
+  const double top = std::max(a, b);
+  return std::isinf(top) ? top : top + std::log(std::exp(a - top) + std::exp(b - top));
+}
+
+/// Of the moved coordinates.
+double log_proposal(const TemperedTarget& target, std::span<const double> z) {
+  if (target.guess_mean.empty()) return log_normal(z);
+  double guess = -0.5 * std::log(2.0 * std::numbers::pi) * static_cast<double>(z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const double d = (z[i] - target.guess_mean[i]) / target.guess_deviation[i];
+    guess -= 0.5 * d * d + std::log(target.guess_deviation[i]);
+  }
+  return log_add(std::log(kGuessShare) + guess, std::log(1.0 - kGuessShare) + log_normal(z));
+}
+
+struct Run {
+  std::vector<LatentPoint> z;
+  std::vector<double> log_l;
+  double b = 0.0;
+  double log_evidence = 0.0;
+  double scale = 1.0;  // of the random walk
+  std::vector<double> deviations;
+  bool moves = false;  // in this round
+};
+
+class Sampler {
+ public:
+  Sampler(const TemperedTarget& target, const TemperedOptions& options, const core::RandomStream& stream)
+      : target_(target), options_(options), stream_(stream), moved_(static_cast<std::size_t>(target.moved)) {}
+
+  TemperedResult run(const core::Cancellation* cancellation) {
+    begin();
+    int last = 0;
+    for (int step = 1; last < options_.last_moves; ++step) {
+      if (cancellation && cancellation->requested()) break;
+      bool any = false;
+      for (std::size_t r = 0; r < runs_.size(); ++r) {
+        Run& run = runs_[r];
+        run.moves = run.b < 1.0;
+        if (run.moves)
+          temper(run, step >= options_.most_steps,
+                 stream_.at(2 * static_cast<std::uint64_t>(step), static_cast<std::uint32_t>(r)));
+        any = any || run.moves;
+      }
+      if (!any) {
+        ++last;
+        for (Run& run : runs_) {
+          run.moves = true;
+          measure(run, std::vector<double>(run.z.size(), 1.0 / static_cast<double>(run.z.size())));
+        }
+      }
+      if (target_.dimensions > 0) move(static_cast<std::uint64_t>(step));
+    }
+    return result();
+  }
+
+ private:
+  std::span<const double> moved(const LatentPoint& z) const { return std::span(z).first(moved_); }
+
+  /// log of (N L / q) at a point: what a step of b adds to its weight.
+  double log_gain(const Run& run, std::size_t i) const {
+    return log_normal(moved(run.z[i])) - log_proposal(target_, moved(run.z[i])) + run.log_l[i];
+  }
+
+  void evaluate(std::span<const LatentPoint> points, std::span<double> log_l) {
+    target_.evaluate(points, log_l);
+    for (double& value : log_l)
+      if (!(value > kImpossible)) value = kImpossible;
+    evaluations_ += static_cast<int>(points.size());
+  }
+
+  void begin() {
+    const auto count = static_cast<std::size_t>(options_.points);
+    std::vector<LatentPoint> all;
+    for (int r = 0; r < options_.runs; ++r) {
+      for (std::size_t i = 0; i < count; ++i) {
+        core::RandomStream draws = stream_.at(0, static_cast<std::uint32_t>(static_cast<std::size_t>(r) * count + i));
+        LatentPoint z(static_cast<std::size_t>(target_.dimensions));
+        // Stratified, so that no run is without points of either kind.
+        const bool guessed =
+            !target_.guess_mean.empty() && static_cast<double>(i) + 0.5 < kGuessShare * static_cast<double>(count);
+        for (std::size_t k = 0; k < z.size(); ++k) {
+          z[k] = draws.normal();
+          if (guessed && k < moved_) z[k] = target_.guess_mean[k] + target_.guess_deviation[k] * z[k];
+        }
+        all.push_back(std::move(z));
+      }
+    }
+    std::vector<double> log_l(all.size());
+    evaluate(all, log_l);
+    for (int r = 0; r < options_.runs; ++r) {
+      Run& run = runs_.emplace_back();
+      const auto from = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(r) * count);
+      const auto to = from + static_cast<std::ptrdiff_t>(count);
+      run.z.assign(all.begin() + from, all.begin() + to);
+      run.log_l.assign(log_l.begin() + from, log_l.begin() + to);
+    }
+  }
+
+  /// The largest step of b that leaves enough effective points; resamples.
+  void temper(Run& run, bool last, core::RandomStream stream) {
+    const std::size_t n = run.z.size();
+    std::vector<double> gain(n), weight(n);
+    for (std::size_t i = 0; i < n; ++i) gain[i] = log_gain(run, i);
+    const double top = *std::max_element(gain.begin(), gain.end());
+    const auto effective = [&](double step) {
+      double sum = 0.0, squares = 0.0;
+      for (std::size_t i = 0; i < n; ++i) {
+        weight[i] = std::exp(step * (gain[i] - top));
+        sum += weight[i];
+        squares += weight[i] * weight[i];
+      }
+      return sum * sum / squares;
+    };
+    const double wanted = options_.least_effective * static_cast<double>(n);
+    double step = 1.0 - run.b;
+    if (effective(step) < wanted && !last) {
+      double low = 0.0, high = step;
+      for (int k = 0; k < 40; ++k) (effective(0.5 * (low + high)) < wanted ? high : low) = 0.5 * (low + high);
+      step = std::max(low, 1e-6);
+    } else if (effective(step) < wanted) {
+      cut_short_ = true;
+    }
+    effective(step);
+    double sum = 0.0;
+    for (const double w : weight) sum += w;
+    run.log_evidence += step * top + std::log(sum / static_cast<double>(n));
+    run.b = run.b + step >= 1.0 - 1e-9 ? 1.0 : run.b + step;
+    for (double& w : weight) w /= sum;
+    measure(run, weight);
+    // Systematic resampling.
+    const double first = stream.uniform();
+    std::vector<LatentPoint> z(n);
+    std::vector<double> log_l(n);
+    double reached = weight[0] * static_cast<double>(n);
+    for (std::size_t i = 0, from = 0; i < n; ++i) {
+      while (reached < static_cast<double>(i) + first && from + 1 < n)
+        reached += weight[++from] * static_cast<double>(n);
+      z[i] = run.z[from];
+      log_l[i] = run.log_l[from];
+    }
+    run.z = std::move(z);
+    run.log_l = std::move(log_l);
+  }
+
+  /// The spread of the moved coordinates, which random walks are scaled by.
+  void measure(Run& run, const std::vector<double>& weight) const {
+    run.deviations.assign(moved_, 0.0);
+    for (std::size_t k = 0; k < moved_; ++k) {
+      double mean = 0.0, square = 0.0;
+      for (std::size_t i = 0; i < run.z.size(); ++i) mean += weight[i] * run.z[i][k];
+      for (std::size_t i = 0; i < run.z.size(); ++i) square += weight[i] * (run.z[i][k] - mean) * (run.z[i][k] - mean);
+      run.deviations[k] = std::max(kLeastDeviation, std::sqrt(square));
+    }
+  }
+
+  void move(std::uint64_t step) {
+    std::vector<LatentPoint> proposed;
+    std::vector<std::pair<std::size_t, std::size_t>> of;
+    for (std::size_t r = 0; r < runs_.size(); ++r) {
+      Run& run = runs_[r];
+      if (!run.moves) continue;
+      const double walk = run.scale * 2.38 / std::sqrt(std::max(1.0, static_cast<double>(moved_)));
+      for (std::size_t i = 0; i < run.z.size(); ++i) {
+        core::RandomStream draws = stream_.at(2 * step + 1, static_cast<std::uint32_t>(r * run.z.size() + i));
+        LatentPoint z = run.z[i];
+        for (std::size_t k = 0; k < z.size(); ++k) {
+          const double draw = draws.normal();
+          if (k < moved_)
+            z[k] += walk * run.deviations[k] * draw;
+          else
+            z[k] = std::sqrt(1.0 - kNuisanceStep * kNuisanceStep) * z[k] + kNuisanceStep * draw;
+        }
+        proposed.push_back(std::move(z));
+        of.emplace_back(r, i);
+      }
+    }
+    std::vector<double> log_l(proposed.size());
+    evaluate(proposed, log_l);
+    std::vector<int> accepted(runs_.size(), 0);
+    for (std::size_t j = 0; j < proposed.size(); ++j) {
+      const auto [r, i] = of[j];
+      Run& run = runs_[r];
+      const auto log_density = [&](const LatentPoint& z, double l) {
+        return (1.0 - run.b) * log_proposal(target_, moved(z)) + run.b * (log_normal(moved(z)) + l);
+      };
+      core::RandomStream draws =
+          stream_.at(2 * step + 1, static_cast<std::uint32_t>((runs_.size() + r) * run.z.size() + i));
+      const double ratio = log_density(proposed[j], log_l[j]) - log_density(run.z[i], run.log_l[i]);
+      if (!(std::log(draws.uniform()) < ratio)) continue;
+      run.z[i] = std::move(proposed[j]);
+      run.log_l[i] = log_l[j];
+      ++accepted[r];
+    }
+    for (std::size_t r = 0; r < runs_.size(); ++r) {
+      if (!runs_[r].moves) continue;
+      const double share = static_cast<double>(accepted[r]) / static_cast<double>(runs_[r].z.size());
+      runs_[r].scale = std::clamp(runs_[r].scale * std::exp(2.0 * (share - kWantedAcceptance)), 0.05, 2.0);
+    }
+  }
+
+  TemperedResult result() const {
+    TemperedResult result;
+    result.evaluations = evaluations_;
+    result.cut_short = cut_short_;
+    for (const Run& run : runs_) result.log_evidence.push_back(run.log_evidence);
+    const double top = *std::max_element(result.log_evidence.begin(), result.log_evidence.end());
+    double sum = 0.0, mean = 0.0, square = 0.0;
+    const auto runs = static_cast<double>(runs_.size());
+    for (const double e : result.log_evidence) sum += std::exp(e - top), mean += e / runs;
+    for (const double e : result.log_evidence) square += (e - mean) * (e - mean);
+    result.mean_log_evidence = top + std::log(sum / runs);
+    result.error = runs > 1.0 ? std::sqrt(square / (runs - 1.0) / runs) : 0.0;
+    for (const Run& run : runs_)
+      for (std::size_t i = 0; i < run.z.size(); ++i)
+        result.points.push_back(
+            {run.z[i], run.log_l[i], std::exp(run.log_evidence - top) / sum / static_cast<double>(run.z.size())});
+    return result;
+  }
+
+  const TemperedTarget& target_;
+  const TemperedOptions& options_;
+  core::RandomStream stream_;
+  std::size_t moved_;
+  std::vector<Run> runs_;
+  int evaluations_ = 0;
+  bool cut_short_ = false;
+};
+
+}  // namespace
+
+TemperedResult tempered_posterior(const TemperedTarget& target, const TemperedOptions& options,
+                                  const core::RandomStream& stream, const core::Cancellation* cancellation) {
+  return Sampler(target, options, stream).run(cancellation);
+}
+
+}  // namespace prescene::queries

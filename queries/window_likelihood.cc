@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "window_likelihood.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/filter/proposals/learned_colors.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::Pose;
+
+// What a simulated path is off a true one by: the spread of a hit is so many times the sensor's. Without it, a few
+// millimetres after a fall would decide between events. Chosen on generated episodes (docs/reference/explain.md).
+constexpr double kPathSpread = 2.5;
+// Frames share the errors of shapes, calibration and path: all of them count as so many.
+constexpr double kEffectiveFrames = 3.0;
+constexpr float kBehindSupport = 0.02F;  // m; so far behind a support's surface an object is hidden by it
+constexpr int kSampled = 8;              // pixels between two that changes are looked for at
+constexpr float kChanged = 0.02F;        // m; a depth that changes by more has changed
+constexpr int kColorChanged = 90;        // sum over red, green and blue
+
+/// Share of the sampled pixels that differ.
+double change_between(const belief::RgbdFrame& a, const belief::RgbdFrame& b) {
+  if (!a.depth || !b.depth || a.depth->width() != b.depth->width() || a.depth->height() != b.depth->height())
+    return 1.0;
+  const bool colors = a.color && b.color && a.color->width() == a.depth->width() &&
+                      b.color->width() == a.depth->width() && a.color->height() == a.depth->height() &&
+                      b.color->height() == a.depth->height();
+  int changed = 0, all = 0;
+  for (int y = kSampled / 2; y < a.depth->height(); y += kSampled)
+    for (int x = kSampled / 2; x < a.depth->width(); x += kSampled) {
+      ++all;
+      const float p = (*a.depth)(x, y), q = (*b.depth)(x, y);
+      bool differs = p > 0.0F && q > 0.0F && std::abs(p - q) > kChanged;
+      if (colors && !differs) {
+        int difference = 0;
+        for (std::size_t c = 0; c < 3; ++c)
+          difference += std::abs(static_cast<int>((*a.color)(x, y)[c]) - static_cast<int>((*b.color)(x, y)[c]));
+        differs = difference > kColorChanged;
+      }
+      changed += differs ? 1 : 0;
+    }
+  return all > 0 ? static_cast<double>(changed) / all : 0.0;
+}
+
+}  // namespace
+
+std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int count) {
+  const auto wanted = static_cast<std::size_t>(count);
+  std::vector<std::size_t> chosen;
+  if (frames.size() <= wanted) {
+    for (std::size_t i = 0; i < frames.size(); ++i) chosen.push_back(i);
+    return chosen;
+  }
+  // A quarter of the weight goes by time alone, so that stillness is seen, too.
+  std::vector<double> passed(frames.size(), 0.0);
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    passed[i] = passed[i - 1] + change_between(frames[i - 1].observation.frame, frames[i].observation.frame);
+  const double all = passed.back();
+  const auto at = [&](std::size_t i) {
+    const double time = static_cast<double>(i) / static_cast<double>(frames.size() - 1);
+    return all > 0.0 ? 0.25 * time + 0.75 * passed[i] / all : time;
+  };
+  for (std::size_t n = 1; n <= wanted; ++n) {
+    std::size_t i = chosen.empty() ? 0 : chosen.back() + 1;
+    while (i + 1 < frames.size() && at(i) + 1e-9 < static_cast<double>(n) / static_cast<double>(wanted)) ++i;
+    // Room for those that are still to come.
+    i = std::min(i, frames.size() - 1 - (wanted - n));
+    chosen.push_back(i);
+  }
+  return chosen;
+}
+
+WindowLikelihood::WindowLikelihood(const belief::Belief& start, std::span<const belief::SceneObject> objects,
+                                   std::span<const WindowFrame> frames, const ExplainContext& context,
+                                   const filter::FilterTools& tools)
+    : start_(start), objects_(objects), window_(frames), context_(context), tools_(tools) {}
+
+core::Status WindowLikelihood::prepare() {
+  auto scene = std::make_shared<belief::Scene>(*start_.scene);
+  const filter::FrameOptions& options = context_.settings.frame;
+  scene->depth_noise.sigma_per_depth_squared =
+      kPathSpread * scene->depth_noise.sigma_per_depth_squared.value_or(options.sensor.sigma_per_depth_squared);
+  const filter::FrameColors colors{context_.settings.colors, filter::learned_models(start_, options.colors)};
+  filter::FrameCache cache;
+  for (const WindowFrame& seen : window_) {
+    filter::FilterFrame& frame = frames_.emplace_back();
+    PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), seen.observation,
+                                                   seen.belief->robot, colors, options, tools_, cache, &frame));
+    stamps_.push_back(seen.observation.stamp_ns);
+    std::vector<filter::SearchTarget>& targets = targets_.emplace_back();
+    for (const belief::SceneObject& object : objects_) {
+      belief::ObjectBelief named;
+      named.name = object.name;
+      named.model = object.model;
+      targets.push_back(filter::target_of(named, *start_.scene, frame, tools_));
+    }
+  }
+  return core::ok_status();
+}
+
+void WindowLikelihood::set_base(std::vector<ObjectPath> base) {
+  base_ = std::move(base);
+  backgrounds_.clear();
+  // One number for all, so that all compare: by the largest object.
+  double pixels = 1.0;
+  for (std::size_t k = 0; k < frames_.size(); ++k)
+    for (std::size_t i = 0; i < objects_.size(); ++i)
+      if (base_[i][k])
+        pixels = std::max(pixels, static_cast<double>(evidence(k, frames_[k].terms, i, *base_[i][k]).measured));
+  const double frames = static_cast<double>(frames_.size());
+  share_ = rendering::tempering(frames_.front().terms.tempering.weight, pixels, frames_.front().terms.step) *
+           std::min(1.0, kEffectiveFrames / frames);
+}
+
+geometry::DepthImage WindowLikelihood::depth_of(std::size_t frame, std::size_t object, const Pose& X_WO) const {
+  const filter::FilterFrame& f = frames_[frame];
+  return filter::depth_of(targets_[frame][object], f.X_CW * X_WO, f.terms.camera, *tools_.renderer);
+}
+
+rendering::FrameTerms WindowLikelihood::terms_with(std::size_t frame, const geometry::DepthImage& known) const {
+  const filter::FilterFrame& f = frames_[frame];
+  rendering::FrameTerms terms;
+  rendering::with_known_surfaces(f.terms, known, &terms);
+  for (std::size_t i = 0; i < terms.known.size(); ++i) {
+    const float support = f.supports.data()[i];
+    if (!(support > 0.0F)) continue;
+    float& nearest = terms.known.data()[i];
+    const float hides = support + kBehindSupport;
+    if (nearest == 0.0F || hides < nearest) nearest = hides;
+  }
+  return terms;
+}
+
+rendering::PoseEvidence WindowLikelihood::evidence(std::size_t frame, const rendering::FrameTerms& terms,
+                                                   std::size_t object, const Pose& X_WO) const {
+  const rendering::WorkspacePool::Loan workspace(tools_.search->workspaces());
+  const rendering::PoseHypothesis h = filter::hypothesis(targets_[frame][object], frames_[frame].X_CW * X_WO);
+  rendering::PoseEvidence result;
+  tools_.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&result, 1));
+  return result;
+}
+
+const WindowLikelihood::Background& WindowLikelihood::background(std::size_t frame,
+                                                                 const std::vector<std::size_t>& moved) {
+  const std::pair key(frame, moved);
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto known = backgrounds_.find(key); known != backgrounds_.end()) return *known->second;
+  }
+  auto made = std::make_unique<Background>();
+  made->depth = frames_[frame].robot;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    if (!base_[i][frame] || std::binary_search(moved.begin(), moved.end(), i)) continue;
+    made->log_ratio += evidence(frame, terms_with(frame, made->depth), i, *base_[i][frame]).log_ratio;
+    filter::merge_nearest(depth_of(frame, i, *base_[i][frame]), &made->depth);
+  }
+  made->terms = terms_with(frame, made->depth);
+  const std::lock_guard lock(mutex_);  // Another thread may have made the same.
+  return *backgrounds_.emplace(key, std::move(made)).first->second;
+}
+
+double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame) {
+  const Background& known = background(frame, path.moved);
+  double sum = known.log_ratio;
+  if (path.moved.size() == 1) {
+    const auto& X_WO = path.paths.front()[frame];
+    return X_WO ? sum + evidence(frame, known.terms, path.moved.front(), *X_WO).log_ratio : sum;
+  }
+  geometry::DepthImage depth = known.depth;
+  bool first = true;
+  for (std::size_t m = 0; m < path.moved.size(); ++m) {
+    const auto& X_WO = path.paths[m][frame];
+    if (!X_WO) continue;
+    sum += first ? evidence(frame, known.terms, path.moved[m], *X_WO).log_ratio
+                 : evidence(frame, terms_with(frame, depth), path.moved[m], *X_WO).log_ratio;
+    first = false;
+    if (m + 1 < path.moved.size()) filter::merge_nearest(depth_of(frame, path.moved[m], *X_WO), &depth);
+  }
+  return sum;
+}
+
+void WindowLikelihood::evaluate(std::span<const ScenePath> paths, std::span<double> log_ratios) {
+  const std::size_t count = frames_.size();
+  tools_.search->threads().for_blocks(paths.size(), 8, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t k = 0; k < count; ++k)
+        log_ratios[i * count + k] = paths[i].impossible ? -1e6 : share_ * log_ratio(paths[i], k);
+  });
+}
+
+void WindowLikelihood::evaluate(std::size_t frame, std::size_t object, std::span<const Pose> X_WO,
+                                std::span<double> log_ratios) {
+  const Background& known = background(frame, {object});
+  tools_.search->threads().for_blocks(X_WO.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      log_ratios[i] = share_ * (known.log_ratio + evidence(frame, known.terms, object, X_WO[i]).log_ratio);
+  });
+}
+
+double WindowLikelihood::visible_share(const ScenePath& path, std::size_t frame, std::size_t object) {
+  const auto at = std::lower_bound(path.moved.begin(), path.moved.end(), object);
+  const bool moves = at != path.moved.end() && *at == object;
+  const auto& X_WO =
+      moves ? path.paths[static_cast<std::size_t>(at - path.moved.begin())][frame] : base_[object][frame];
+  if (!X_WO) return 0.0;
+  geometry::DepthImage hides = frames_[frame].robot;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    if (i == object) continue;
+    const auto other = std::lower_bound(path.moved.begin(), path.moved.end(), i);
+    const bool other_moves = other != path.moved.end() && *other == i;
+    const auto& X_WI =
+        other_moves ? path.paths[static_cast<std::size_t>(other - path.moved.begin())][frame] : base_[i][frame];
+    if (X_WI) filter::merge_nearest(depth_of(frame, i, *X_WI), &hides);
+  }
+  const rendering::PoseEvidence seen = evidence(frame, terms_with(frame, hides), object, *X_WO);
+  // By how much of it would be in view if nothing stood before it, the image's edge included.
+  return seen.in_view > 0 ? static_cast<double>(seen.covered) / seen.in_view : 0.0;
+}
+
+}  // namespace prescene::queries

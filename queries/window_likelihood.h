@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// How probable the frames of a window are, given where each object was in each of them.
+//
+// A frame's log ratio against the empty scene is the sum of the objects' log ratios, each given those before it: what
+// an object hides, or stands before, is known then (rendering::with_known_surfaces). Objects that are where all
+// hypotheses have them come first and are worked out once.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/queries/explain.h"
+
+namespace prescene::queries {
+
+/// Of one object, by frame; empty = it is not there.
+using ObjectPath = std::vector<std::optional<belief::Pose>>;
+
+/// What one instance says of all objects.
+struct ScenePath {
+  std::vector<std::size_t> moved;  ///< Objects that are not where the base has them, ascending.
+  std::vector<ObjectPath> paths;   ///< Of these.
+  bool impossible = false;
+};
+
+/// The frames that differ most: places in `frames` at which equal parts of all change have passed, the last always,
+/// filled up evenly where little changes. Ascending.
+std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int count);
+
+class WindowLikelihood {
+ public:
+  /// `objects`: names and models of the scene's objects, in the order of paths. All must outlive it.
+  WindowLikelihood(const belief::Belief& start, std::span<const belief::SceneObject> objects,
+                   std::span<const WindowFrame> frames, const ExplainContext& context,
+                   const filter::FilterTools& tools);
+  /// Errors of filter::prepare_frame.
+  core::Status prepare();
+
+  std::size_t frames() const { return stamps_.size(); }
+  core::TimeNs stamp(std::size_t frame) const { return stamps_[frame]; }
+
+  /// Where objects are if nothing is said of them.
+  void set_base(std::vector<ObjectPath> base);
+  const std::vector<ObjectPath>& base() const { return base_; }
+
+  /// log_ratios[i * frames() + k]: tempered, of paths[i] in frame k.
+  void evaluate(std::span<const ScenePath> paths, std::span<double> log_ratios);
+  /// The same of one object at many poses in one frame, all others as the base has them.
+  void evaluate(std::size_t frame, std::size_t object, std::span<const belief::Pose> X_WO,
+                std::span<double> log_ratios);
+  /// Share of the pixels of an object, as the path has it, that known things do not hide in the frame.
+  double visible_share(const ScenePath& path, std::size_t frame, std::size_t object);
+
+ private:
+  /// A frame with the objects that do not move in it.
+  struct Background {
+    double log_ratio = 0.0;
+    geometry::DepthImage depth;   // robot and these objects
+    rendering::FrameTerms terms;  // with them known
+  };
+  const Background& background(std::size_t frame, const std::vector<std::size_t>& moved);
+  rendering::FrameTerms terms_with(std::size_t frame, const geometry::DepthImage& known) const;
+  geometry::DepthImage depth_of(std::size_t frame, std::size_t object, const belief::Pose& X_WO) const;
+  rendering::PoseEvidence evidence(std::size_t frame, const rendering::FrameTerms& terms, std::size_t object,
+                                   const belief::Pose& X_WO) const;
+  double log_ratio(const ScenePath& path, std::size_t frame);
+
+  const belief::Belief& start_;
+  std::span<const belief::SceneObject> objects_;
+  std::span<const WindowFrame> window_;
+  const ExplainContext& context_;
+  const filter::FilterTools& tools_;
+  std::vector<core::TimeNs> stamps_;
+  std::vector<filter::FilterFrame> frames_;
+  std::vector<std::vector<filter::SearchTarget>> targets_;  // by frame, by object
+  std::vector<ObjectPath> base_;
+  double share_ = 1.0;  // of tempering
+  std::mutex mutex_;
+  std::map<std::pair<std::size_t, std::vector<std::size_t>>, std::unique_ptr<const Background>> backgrounds_;
+};
+
+}  // namespace prescene::queries

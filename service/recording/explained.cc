@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/explained.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "prescene/core/clock.h"
+#include "prescene/core/text.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
+#include "prescene/service/tracking/waiting_controls.h"
+
+namespace prescene::service {
+namespace {
+
+using core::fixed_text;
+using nlohmann::ordered_json;
+
+constexpr double kRounding = 1e-6;  // s
+
+/// What the robot said that it does, by the clock of the frames; controls that can't be placed are counted.
+core::Status read_actions(const ExplainOptions& options, queries::ExplainWindow& window,
+                          std::vector<std::string>& remarks) {
+  if (std::error_code none; std::filesystem::is_directory(options.path, none)) return core::ok_status();
+  PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
+  const core::TimeNs begin = window.start->stamp_ns, end = window.frames.back().observation.stamp_ns;
+  int placeless = 0;
+  for (;;) {
+    PRESCENE_TRY(const auto entry, reader->next());
+    if (!entry) break;
+    if (entry->is_json || entry->message.topic != kControlTopic) continue;
+    const auto text = interfaces::decode_cdr<interfaces::RosString>(entry->message.cdr, interfaces::kSmallMessage);
+    if (!text) continue;  // The tracker refused it, and said so.
+    const auto control = parse_control(text->data);
+    if (!control) continue;
+    if (!control->stamp_ns && std::abs(entry->message.source_ns - begin) > 3600 * core::TimeNs{1'000'000'000}) {
+      ++placeless;
+      continue;
+    }
+    for (const auto& [after_ns, action] : control->actions) {
+      const core::TimeNs time_ns = control->stamp_ns.value_or(entry->message.source_ns) + after_ns;
+      if (time_ns > begin && time_ns <= end) window.actions.emplace_back(time_ns, action);
+    }
+  }
+  if (placeless > 0)
+    remarks.push_back(std::to_string(placeless) +
+                      " controls have no stamp and came by another clock than the frames': their actions are not known "
+                      "to the explanation.");
+  return core::ok_status();
+}
+
+ordered_json value_json(const queries::EventValue& value, double shift = 0.0) {
+  return {{"mean", value.mean + shift}, {"interval", {value.low + shift, value.high + shift}}};
+}
+
+ordered_json explanation_json(const queries::Explanation& e, double from) {
+  ordered_json json = {{"event", belief::name_of(e.kind)}};
+  if (!e.object.empty()) json["object"] = e.object;
+  if (!e.partner.empty()) json["partner"] = e.partner;
+  json["probability"] = e.probability;
+  json["interval"] = {e.low, e.high};
+  json["log_bayes_factor"] = e.log_bayes_factor;
+  if (e.time) json["time"] = value_json(*e.time, from);
+  if (e.towards) json["towards_deg"] = value_json(*e.towards);
+  if (e.speed) json["speed"] = value_json(*e.speed);
+  if (e.impulse) json["impulse"] = value_json(*e.impulse);
+  if (e.touched_at) json["touched_at"] = value_json(*e.touched_at);
+  if (e.kind != belief::EventKind::kNothing && e.kind != belief::EventKind::kOther && e.time)
+    json["effects"] = {{"tips", e.tips}, {"falls", e.falls}};
+  if (!e.timeline.empty()) {
+    ordered_json timeline = ordered_json::array();
+    for (const belief::Interval& interval : e.timeline) {
+      ordered_json entry = {{"relation", belief::to_string(interval.relation)}, {"subject", interval.subject}};
+      if (!interval.other.empty()) entry["other"] = interval.other;
+      entry["begin"] = interval.begin + from;
+      entry["end"] = interval.end + from;
+      timeline.push_back(std::move(entry));
+    }
+    json["timeline"] = std::move(timeline);
+  }
+  json["sentence"] = e.sentence;
+  return json;
+}
+
+}  // namespace
+
+bool WindowKeeper::add(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief) {
+  if (!any_) first_ns_ = observation.stamp_ns;
+  any_ = true;
+  const double t = core::seconds_of(observation.stamp_ns - first_ns_);
+  if (t > to_ + kRounding) return false;
+  last_ns_ = observation.stamp_ns;
+  if (t <= from_ + kRounding)
+    window_.start = std::move(belief);
+  else
+    window_.frames.push_back({observation, std::move(belief)});
+  return true;
+}
+
+core::Result<Explained> explain_recording(const ReplayInput& input, const ExplainOptions& options,
+                                          const TrackerSettings& settings, std::uint64_t seed, Backends& backends,
+                                          const core::Cancellation& cancellation, const core::ProgressSink& progress) {
+  if (!(options.from >= 0.0 && options.to > options.from))
+    return core::invalid_input("the window from " + core::rounded_text(options.from) + " to " +
+                               core::rounded_text(options.to) +
+                               " s is none: give a --from of at least 0, and a --to that is later");
+  PRESCENE_RETURN_IF_ERROR(queries::validate(options.query));
+  queries::ExplainQuery query = options.query;
+  if (!input.scene_text().empty()) {
+    auto weights = interfaces::parse_event_weights(input.scene_text(), "the scene");
+    if (!weights) return weights.status();
+    query.weights = *weights;
+  }
+  PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
+  WindowKeeper keeper(options.from, options.to);
+  bool over = false;
+  const auto summary = input.replay(*tracker, cancellation, progress,
+                                    [&](const TrackerStep& step, const Tracker& at) -> core::Status {
+                                      over = !keeper.add(step.observation, at.belief());
+                                      return over ? core::cancelled("the window is over") : core::ok_status();
+                                    },
+                                    {});
+  if (!summary && !over) return summary.status();
+  if (cancellation.requested()) return core::cancelled("stopped on request before the window was tracked");
+  queries::ExplainWindow& window = keeper.window();
+  if (!window.start) {
+    if (summary) PRESCENE_RETURN_IF_ERROR(check_steps(*summary, settings.topics));
+    return core::invalid_input("there is no frame before the window's begin");
+  }
+  const double end = core::seconds_of(keeper.last_ns() - keeper.first_ns());
+  const double between =
+      window.frames.size() > 1
+          ? core::seconds_of(window.frames.back().observation.stamp_ns - window.frames.front().observation.stamp_ns) /
+                static_cast<double>(window.frames.size() - 1)
+          : 0.1;
+  if (window.frames.empty() || (!over && options.to > end + between + 0.01))
+    return core::invalid_input("the window from " + core::rounded_text(options.from) + " to " +
+                               core::rounded_text(options.to) + " s is not in the recording, whose last frame is at " +
+                               fixed_text(end, 2) + " s: give an earlier --to" +
+                               (window.frames.empty() ? " and an earlier --from" : ""));
+  Explained explained;
+  explained.from = core::seconds_of(window.start->stamp_ns - keeper.first_ns());
+  explained.to = end;
+  PRESCENE_RETURN_IF_ERROR(read_actions(options, window, explained.remarks));
+  PRESCENE_TRY(const auto likelihood, backends.make_likelihood());
+  queries::ExplainContext context;
+  context.simulation = backends.query_context(backends.pool());
+  context.simulation.cancellation = &cancellation;
+  context.likelihood = likelihood.get();
+  context.settings = settings.filter;
+  const core::Stopwatch watch;
+  PRESCENE_TRY(explained.answer, queries::explain(window, query, context));
+  explained.seconds = watch.seconds();
+  return explained;
+}
+
+ordered_json to_json(const Explained& explained) {
+  const queries::ExplainAnswer& answer = explained.answer;
+  ordered_json explanations = ordered_json::array(), objects = ordered_json::array(), frames = ordered_json::array();
+  for (const queries::Explanation& e : answer.explanations) explanations.push_back(explanation_json(e, explained.from));
+  for (const queries::WhereItIs& object : answer.objects)
+    objects.push_back({{"object", object.object},
+                       {"present", object.present},
+                       {"mean", {object.mean.x(), object.mean.y(), object.mean.z()}},
+                       {"radius_90", object.radius_90},
+                       {"out_of_sight", object.out_of_sight}});
+  for (const queries::DecidingFrame& frame : answer.frames)
+    frames.push_back({{"time", frame.time + explained.from},
+                      {"against_nothing", frame.against_nothing},
+                      {"against_second", frame.against_second}});
+  ordered_json remarks = answer.remarks;
+  for (const std::string& remark : explained.remarks) remarks.push_back(remark);
+  return {{"from", explained.from},
+          {"to", explained.to},
+          {"explanations", explanations},
+          {"objects", objects},
+          {"frames", frames},
+          {"text", answer.text},
+          {"remarks", remarks},
+          {"simulated_instances", answer.simulated},
+          {"weighed_instances", answer.evaluated},
+          {"failed_instances", answer.failed},
+          {"stepper", answer.stepper},
+          {"wall_seconds", explained.seconds}};
+}
+
+}  // namespace prescene::service

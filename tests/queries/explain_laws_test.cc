@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "prescene/belief/event.h"
+#include "prescene/queries/explain.h"
+#include "prescene/queries/tempered_smc.h"
+
+namespace prescene::queries {
+namespace {
+
+/// A Gaussian likelihood of the first coordinate, whose posterior and evidence under the standard normal are known.
+struct GaussianCase {
+  double mean = 0.0, deviation = 1.0;
+
+  double log_likelihood(const LatentPoint& z) const {
+    const double d = (z[0] - mean) / deviation;
+    return -0.5 * d * d;
+  }
+  double log_evidence() const {
+    const double variance = 1.0 + deviation * deviation;
+    return std::log(deviation) - 0.5 * std::log(variance) - 0.5 * mean * mean / variance;
+  }
+  double posterior_mean() const { return mean / (1.0 + deviation * deviation); }
+};
+
+TemperedResult solve(const GaussianCase& gaussian, bool guess, std::uint64_t seed, TemperedOptions options = {}) {
+  TemperedTarget target;
+  target.dimensions = 3;
+  target.moved = 2;
+  if (guess) {
+    target.guess_mean = {gaussian.mean, 0.0};
+    target.guess_deviation = {0.3, 1.0};
+  }
+  target.evaluate = [&](std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
+    for (std::size_t i = 0; i < points.size(); ++i) log_likelihoods[i] = gaussian.log_likelihood(points[i]);
+  };
+  return tempered_posterior(target, options, core::RandomStream(seed, core::Purpose::kTest));
+}
+
+TEST(TemperedPosterior, HasTheEvidenceAndTheMeanOfAGaussian) {
+  for (const GaussianCase& gaussian : {GaussianCase{0.5, 1.0}, GaussianCase{1.5, 0.1}, GaussianCase{-2.5, 0.05}})
+    for (const bool guess : {false, true}) {
+      TemperedOptions options;
+      options.runs = 8;
+      options.points = 200;
+      const TemperedResult result = solve(gaussian, guess, 7, options);
+      // Five standard errors of either, and what few runs leave open of those.
+      EXPECT_NEAR(result.mean_log_evidence, gaussian.log_evidence(), 5.0 * result.error + 0.05)
+          << gaussian.mean << " " << guess;
+      double mean = 0.0, weight = 0.0;
+      for (const TemperedPoint& point : result.points) mean += point.weight * point.z[0], weight += point.weight;
+      EXPECT_NEAR(weight, 1.0, 1e-9);
+      EXPECT_NEAR(mean, gaussian.posterior_mean(), 5.0 * gaussian.deviation / std::sqrt(100.0));
+    }
+}
+
+TEST(TemperedPosterior, RepeatsItsBits) {
+  const GaussianCase gaussian{1.0, 0.2};
+  const TemperedResult a = solve(gaussian, true, 3), b = solve(gaussian, true, 3), c = solve(gaussian, true, 4);
+  EXPECT_EQ(a.log_evidence, b.log_evidence);
+  EXPECT_NE(a.log_evidence, c.log_evidence);
+}
+
+TEST(TemperedPosterior, OfAnImpossibleLikelihoodIsFinite) {
+  TemperedTarget target;
+  target.dimensions = target.moved = 1;
+  target.evaluate = [](std::span<const LatentPoint>, std::span<double> log_likelihoods) {
+    for (double& value : log_likelihoods) value = -INFINITY;
+  };
+  const TemperedResult result = tempered_posterior(target, {}, core::RandomStream(1, core::Purpose::kTest));
+  EXPECT_LT(result.mean_log_evidence, -1e4);
+  EXPECT_TRUE(std::isfinite(result.mean_log_evidence));
+}
+
+TEST(Explain, RefusesQueriesThatAreOutOfRangeAndWindowsThatAreNone) {
+  ExplainQuery query;
+  query.frames = 1;
+  EXPECT_NE(validate(query).message().find("frames: give 2 to 64"), std::string::npos);
+  query = {};
+  query.weights.weight.fill(0.0);
+  EXPECT_NE(validate(query).message().find("events"), std::string::npos);
+  query = {};
+  const auto none = explain({}, query, {});
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.status().code(), core::StatusCode::kInvalidInput);
+}
+
+TEST(Events, NamesAndKindsAreOneToOne) {
+  for (std::size_t i = 0; i < belief::kEventKinds; ++i) {
+    const auto kind = static_cast<belief::EventKind>(i);
+    EXPECT_EQ(belief::event_kind_of(belief::name_of(kind)), kind);
+  }
+  EXPECT_FALSE(belief::event_kind_of("abducted"));
+}
+
+}  // namespace
+}  // namespace prescene::queries
