@@ -93,7 +93,7 @@ ParticleFilter::ParticleFilter(const rendering::LikelihoodBatch& likelihood, ren
       simulators_(std::move(simulators)),
       search_(likelihood, threads),
       renderer_(renderer),
-      tools_{&search_, &renderer_, &meshes_} {}
+      tools_{&search_, &renderer_, &meshes_, settings_.learned.get()} {}
 
 Belief ParticleFilter::start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const {
   return belief_from_priors(std::move(scene), seed, 0, settings_.initialise);

@@ -18,6 +18,8 @@ using belief::Particle;
 constexpr double kNearShare = 0.33;
 constexpr double kNearShift = 0.08;  // m
 constexpr double kNearTurn = 0.8;    // rad
+constexpr double kLearnedShare =
+    0.33;  // of the starts, at places that look like learned ones, where something was learned
 constexpr SearchOptions kRecoverySearch = {.refine = {.steps = 10}, .polish_candidates = 1, .polish_draws = 12};
 constexpr double kExplained = 0.015;     // m; measurements so near to a known surface are explained
 constexpr double kLeastShown = 0.08;     // share of the pixels in view that must not be hidden for a find to count ...
@@ -30,11 +32,18 @@ constexpr double kHiddenTurn = 0.8;      // rad
 
 bool lighter(const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }
 
-std::vector<Pose> recovery_starts(const Pose& X_CO, const SearchTarget& target, std::span<const Vector3d> points,
-                                  const AugmentOptions& options, const core::RandomStream& stream) {
+std::vector<Pose> recovery_starts(const Pose& X_CO, const SearchTarget& target, const rendering::FrameTerms& terms,
+                                  const Vector3d& up_C, std::span<const Vector3d> points, const AugmentOptions& options,
+                                  const core::RandomStream& stream) {
   const int near =
       points.empty() ? options.recover_starts : static_cast<int>(std::lround(kNearShare * options.recover_starts));
   std::vector<Pose> starts = disturbed_starts(X_CO, target.centre(), kNearShift, kNearTurn, near, stream);
+  if (target.learned != nullptr && !points.empty()) {
+    const auto places = static_cast<int>(std::lround(kLearnedShare * options.recover_starts));
+    const std::vector<Pose> learned = learned_starts(*target.learned, terms.depth, terms.camera, points, up_C, places,
+                                                     stream.for_purpose(core::Purpose::kSurface));
+    starts.insert(starts.end(), learned.begin(), learned.end());
+  }
   core::RandomStream draws = stream.for_purpose(core::Purpose::kDetection);
   while (static_cast<int>(starts.size()) < options.recover_starts) {
     const Vector3d& seen = points[draws.uniform_below(points.size())];
@@ -101,7 +110,8 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const Particle& last = belief::heaviest(object.particles);
   const Pose X_CO = frame.X_CW * last.X_WO;
   const std::vector<Vector3d> points = unexplained_points(frame, terms, kExplained);
-  const std::vector<Pose> starts = recovery_starts(X_CO, target, points, options, stream);
+  const std::vector<Pose> starts =
+      recovery_starts(X_CO, target, terms, frame.X_CW.rotation * frame.up_W, points, options, stream);
   const PoseCandidate found = tools.search->run(terms, target, starts, kRecoverySearch, stream).front();
 
   const rendering::PoseEvidence& e = found.evidence;

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 
+#include "prescene/filter/proposals/fit_judgement.h"
 #include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 
@@ -40,17 +41,34 @@ constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much la
 constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
 constexpr double kHitPower = 8.0;       // how much a pose's score suffers from pixels that do not match
 constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
+// Where a learned judge decides, only what is hopeless is not shown to it.
+constexpr int kKeptForJudge = 6;
+constexpr double kHopelessLogRatio = 20.0;  // nats
+constexpr double kHopelessHits = 0.5;
+constexpr double kHopelessVisible = 0.15;
+// Candidates of one cluster and model that are so near and explain so much the same are one.
+constexpr double kSamePlace = 0.01;   // m
+constexpr double kSameShare = 0.03;   // of the log ratio
+constexpr double kMostLogOdds = 8.0;  // of a find that the judge is sure of
 
 struct Proposal {
   int model = 0;
-  PoseCandidate candidate;
+  PoseCandidate candidate{};
+  int cluster = 0;    ///< Of those that were looked at.
   double cost = 0.0;  ///< nats
+  bool stands = false;
+  FitNumbers numbers{};  ///< Of `judged` ...
+  bool is_judged = false;
+  rendering::PoseEvidence judged{};
+  bool judged_standing = false;
+  double log_odds = 0.0;  ///< ... and what the judge says of them.
 
   /// A wrong model that explains much of a large thing badly must not go before a right one that explains little well.
   double score() const {
     return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kHitPower) - cost;
   }
-  void weigh(bool stands) {
+  void weigh(bool on_something) {
+    stands = on_something;
     cost = stands ? 0.0 : kFloatingCost + kFloatingShare * std::max(0.0, candidate.evidence.log_ratio);
   }
 };
@@ -58,6 +76,134 @@ struct Proposal {
 bool acceptable(const rendering::PoseEvidence& evidence, double cost, const DetectionOptions& options) {
   return evidence.log_ratio - cost > options.min_log_ratio && evidence.hit_share() >= options.min_hit_share &&
          evidence.log_ratio_per_visible_pixel() >= kMinEvidence && evidence.visible >= kMinVisible * evidence.in_view;
+}
+
+/// Who decides about candidates where something was learned of all that is looked for.
+class Judge {
+ public:
+  Judge(std::span<const WantedModel> wanted, const Vector3d& up_C, const DetectionOptions& options,
+        const FilterTools& tools, DetectionTrace* trace)
+      : wanted_(wanted), up_C_(up_C), options_(options), tools_(tools), trace_(trace) {
+    all_learned_ = tools.learned != nullptr && !wanted.empty() &&
+                   std::all_of(wanted.begin(), wanted.end(), [](const auto& w) { return w.target.learned != nullptr; });
+  }
+
+  /// Whether it decides; else the thresholds of DetectionOptions do.
+  bool decides() const { return all_learned_ && (!tools_.learned->fit.empty() || trace_ != nullptr); }
+
+  /// While nothing was learned of fits, the thresholds decide whose numbers are recorded as a find's.
+  double log_odds(const Proposal& p) const {
+    if (!tools_.learned->fit.empty()) return tools_.learned->fit.log_odds(p.numbers);
+    const bool good = acceptable(p.candidate.evidence, p.cost, options_) &&
+                      static_cast<double>(p.numbers[kFitOutline]) >= kMinOutline && p.score() > 1.0;
+    return good ? std::log(p.score()) : -kMostLogOdds;
+  }
+  /// Whether a find is still worth what a candidate must be.
+  bool believes(double log_odds_at_end) const {
+    return tools_.learned->fit.empty() || log_odds_at_end >= options_.least_log_odds;
+  }
+  double probability(double accepted, double at_end) const {
+    const auto& c = tools_.learned->confidence;
+    const double odds = std::clamp(c[0] + c[1] * at_end + c[2] * accepted, -kMostLogOdds, kMostLogOdds);
+    return 1.0 / (1.0 + std::exp(-odds));
+  }
+
+  /// Judges those of which something has changed.
+  void judge(const rendering::FrameTerms& terms, const std::vector<Cluster>& clusters,
+             std::vector<Proposal>& proposals) const {
+    std::vector<std::uint8_t> fresh(proposals.size(), 0);
+    tools_.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
+      Proposal& p = proposals[i];
+      const rendering::PoseEvidence& e = p.candidate.evidence;
+      const bool same = p.is_judged && p.judged_standing == p.stands && p.judged.log_ratio == e.log_ratio &&
+                        p.judged.covered == e.covered && p.judged.visible == e.visible && p.judged.hits == e.hits;
+      Fit fit = fit_of(p.model, p.candidate.X_CO, e, clusters[static_cast<std::size_t>(p.cluster)], p.stands);
+      set_rivals_among(proposals, i, fit);
+      const FitNumbers before = p.numbers;
+      if (same)
+        set_rivals(fit, p.numbers);
+      else
+        p.numbers = fit_numbers(fit, terms, *tools_.renderer);
+      if (same && p.numbers == before) return;
+      fresh[i] = 1;
+      p.is_judged = true;
+      p.judged = e;
+      p.judged_standing = p.stands;
+      p.log_odds = log_odds(p);
+    });
+    if (trace_ == nullptr) return;
+    for (std::size_t i = 0; i < proposals.size(); ++i)
+      if (fresh[i] != 0)
+        trace_->candidates.push_back({proposals[i].model, proposals[i].candidate.X_CO, proposals[i].numbers});
+  }
+
+  /// Of a find as it is at the end.
+  FitNumbers numbers_of(const rendering::FrameTerms& terms, const Cluster& cluster, const Detection& found) const {
+    Fit fit = fit_of(found.model, found.X_CO, found.evidence, cluster, found.stands);
+    FitNumbers numbers = fit_numbers(fit, terms, *tools_.renderer);
+    // Who its rivals were is known from when it was accepted.
+    numbers[kFitRivalModels] = found.numbers[kFitRivalModels];
+    numbers[kFitRivalPoses] = found.numbers[kFitRivalPoses];
+    return numbers;
+  }
+
+  DetectionTrace* trace() const { return trace_; }
+
+ private:
+  Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, const Cluster& cluster,
+             bool stands) const {
+    Fit fit;
+    fit.target = &wanted_[static_cast<std::size_t>(model)].target;
+    fit.learned = fit.target->learned;
+    fit.X_CO = X_CO;
+    fit.evidence = evidence;
+    fit.cluster_C = cluster.points_C;
+    fit.up_C = up_C_;
+    fit.stands = stands;
+    return fit;
+  }
+
+  void set_rivals_among(const std::vector<Proposal>& proposals, std::size_t mine, Fit& fit) const {
+    const Proposal& own = proposals[mine];
+    const Vector3d centre = own.candidate.X_CO * fit.target->centre();
+    const double apart = 0.5 * static_cast<double>(fit.target->mesh->radius);
+    for (std::size_t i = 0; i < proposals.size(); ++i) {
+      const Proposal& other = proposals[i];
+      const double log_ratio = other.candidate.evidence.log_ratio;
+      if (other.model != own.model) {
+        if (other.cluster == own.cluster) fit.rival_models = std::max(fit.rival_models, log_ratio);
+      } else if ((other.candidate.X_CO * fit.target->centre() - centre).norm() > apart) {
+        fit.rival_poses = std::max(fit.rival_poses, log_ratio);
+      }
+    }
+  }
+
+  std::span<const WantedModel> wanted_;
+  Vector3d up_C_;
+  const DetectionOptions& options_;
+  const FilterTools& tools_;
+  DetectionTrace* trace_;
+  bool all_learned_ = false;
+};
+
+/// The best of each group of candidates that are one, best first.
+void keep_distinct(const Vector3d& centre, std::size_t most, std::vector<PoseCandidate>& candidates) {
+  std::vector<PoseCandidate> kept;
+  for (const PoseCandidate& candidate : candidates) {
+    if (kept.size() >= most) break;
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const PoseCandidate& k) {
+      return (k.X_CO * centre - candidate.X_CO * centre).norm() < kSamePlace &&
+             std::abs(k.evidence.log_ratio - candidate.evidence.log_ratio) <
+                 kSameShare * std::abs(k.evidence.log_ratio);
+    });
+    if (!known) kept.push_back(candidate);
+  }
+  candidates = std::move(kept);
+}
+
+/// What need not be judged.
+bool hopeless(const rendering::PoseEvidence& e) {
+  return e.log_ratio < kHopelessLogRatio || e.hit_share() < kHopelessHits || e.visible < kHopelessVisible * e.in_view;
 }
 
 /// Whether one of the lowest points of an object at X_WO is right above a surface, or a little below.
@@ -77,38 +223,62 @@ bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
   });
 }
 
-/// The best poses of each wanted model in each cluster, ordered by cluster, model, rank.
-std::vector<Proposal> propose(const rendering::FrameTerms& terms, std::span<const Cluster> clusters,
-                              const Surroundings& surroundings, std::span<const WantedModel> wanted,
-                              std::span<const int> left, const DetectionOptions& options, const FilterTools& tools,
+/// What a cluster and model are tried from: places that look like learned ones of the model, if there are any, and
+/// random poses.
+std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
+                            const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream) {
+  if (target.learned == nullptr) return cluster_starts(cluster, target, up_C, kStandingStarts, options.starts, stream);
+  std::vector<Pose> starts = learned_starts(*target.learned, sampled.depth, sampled.camera, cluster.points_C, up_C,
+                                            options.learned_starts, stream.for_purpose(core::Purpose::kSurface));
+  const std::vector<Pose> others =
+      cluster_starts(cluster, target, up_C, kStandingStarts, options.starts_beside_learned, stream);
+  starts.insert(starts.end(), others.begin(), others.end());
+  return starts;
+}
+
+/// The best poses of each wanted model in each cluster from `first` on, ordered by cluster, model, rank.
+std::vector<Proposal> propose(const rendering::FrameTerms& terms, const SampledDepth& sampled,
+                              const std::vector<Cluster>& clusters, std::size_t first, const Surroundings& surroundings,
+                              std::span<const WantedModel> wanted, std::span<const int> left, const Judge& judge,
+                              const DetectionOptions& options, const FilterTools& tools,
                               const core::RandomStream& stream, std::uint64_t round) {
   struct Task {
-    const Cluster* cluster;
+    int cluster;
     int model;
     std::vector<PoseCandidate> found;
   };
   const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
   std::vector<Task> tasks;
-  for (const Cluster& cluster : clusters)
+  for (std::size_t cluster = first; cluster < clusters.size(); ++cluster)
     for (std::size_t model = 0; model < wanted.size(); ++model)
-      if (left[model] > 0) tasks.push_back({&cluster, static_cast<int>(model), {}});
+      if (left[model] > 0) tasks.push_back({static_cast<int>(cluster), static_cast<int>(model), {}});
   tools.search->threads().for_each_index(tasks.size(), [&](std::size_t i) {
     const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
     Task& task = tasks[i];
     const SearchTarget& target = wanted[static_cast<std::size_t>(task.model)].target;
     core::RandomStream draws = stream;
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
-    const std::vector<Pose> starts = cluster_starts(*task.cluster, target, up_C, kStandingStarts, options.starts, mine);
+    const std::vector<Pose> starts =
+        starts_in(clusters[static_cast<std::size_t>(task.cluster)], sampled, target, up_C, options, mine);
     task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
     std::erase_if(task.found, [&](const PoseCandidate& c) {
       return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
     });
-    task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
+    if (judge.decides())
+      keep_distinct(target.centre(), kKeptForJudge, task.found);
+    else
+      task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
   });
   std::vector<Proposal> proposals;
   for (const Task& task : tasks)
     for (const PoseCandidate& candidate : task.found)
-      if (acceptable(candidate.evidence, 0.0, options)) proposals.push_back({task.model, candidate});
+      if (judge.decides() ? !hopeless(candidate.evidence) : acceptable(candidate.evidence, 0.0, options)) {
+        Proposal proposal;
+        proposal.model = task.model;
+        proposal.candidate = candidate;
+        proposal.cluster = task.cluster;
+        proposals.push_back(proposal);
+      }
   return proposals;
 }
 
@@ -130,10 +300,10 @@ std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, st
 }
 
 /// Accepts the strongest proposal, puts it into the frame, judges the others again, until none is acceptable.
-void accept_greedily(std::vector<Proposal> proposals, const Surroundings& surroundings,
-                     std::span<const WantedModel> wanted, const DetectionOptions& options, const FilterTools& tools,
-                     rendering::FrameTerms& terms, geometry::DepthImage& known, std::vector<int>& left,
-                     std::vector<Detection>& found) {
+void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>& clusters,
+                     const Surroundings& surroundings, std::span<const WantedModel> wanted, const Judge& judge,
+                     const DetectionOptions& options, const FilterTools& tools, rendering::FrameTerms& terms,
+                     geometry::DepthImage& known, std::vector<int>& left, std::vector<Detection>& found) {
   SupportSurfaces things = surfaces_of(found, wanted, surroundings.X_WC);
   const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
   const auto weigh_standing = [&] {
@@ -144,14 +314,20 @@ void accept_greedily(std::vector<Proposal> proposals, const Surroundings& surrou
       p.weigh(stands(target, X_WO, surroundings.up_W, ground));
     });
     // What stands on nothing now may stand on what is found next.
-    std::erase_if(proposals, [&](const Proposal& p) { return !acceptable(p.candidate.evidence, 0.0, options); });
+    std::erase_if(proposals, [&](const Proposal& p) {
+      return judge.decides() ? hopeless(p.candidate.evidence) : !acceptable(p.candidate.evidence, 0.0, options);
+    });
+    if (judge.decides()) judge.judge(terms, clusters, proposals);
+  };
+  const auto worse = [&](const Proposal& a, const Proposal& b) {
+    return judge.decides() ? a.log_odds < b.log_odds : a.score() < b.score();
   };
   std::vector<Proposal> waiting;
   weigh_standing();
   while (!proposals.empty()) {
-    const auto best = std::max_element(proposals.begin(), proposals.end(),
-                                       [](const auto& a, const auto& b) { return a.score() < b.score(); });
-    if (!acceptable(best->candidate.evidence, best->cost, options)) {
+    const auto best = std::max_element(proposals.begin(), proposals.end(), worse);
+    if (judge.decides() ? best->log_odds < options.least_log_odds
+                        : !acceptable(best->candidate.evidence, best->cost, options)) {
       proposals.erase(best);
       continue;
     }
@@ -163,13 +339,20 @@ void accept_greedily(std::vector<Proposal> proposals, const Surroundings& surrou
       proposals.erase(best);
       continue;
     }
-    if (outline_support(terms, depth, kOutlineStep) < kMinOutline) {
+    if (!judge.decides() && outline_support(terms, depth, kOutlineStep) < kMinOutline) {
       // Its surface may end where a neighbour is that is not found yet.
       waiting.push_back(*best);
       proposals.erase(best);
       continue;
     }
-    found.push_back({best->model, best->candidate.X_CO, best->candidate.evidence});
+    Detection detection;
+    detection.model = best->model;
+    detection.X_CO = best->candidate.X_CO;
+    detection.evidence = best->candidate.evidence;
+    detection.cluster = best->cluster;
+    detection.numbers = best->numbers;
+    detection.log_odds = best->log_odds;
+    found.push_back(detection);
     --left[model];
     merge_nearest(depth, &known);
     with_known_surfaces(terms, depth, &terms);
@@ -213,23 +396,33 @@ void settle(const rendering::FrameTerms& terms, std::span<const WantedModel> wan
   }
 }
 
-/// Gives each find the probability that it is right.
-void judge(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const FilterTools& tools,
-           std::vector<Detection>& found) {
+/// Gives each find the probability that it is right; returns the judge's log odds of each with all others known.
+std::vector<double> believe(const rendering::FrameTerms& terms, const std::vector<Cluster>& clusters,
+                            std::span<const WantedModel> wanted, const Judge& judge, const FilterTools& tools,
+                            std::vector<Detection>& found) {
   const std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
+  std::vector<double> log_odds(found.size(), 0.0);
   for (std::size_t i = 0; i < found.size(); ++i) {
     rendering::FrameTerms mine = terms;
     for (std::size_t j = 0; j < found.size(); ++j)
       if (j != i) with_known_surfaces(mine, depths[j], &mine);
     const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
+    if (judge.decides()) {
+      const FitNumbers numbers = judge.numbers_of(mine, clusters[static_cast<std::size_t>(found[i].cluster)], found[i]);
+      log_odds[i] = tools.learned->fit.log_odds(numbers);
+      found[i].probability = judge.probability(found[i].log_odds, log_odds[i]);
+      continue;
+    }
     found[i].probability =
         probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer));
   }
+  return log_odds;
 }
 
 /// Takes back what is no longer acceptable now that the others are where they are.
-void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const DetectionOptions& options,
-               std::vector<int>& left, std::vector<Detection>& found) {
+void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const Judge& judge,
+               const DetectionOptions& options, std::span<const double> log_odds, std::vector<int>& left,
+               std::vector<Detection>& found) {
   for (std::size_t i = found.size(); i-- > 0;) {
     std::vector<Detection> others = found;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
@@ -239,9 +432,13 @@ void take_back(const Surroundings& surroundings, std::span<const WantedModel> wa
     const auto model = static_cast<std::size_t>(detection.model);
     const Pose X_WO = surroundings.X_WC * detection.X_CO;
     detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground);
-    Proposal proposal{detection.model, {detection.X_CO, detection.evidence}};
+    Proposal proposal;
+    proposal.model = detection.model;
+    proposal.candidate = {detection.X_CO, detection.evidence};
     proposal.weigh(detection.stands);
-    if (acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kMinOutline) continue;
+    if (judge.decides() ? !hopeless(detection.evidence) && judge.believes(log_odds[i])
+                        : acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kMinOutline)
+      continue;
     ++left[model];
     found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
   }
@@ -342,15 +539,17 @@ double least_support_area(std::span<const WantedModel> wanted) {
 std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const geometry::DepthImage& known,
                               const SampledDepth& sampled, const Surroundings& surroundings,
                               std::span<const WantedModel> wanted, const DetectionOptions& options,
-                              const FilterTools& tools, const core::RandomStream& stream) {
+                              const FilterTools& tools, const core::RandomStream& stream, DetectionTrace* trace) {
   rendering::FrameTerms terms;
   with_known_surfaces(frame_terms, walls_in(frame_terms, sampled, surroundings), &terms);
+  const Judge judge(wanted, surroundings.X_WC.rotation.conjugate() * surroundings.up_W, options, tools, trace);
   std::vector<int> left;
   for (const WantedModel& model : wanted) left.push_back(model.count);
   rendering::FrameTerms explained_terms = terms;
   geometry::DepthImage explained_depth =
       known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
   std::vector<Detection> found;
+  std::vector<Cluster> looked_at;
   for (int round = 0; round < kRounds; ++round) {
     auto mask = explained_pixels(sampled, explained_depth, terms.camera, kExplainedDepth);
     for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] |= surroundings.background.data()[i];
@@ -366,13 +565,17 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const ge
     }
     if (static_cast<int>(clusters.size()) > options.max_clusters)
       clusters.resize(static_cast<std::size_t>(options.max_clusters));
-    std::vector<Proposal> proposals = propose(explained_terms, clusters, surroundings, wanted, left, options, tools,
-                                              stream, static_cast<std::uint64_t>(round));
+    const std::size_t first = looked_at.size();
+    std::move(clusters.begin(), clusters.end(), std::back_inserter(looked_at));
+    std::vector<Proposal> proposals = propose(explained_terms, sampled, looked_at, first, surroundings, wanted, left,
+                                              judge, options, tools, stream, static_cast<std::uint64_t>(round));
     if (proposals.empty()) continue;
-    accept_greedily(std::move(proposals), surroundings, wanted, options, tools, explained_terms, explained_depth, left,
-                    found);
+    accept_greedily(std::move(proposals), looked_at, surroundings, wanted, judge, options, tools, explained_terms,
+                    explained_depth, left, found);
     settle(terms, wanted, options, tools, stream, found);
-    take_back(surroundings, wanted, options, left, found);
+    std::vector<double> log_odds(found.size(), 0.0);
+    if (judge.decides()) log_odds = believe(terms, looked_at, wanted, judge, tools, found);
+    take_back(surroundings, wanted, judge, options, log_odds, left, found);
     explained_terms = terms;
     explained_depth = known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
     for (const geometry::DepthImage& depth : depths_of(found, wanted, terms.camera, tools)) {
@@ -380,7 +583,12 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const ge
       with_known_surfaces(explained_terms, depth, &explained_terms);
     }
   }
-  judge(terms, wanted, tools, found);
+  const std::vector<double> log_odds = believe(terms, looked_at, wanted, judge, tools, found);
+  if (trace != nullptr)
+    for (std::size_t i = 0; i < found.size(); ++i)
+      trace->finds.push_back({found[i].model, found[i].X_CO, found[i].numbers, found[i].log_odds, log_odds[i]});
+  if (judge.decides() && trace == nullptr)
+    std::erase_if(found, [&](const Detection& d) { return d.probability < options.least_probability; });
   return found;
 }
 

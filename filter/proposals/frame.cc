@@ -74,6 +74,7 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   frame->stamp_ns = observation.stamp_ns;
   frame->X_WC = observation.X_WC;
   frame->X_CW = observation.X_WC.inverse();
+  frame->up_W = scene->gravity_W.norm() > 1e-9 ? Vector3d(-scene->gravity_W.normalized()) : Vector3d::UnitZ();
   frame->X_WG.assign(X_WG.begin(), X_WG.end());
   frame->color_models.clear();
   frame->color_objects.clear();
@@ -110,6 +111,7 @@ SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& fram
   target.mesh = tools.meshes->get(model.visual, model.collision, MeshDetail::kLikelihood);
   target.material = material_of(model.surface, model.color);
   target.facet_lever = tools.meshes->facet_lever(*target.mesh);
+  if (tools.learned != nullptr) target.learned = find(*tools.learned, *target.mesh);
   const auto color = std::find(frame.color_models.begin(), frame.color_models.end(), model.name);
   if (color != frame.color_models.end()) target.color_model = static_cast<int>(color - frame.color_models.begin());
   return target;

@@ -107,6 +107,12 @@ void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice)
       ->capture_default_str();
 }
 
+void add_proposals_option(CLI::App& verb, std::string& path) {
+  verb.add_option("--proposals", path,
+                  "File of `prescene train` for this scene: what it learned is used wherever objects are looked for")
+      ->check(file_name());
+}
+
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given) {
   const auto take = [&verb](const char* option, auto& to, const auto& from) {
     if (verb.get_option(option)->count() > 0) to = from;

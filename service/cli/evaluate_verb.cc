@@ -11,8 +11,11 @@
 #include "prescene/service/evaluate/cube_tosses.h"
 #include "prescene/service/evaluate/explained_events.h"
 #include "prescene/service/evaluate/finding.h"
+#include "prescene/service/evaluate/simulated_supports.h"
 #include "prescene/service/evaluate/tracking_suite.h"
 #include "prescene/service/evaluate/ycb_video.h"
+#include "prescene/service/training/proposals_file.h"
+#include "prescene/service/training/train_proposals.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -29,6 +32,8 @@ struct EvaluateOptions {
   TrackingOptions tracking;
   std::string keep;
   ExplainedEventsOptions explain;
+  std::string proposals;
+  std::string train;
 };
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
@@ -122,7 +127,24 @@ core::Status run_tracking(const EvaluateOptions& options, VerbContext& context) 
   return core::ok_status();
 }
 
+/// What was learned of the models of finding's rooms before, or is learned now.
+core::Result<filter::LearnedModels> learned_of_rooms(const EvaluateOptions& options, VerbContext& context) {
+  if (options.proposals.empty() && options.train.empty()) return filter::LearnedModels();
+  PRESCENE_TRY(const belief::Scene models, room_models());
+  if (!options.proposals.empty()) return load_proposals(options.proposals, models);
+  PRESCENE_RETURN_IF_ERROR(check_output("--train", options.train, {}));
+  BackendSettings settings;
+  settings.likelihood = options.likelihood;
+  Backends backends(context.pool(), settings);
+  PRESCENE_TRY(TrainedProposals trained,
+               train_proposals(models, {}, backends, context.progress("training"), &context.cancellation()));
+  PRESCENE_RETURN_IF_ERROR(write_proposals(options.train, trained.proposals));
+  return filter::LearnedModels(std::make_shared<filter::LearnedProposals>(std::move(trained.proposals)));
+}
+
 core::Status run(const EvaluateOptions& options, VerbContext& context) {
+  if (options.name != "finding" && !(options.proposals.empty() && options.train.empty()))
+    return core::invalid_input("--proposals and --train go with finding only: leave them out");
   if (options.name == "tracking") return run_tracking(options, context);
   const bool simulated = options.name == "credible_regions" || options.name == "finding" || options.name == "explain";
   if (!simulated && options.data.empty())
@@ -144,6 +166,7 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
     finding.first = context.options().seed;
     finding.likelihood = options.likelihood;
     if (options.frames > 0) finding.frames = options.frames;
+    PRESCENE_TRY(finding.learned, learned_of_rooms(options, context));
     PRESCENE_TRY(const FindingReport report,
                  evaluate_finding(finding, context.pool(), progress, &context.cancellation()));
     document = to_json(report);
@@ -219,6 +242,14 @@ Verb add_evaluate_verb(CLI::App& app) {
           "--keep", options->keep,
           "Of tracking: a folder for the recordings and their scene files; those that are there are used again")
       ->check(file_name());
+  verb->add_option("--proposals", options->proposals,
+                   "Of finding: a file that --train wrote; what it learned of the rooms' models is used")
+      ->check(file_name());
+  verb->add_option(
+          "--train", options->train,
+          "Of finding: learn the rooms' models first, as `prescene train` does with seed 1, and write this file")
+      ->check(file_name())
+      ->excludes("--proposals");
   verb->footer("Example: prescene evaluate ycb_video --data data --json");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

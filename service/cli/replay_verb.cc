@@ -15,6 +15,7 @@
 #include "prescene/service/recording/session_report.h"
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
+#include "prescene/service/training/proposals_file.h"
 #include "replay_text.h"
 #include "verb.h"
 
@@ -29,6 +30,7 @@ struct ReplayOptions {
   BackendSettings backends;
   std::string scene;
   std::string report;
+  std::string proposals;
   bool over_dds = false;
   BusReplayOptions bus;
   RecordingReadOptions read;
@@ -150,7 +152,10 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
 
 core::Status run_here(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
-  PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
+  PRESCENE_TRY(TrackerSettings settings, settings_of(options, input));
+  if (!options.proposals.empty()) {
+    PRESCENE_TRY(settings.filter.learned, load_proposals(options.proposals, *input.scene()));
+  }
   Backends backends(context.pool(), options.backends);
   const std::uint64_t seed =
       context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
@@ -248,6 +253,8 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
 /// kInvalidInput for an option that would do nothing.
 core::Status check_options(const ReplayOptions& options) {
   const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
+  if (options.over_dds && given("--proposals"))
+    return core::invalid_input("--proposals is for replaying here: give it to the running `serve` instead");
   if (!options.over_dds) {
     for (const char* name : {"--domain", "--ros-distro"})
       if (given(name))
@@ -292,6 +299,7 @@ Verb add_replay_verb(CLI::App& app) {
                  "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
       ->check(file_name());
+  add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->bus.dds, options->tracker.topics);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);

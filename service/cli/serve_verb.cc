@@ -5,6 +5,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/training/proposals_file.h"
 #include "prescene/service/view/live_view.h"
 #include "verb.h"
 
@@ -14,6 +15,7 @@ namespace {
 struct ServeOptions {
   std::string scene;
   std::string record;
+  std::string proposals;
   LiveSettings settings;
   BackendSettings backends;
   ViewOptions view;
@@ -42,6 +44,9 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.settings.dds));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
+  if (!options.proposals.empty()) {
+    PRESCENE_TRY(options.settings.tracker.filter.learned, load_proposals(options.proposals, *scene));
+  }
   PRESCENE_RETURN_IF_ERROR(check_recording("--record", options.record, {options.scene}));
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
@@ -85,6 +90,7 @@ Verb add_serve_verb(CLI::App& app) {
                    "Port of a page for the browser that shows the belief live; 0 = any that is free")
       ->check(CLI::Range(0, 65535));
   add_web_options(*verb, "view-", options->view);
+  add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
   add_camera_options(*verb, options->settings.tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);

@@ -92,6 +92,7 @@ Verb add_inspect_verb(CLI::App& app);
 Verb add_evaluate_verb(CLI::App& app);
 Verb add_explain_verb(CLI::App& app);
 Verb add_calibrate_verb(CLI::App& app);
+Verb add_train_verb(CLI::App& app);
 Verb add_record_verb(CLI::App& app);
 Verb add_replay_verb(CLI::App& app);
 Verb add_serve_verb(CLI::App& app);
@@ -112,6 +113,8 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
 void add_web_options(CLI::App& verb, const std::string& prefix, ViewOptions& view);
 /// --likelihood and --graphics-device.
 void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice);
+/// --proposals.
+void add_proposals_option(CLI::App& verb, std::string& path);
 /// `settings` (of a recording) with those of the options above that were on the command line.
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given);
 

@@ -73,7 +73,9 @@ core::Result<FindingReport> evaluate_finding(const FindingOptions& options, core
     const std::uint64_t number = options.first + static_cast<std::uint64_t>(i);
     if (progress) progress({static_cast<double>(i) / options.frames, std::nullopt, "room " + std::to_string(number)});
     PRESCENE_TRY(const SupportsFrame frame, simulate_supports(number, *renderer));
-    filter::ParticleFilter filter(*batch, *renderer, threads, {});
+    filter::FilterSettings settings;
+    settings.learned = options.learned;
+    filter::ParticleFilter filter(*batch, *renderer, threads, settings);
     const belief::Belief start = filter.start(frame.scene, number);
     const double before = core::process_cpu_seconds();
     const filter::StepResult result = filter.step(start, frame.observation, {});

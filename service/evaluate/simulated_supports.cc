@@ -398,6 +398,16 @@ core::Result<belief::ObjectModel> model_of(const Kind& kind) {
 
 }  // namespace
 
+core::Result<belief::Scene> room_models() {
+  belief::Scene scene;
+  scene.name = "rooms";
+  for (const Kind& kind : object_kinds()) {
+    PRESCENE_TRY(belief::ObjectModel model, model_of(kind));
+    scene.models.push_back(std::move(model));
+  }
+  return scene;
+}
+
 core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::Renderer& renderer) {
   const core::RandomStream stream(number, core::Purpose::kScenario);
   core::RandomStream draws = stream;

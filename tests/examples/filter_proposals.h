@@ -38,6 +38,25 @@ extern const Pose X_WC, X_CO, X_WO;
 extern const std::vector<Pose> X_WG;
 extern const geometry::DepthImage known;
 
+namespace boosted_trees_h {
+extern const std::vector<float> values, example;
+extern const std::vector<std::uint8_t> yes;
+}  // namespace boosted_trees_h
+
+namespace fit_judgement_h {
+extern const Fit fit;
+extern const LearnedProposals proposals;
+extern const std::unique_ptr<rendering::Renderer> renderer;
+}  // namespace fit_judgement_h
+
+namespace learned_proposals_h {
+extern const std::unique_ptr<LearnedProposals> proposals;
+extern const geometry::DepthImage depth;
+extern const geometry::PinholeCamera camera;
+extern const std::vector<Vector3d> points_C;
+extern const Vector3d up_C;
+}  // namespace learned_proposals_h
+
 namespace detection_h {
 extern const Surroundings surroundings;
 extern const std::vector<WantedModel> wanted;

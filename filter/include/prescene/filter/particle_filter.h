@@ -14,6 +14,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,8 @@
 
 namespace prescene::filter {
 
+using LearnedModels = std::shared_ptr<const LearnedProposals>;
+
 struct FilterSettings {
   FrameOptions frame;
   InitialiseOptions initialise;
@@ -45,6 +48,8 @@ struct FilterSettings {
   ResampleOptions resample;
   TrackStateOptions track;
   SupportTrackingOptions supports;
+  /// What training learned of the scene's models (service/training); null = nothing. Finding uses it.
+  LearnedModels learned;
   /// By model name. What an object's colours were learned to be (frame.colors) takes precedence.
   ColorModels colors;
   /// switch. Look for objects that are not tracked. Range true or false. Measured: docs/studies/tracking.md.

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "prescene/filter/proposals/fit_judgement.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/frame_surfaces.h"
 #include "prescene/filter/proposals/pose_search.h"
@@ -19,6 +20,10 @@ struct DetectionOptions {
   SegmentationOptions segmentation;
   /// count. Random poses tried for each cluster and model. Range 8 to 1000. Measured: docs/studies/tracking.md.
   int starts = 192;
+  /// count. The same beside what was learned (FilterTools::learned), ... Range 0 to 1000. Chosen.
+  int starts_beside_learned = 24;
+  /// count. ... and poses that the learned places propose. Range 0 to 1000. Chosen.
+  int learned_starts = 36;
   SearchOptions search;
   /// count. The largest clusters only. Range 1 to 100. Chosen.
   int max_clusters = 14;
@@ -26,6 +31,11 @@ struct DetectionOptions {
   double min_hit_share = 0.85;
   /// nats. Untempered, at the likelihood's resolution. Range 0 to 10000. Tuned: docs/studies/tracking.md.
   double min_log_ratio = 60.0;
+  /// nats. Log odds from which on a candidate is accepted where a learned judge decides (FilterTools::learned) in place
+  /// of these thresholds, ... Range -10 to 10. Chosen.
+  double least_log_odds = -0.8;
+  /// probability. ... and that a find is right at the end. Range 0 to 1. Chosen.
+  double least_probability = 0.5;
 };
 
 /// A model that is looked for, and how many of it may be found.
@@ -40,7 +50,28 @@ struct Detection {
   rendering::PoseEvidence evidence;  ///< With the other detections as known surfaces.
   double outline = 1.0;              ///< outline_support, likewise.
   bool stands = true;                ///< On a support or another detection.
-  double probability = 1.0;          ///< probability_right.
+  double probability = 1.0;          ///< probability_right, or as the learned judge says.
+  int cluster = 0;                   ///< Of those that were looked at, in their order.
+  FitNumbers numbers{};              ///< What a learned judge saw when it was accepted, ...
+  double log_odds = 0.0;             ///< ... and made of it.
+};
+
+/// What a judge is learned from: all that was judged.
+struct DetectionTrace {
+  struct Candidate {
+    int model = 0;  ///< Index into the wanted models.
+    Pose X_CO;
+    FitNumbers numbers;
+  };
+  struct Find {
+    int model = 0;
+    Pose X_CO;
+    FitNumbers numbers;
+    double accepted_log_odds = 0.0;
+    double final_log_odds = 0.0;
+  };
+  std::vector<Candidate> candidates;
+  std::vector<Find> finds;  ///< All of them, whatever DetectionOptions::least_probability says.
 };
 
 /// Probability that a find is right: the more evidence there is in all, and the more of what the sensor model expects
@@ -52,11 +83,14 @@ double least_support_area(std::span<const WantedModel> wanted);
 
 /// Objects found, in the order of their acceptance (strongest first). `terms` is the frame with what is known put in;
 /// `known` its rendered depth at terms.camera (empty = nothing). No pose reaches into a support or another find, and
-/// one that stands on neither must explain more. The same bits for any number of threads.
+/// one that stands on neither must explain more. Where something was learned of all wanted models, the learned judge
+/// decides. With a `trace`, nothing is left out for want of probability; without judge, the trace is what one is
+/// learned from. The same bits for any number of threads.
 std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry::DepthImage& known,
                               const SampledDepth& sampled, const Surroundings& surroundings,
                               std::span<const WantedModel> wanted, const DetectionOptions& options,
-                              const FilterTools& tools, const core::RandomStream& stream);
+                              const FilterTools& tools, const core::RandomStream& stream,
+                              DetectionTrace* trace = nullptr);
 
 /// The measured pixels of `sampled` that a surface of `known` (depth in `camera`) explains, as a mask of the sampled
 /// camera's size: less than `tolerance` (m; growing with the squared depth beyond 1.2 m) in front of the surface and

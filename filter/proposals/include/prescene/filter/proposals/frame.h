@@ -17,6 +17,7 @@
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
 #include "prescene/filter/proposals/learned_colors.h"
+#include "prescene/filter/proposals/learned_proposals.h"
 #include "prescene/filter/proposals/pose_search.h"
 #include "prescene/filter/proposals/render_scene.h"
 #include "prescene/filter/proposals/segmentation.h"
@@ -31,6 +32,7 @@ struct FilterTools {
   PoseSearch* search = nullptr;
   rendering::Renderer* renderer = nullptr;
   MeshCache* meshes = nullptr;
+  const LearnedProposals* learned = nullptr;  ///< What training learned of the scene's models; null = nothing.
 };
 
 struct FrameOptions {
@@ -49,6 +51,7 @@ struct FilterFrame {
   core::TimeNs stamp_ns = 0;
   Pose X_WC;
   Pose X_CW;
+  Vector3d up_W = Vector3d::UnitZ();                ///< Against gravity; W's z where there is none.
   std::vector<Pose> X_WG;                           ///< Of the robot's bodies, in the order of Scene::robot.
   rendering::FrameTerms terms;                      ///< With the supports as what is seen where no object is.
   geometry::DepthImage supports;                    ///< Their depth in terms.camera, 0 = none.

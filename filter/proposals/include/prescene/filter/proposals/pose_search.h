@@ -22,6 +22,8 @@ using geometry::Pose;
 using geometry::Vector3d;
 using geometry::Vector6d;
 
+struct LearnedModel;  // prescene/filter/proposals/learned_proposals.h
+
 /// The object that is looked for.
 struct SearchTarget {
   rendering::MeshHandle mesh;
@@ -29,6 +31,7 @@ struct SearchTarget {
   int color_model = -1;  ///< Index into the frame's colour models, -1 = no colour.
   /// m, of the mesh as facet_lever() says (facets.h).
   double facet_lever = 0.0;
+  const LearnedModel* learned = nullptr;  ///< What was learned of it, if anything was; outlives the search.
 
   /// Centre of the mesh's bounding sphere: turns are made about it, wherever the object's frame lies.
   Vector3d centre() const { return mesh->centre.cast<double>(); }

@@ -13,6 +13,7 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
+#include "prescene/filter/particle_filter.h"
 #include "prescene/rendering/gpu/likelihood_choice.h"
 
 namespace prescene::service {
@@ -20,6 +21,8 @@ namespace prescene::service {
 struct FindingOptions {
   std::uint64_t first = 1;  ///< Number of the first simulated room, see simulate_supports. Also the filter's seed.
   int frames = 60;
+  /// What was learned of the rooms' models (room_models()); null = nothing.
+  filter::LearnedModels learned;
   rendering::LikelihoodChoice likelihood;  ///< Who scores poses; nothing but times depend on it.
 };
 

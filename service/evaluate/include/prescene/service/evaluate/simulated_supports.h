@@ -42,6 +42,9 @@ struct SupportsFrame {
   bool has_floor = false;
 };
 
+/// A scene of all models that the rooms' objects are of, and nothing else: what proposals for them are learned of.
+core::Result<belief::Scene> room_models();
+
 /// The frame of this number: room, objects, camera and noise are drawn from it alone. The noise is that of the
 /// simulated camera with figures that are not the filter's. Listed are all supports, none, or some, in turn.
 core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::Renderer& renderer);
