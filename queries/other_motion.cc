@@ -11,9 +11,9 @@ namespace {
 using belief::Pose;
 using geometry::Vector3d;
 
-constexpr double kStays = 0.45, kMoves = 0.45, kUnseen = 0.1;  // in a frame
-constexpr std::size_t kDraws = 48;                             // of the integral over poses
-constexpr double kLeastShift = 0.003, kLeastTurn = 0.035;      // m and rad; deviations of the draws
+constexpr double kStaysInFrame = 0.45, kMoves = 0.45, kUnseen = 0.1;  // in a frame
+constexpr std::size_t kDraws = 48;                                    // of the integral over poses
+constexpr double kLeastShift = 0.003, kLeastTurn = 0.035;             // m and rad; deviations of the draws
 
 double log_normal_density(double x, double deviation) {
   return -0.5 * x * x / (deviation * deviation) - std::log(deviation) - 0.5 * std::log(2.0 * std::numbers::pi);
@@ -51,7 +51,7 @@ OtherMotion other_motion(const EventPaths& events, WindowLikelihood& likelihood,
     double log_stays = -1e300, log_moves = -1e300;
     if (at) {
       likelihood.evaluate(k, object, std::span(&*at, 1), std::span(&log_stays, 1));
-      log_stays += std::log(kStays);
+      log_stays += std::log(kStaysInFrame);
     }
     std::optional<Pose> best;
     double best_ratio = -1e300;

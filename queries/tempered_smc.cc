@@ -48,9 +48,9 @@ struct Run {
   bool moves = false;  // in this round
 };
 
-class Sampler {
+class TemperedSampler {
  public:
-  Sampler(const TemperedTarget& target, const TemperedOptions& options, const core::RandomStream& stream)
+  TemperedSampler(const TemperedTarget& target, const TemperedOptions& options, const core::RandomStream& stream)
       : target_(target), options_(options), stream_(stream), moved_(static_cast<std::size_t>(target.moved)) {}
 
   TemperedResult run(const core::Cancellation* cancellation) {
@@ -256,7 +256,7 @@ class Sampler {
 
 TemperedResult tempered_posterior(const TemperedTarget& target, const TemperedOptions& options,
                                   const core::RandomStream& stream, const core::Cancellation* cancellation) {
-  return Sampler(target, options, stream).run(cancellation);
+  return TemperedSampler(target, options, stream).run(cancellation);
 }
 
 }  // namespace prescene::queries
