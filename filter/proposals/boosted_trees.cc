@@ -49,7 +49,7 @@ double BoostedTrees::log_odds(std::span<const float> values) const {
 }
 
 BoostedTrees fit_boosted_trees(std::span<const float> values, int columns, std::span<const std::uint8_t> yes,
-                               std::span<const float> weights, const BoostingOptions& options) {
+                               std::span<const float> weights, const Boosting& options) {
   const std::size_t rows = yes.size(), width = static_cast<std::size_t>(columns);
   PRESCENE_CHECK(values.size() == rows * width && (weights.empty() || weights.size() == rows));
   const auto weight_of = [&](std::size_t r) { return weights.empty() ? 1.0 : static_cast<double>(weights[r]); };

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "filter_fixture.h"
 #include "prescene/geometry/sampling.h"
@@ -74,7 +76,8 @@ TEST(BoostedTrees, OfOneKindOfExampleThereAreNone) {
 
 /// A box on a table, seen by a camera that may be rolled.
 struct SeenBox {
-  explicit SeenBox(double roll) {
+  explicit SeenBox(double roll, double turn = 0.4) {
+    X_WO = {geometry::exp_rotation({0.0, 0.0, turn}), {0.0, 0.0, 0.09}};
     const Pose X_WC = test_camera_pose();
     X_WC_ = {(X_WC.rotation * geometry::exp_rotation({0.0, 0.0, roll})).normalized(), X_WC.translation};
     rendering::RenderScene scene;
@@ -97,7 +100,7 @@ struct SeenBox {
     return found;
   }
 
-  Pose X_WO{geometry::exp_rotation({0.0, 0.0, 0.4}), {0.0, 0.0, 0.09}};
+  Pose X_WO;
   Pose X_WC_;
   Vector3d up_C;
   rendering::MeshHandle mesh;
@@ -191,6 +194,41 @@ TEST(LearnedProposals, BelongToAMeshAndToNoOther) {
   EXPECT_NE(find(proposals, *seen.mesh), nullptr);
   const auto other = rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{{0.06, 0.10, 0.181}}));
   EXPECT_EQ(find(proposals, *other), nullptr);
+}
+
+/// A first step of the filter that knows places on the box, and nothing of fits.
+StepResult first_step(int threads, LearnedModels learned, const Pose& X_WO) {
+  Backends backends(threads);
+  const std::vector<belief::ObjectModel> models = {box_model("box", {0.06, 0.10, 0.18})};
+  const SimulatedSequence sequence = still_sequence(models, {X_WO});
+  FilterSettings settings;
+  settings.learned = std::move(learned);
+  ParticleFilter filter = backends.make_filter(settings);
+  return filter.step(filter.start(open_scene(models), 1), sequence.observe(0, *backends.renderer), {});
+}
+
+TEST(LearnedProposals, FindAnObjectAndGiveTheSameBitsForAnyNumberOfThreads) {
+  auto learned = std::make_shared<LearnedProposals>();
+  for (int i = 0; i < 12; ++i) {
+    const LearnedModel view = learned_from(SeenBox(0.0, 0.5 * i), 20);
+    if (i == 0) {
+      learned->models.push_back(view);
+      MeshCache meshes;
+      const belief::ObjectModel model = box_model("box", {0.06, 0.10, 0.18});
+      learned->models.front().mesh = mesh_hash(*meshes.get(model.visual, model.collision, MeshDetail::kLikelihood));
+      continue;
+    }
+    LearnedModel& all = learned->models.front();
+    all.patches.insert(all.patches.end(), view.patches.begin(), view.patches.end());
+    all.X_AO.insert(all.X_AO.end(), view.X_AO.begin(), view.X_AO.end());
+  }
+  const Pose X_WO{geometry::exp_rotation({0.0, 0.0, 1.1}), {0.05, -0.1, 0.09}};
+  const StepResult result = first_step(1, learned, X_WO);
+  EXPECT_EQ(result.counters.found, 1);
+  EXPECT_LT((belief::estimate(result.belief.objects[0]).mode.translation - X_WO.translation).norm(), 0.02);
+  EXPECT_EQ(belief::content_hash(first_step(2, learned, X_WO).belief), belief::content_hash(result.belief));
+  // It makes a difference: other poses were tried.
+  EXPECT_NE(belief::content_hash(first_step(2, nullptr, X_WO).belief), belief::content_hash(result.belief));
 }
 
 }  // namespace

@@ -17,19 +17,19 @@ WeightReport seen(double nats) {
   return report;
 }
 
-constexpr core::TimeNs kFrame = 33'333'333;
+constexpr core::TimeNs kFrameNs = 33'333'333;
 
 TEST(TrackState, FollowsTheEvidence) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
-  filter::update_track(seen(5.0), kFrame, options, object);
+  filter::update_track(seen(5.0), kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
-  EXPECT_EQ(object.last_seen_ns, kFrame);
-  filter::update_track(seen(2.0), 2 * kFrame, options, object);
+  EXPECT_EQ(object.last_seen_ns, kFrameNs);
+  filter::update_track(seen(2.0), 2 * kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   EXPECT_EQ(object.frames_unseen, 1);
-  EXPECT_EQ(object.last_seen_ns, kFrame);
-  filter::update_track(seen(5.0), 3 * kFrame, options, object);
+  EXPECT_EQ(object.last_seen_ns, kFrameNs);
+  filter::update_track(seen(5.0), 3 * kFrameNs, options, object);
   EXPECT_EQ(object.frames_unseen, 0);
 }
 
@@ -38,10 +38,10 @@ TEST(TrackState, AsksOfAPoseWhatItCanSay) {
   belief::ObjectBelief object;
   WeightReport report = seen(1.2);
   report.expected_evidence = 2.0;
-  filter::update_track(report, kFrame, {}, object);
+  filter::update_track(report, kFrameNs, {}, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
   report.expected_evidence = 6.5;
-  filter::update_track(report, 2 * kFrame, {}, object);
+  filter::update_track(report, 2 * kFrameNs, {}, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   EXPECT_EQ(filter::evidence_scale(6.5), 1.0);
   EXPECT_GT(filter::evidence_scale(0.0), 0.0);
@@ -52,10 +52,10 @@ TEST(TrackState, IsLostOnlyAfterSomeFramesOfContradiction) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
   for (int i = 1; i < options.lost_after_frames; ++i) {
-    filter::update_track(seen(-1.0), i * kFrame, options, object);
+    filter::update_track(seen(-1.0), i * kFrameNs, options, object);
     EXPECT_EQ(object.state, TrackState::kDoubtful) << i;
   }
-  filter::update_track(seen(-1.0), options.lost_after_frames * kFrame, options, object);
+  filter::update_track(seen(-1.0), options.lost_after_frames * kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
 }
 
@@ -65,7 +65,7 @@ TEST(TrackState, HidingEndsTheContradiction) {
   WeightReport hidden;
   hidden.hidden_weight = 0.9;
   for (int i = 1; i < 40; ++i) {
-    filter::update_track(i % options.lost_after_frames == 0 ? hidden : seen(-1.0), i * kFrame, options, object);
+    filter::update_track(i % options.lost_after_frames == 0 ? hidden : seen(-1.0), i * kFrameNs, options, object);
     EXPECT_NE(object.state, TrackState::kLost) << i;
   }
 }
@@ -75,12 +75,12 @@ TEST(TrackState, AFewPixelsAreNotEnoughToBeSure) {
   const filter::TrackStateOptions options;
   WeightReport corner = seen(9.0);
   corner.visible_pixels = options.tracked_pixels - 1;
-  filter::update_track(corner, kFrame, options, object);
+  filter::update_track(corner, kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
-  for (int i = 2; i < 20; ++i) filter::update_track(corner, i * kFrame, options, object);
+  for (int i = 2; i < 20; ++i) filter::update_track(corner, i * kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   corner.visible_pixels = options.tracked_pixels;
-  filter::update_track(corner, 20 * kFrame, options, object);
+  filter::update_track(corner, 20 * kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
 }
 
@@ -104,10 +104,10 @@ TEST(TrackState, ExistenceFallsWithContradictionAndRecovers) {
   belief::ObjectBelief object;
   object.existence = 0.9;
   const filter::TrackStateOptions options;
-  for (int i = 1; i < 40; ++i) filter::update_track(seen(-3.0), i * kFrame, options, object);
+  for (int i = 1; i < 40; ++i) filter::update_track(seen(-3.0), i * kFrameNs, options, object);
   EXPECT_LT(object.existence, 0.01);
   EXPECT_GT(object.existence, 0.0);
-  for (int i = 40; i < 80; ++i) filter::update_track(seen(5.0), i * kFrame, options, object);
+  for (int i = 40; i < 80; ++i) filter::update_track(seen(5.0), i * kFrameNs, options, object);
   EXPECT_GT(object.existence, 0.99);
   EXPECT_LT(object.existence, 1.0);
 }

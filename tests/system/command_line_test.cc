@@ -29,7 +29,7 @@ TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
   EXPECT_EQ(run_program({"--help"}).exit_code, 0);
   EXPECT_EQ(run_program({"--version"}).exit_code, 0);
   for (const char* verb : {"validate", "predict", "inspect", "record", "replay", "explain", "serve", "ask", "achieve",
-                           "view", "evaluate", "calibrate"}) {
+                           "view", "train", "evaluate", "calibrate"}) {
     const Finished help = run_program({verb, "--help"});
     EXPECT_EQ(help.exit_code, 0) << verb;
     EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;
@@ -52,6 +52,9 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
                                              {"record"},
                                              {"evaluate", "nothing", "--data", "."},
                                              {"calibrate", "cube_tosses"},
+                                             {"train", scenario("milk_on_bin")},
+                                             {"train", scenario("milk_on_bin"), "-o", "p.bin", "--views", "0"},
+                                             {"evaluate", "tracking", "--proposals", "p.bin"},
                                              {"explain", "none.mcap", "--from", "1"},
                                              {"explain", "none.mcap", "--from", "2", "--to", "1"},
                                              {"explain", "none.mcap", "--from", "-1", "--to", "1"},
@@ -176,7 +179,10 @@ TEST(CommandLine, InputThatCannotBeUsedEndsWithTwo) {
                                              {"serve", "--scene", file("large.yaml")},
                                              {"ask", "--question", "{"},
                                              {"evaluate", "cube_tosses", "--data", file("none")},
-                                             {"calibrate", file("none"), "-o", file("o.yaml")}}) {
+                                             {"calibrate", file("none"), "-o", file("o.yaml")},
+                                             {"train", file("none.yaml"), "-o", file("p.bin")},
+                                             {"train", file("bad.yaml"), "-o", file("p.bin")},
+                                             {"evaluate", "finding", "--proposals", file("bad.ply")}}) {
     const Finished finished = run_program(args, {own_domain()});
     EXPECT_EQ(finished.exit_code, 2) << args[0] << " " << args[1] << ": " << finished.err;
     EXPECT_NE(finished.err.find("prescene " + args[0]), std::string::npos) << finished.err;

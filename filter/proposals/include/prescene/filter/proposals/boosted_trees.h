@@ -36,7 +36,7 @@ struct BoostedTrees {
   friend bool operator==(const BoostedTrees&, const BoostedTrees&) = default;
 };
 
-struct BoostingOptions {
+struct Boosting {
   int trees = 120;
   double rate = 0.08;         ///< Share of each tree's step that is taken.
   double shrinkage = 8.0;     ///< Added to a leaf's curvature: how many examples of even odds it takes to believe it.
@@ -46,6 +46,6 @@ struct BoostingOptions {
 /// `values`: row by row, `columns` finite numbers an example; yes.size() examples, of `weights` (empty = all 1).
 /// Without examples of both kinds there are no trees. The same bits on every run.
 BoostedTrees fit_boosted_trees(std::span<const float> values, int columns, std::span<const std::uint8_t> yes,
-                               std::span<const float> weights, const BoostingOptions& options);
+                               std::span<const float> weights, const Boosting& options);
 
 }  // namespace prescene::filter
