@@ -207,15 +207,19 @@ Result<ColorImage> decode_png_color(std::span<const std::uint8_t> bytes, const I
   return decode<geometry::Rgb>(bytes, header, PngDecoder::Output::kRgb8);
 }
 
-Result<DepthImage> decode_png_depth(std::span<const std::uint8_t> bytes, double metres_per_unit,
-                                    const ImageLimits& limits) {
-  PRESCENE_CHECK(metres_per_unit > 0.0 && std::isfinite(metres_per_unit));
+Result<geometry::Image<std::uint16_t>> decode_png_gray16(std::span<const std::uint8_t> bytes,
+                                                         const ImageLimits& limits) {
   PRESCENE_TRY(const PngHeader header, parse_header(bytes, limits));
   if (!is_grey(header) || header.bit_depth != 16) {
     return core::invalid_input("is " + kind_text(header) + ", but depth needs 16-bit grey; is it the colour image?");
   }
-  PRESCENE_TRY(const geometry::Image<std::uint16_t> units,
-               decode<std::uint16_t>(bytes, header, PngDecoder::Output::kGrey));
+  return decode<std::uint16_t>(bytes, header, PngDecoder::Output::kGrey);
+}
+
+Result<DepthImage> decode_png_depth(std::span<const std::uint8_t> bytes, double metres_per_unit,
+                                    const ImageLimits& limits) {
+  PRESCENE_CHECK(metres_per_unit > 0.0 && std::isfinite(metres_per_unit));
+  PRESCENE_TRY(const geometry::Image<std::uint16_t> units, decode_png_gray16(bytes, limits));
   DepthImage depth(units.width(), units.height());
   for (std::size_t i = 0; i < units.size(); ++i) {
     const std::uint16_t value = units.data()[i];

@@ -46,6 +46,9 @@ core::Result<geometry::ColorImage> decode_png_color(std::span<const std::uint8_t
 /// z in metres = value * metres_per_unit from 16-bit grey; 0 and 65535 mean no measurement (0 in the image).
 core::Result<geometry::DepthImage> decode_png_depth(std::span<const std::uint8_t> bytes, double metres_per_unit,
                                                     const ImageLimits& limits = {});
+/// Values of 16-bit grey as they are.
+core::Result<geometry::Image<std::uint16_t>> decode_png_gray16(std::span<const std::uint8_t> bytes,
+                                                               const ImageLimits& limits = {});
 /// Values of 1- to 16-bit grey, or palette indices, as they are.
 core::Result<geometry::LabelImage> decode_png_label(std::span<const std::uint8_t> bytes,
                                                     const ImageLimits& limits = {});
