@@ -61,6 +61,12 @@ PRESCENE_FIELDS(RosCameraInfo, Field{"header", &M::header}, Field{"height", &M::
                 Field{"distortion_model", &M::distortion_model}, Field{"d", &M::d}, Field{"k", &M::k},
                 Field{"r", &M::r}, Field{"p", &M::p}, Field{"binning_x", &M::binning_x},
                 Field{"binning_y", &M::binning_y}, Field{"roi", &M::roi});
+PRESCENE_FIELDS(RosPointField, Field{"name", &M::name}, Field{"offset", &M::offset}, Field{"datatype", &M::datatype},
+                Field{"count", &M::count});
+PRESCENE_FIELDS(RosPointCloud2, Field{"header", &M::header}, Field{"height", &M::height}, Field{"width", &M::width},
+                Field{"fields", &M::fields}, Field{"is_bigendian", &M::is_bigendian},
+                Field{"point_step", &M::point_step}, Field{"row_step", &M::row_step}, Field{"data", &M::data},
+                Field{"is_dense", &M::is_dense});
 PRESCENE_FIELDS(RosJointState, Field{"header", &M::header}, Field{"name", &M::name}, Field{"position", &M::position},
                 Field{"velocity", &M::velocity}, Field{"effort", &M::effort});
 PRESCENE_FIELDS(RosObjectHypothesis, Field{"class_id", &M::class_id}, Field{"score", &M::score});
@@ -123,7 +129,7 @@ struct MinWireSize<std::array<T, n>> {
   DO(RosPoint) DO(RosQuaternion) DO(RosPose) DO(RosPoseStamped) DO(RosPoseWithCovariance) \
   DO(RosPoseWithCovarianceStamped) DO(RosPoseArray) DO(RosTransform) DO(RosTransformStamped) DO(RosTfMessage) \
   DO(RosTwist) DO(RosTwistStamped) DO(RosImage) DO(RosCompressedImage) DO(RosRegionOfInterest) \
-  DO(RosCameraInfo) DO(RosJointState) DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose) \
+  DO(RosCameraInfo) DO(RosPointField) DO(RosPointCloud2) DO(RosJointState) DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose) \
   DO(RosBoundingBox3d) DO(RosDetection3d) DO(RosDetection3dArray) DO(RosUvCoordinate) DO(RosMeshFile) \
   DO(RosMarker) DO(RosMarkerArray) DO(RosKeyValue) DO(RosDiagnosticStatus) DO(RosDiagnosticArray)
 // clang-format on

@@ -11,7 +11,7 @@
 namespace prescene::interfaces {
 namespace {
 
-constexpr std::array<RosType, 36> kTypes = {{
+constexpr std::array<RosType, 38> kTypes = {{
     {"builtin_interfaces/msg/Duration", "builtin_interfaces::msg::dds_::Duration_",
      "RIHS01_e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b",
      "int32 sec\n"
@@ -124,6 +124,23 @@ constexpr std::array<RosType, 36> kTypes = {{
      "float64[] position\n"
      "float64[] velocity\n"
      "float64[] effort\n"},
+    {"sensor_msgs/msg/PointCloud2", "sensor_msgs::msg::dds_::PointCloud2_",
+     "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5",
+     "std_msgs/Header header\n"
+     "uint32 height\n"
+     "uint32 width\n"
+     "PointField[] fields\n"
+     "bool is_bigendian\n"
+     "uint32 point_step\n"
+     "uint32 row_step\n"
+     "uint8[] data\n"
+     "bool is_dense\n"},
+    {"sensor_msgs/msg/PointField", "sensor_msgs::msg::dds_::PointField_",
+     "RIHS01_5c6a4750728c2bcfbbf7037225b20b02d4429634732146b742dee1726637ef01",
+     "string name\n"
+     "uint32 offset\n"
+     "uint8 datatype\n"
+     "uint32 count\n"},
     {"sensor_msgs/msg/RegionOfInterest", "sensor_msgs::msg::dds_::RegionOfInterest_",
      "RIHS01_ad16bcba5f9131dcdba6fbded19f726f5440e3c513b4fb586dd3027eeed8abb1",
      "uint32 x_offset\n"
@@ -288,6 +305,8 @@ PRESCENE_NAME(RosCameraInfo, "sensor_msgs/msg/CameraInfo")
 PRESCENE_NAME(RosCompressedImage, "sensor_msgs/msg/CompressedImage")
 PRESCENE_NAME(RosImage, "sensor_msgs/msg/Image")
 PRESCENE_NAME(RosJointState, "sensor_msgs/msg/JointState")
+PRESCENE_NAME(RosPointCloud2, "sensor_msgs/msg/PointCloud2")
+PRESCENE_NAME(RosPointField, "sensor_msgs/msg/PointField")
 PRESCENE_NAME(RosRegionOfInterest, "sensor_msgs/msg/RegionOfInterest")
 PRESCENE_NAME(RosColorRgba, "std_msgs/msg/ColorRGBA")
 PRESCENE_NAME(RosHeader, "std_msgs/msg/Header")

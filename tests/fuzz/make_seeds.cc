@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes the seeds of the fuzz targets: make_fuzz_seeds FOLDER. Small, sound inputs of every kind that the decoders
 // know.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <initializer_list>
@@ -19,6 +20,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
+#include "tests/interfaces/images/rvl_coder.h"
 #include "tests/interfaces/ros_messages/schema_walk.h"
 #include "tests/support/paths.h"
 #include "tree_kinds.h"
@@ -171,6 +173,50 @@ void write_message_seeds(const std::string& target) {
   }
 }
 
+/// Colour and depth as image_transport packs them, and an organised cloud.
+void write_packed_images(const RosHeader& header) {
+  geometry::Image<std::uint16_t> codes(4, 3);
+  const std::vector<std::uint16_t> values = {0, 0, 0, 1000, 1001, 999, 0, 65535, 1, 0, 0, 5};
+  std::copy(values.begin(), values.end(), codes.data());
+  const auto behind_header = [](std::vector<std::uint8_t> payload) {
+    // Inverse depth with a = 10100, b = -1009.
+    const std::vector<std::uint8_t> start = {0, 0, 0, 0, 0x00, 0xd0, 0x1d, 0x46, 0x00, 0x40, 0x7c, 0xc4};
+    payload.insert(payload.begin(), start.begin(), start.end());
+    return payload;
+  };
+  std::vector<std::uint8_t> rvl = {4, 0, 0, 0, 3, 0, 0, 0};
+  const std::vector<std::uint8_t> code = tests::rvl_code(values);
+  rvl.insert(rvl.end(), code.begin(), code.end());
+  const auto png = encode_png(std::as_const(codes).view());
+  const auto seed = [&](const std::string& name, const std::string& format, const std::vector<std::uint8_t>& data) {
+    write_seed("cdr_compressed_image", name, encode_cdr(RosCompressedImage{header, format, data}));
+  };
+  for (const std::string encoding : {"16UC1", "32FC1"}) {
+    seed(encoding + "_png", encoding + "; compressedDepth png", behind_header(png));
+    seed(encoding + "_rvl", encoding + "; compressedDepth rvl", behind_header(rvl));
+  }
+  seed("depth_png", "16UC1; png compressed ", png);
+  const geometry::ColorImage color(5, 4, {10, 20, 30});
+  seed("jpeg", "rgb8; jpeg compressed bgr8", encode_jpeg(color.view()));
+  seed("color_png", "rgb8; png compressed bgr8", encode_png(color.view()));
+  std::vector<std::uint8_t> sized = {4, 3};
+  sized.insert(sized.end(), code.begin(), code.end());
+  write_seed("rvl", "published", sized);
+  std::vector<std::uint8_t> empty = tests::rvl_words({200 * 100, 0});
+  empty.insert(empty.begin(), {200, 100});
+  write_seed("rvl", "empty", empty);
+
+  RosPointCloud2 cloud{header, 8, 9, {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}}, false, 12, 9 * 12, {}, false};
+  for (int i = 0; i < 72; ++i) {
+    const float point[3] = {0.1F * static_cast<float>(i % 9 - 4), 0.1F * static_cast<float>(i / 9 - 4), 0.8F};
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(point);
+    cloud.data.insert(cloud.data.end(), bytes, bytes + sizeof point);
+  }
+  write_seed("cdr_point_cloud", "organised", encode_cdr(cloud));
+  cloud.fields[2].datatype = 8;
+  write_seed("cdr_point_cloud", "beyond", encode_cdr(cloud));
+}
+
 void write_sound_messages() {
   const geometry::PinholeCamera camera{6, 4, 5.0, 5.0, 2.5, 1.5};
   const geometry::DepthImage depth(6, 4, 0.75F);
@@ -197,6 +243,7 @@ void write_sound_messages() {
     image.step = 5 * bytes_per_pixel - 1;
     write_seed("cdr_image", std::string(encoding) + "_short", encode_cdr(image));
   }
+  write_packed_images(header);
   RosCameraInfo info = to_ros_camera_info(camera, header);
   write_seed("cdr_camera_info", "plain", encode_cdr(info));
   info.d = {-0.3, 0.1, 0.001, -0.002, 0.05};
@@ -228,6 +275,7 @@ int main(int argc, char** argv) {
   write_recording_seed("zstd", McapCompression::kZstd, 1500);
   write_message_seeds<RosImage>("image");
   write_message_seeds<RosCompressedImage>("compressed_image");
+  write_message_seeds<RosPointCloud2>("point_cloud");
   write_message_seeds<RosCameraInfo>("camera_info");
   write_message_seeds<RosJointState>("joint_state");
   write_message_seeds<RosTfMessage>("tf");

@@ -31,6 +31,29 @@ inline void convert(const RosImage& image) {
   if (const auto color = to_color_image(image, rules)) PRESCENE_CHECK(color->size() <= image.data.size());
 }
 
+/// Depth that is finite and as large as said.
+template <class Message>
+void check_depth(const Message& message, const ImageRules& rules) {
+  DepthImageReport report;
+  const auto depth = to_depth_image(message, rules, &report);
+  if (!depth) {
+    PRESCENE_CHECK(!depth.status().message().empty());
+    return;
+  }
+  PRESCENE_CHECK(report.measured + report.missing == static_cast<std::int64_t>(depth->size()));
+  PRESCENE_CHECK(depth->size() <= rules.max_pixels);
+  for (std::size_t i = 0; i < depth->size(); ++i)
+    PRESCENE_CHECK(std::isfinite(depth->data()[i]) && depth->data()[i] >= 0.0F);
+}
+
+inline void convert(const RosCompressedImage& image) {
+  const ImageRules rules{.max_side = 1024, .max_pixels = 1U << 18, .mono16_is_depth = true};
+  check_depth(image, rules);
+  if (const auto color = to_color_image(image, rules)) PRESCENE_CHECK(color->size() <= rules.max_pixels);
+}
+
+inline void convert(const RosPointCloud2& cloud) { check_depth(cloud, {.max_side = 1024, .max_pixels = 1U << 18}); }
+
 inline void convert(const RosCameraInfo& info) {
   for (const bool rectified : {false, true}) {
     if (const auto camera = to_camera(info, {.rectified = rectified}))

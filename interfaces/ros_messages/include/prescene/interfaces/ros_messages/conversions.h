@@ -98,6 +98,22 @@ core::Result<geometry::DepthImage> to_depth_image(const RosImage& image, const I
 /// odd width (nv12 and nv21: or height), and for a Bayer pattern of fewer than 3 x 3 pixels.
 core::Result<geometry::ColorImage> to_color_image(const RosImage& image, const ImageRules& rules = {});
 
+/// Depth from what ROS's image_transport sends on <topic>/compressedDepth: a header of 12 bytes, then PNG of 16-bit
+/// grey or RVL, of 16UC1 (mono16 by rule) or of 32FC1 as inverse depth; and from such a PNG alone, as on
+/// <topic>/compressed. Which coding it is, the bytes say where they can, else `format`. kInvalidInput for JPEG, which
+/// does not keep depth, and for a header that is none; kUnsupported for another encoding; errors of the decoders.
+core::Result<geometry::DepthImage> to_depth_image(const RosCompressedImage& image, const ImageRules& rules = {},
+                                                  DepthImageReport* report = nullptr);
+/// Colour from JPEG or PNG, whatever `format` says. Errors of the decoders.
+core::Result<geometry::ColorImage> to_color_image(const RosCompressedImage& image, const ImageRules& rules = {});
+
+/// Depth from the z of an organised cloud (a point for each pixel, in rows) in the optical frame of the camera: x
+/// right, y down, z forward. kInvalidInput for a cloud that is not organised, fields that contradict each other or the
+/// data, points of another frame, and a median above 100 m; kUnsupported for coordinates that are not float32 or
+/// float64.
+core::Result<geometry::DepthImage> to_depth_image(const RosPointCloud2& cloud, const ImageRules& rules = {},
+                                                  DepthImageReport* report = nullptr);
+
 struct CameraRules {
   bool rectified = false;  ///< The images are rectified: use P instead of K.
   int image_width = 0;     ///< Of the images that go with it; 0 = not checked.

@@ -196,6 +196,30 @@ struct RosCameraInfo {
   friend bool operator==(const RosCameraInfo&, const RosCameraInfo&) = default;
 };
 
+/// sensor_msgs/PointField: datatype 1 int8, 2 uint8, 3 int16, 4 uint16, 5 int32, 6 uint32, 7 float32, 8 float64.
+struct RosPointField {
+  std::string name;
+  std::uint32_t offset = 0;
+  std::uint8_t datatype = 0;
+  std::uint32_t count = 0;
+  friend bool operator==(const RosPointField&, const RosPointField&) = default;
+};
+
+/// sensor_msgs/PointCloud2: points of `point_step` bytes in rows of `row_step` bytes; a height above 1 says that the
+/// cloud is organised like an image.
+struct RosPointCloud2 {
+  RosHeader header;
+  std::uint32_t height = 0;
+  std::uint32_t width = 0;
+  std::vector<RosPointField> fields;
+  bool is_bigendian = false;
+  std::uint32_t point_step = 0;
+  std::uint32_t row_step = 0;
+  std::vector<std::uint8_t> data;
+  bool is_dense = false;
+  friend bool operator==(const RosPointCloud2&, const RosPointCloud2&) = default;
+};
+
 /// sensor_msgs/JointState: position rad or m, velocity rad/s or m/s, effort N m or N; each empty or as long as name.
 struct RosJointState {
   RosHeader header;

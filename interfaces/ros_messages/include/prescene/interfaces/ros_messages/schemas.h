@@ -75,6 +75,10 @@ const RosType& ros_type<RosImage>();
 template <>
 const RosType& ros_type<RosJointState>();
 template <>
+const RosType& ros_type<RosPointCloud2>();
+template <>
+const RosType& ros_type<RosPointField>();
+template <>
 const RosType& ros_type<RosRegionOfInterest>();
 template <>
 const RosType& ros_type<RosColorRgba>();
