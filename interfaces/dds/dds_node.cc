@@ -10,16 +10,18 @@
 #include <cstdlib>
 #include <deque>
 #include <exception>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
+#include <dds/ddsrt/log.h>
+#include "bus_census.h"
 #include "graph_announcement.h"
 #include "idl_messages.h"
 #include "prescene/core/check.h"
@@ -43,12 +45,15 @@ std::string configuration(const DdsOptions& options) {
       std::to_string(options.receive_buffer_bytes) + "B\"/><MaxSampleSize>" +
       // Beyond our own limit, so that what exceeds it comes here and is counted.
       std::to_string(2 * options.max_message_bytes) + "B</MaxSampleSize></Internal>";
+  if (options.find_interfaces)
+    xml += "<Tracing><Category>config</Category><OutputFile>/dev/null</OutputFile></Tracing>";
   if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
   return xml;
 }
 
-// What the system grants of a receive buffer, bytes; nothing where it does not say.
-std::optional<int> granted_buffer(int asked) {
+}  // namespace
+
+std::optional<int> granted_receive_buffer(int asked) {
   const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (socket < 0) return std::nullopt;
   int granted = 0;
@@ -60,8 +65,39 @@ std::optional<int> granted_buffer(int asked) {
   return granted / 2;  // Linux doubles it for its own bookkeeping
 }
 
+namespace {
+
+/// Reads the names of the network interfaces off Cyclone's trace, which has no other way to tell them.
+class InterfaceListener {
+ public:
+  explicit InterfaceListener(bool listens) : listens_(listens) {
+    if (!listens_) return;
+    dds_set_trace_sink(
+        [](void* self, const dds_log_data_t* line) {
+          constexpr std::string_view kBegin = "selected interfaces: ";
+          const std::string_view text(line->message, line->size);
+          const std::size_t at = text.find(kBegin);
+          if (at == std::string_view::npos) return;
+          const std::string_view rest = text.substr(at + kBegin.size());
+          static_cast<InterfaceListener*>(self)->found_ = rest.substr(0, rest.find_last_not_of(" \n") + 1);
+        },
+        this);
+  }
+  ~InterfaceListener() {
+    if (listens_) dds_set_trace_sink(nullptr, nullptr);
+  }
+  InterfaceListener(const InterfaceListener&) = delete;
+  InterfaceListener& operator=(const InterfaceListener&) = delete;
+
+  std::string take() const { return found_; }
+
+ private:
+  bool listens_;
+  std::string found_;
+};
+
 void check_buffer(const DdsOptions& options, const core::LogSink& log) {
-  const std::optional<int> granted = granted_buffer(options.receive_buffer_bytes);
+  const std::optional<int> granted = granted_receive_buffer(options.receive_buffer_bytes);
   if (!granted || *granted >= options.receive_buffer_bytes) return;
   core::log(
       log, core::LogLevel::kWarning,
@@ -94,10 +130,9 @@ struct DdsNode::Impl {
   dds_entity_t waitset = 0;
   dds_entity_t stop = 0;
   std::unique_ptr<GraphAnnouncement> graph;
-  std::mutex census_mutex;                          // guards what is known of other nodes' writers
-  dds_entity_t census = 0;                          // a reader of the writers on the bus; made when first asked for
-  std::map<std::string, std::string> census_taken;  // topics in the form of DDS, by the bytes of the writer's key
-  mutable std::mutex mutex;                         // guards the two lists; their entries stay where they are
+  BusCensus census;
+  std::string interfaces;    // as Cyclone names those that it uses, or ""
+  mutable std::mutex mutex;  // guards the two lists; their entries stay where they are
   std::deque<Subscription> subscriptions;
   std::deque<Publication> publications;
   std::atomic<std::uint64_t> dropped{0};
@@ -125,8 +160,6 @@ struct DdsNode::Impl {
   template <class CType, class Message>
   core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
   void announce();
-  /// Brings census_taken up to date; census_mutex is locked.
-  void take_census();
 };
 
 void DdsNode::Impl::run() {
@@ -222,30 +255,6 @@ void DdsNode::Impl::announce() {
   graph->publish(options.node_name, readers, writers);
 }
 
-void DdsNode::Impl::take_census() {
-  if (census <= 0) census = dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
-  dds_guid_t own{};
-  if (census <= 0 || dds_get_guid(participant, &own) != DDS_RETCODE_OK) return;
-  const auto bytes_of = [](const dds_guid_t& guid) {
-    return std::string(reinterpret_cast<const char*>(guid.v), sizeof(guid.v));
-  };
-  constexpr std::uint32_t kBatch = 64;
-  for (;;) {
-    void* samples[kBatch] = {};  // lent by the middleware
-    dds_sample_info_t infos[kBatch];
-    const dds_return_t count = dds_take(census, samples, infos, kBatch, kBatch);
-    for (dds_return_t i = 0; i < count; ++i) {
-      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
-      if (infos[i].instance_state != DDS_IST_ALIVE)
-        census_taken.erase(bytes_of(writer.key));
-      else if (infos[i].valid_data && bytes_of(writer.participant_key) != bytes_of(own))
-        census_taken[bytes_of(writer.key)] = writer.topic_name;
-    }
-    if (count > 0) dds_return_loan(census, samples, count);
-    if (count < static_cast<dds_return_t>(kBatch)) return;
-  }
-}
-
 DdsNode::DdsNode(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 DdsNode::~DdsNode() = default;
 
@@ -258,6 +267,7 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   const auto domain_id = static_cast<dds_domainid_t>(options.domain);
+  InterfaceListener listener(options.find_interfaces);
   const dds_entity_t domain = dds_create_domain(domain_id, configuration(options).c_str());
   // A second node of this process finds the domain made already and shares its configuration.
   if (domain < 0 && domain != DDS_RETCODE_PRECONDITION_NOT_MET) {
@@ -270,6 +280,8 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   impl->participant = dds_create_participant(domain_id, qos.get(), nullptr);
   PRESCENE_RETURN_IF_ERROR(
       dds_status(impl->participant, "DDS participant in domain " + std::to_string(options.domain)));
+  impl->interfaces = listener.take();
+  impl->census.set_participant(impl->participant);
   impl->waitset = dds_create_waitset(impl->participant);
   PRESCENE_RETURN_IF_ERROR(dds_status(impl->waitset, "DDS waitset"));
   impl->stop = dds_create_guardcondition(impl->participant);
@@ -348,6 +360,12 @@ core::Status DdsNode::Impl::write(DdsPublisher publisher, const std::string& typ
 core::Status DdsNode::publish(DdsPublisher publisher, const RosImage& message) {
   return impl_->write<sensor_msgs_msg_dds__Image_>(publisher, "sensor_msgs/msg/Image", message);
 }
+core::Status DdsNode::publish(DdsPublisher publisher, const RosCompressedImage& message) {
+  return impl_->write<sensor_msgs_msg_dds__CompressedImage_>(publisher, "sensor_msgs/msg/CompressedImage", message);
+}
+core::Status DdsNode::publish(DdsPublisher publisher, const RosPointCloud2& message) {
+  return impl_->write<sensor_msgs_msg_dds__PointCloud2_>(publisher, "sensor_msgs/msg/PointCloud2", message);
+}
 core::Status DdsNode::publish(DdsPublisher publisher, const RosCameraInfo& message) {
   return impl_->write<sensor_msgs_msg_dds__CameraInfo_>(publisher, "sensor_msgs/msg/CameraInfo", message);
 }
@@ -387,6 +405,8 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
     type = impl_->publications[static_cast<std::size_t>(publisher.index)].type;
   }
   if (type == "sensor_msgs/msg/Image") return decoded(RosImage{});
+  if (type == "sensor_msgs/msg/CompressedImage") return decoded(RosCompressedImage{});
+  if (type == "sensor_msgs/msg/PointCloud2") return decoded(RosPointCloud2{});
   if (type == "sensor_msgs/msg/CameraInfo") return decoded(RosCameraInfo{});
   if (type == "tf2_msgs/msg/TFMessage") return decoded(RosTfMessage{});
   if (type == "std_msgs/msg/String") return decoded(RosString{});
@@ -422,12 +442,12 @@ int DdsNode::matched_writers(const std::string& topic) const {
 
 int DdsNode::other_writers(const std::string& topic) const {
   const auto name = dds_topic_name(topic);
-  if (!name) return 0;
-  const std::lock_guard lock(impl_->census_mutex);
-  impl_->take_census();
-  return static_cast<int>(std::count_if(impl_->census_taken.begin(), impl_->census_taken.end(),
-                                        [&](const auto& entry) { return entry.second == *name; }));
+  return name ? impl_->census.writers_of(*name) : 0;
 }
+
+std::vector<DomainTopic> DdsNode::domain_topics() const { return impl_->census.topics(); }
+int DdsNode::other_participants() const { return impl_->census.participants(); }
+std::string DdsNode::interfaces() const { return impl_->interfaces; }
 
 std::uint64_t DdsNode::dropped_samples() const { return impl_->dropped.load(std::memory_order_relaxed); }
 

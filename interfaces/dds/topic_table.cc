@@ -18,6 +18,7 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
   static constexpr Row kRows[] = {
       {"sensor_msgs/msg/Image", &sensor_msgs_msg_dds__Image__desc},
       {"sensor_msgs/msg/CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
+      {"sensor_msgs/msg/PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
       {"sensor_msgs/msg/CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
       {"tf2_msgs/msg/TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
       {"std_msgs/msg/String", &std_msgs_msg_dds__String__desc},
@@ -45,6 +46,36 @@ core::Result<std::string> dds_topic_name(const std::string& ros_topic) {
     before = c;
   }
   return "rt" + ros_topic;
+}
+
+std::optional<std::string> ros_topic_name(const std::string& dds_topic) {
+  if (!dds_topic.starts_with("rt/")) return std::nullopt;
+  std::string name = dds_topic.substr(2);
+  if (!dds_topic_name(name)) return std::nullopt;
+  return name;
+}
+
+std::optional<std::string> ros_type_name(std::string_view dds_type) {
+  constexpr std::string_view kInfix = "dds_::";
+  if (dds_type.size() > 250 || !dds_type.ends_with('_')) return std::nullopt;
+  dds_type.remove_suffix(1);
+  const std::size_t infix = dds_type.rfind(kInfix);
+  if (infix == std::string_view::npos) return std::nullopt;
+  std::string name;
+  for (std::string_view rest = dds_type; !rest.empty();) {
+    if (rest.data() == dds_type.data() + infix) {
+      rest.remove_prefix(kInfix.size());
+    } else if (rest.starts_with("::")) {
+      name += '/';
+      rest.remove_prefix(2);
+    } else {
+      const auto u = static_cast<unsigned char>(rest.front());
+      if (u > 127 || (!std::isalnum(u) && u != '_')) return std::nullopt;
+      name += rest.front();
+      rest.remove_prefix(1);
+    }
+  }
+  return name;
 }
 
 QosPtr make_qos(TopicQos kind, const std::string& ros_type) {

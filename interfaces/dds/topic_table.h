@@ -3,7 +3,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include <dds/dds.h>
 #include "prescene/core/status.h"
@@ -15,6 +17,10 @@ namespace prescene::interfaces {
 const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type);
 /// "/a/b" -> "rt/a/b". kInvalidInput for names that ROS would refuse.
 core::Result<std::string> dds_topic_name(const std::string& ros_topic);
+/// "rt/a/b" -> "/a/b"; nothing for names that are not those of ROS topics.
+std::optional<std::string> ros_topic_name(const std::string& dds_topic);
+/// "std_msgs::msg::dds_::String_" -> "std_msgs/msg/String"; nothing for other forms.
+std::optional<std::string> ros_type_name(std::string_view dds_type);
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }

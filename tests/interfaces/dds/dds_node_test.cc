@@ -112,6 +112,18 @@ TEST(DdsNode, CarriesEveryFieldOfTheOtherTypes) {
   tf.transforms.push_back({kHeader, "hand", {{1.0, 2.0, 3.0}, {0.1, 0.2, 0.3, 0.9}}});
   tf.transforms.push_back({kHeader, "finger", {{-1.0, -2.0, -3.0}, {0.0, 0.0, 0.0, 1.0}}});
   expect_round_trip(tf, "tf2_msgs/msg/TFMessage");
+  expect_round_trip(RosCompressedImage{kHeader, "16UC1; compressedDepth png", {9, 8, 7}},
+                    "sensor_msgs/msg/CompressedImage");
+  expect_round_trip(RosPointCloud2{kHeader,
+                                   1,
+                                   2,
+                                   {{"x", 0, 7, 1}, {"z", 4, 7, 1}},
+                                   false,
+                                   8,
+                                   16,
+                                   {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16},
+                                   true},
+                    "sensor_msgs/msg/PointCloud2");
   expect_round_trip(RosString{"{\"where\": {}}"}, "std_msgs/msg/String");
   expect_round_trip(RosClock{{5, 6}}, "rosgraph_msgs/msg/Clock");
 
@@ -320,6 +332,30 @@ TEST_F(TwoNodes, WritersOfOthersAreCountedAndOwnOnesAreNot) {
   EXPECT_EQ((*reader_)->other_writers("not a topic"), 0);
   writer_->reset();
   others(reader_, 0);
+}
+
+TEST_F(TwoNodes, TopicsOfOthersAreListedWithTheirTypes) {
+  text_publisher("/listed/text");
+  ASSERT_TRUE((*writer_)->advertise("/listed/depth", "sensor_msgs/msg/Image", TopicQos::kImages).ok());
+  ASSERT_TRUE((*writer_)->subscribe("/listed/wanted", "std_msgs/msg/String", TopicQos::kReliable, {}).ok());
+  ASSERT_TRUE((*reader_)->advertise("/own", "std_msgs/msg/String", TopicQos::kState).ok());
+  const std::vector<DomainTopic> expected = {{"/listed/depth", "sensor_msgs/msg/Image", 1, 0},
+                                             {"/listed/text", "std_msgs/msg/String", 1, 0},
+                                             {"/listed/wanted", "std_msgs/msg/String", 0, 1}};
+  while ((*reader_)->domain_topics() != expected) std::this_thread::yield();
+  EXPECT_EQ((*reader_)->other_participants(), 1);
+  writer_->reset();
+  while (!(*reader_)->domain_topics().empty() || (*reader_)->other_participants() > 0) std::this_thread::yield();
+}
+
+TEST(DdsNode, SaysWhichInterfaceItUses) {
+  DdsOptions asking = options();
+  asking.domain = 10 + (options().domain - 10 + 100) % 200;  // where no node of this process was before
+  asking.find_interfaces = true;
+  const auto node = DdsNode::create(asking, {});
+  ASSERT_TRUE(node.ok()) << node.status().message();
+  EXPECT_NE((*node)->interfaces().find("(index "), std::string::npos) << (*node)->interfaces();
+  EXPECT_EQ((*node)->interfaces().find('\n'), std::string::npos);
 }
 
 TEST(DdsNode, SaysWhenTheSystemGrantsASmallerReceiveBuffer) {

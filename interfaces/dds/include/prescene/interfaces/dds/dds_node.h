@@ -37,7 +37,13 @@ struct DdsOptions {
   /// Larger samples are dropped unread and counted; those of more than twice that Cyclone drops itself, with a warning
   /// of its own and uncounted.
   std::size_t max_message_bytes = std::size_t{64} << 20;
+  /// Find out which network interfaces the middleware uses, for interfaces(); only the first node of a process in a
+  /// domain can.
+  bool find_interfaces = false;
 };
+
+/// What the system grants of a receive buffer of so many bytes; nothing where it does not say.
+std::optional<int> granted_receive_buffer(int asked_bytes);
 
 /// How a topic is offered or asked for; names say who uses it.
 enum class TopicQos {
@@ -58,6 +64,15 @@ struct ReceivedMessage {
   std::vector<std::uint8_t> cdr;
   core::TimeNs source_ns = 0;    ///< The writer's wall time.
   core::TimeNs received_ns = 0;  ///< Ours, of core::steady_now_ns(): does not jump when the wall clock is set.
+};
+
+/// A topic that other participants of the domain write or read now. A name that carries two types is two of them.
+struct DomainTopic {
+  std::string name;  ///< "/camera/color/image_raw"
+  std::string type;  ///< "sensor_msgs/msg/Image"
+  int writers = 0;
+  int readers = 0;
+  friend bool operator==(const DomainTopic&, const DomainTopic&) = default;
 };
 
 /// Handle of a topic to publish on.
@@ -86,6 +101,8 @@ class DdsNode {
   /// not read holds up the topic: at once for kState, after 100 ms otherwise. kInvalidInput when the message is not of
   /// the publisher's type. May be called from any thread.
   core::Status publish(DdsPublisher publisher, const RosImage& message);
+  core::Status publish(DdsPublisher publisher, const RosCompressedImage& message);
+  core::Status publish(DdsPublisher publisher, const RosPointCloud2& message);
   core::Status publish(DdsPublisher publisher, const RosCameraInfo& message);
   core::Status publish(DdsPublisher publisher, const RosTfMessage& message);
   core::Status publish(DdsPublisher publisher, const RosString& message);
@@ -108,6 +125,14 @@ class DdsNode {
   /// How many writers on the bus that are not this node's offer a topic now, whatever their type; no subscription is
   /// needed.
   int other_writers(const std::string& topic) const;
+  /// The ROS topics of all other participants that were found so far, by name and type. Finding those that run already
+  /// takes the middleware some tenths of a second from create() on, across a network up to some seconds.
+  std::vector<DomainTopic> domain_topics() const;
+  /// How many other participants were found so far; a ROS 2 process is one.
+  int other_participants() const;
+  /// The network interfaces that the middleware uses, in its words ("eth0 (index 4 priority 0)"); "" where it was not
+  /// asked (DdsOptions::find_interfaces) or did not say.
+  std::string interfaces() const;
   /// Samples that reached this node and were dropped: too large (see DdsOptions), overwritten by newer ones before the
   /// node's thread took them, without memory to hold them, or given up by their callback with an exception. What the
   /// network loses of best-effort topics nobody can count.
