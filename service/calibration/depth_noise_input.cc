@@ -64,10 +64,10 @@ core::Status add_recording(const std::filesystem::path& path, const core::Progre
     } else if (entry->message.topic == settings.topics.depth) {
       ++images;
       if (!camera) continue;
-      PRESCENE_TRY(const auto message, interfaces::decode_cdr<interfaces::RosImage>(entry->message.cdr));
       interfaces::ImageRules rules;
       rules.mono16_is_depth = settings.assembler.mono16_is_depth;
-      PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(message, rules));
+      PRESCENE_TRY(DepthMessage message, decode_depth(entry->message, rules));
+      geometry::DepthImage depth = std::move(message.depth);
       if (!lens.is_none()) {
         if (!warp) warp = interfaces::LensWarp::undistorting(*camera, lens);
         PRESCENE_TRY(depth, warp->depth(depth));

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/service/tracking/camera_presets.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -41,11 +42,34 @@ core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds) {
   return core::ok_status();
 }
 
-void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics) {
+void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, TrackerSettings& tracker) {
   add_domain_option(verb, dds);
+  add_topic_options(verb, tracker);
+}
+
+void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
+  InputTopics& topics = tracker.topics;
   auto* group = verb.add_option_group("Topics", "Names of the robot's topics");
+  std::vector<std::string> presets;
+  for (const CameraPreset& preset : camera_presets()) presets.emplace_back(preset.name);
+  // First: options run in their order, and what is named by itself takes precedence.
+  group
+      ->add_option_function<std::string>(
+          "--camera", [&tracker](const std::string& name) { apply(*find_camera_preset(name), tracker); },
+          "Names that the driver of this camera gives its topics, instead of the defaults below")
+      ->check(CLI::IsMember(presets));
   group->add_option("--depth-topic", topics.depth)->check(utf8_text())->capture_default_str();
   group->add_option("--color-topic", topics.color, "Empty = no colour")->check(utf8_text())->capture_default_str();
+  group
+      ->add_option(
+          "--depth-form", topics.depth_form,
+          "What the depth topic carries: image, compressed (compressedDepth) or points (PointCloud2); default: "
+          "as its name says")
+      ->check(CLI::IsMember({"image", "compressed", "points"}));
+  group
+      ->add_option("--color-form", topics.color_form,
+                   "What the colour topic carries: image or compressed (JPEG, PNG); default: as its name says")
+      ->check(CLI::IsMember({"image", "compressed"}));
   group->add_option("--camera-info-topic", topics.camera_info)->check(utf8_text())->capture_default_str();
   group->add_option("--tf-topic", topics.tf)->check(utf8_text())->capture_default_str();
   group->add_option("--tf-static-topic", topics.tf_static)->check(utf8_text())->capture_default_str();
@@ -117,8 +141,16 @@ TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const
   const auto take = [&verb](const char* option, auto& to, const auto& from) {
     if (verb.get_option(option)->count() > 0) to = from;
   };
+  if (verb.get_option("--camera")->count() > 0) {
+    settings.topics.depth = given.topics.depth;
+    settings.topics.color = given.topics.color;
+    settings.topics.camera_info = given.topics.camera_info;
+    settings.assembler.rectified = given.assembler.rectified;
+  }
   take("--depth-topic", settings.topics.depth, given.topics.depth);
   take("--color-topic", settings.topics.color, given.topics.color);
+  take("--depth-form", settings.topics.depth_form, given.topics.depth_form);
+  take("--color-form", settings.topics.color_form, given.topics.color_form);
   take("--camera-info-topic", settings.topics.camera_info, given.topics.camera_info);
   take("--tf-topic", settings.topics.tf, given.topics.tf);
   take("--tf-static-topic", settings.topics.tf_static, given.topics.tf_static);

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/json.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/load_scene.h"
@@ -20,7 +21,7 @@ struct RecordOptions {
   bool unreported_robot = false;
   SimulatedRecordingOptions simulation;
   interfaces::DdsOptions dds;
-  InputTopics topics;
+  TrackerSettings tracker;
   const CLI::App* verb = nullptr;
 };
 
@@ -82,9 +83,11 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {}));
   const std::string output = live_recording_path(options.output, context);
-  PRESCENE_TRY(const auto recording, RecordingWriter::create(output, {"", "", context.options().seed, ""}));
+  // With the names of the topics, so that a replay knows them.
+  PRESCENE_TRY(const auto recording, RecordingWriter::create(output, {"", "", context.options().seed,
+                                                                      belief::json_text(to_json(options.tracker))}));
   PRESCENE_TRY(const std::uint64_t messages,
-               record_topics(options.dds, options.topics, context.cancellation(), context.log(), *recording));
+               record_topics(options.dds, options.tracker.topics, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},
                 "recorded " + std::to_string(messages) + " messages to " + output + "\n");
   return core::ok_status();
@@ -114,14 +117,14 @@ Verb add_record_verb(CLI::App& app) {
   verb->add_flag("--unreported-robot", options->unreported_robot,
                  "The robot moves and acts, but neither its poses nor its actions are published")
       ->needs("--simulate");
-  add_bus_options(*verb, options->dds, options->topics);
+  add_bus_options(*verb, options->dds, options->tracker);
   options->verb = verb;
   verb->footer(
       "Examples: prescene record -o run.mcap                  (until Ctrl-C)\n"
       "          prescene record --simulate scenarios/milk_on_bin.yaml -o milk.mcap --seed 1");
   return {verb, [options](VerbContext& context) {
-            PRESCENE_RETURN_IF_ERROR(validate(options->topics));
-            options->simulation.topics = options->topics;
+            PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
+            options->simulation.topics = options->tracker.topics;
             return options->simulate.empty() ? record_bus(*options, context) : record_simulation(*options, context);
           }};
 }

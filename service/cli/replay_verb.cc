@@ -300,7 +300,7 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
       ->check(file_name());
   add_proposals_option(*verb, options->proposals);
-  add_bus_options(*verb, options->bus.dds, options->tracker.topics);
+  add_bus_options(*verb, options->bus.dds, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;

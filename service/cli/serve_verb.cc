@@ -91,7 +91,7 @@ Verb add_serve_verb(CLI::App& app) {
       ->check(CLI::Range(0, 65535));
   add_web_options(*verb, "view-", options->view);
   add_proposals_option(*verb, options->proposals);
-  add_bus_options(*verb, options->settings.dds, options->settings.tracker.topics);
+  add_bus_options(*verb, options->settings.dds, options->settings.tracker);
   add_camera_options(*verb, options->settings.tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;

@@ -99,14 +99,17 @@ Verb add_serve_verb(CLI::App& app);
 Verb add_ask_verb(CLI::App& app);
 Verb add_view_verb(CLI::App& app);
 Verb add_achieve_verb(CLI::App& app);
+Verb add_doctor_verb(CLI::App& app);
 
 /// --domain and --ros-distro.
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 /// The domain that ROS_DOMAIN_ID names, unless one was given; to be called by what joins the bus. kInvalidInput where
 /// the variable holds none.
 core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds);
-/// The same and the names of the robot's topics.
-void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, InputTopics& topics);
+/// --camera and the names of the robot's topics; --camera also sets whether images are rectified.
+void add_topic_options(CLI::App& verb, TrackerSettings& tracker);
+/// Both.
+void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, TrackerSettings& tracker);
 /// --world-frame and --camera-pose.
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
 /// --view-address, --view-token and --view-origin, with `prefix` in place of "view-"; the port is the verb's own.

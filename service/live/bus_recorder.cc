@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "prescene/core/clock.h"
 #include "prescene/service/live/inbox.h"
+#include "prescene/service/tracking/camera_presets.h"
 
 namespace prescene::service {
 namespace {
@@ -25,12 +27,21 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
         node->subscribe(topic.name, topic.type, topic.read,
                         [&inbox](interfaces::ReceivedMessage&& message) { inbox.put(std::move(message)); }));
   }
+  const std::string domain = "in DDS domain " + std::to_string(dds.domain);
+  core::log(log, core::LogLevel::kInfo, "recording " + domain + ": " + topics_text(topics));
   std::uint64_t messages = 0;
   core::TimeNs last_ns = 0;
+  bool waits_for_depth = true;
+  const core::Stopwatch watch;
   while (!cancellation.requested()) {
+    if (waits_for_depth && watch.seconds() > kNothingCameAfter) {
+      core::log(log, core::LogLevel::kWarning, nothing_came_text(topics, node->domain_topics(), domain));
+      waits_for_depth = false;
+    }
     for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kWriteInterval)) {
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
+      waits_for_depth = waits_for_depth && message.topic != topics.depth;
       PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
       ++messages;
     }

@@ -205,8 +205,13 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
       options.wait_for_service <= 0.0 || player.wait_for_listeners(options.wait_for_service, cancellation);
   if (cancellation.requested()) return core::cancelled("stopped on request, before anything was played");
   if (!heard) {
-    return core::unavailable("no service listens to the recording's topics: start `prescene serve` in domain " +
-                             std::to_string(options.dds.domain) + ", with topic names as in the recording");
+    std::string read;
+    for (const interfaces::DomainTopic& topic : node->domain_topics())
+      if (topic.readers > 0 && is_image_type(topic.type)) read += (read.empty() ? "" : ", ") + topic.name;
+    return core::unavailable("no service listens to the recording's topics" +
+                             (read.empty() ? "" : ", though images are read on " + read) +
+                             ": start `prescene serve` in domain " + std::to_string(options.dds.domain) +
+                             ", with topic names as in the recording");
   }
 
   RecordingReadOptions again = options.read;
@@ -235,8 +240,7 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
     PRESCENE_TRY(const DdsPublisher publisher, player.publisher_of(entry->message));
     const core::Status published = node->publish_cdr(publisher, entry->message.cdr);
     if (!published.ok()) core::log(log, core::LogLevel::kWarning, entry->message.topic + ": " + published.message());
-    last_stamp_ns =
-        std::max(last_stamp_ns, entry->message.type == "sensor_msgs/msg/Image" ? entry->message.source_ns : 0);
+    last_stamp_ns = std::max(last_stamp_ns, is_image_type(entry->message.type) ? entry->message.source_ns : 0);
     ++result.messages;
   }
   for (; asked < options.questions.size() && !cancellation.requested(); ++asked) {

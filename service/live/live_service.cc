@@ -18,6 +18,7 @@
 #include "prescene/service/live/log_limiter.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
+#include "prescene/service/tracking/camera_presets.h"
 
 namespace prescene::service {
 namespace {
@@ -97,6 +98,7 @@ struct LiveService::Impl {
   void publish();
   void publish_diagnostics();
   core::TimeNs now();
+  std::string domain_text() const { return "DDS domain " + std::to_string(settings.dds.domain); }
   ServiceHealth health() const;
   void tell_what_changed(const ServiceHealth& health);
 
@@ -130,6 +132,9 @@ struct LiveService::Impl {
   std::string last_idle_control;
   const Backends* backends = nullptr;
   std::optional<core::Stopwatch> since_frame;
+  core::Stopwatch since_start;
+  bool depth_has_come = false;
+  bool told_nothing_came = false;
   bool was_tracking = false;
   bool was_degraded = false;
   bool reported_why_not = false;
@@ -271,6 +276,7 @@ void LiveService::Impl::take_in(ReceivedMessage& message) {
       give_up_recording(written.status());
     }
   }
+  depth_has_come = depth_has_come || message.topic == settings.tracker.topics.depth;
   const core::Status taken = tracker->take_in(message, index);
   if (!taken.ok()) refuse(taken);
 }
@@ -342,6 +348,8 @@ void LiveService::Impl::publish() {
 ServiceHealth LiveService::Impl::health() const {
   ServiceHealth health;
   health.depth_topic = settings.tracker.topics.depth;
+  if (!depth_has_come && since_start.seconds() > kNothingCameAfter)
+    health.nothing_came = nothing_came_text(settings.tracker.topics, node->domain_topics(), "in " + domain_text());
   health.steps = steps;
   health.skipped_frames = tracker->skipped_count();
   health.refused_messages = refused;
@@ -387,6 +395,8 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
                          "simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
                              health.steppers.last_reason);
   if (health.other_services > 0) log_limiter.log_once(core::LogLevel::kWarning, others_text(health.other_services));
+  if (!health.nothing_came.empty() && !told_nothing_came)
+    told_nothing_came = log_limiter.log(core::LogLevel::kWarning, health.nothing_came);
   // What the log holds back is said at the next look, if it is still so then.
   const bool tracking = is_tracking(health);
   if (tracking && !was_tracking) {
@@ -417,8 +427,7 @@ void LiveService::ask(std::string question_json) { impl_->worker->ask(std::move(
 core::Status LiveService::run(const core::Cancellation& cancellation) {
   Impl& impl = *impl_;
   core::log(impl.log, core::LogLevel::kInfo,
-            "listening in DDS domain " + std::to_string(impl.settings.dds.domain) + " for " +
-                impl.settings.tracker.topics.depth);
+            "listening in " + impl.domain_text() + ": " + topics_text(impl.settings.tracker.topics));
   const auto turn = [&] {
     auto until = steady_clock::now() + kPollInterval;
     if (const auto deadline = impl.tracker->next_deadline()) {

@@ -56,14 +56,15 @@ std::string joined(const std::vector<std::string>& words) {
 
 // Every member is bound to a name, so that one which is added does not compile until it is told of here.
 std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
-  const auto& [depth_topic, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics, lost_on_bus,
-               questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late, waiting_controls,
-               dropped_controls, idle_controls, last_idle_control, other_services, is_recording, recording_failure,
-               seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers, lens, degraded,
-               last_skip, last_refusal, last_failure, last_failure_ns] = health;
+  const auto& [depth_topic, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics,
+               lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late,
+               waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services, is_recording,
+               recording_failure, seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers,
+               lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
+  static_cast<void>(nothing_came);       // is in the text
   static_cast<void>(is_recording);       // told, like its failure,
   static_cast<void>(recording_failure);  // by recording_text()
   const bool question_is_newer = last_failure.empty() || question_failure_ns > last_failure_ns;
@@ -127,6 +128,7 @@ std::string health_text(const ServiceHealth& health) {
   }
   std::string text =
       health.seconds_since_frame ? "no frame is used any more" : "waiting for frames on " + health.depth_topic;
+  if (!health.nothing_came.empty()) text = health.nothing_came;
   if (!health.last_skip.empty()) text += "; the last one was skipped: " + health.last_skip;
   if (!health.last_refusal.empty()) text += "; the last message refused: " + health.last_refusal;
   return text + end;

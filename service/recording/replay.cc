@@ -33,6 +33,7 @@ class Replay {
 
   core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index) {
     ++summary_.messages;
+    note_image_topic(message);
     const core::Status taken = tracker_.take_in(message, index);
     if (!taken.ok()) {
       if (summary_.refused++ == 0) summary_.first_refusal = taken.message();
@@ -79,6 +80,14 @@ class Replay {
     ++summary_.steps;
     count_degraded(step.record.degraded);
     return on_step_ ? on_step_(step, tracker_) : core::ok_status();
+  }
+
+  void note_image_topic(const interfaces::ReceivedMessage& message) {
+    constexpr std::size_t kMost = 100;
+    std::vector<interfaces::DomainTopic>& known = summary_.image_topics;
+    if (!is_image_type(message.type) || known.size() >= kMost) return;
+    const interfaces::DomainTopic topic{message.topic, message.type, 1, 0};
+    if (std::find(known.begin(), known.end(), topic) == known.end()) known.push_back(topic);
   }
 
   void count_degraded(const std::vector<std::string>& words) {

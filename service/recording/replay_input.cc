@@ -5,6 +5,7 @@
 
 #include "prescene/service/load_scene.h"
 #include "prescene/service/outside_json.h"
+#include "prescene/service/tracking/camera_presets.h"
 
 namespace prescene::service {
 
@@ -56,7 +57,11 @@ core::Status check_steps(const ReplaySummary& summary, const InputTopics& topics
   if (summary.steps > 0) return core::ok_status();
   if (!summary.last_skip.empty()) return core::invalid_input("no frame could be used: " + summary.last_skip);
   if (!summary.first_refusal.empty()) return core::invalid_input("no frame could be used: " + summary.first_refusal);
-  return core::invalid_input("no depth image on " + topics.depth + ": name the recording's topics (--help)");
+  if (summary.image_topics.empty())
+    return core::invalid_input("no depth image on " + topics.depth +
+                               ", and no other image in the recording: record the "
+                               "camera's topics (prescene doctor finds them)");
+  return core::invalid_input(nothing_came_text(topics, summary.image_topics, "in the recording"));
 }
 
 }  // namespace prescene::service

@@ -96,13 +96,11 @@ void SessionReport::add(const interfaces::ReceivedMessage& message) {
   // What makes no sense is told by the tracker; here it is only left out.
   core::Status taken;
   if (message.topic == topics_.depth) {
-    if (const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr)) {
-      taken = assembler_.add_depth(*image, index, message.received_ns);
-    }
+    if (auto depth = decode_depth(message, assembler_.image_rules()))
+      taken = assembler_.add_depth(*std::move(depth), index, message.received_ns);
   } else if (message.topic == topics_.color) {
-    if (const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr)) {
-      taken = assembler_.add_color(*image, index, message.received_ns);
-    }
+    if (auto color = decode_color_message(message))
+      taken = assembler_.add_color(*std::move(color), index, message.received_ns);
   } else if (message.topic == topics_.camera_info) {
     if (const auto info = interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage))
       taken = assembler_.add_camera_info(*info, index);

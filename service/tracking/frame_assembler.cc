@@ -48,24 +48,31 @@ FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::stri
                                TfBufferSettings tf_settings)
     : settings_(std::move(settings)), robot_bodies_(std::move(robot_bodies)), tf_(tf_settings) {}
 
-core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, MessageIndex index,
-                                       core::TimeNs received_ns) {
-  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
-  std::string frame_id = settings_.camera_frame;
-  if (frame_id.empty() && !image.header.frame_id.empty()) {
-    PRESCENE_TRY(frame_id, interfaces::to_frame_id(image.header.frame_id));
-  }
+interfaces::ImageRules FrameAssembler::image_rules() const {
   interfaces::ImageRules rules;
   rules.mono16_is_depth = settings_.mono16_is_depth;
-  interfaces::DepthImageReport report;
-  PRESCENE_TRY(geometry::DepthImage depth, interfaces::to_depth_image(image, rules, &report));
+  return rules;
+}
 
+core::Status FrameAssembler::add_depth(const interfaces::RosImage& image, MessageIndex index,
+                                       core::TimeNs received_ns) {
+  DepthMessage message{image.header, {}, {}, image.encoding};
+  PRESCENE_TRY(message.depth, interfaces::to_depth_image(image, image_rules(), &message.report));
+  return add_depth(std::move(message), index, received_ns);
+}
+
+core::Status FrameAssembler::add_depth(DepthMessage&& message, MessageIndex index, core::TimeNs received_ns) {
+  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(message.header.stamp));
+  std::string frame_id = settings_.camera_frame;
+  if (frame_id.empty() && !message.header.frame_id.empty()) {
+    PRESCENE_TRY(frame_id, interfaces::to_frame_id(message.header.frame_id));
+  }
   Waiting entry{index,
                 stamp_ns,
                 received_ns,
                 std::move(frame_id),
-                std::make_shared<geometry::DepthImage>(std::move(depth)),
-                std::move(report.warnings)};
+                std::make_shared<geometry::DepthImage>(std::move(message.depth)),
+                std::move(message.report.warnings)};
   if (const char* doubt = doubt_of_stamp(entry)) {
     skip(entry, doubt);
     return core::ok_status();
@@ -101,11 +108,18 @@ const char* FrameAssembler::doubt_of_stamp(const Waiting& frame) {
   return nullptr;
 }
 
-core::Status FrameAssembler::add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs) {
+core::Status FrameAssembler::add_color(const interfaces::RosImage& image, MessageIndex index,
+                                       core::TimeNs received_ns) {
   if (!settings_.use_color) return core::ok_status();
-  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(image.header.stamp));
-  PRESCENE_TRY(geometry::ColorImage color, interfaces::to_color_image(image));
-  colors_.push_back({index, stamp_ns, std::make_shared<geometry::ColorImage>(std::move(color))});
+  ColorMessage message{image.header, {}, image.encoding};
+  PRESCENE_TRY(message.color, interfaces::to_color_image(image));
+  return add_color(std::move(message), index, received_ns);
+}
+
+core::Status FrameAssembler::add_color(ColorMessage&& message, MessageIndex index, core::TimeNs) {
+  if (!settings_.use_color) return core::ok_status();
+  PRESCENE_TRY(const core::TimeNs stamp_ns, interfaces::to_stamp_ns(message.header.stamp));
+  colors_.push_back({index, stamp_ns, std::make_shared<geometry::ColorImage>(std::move(message.color))});
   while (too_many(colors_, kMaxColors, &Color::image)) colors_.pop_front();
   return core::ok_status();
 }

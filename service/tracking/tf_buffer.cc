@@ -166,6 +166,21 @@ core::Result<geometry::Pose> TfBuffer::pose_along(std::span<const std::string> p
   return X_AF;
 }
 
+std::vector<std::string> TfBuffer::chain(const std::string& raw_parent, const std::string& raw_child) const {
+  std::vector<std::string> from_child = path_to_root(without_slash(raw_child));
+  std::vector<std::string> from_parent = path_to_root(without_slash(raw_parent));
+  if (from_child.back() != from_parent.back()) return {};
+  std::string common;
+  while (!from_parent.empty() && !from_child.empty() && from_parent.back() == from_child.back()) {
+    common = from_child.back();
+    from_parent.pop_back();
+    from_child.pop_back();
+  }
+  from_child.push_back(common);
+  from_child.insert(from_child.end(), from_parent.rbegin(), from_parent.rend());
+  return from_child;
+}
+
 core::Result<geometry::Pose> TfBuffer::lookup(const std::string& raw_parent, const std::string& raw_child,
                                               core::TimeNs stamp_ns) const {
   const std::string parent = without_slash(raw_parent);

@@ -10,9 +10,33 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 
 namespace prescene::service {
+namespace {
+
+std::string image_type(const std::string& form, const std::string& last_name) {
+  const bool packed =
+      form == "compressed" || (form.empty() && (last_name == "compressed" || last_name == "compressedDepth"));
+  return packed ? "sensor_msgs/msg/CompressedImage" : "sensor_msgs/msg/Image";
+}
+
+}  // namespace
 
 bool names_rectified_images(const std::string& topic) {
-  return topic.substr(topic.rfind('/') + 1).starts_with("image_rect");
+  std::string image = topic;
+  for (const char* packing : {"/compressed", "/compressedDepth"})
+    if (image.ends_with(packing)) image.resize(image.size() - std::string(packing).size());
+  return image.substr(image.rfind('/') + 1).starts_with("image_rect");
+}
+
+std::string depth_type(const InputTopics& topics) {
+  const std::string last = topics.depth.substr(topics.depth.rfind('/') + 1);
+  if (topics.depth_form == "points" ||
+      (topics.depth_form.empty() && (last.starts_with("points") || last.starts_with("cloud"))))
+    return "sensor_msgs/msg/PointCloud2";
+  return image_type(topics.depth_form, last);
+}
+
+std::string color_type(const InputTopics& topics) {
+  return image_type(topics.color_form, topics.color.substr(topics.color.rfind('/') + 1));
 }
 
 core::Status validate(const InputTopics& topics) {
@@ -35,6 +59,11 @@ core::Status validate(const InputTopics& topics) {
       return core::invalid_input(std::string("the ") + what + " topic is the " + other->second + " topic, " + *topic +
                                  ": name the two that the camera has");
   }
+  const auto known = [](const std::string& form, bool may_be_points) {
+    return form.empty() || form == "image" || form == "compressed" || (may_be_points && form == "points");
+  };
+  if (!known(topics.depth_form, true) || !known(topics.color_form, false))
+    return core::invalid_input("the form of an image topic is image or compressed, of the depth topic also points");
   return core::ok_status();
 }
 
@@ -49,8 +78,8 @@ std::string pose_topic(const std::string& object) {
 std::vector<BusTopic> bus_topics(const InputTopics& topics) {
   using interfaces::TopicQos;
   std::vector<BusTopic> rows = {
-      {topics.depth, "sensor_msgs/msg/Image", TopicQos::kSensor, TopicQos::kImages},
-      {topics.color, "sensor_msgs/msg/Image", TopicQos::kSensor, TopicQos::kImages},
+      {topics.depth, depth_type(topics), TopicQos::kSensor, TopicQos::kImages},
+      {topics.color, color_type(topics), TopicQos::kSensor, TopicQos::kImages},
       {topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor, TopicQos::kReliable},
       {topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf, TopicQos::kTf},
       {topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, TopicQos::kLatched},
@@ -62,12 +91,17 @@ std::vector<BusTopic> bus_topics(const InputTopics& topics) {
   return rows;
 }
 
+bool is_image_type(const std::string& type) {
+  return type == "sensor_msgs/msg/Image" || type == "sensor_msgs/msg/CompressedImage" ||
+         type == "sensor_msgs/msg/PointCloud2";
+}
+
 interfaces::TopicQos offered_as(const std::string& topic, const std::string& type) {
   using interfaces::TopicQos;
   const std::vector<BusTopic> rows = bus_topics({});
   const auto known = std::find_if(rows.begin(), rows.end(), [&](const BusTopic& row) { return row.name == topic; });
   if (known != rows.end() && known->type == type) return known->write;
-  if (type == "sensor_msgs/msg/Image") return TopicQos::kImages;
+  if (is_image_type(type)) return TopicQos::kImages;
   if (type == "tf2_msgs/msg/TFMessage") return topic.ends_with("static") ? TopicQos::kLatched : TopicQos::kTf;
   return TopicQos::kReliable;
 }

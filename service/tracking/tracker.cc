@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <type_traits>
 #include <utility>
 
 #include "prescene/core/hash.h"
@@ -21,8 +20,7 @@ core::Status check_type(const interfaces::ReceivedMessage& message, const char* 
 template <class Message>
 core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const char* type) {
   PRESCENE_RETURN_IF_ERROR(check_type(message, type));
-  const bool large = std::is_same_v<Message, interfaces::RosImage>;
-  return interfaces::decode_cdr<Message>(message.cdr, large ? interfaces::CdrLimits{} : interfaces::kSmallMessage);
+  return interfaces::decode_cdr<Message>(message.cdr, interfaces::kSmallMessage);
 }
 
 /// Frames do not wait for the colour of a topic that nobody named, and topics say by their names what they hold.
@@ -81,12 +79,13 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
   const InputTopics& topics = settings_.topics;
   const auto take = [&]() -> core::Status {
     if (message.topic == topics.depth) {
-      PRESCENE_TRY(const auto image, decoded<interfaces::RosImage>(message, "sensor_msgs/msg/Image"));
-      return assembler_.add_depth(image, index, message.received_ns);
+      PRESCENE_TRY(DepthMessage depth, decode_depth(message, assembler_.image_rules()));
+      return assembler_.add_depth(std::move(depth), index, message.received_ns);
     }
     if (message.topic == topics.color) {
-      PRESCENE_TRY(const auto image, decoded<interfaces::RosImage>(message, "sensor_msgs/msg/Image"));
-      return assembler_.add_color(image, index, message.received_ns);
+      if (!assembler_.uses_color()) return core::ok_status();
+      PRESCENE_TRY(ColorMessage color, decode_color_message(message));
+      return assembler_.add_color(std::move(color), index, message.received_ns);
     }
     if (message.topic == topics.camera_info) {
       PRESCENE_TRY(const auto info, decoded<interfaces::RosCameraInfo>(message, "sensor_msgs/msg/CameraInfo"));

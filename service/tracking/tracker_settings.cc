@@ -71,6 +71,8 @@ template <class Settings, class Visit>
 void for_each_setting(Settings& settings, const Visit& visit) {
   visit("depth_topic", settings.topics.depth);
   visit("color_topic", settings.topics.color);
+  visit("depth_form", settings.topics.depth_form);
+  visit("color_form", settings.topics.color_form);
   visit("camera_info_topic", settings.topics.camera_info);
   visit("tf_topic", settings.topics.tf);
   visit("tf_static_topic", settings.topics.tf_static);

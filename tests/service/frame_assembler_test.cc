@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <utility>
+
 #include "prescene/interfaces/images/lens_warp.h"
+#include "prescene/interfaces/images/png.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 
 namespace prescene::service {
@@ -75,6 +80,59 @@ TEST(FrameAssembler, TheFirstFrameWaitsForRobotBodiesThatNothingIsKnownOf) {
   ASSERT_TRUE(assembler.add_tf(transform("gripper", 140 * kMs, 2.0), 5, false).ok());
   ASSERT_TRUE(assembler.add_depth(depth_at(133 * kMs), 6, 160 * kMs).ok());
   EXPECT_TRUE(assembler.take(161 * kMs).has_value()) << "what never comes is waited for once";
+}
+
+TEST(FrameAssembler, TakesPackedImagesAndClouds) {
+  const auto received = [](const std::string& type, const auto& message) {
+    return interfaces::ReceivedMessage{"/t", type, interfaces::encode_cdr(message), 0, 0};
+  };
+  // 0.75 m as 16UC1 in PNG behind the header of compressedDepth, and colour as PNG.
+  geometry::Image<std::uint16_t> millimetres(8, 6, 750);
+  interfaces::RosCompressedImage packed{header(100 * kMs), "16UC1; compressedDepth png", std::vector<std::uint8_t>(12)};
+  const auto png = interfaces::encode_png(std::as_const(millimetres).view());
+  packed.data.insert(packed.data.end(), png.begin(), png.end());
+  const geometry::ColorImage color(8, 6, {1, 2, 3});
+  const interfaces::RosCompressedImage packed_color{header(100 * kMs), "rgb8; png compressed bgr8",
+                                                    interfaces::encode_png(color.view())};
+  FrameAssembler assembler({}, {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  auto depth = decode_depth(received("sensor_msgs/msg/CompressedImage", packed));
+  ASSERT_TRUE(depth.ok()) << depth.status().message();
+  EXPECT_EQ(depth->form, "16UC1; compressedDepth png");
+  ASSERT_TRUE(assembler.add_depth(*std::move(depth), 3, 101 * kMs).ok());
+  auto colored = decode_color_message(received("sensor_msgs/msg/CompressedImage", packed_color));
+  ASSERT_TRUE(colored.ok()) << colored.status().message();
+  ASSERT_TRUE(assembler.add_color(*std::move(colored), 4, 101 * kMs).ok());
+  const auto frame = assembler.take(102 * kMs);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_FLOAT_EQ((*frame->observation.frame.depth)(3, 3), 0.75F);
+  ASSERT_NE(frame->observation.frame.color, nullptr);
+  EXPECT_EQ(*frame->observation.frame.color, color);
+
+  interfaces::RosPointCloud2 cloud{header(200 * kMs),
+                                   6,
+                                   8,
+                                   {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}},
+                                   false,
+                                   12,
+                                   96,
+                                   std::vector<std::uint8_t>(96 * 6),
+                                   false};
+  for (int i = 0; i < 48; ++i) {
+    const float point[3] = {0.05F * (static_cast<float>(i % 8) - 3.5F), 0.05F * (static_cast<float>(i / 8) - 2.5F),
+                            0.5F};
+    std::memcpy(cloud.data.data() + 12 * static_cast<std::size_t>(i), point, sizeof point);
+  }
+  auto points = decode_depth(received("sensor_msgs/msg/PointCloud2", cloud));
+  ASSERT_TRUE(points.ok()) << points.status().message();
+  ASSERT_TRUE(assembler.add_depth(*std::move(points), 5, 201 * kMs).ok());
+  const auto second = assembler.take(300 * kMs);
+  ASSERT_TRUE(second.has_value());
+  EXPECT_FLOAT_EQ((*second->observation.frame.depth)(7, 5), 0.5F);
+
+  EXPECT_FALSE(decode_depth(received("std_msgs/msg/String", interfaces::RosString{"x"})).ok());
+  EXPECT_FALSE(decode_color_message(received("sensor_msgs/msg/PointCloud2", cloud)).ok());
 }
 
 TEST(FrameAssembler, GoesWithoutColourWhenItDoesNotComeInTime) {

@@ -33,6 +33,22 @@ TEST(TfBuffer, ComposesAlongTheTreeInBothDirections) {
   EXPECT_LT((*X_CG * (*X_GC * p_GQ) - p_GQ).norm(), 1e-12);
 }
 
+TEST(TfBuffer, NamesTheFramesOnTheWay) {
+  TfBuffer tf;
+  ASSERT_TRUE(tf.add("world", "base", 0, Pose(), true).ok());
+  ASSERT_TRUE(tf.add("base", "mast", 0, Pose(), true).ok());
+  ASSERT_TRUE(tf.add("mast", "camera", 0, Pose(), true).ok());
+  ASSERT_TRUE(tf.add("base", "hand", 0, Pose(), true).ok());
+  ASSERT_TRUE(tf.add("other", "alone", 0, Pose(), true).ok());
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(tf.chain("world", "/camera"), (Names{"camera", "mast", "base", "world"}));
+  EXPECT_EQ(tf.chain("camera", "world"), (Names{"world", "base", "mast", "camera"}));
+  EXPECT_EQ(tf.chain("hand", "camera"), (Names{"camera", "mast", "base", "hand"}));
+  EXPECT_EQ(tf.chain("base", "base"), Names{"base"});
+  EXPECT_EQ(tf.chain("world", "alone"), Names());
+  EXPECT_EQ(tf.chain("world", "unknown"), Names());
+}
+
 TEST(TfBuffer, CountsWhatCameTooLate) {
   TfBuffer tf({.history_s = 1.0});
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(tf.add("world", "hand", 100 * kSecond + i, Pose(), false).ok());

@@ -19,7 +19,8 @@ BusTopic named(const std::string& name) {
 
 // Of a burst none may push out another before it is read, live and in `record` and `replay`, which all listen so.
 TEST(Topics, SayByTheirNamesThatTheyAreRectified) {
-  for (const char* name : {"/camera/depth/image_rect_raw", "image_rect", "/rgb/image_rect_color"})
+  for (const char* name : {"/camera/depth/image_rect_raw", "image_rect", "/rgb/image_rect_color",
+                           "/rgb/image_rect_color/compressed", "/depth/image_rect/compressedDepth"})
     EXPECT_TRUE(names_rectified_images(name)) << name;
   for (const char* name : {"", "/image_rect/image_raw", "/camera/color/image_raw", "/image_rect/"})
     EXPECT_FALSE(names_rectified_images(name)) << name;
@@ -39,8 +40,36 @@ TEST(BusTopics, ColourIsLeftOutWhereItIsNotNamed) {
   EXPECT_EQ(bus_topics(topics).size(), all - 1);
 }
 
+TEST(BusTopics, ImagesHaveTheTypeThatTheirNamesOrFormsSay) {
+  const auto depth = [](const std::string& name, const std::string& form = "") {
+    InputTopics topics;
+    topics.depth = name;
+    topics.depth_form = form;
+    EXPECT_TRUE(validate(topics).ok()) << form;
+    return depth_type(topics);
+  };
+  EXPECT_EQ(depth("/camera/depth/image_raw"), "sensor_msgs/msg/Image");
+  EXPECT_EQ(depth("/camera/depth/image_raw/compressedDepth"), "sensor_msgs/msg/CompressedImage");
+  EXPECT_EQ(depth("/camera/depth/points"), "sensor_msgs/msg/PointCloud2");
+  EXPECT_EQ(depth("/zed/point_cloud/cloud_registered"), "sensor_msgs/msg/PointCloud2");
+  EXPECT_EQ(depth("/points/image_raw"), "sensor_msgs/msg/Image");
+  EXPECT_EQ(depth("/depth", "compressed"), "sensor_msgs/msg/CompressedImage");
+  EXPECT_EQ(depth("/depth", "points"), "sensor_msgs/msg/PointCloud2");
+  EXPECT_EQ(depth("/points", "image"), "sensor_msgs/msg/Image");
+  InputTopics topics;
+  topics.color = "/camera/color/image_raw/compressed";
+  EXPECT_EQ(color_type(topics), "sensor_msgs/msg/CompressedImage");
+  EXPECT_EQ(bus_topics(topics)[1].type, "sensor_msgs/msg/CompressedImage");
+  topics.color_form = "points";
+  EXPECT_FALSE(validate(topics).ok());
+  topics.color_form = "";
+  topics.depth_form = "jpeg";
+  EXPECT_FALSE(validate(topics).ok());
+}
+
 TEST(BusTopics, ARenamedTopicIsOfferedByItsType) {
   EXPECT_EQ(offered_as("/robot/depth", "sensor_msgs/msg/Image"), TopicQos::kImages);
+  EXPECT_EQ(offered_as("/robot/points", "sensor_msgs/msg/PointCloud2"), TopicQos::kImages);
   EXPECT_EQ(offered_as("/robot/tf_static", "tf2_msgs/msg/TFMessage"), TopicQos::kLatched);
   EXPECT_EQ(offered_as("/robot/tf", "tf2_msgs/msg/TFMessage"), TopicQos::kTf);
   EXPECT_EQ(offered_as("/tf_static", "tf2_msgs/msg/TFMessage"), TopicQos::kLatched);

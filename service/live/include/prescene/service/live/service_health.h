@@ -20,6 +20,7 @@ inline constexpr double kSilentAfter = 2.0;
 
 struct ServiceHealth {
   std::string depth_topic;
+  std::string nothing_came;  ///< As nothing_came_text(), once none has for some seconds; "" = images come, or may yet.
   std::uint64_t steps = 0;
   std::uint64_t skipped_frames = 0;
   std::uint64_t refused_messages = 0;

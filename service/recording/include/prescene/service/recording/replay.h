@@ -28,6 +28,7 @@ struct ReplaySummary {
   std::uint64_t messages = 0;
   std::uint64_t refused = 0;  ///< Messages that made no sense; the first one's reason is in first_refusal.
   std::string first_refusal;
+  std::vector<interfaces::DomainTopic> image_topics;  ///< Those that carried images, as if each had one writer.
   std::uint64_t steps = 0;
   std::uint64_t skipped = 0;  ///< Frames.
   std::string last_skip;      ///< Why the last frame was, if no step came after it.

@@ -25,6 +25,7 @@
 #include "prescene/geometry/lens.h"
 #include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/service/tracking/image_messages.h"
 #include "prescene/service/tracking/tf_buffer.h"
 
 namespace prescene::service {
@@ -73,8 +74,13 @@ class FrameAssembler {
 
   /// Each takes a message with its running number and the time it came in. A message that says something impossible is
   /// refused with a status that names the field and the remedy, and changes nothing.
+  core::Status add_depth(DepthMessage&& message, MessageIndex index, core::TimeNs received_ns);
   core::Status add_depth(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns);
+  core::Status add_color(ColorMessage&& message, MessageIndex index, core::TimeNs received_ns);
   core::Status add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns);
+  /// How depth images are to be read.
+  interfaces::ImageRules image_rules() const;
+  bool uses_color() const { return settings_.use_color; }
   core::Status add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index);
   /// Takes every good transform of the message; the status tells of the first bad one.
   core::Status add_tf(const interfaces::RosTfMessage& message, MessageIndex index, bool is_static);

@@ -43,6 +43,9 @@ class TfBuffer {
   /// that time (yet, or any more): the text names the edge.
   core::Result<geometry::Pose> lookup(const std::string& parent, const std::string& child, core::TimeNs stamp_ns) const;
 
+  /// The frames on the way from `child` up to the nearest common ancestor and down to `parent`, both included; empty
+  /// where they are not connected.
+  std::vector<std::string> chain(const std::string& parent, const std::string& child) const;
   bool knows(const std::string& frame) const;
   /// Transforms that are kept now, and those that were forgotten before the end of the history for want of room.
   std::size_t sample_count() const { return sample_count_; }

@@ -11,21 +11,33 @@
 
 namespace prescene::service {
 
-/// Names of what comes in; the defaults are those of common RGB-D drivers.
+/// Names of what comes in; the defaults are those of old RealSense drivers (camera_presets.h has today's).
 struct InputTopics {
-  std::string depth = "/camera/aligned_depth_to_color/image_raw";  ///< sensor_msgs/Image, registered to colour
-  std::string color = "/camera/color/image_raw";                   ///< sensor_msgs/Image; empty = none
+  std::string depth = "/camera/aligned_depth_to_color/image_raw";  ///< Registered to colour; of depth_type().
+  std::string color = "/camera/color/image_raw";                   ///< Of color_type(); empty = none.
   std::string camera_info = "/camera/color/camera_info";           ///< sensor_msgs/CameraInfo
   std::string tf = "/tf";                                          ///< tf2_msgs/TFMessage
   std::string tf_static = "/tf_static";                            ///< tf2_msgs/TFMessage, latched
+  /// What the depth topic carries: "image", "compressed", "points", or "" = as its name says.
+  std::string depth_form;
+  std::string color_form;  ///< The same of the colour topic: "image", "compressed" or "".
   friend bool operator==(const InputTopics&, const InputTopics&) = default;
 };
 
+/// The message types of the images: sensor_msgs/msg/Image; CompressedImage where the form says so, or without one the
+/// name's last part is "compressed" or "compressedDepth", as image_transport names them; for depth also PointCloud2,
+/// without a form where the last part begins with "points" or "cloud".
+std::string depth_type(const InputTopics& topics);
+std::string color_type(const InputTopics& topics);
+
+/// Whether messages of this type hold images, or points that can be one.
+bool is_image_type(const std::string& type);
+
 /// By its name, whether a topic carries rectified images: those of ROS's image_proc and of drivers are called
-/// image_rect, image_rect_color, image_rect_raw and the like.
+/// image_rect, image_rect_color, image_rect_raw and the like, also if they are compressed.
 bool names_rectified_images(const std::string& topic);
 
-/// kInvalidInput where a topic but colour is empty, or two are one.
+/// kInvalidInput where a topic but colour is empty, two are one, or a form is none of the above.
 core::Status validate(const InputTopics& topics);
 
 // Our own topics. JSON is carried by std_msgs/String, so that `ros2 topic pub` and `echo` can speak it.
@@ -47,7 +59,7 @@ inline constexpr const char* kStepTopic = "/prescene/step";        ///< One step
 /// A topic as it is on the bus.
 struct BusTopic {
   std::string name;
-  const char* type = "";
+  std::string type;
   interfaces::TopicQos read{};   ///< How whoever may lose nothing of it listens.
   interfaces::TopicQos write{};  ///< How it is offered, by a robot or by who plays a recording in its place.
 };
