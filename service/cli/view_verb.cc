@@ -145,7 +145,7 @@ Verb add_view_verb(CLI::App& app) {
   verb->add_flag("--salvage", options->read.salvage,
                  "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
   add_web_options(*verb, "", options->view);
-  add_bus_options(*verb, options->dds, options->tracker.topics);
+  add_bus_options(*verb, options->dds, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -28,8 +29,8 @@ ordered_json parsed(const Finished& finished) {
 TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
   EXPECT_EQ(run_program({"--help"}).exit_code, 0);
   EXPECT_EQ(run_program({"--version"}).exit_code, 0);
-  for (const char* verb : {"validate", "predict", "inspect", "record", "replay", "explain", "serve", "ask", "achieve",
-                           "view", "train", "evaluate", "calibrate"}) {
+  for (const char* verb : {"validate", "predict", "inspect", "doctor", "record", "replay", "explain", "serve", "ask",
+                           "achieve", "view", "train", "evaluate", "calibrate"}) {
     const Finished help = run_program({verb, "--help"});
     EXPECT_EQ(help.exit_code, 0) << verb;
     EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;
@@ -186,6 +187,42 @@ TEST(CommandLine, InputThatCannotBeUsedEndsWithTwo) {
     const Finished finished = run_program(args, {own_domain()});
     EXPECT_EQ(finished.exit_code, 2) << args[0] << " " << args[1] << ": " << finished.err;
     EXPECT_NE(finished.err.find("prescene " + args[0]), std::string::npos) << finished.err;
+  }
+}
+
+TEST(CommandLine, DoctorSaysWhatIsMissingAndEndsWithOne) {
+  const ScratchDir folder;
+  const std::string scene = (folder.path() / "box.yaml").string();
+  write_file(scene, kOneBox);
+  const Finished finished = run_program(
+      {"doctor", scene, "--seconds", "0.5", "--camera", "zed", "--color-topic", "/mine", "--json"}, {own_domain()});
+  EXPECT_EQ(finished.exit_code, 1) << finished.err;
+  EXPECT_NE(finished.err.find("depth /zed/zed_node/depth/depth_registered, colour /mine,"), std::string::npos)
+      << "what is named by itself takes precedence: " << finished.err;
+  const auto document = nlohmann::json::parse(finished.out, nullptr, false);
+  ASSERT_FALSE(document.is_discarded()) << finished.out;
+  EXPECT_EQ(document["usable"], false);
+  std::map<std::string, nlohmann::json> checks;
+  for (const auto& check : document["checks"]) {
+    checks[check["check"].get<std::string>()] = check;
+    EXPECT_EQ(check["status"] == "ok", check["remedy"] == "") << check;
+  }
+  EXPECT_EQ(checks["scene"]["status"], "ok");
+  EXPECT_EQ(checks["depth image"]["status"], "error");
+
+  write_file(scene, "name: [1\n");
+  const Finished wrong = run_program({"doctor", scene, "--seconds", "0.5"}, {own_domain()});
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_NE(wrong.out.find("box.yaml:"), std::string::npos) << wrong.out;
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"doctor", (folder.path() / "none.yaml").string()},
+                                             {"doctor", "--seconds", "0"},
+                                             {"doctor", "--camera", "kinect"},
+                                             {"doctor", "--depth-form", "png"},
+                                             {"doctor", "--overlay", "seen.png"},
+                                             {"doctor", "--depth-topic", "/a", "--camera-info-topic", "/a"}}) {
+    const Finished refused = run_program(args, {own_domain()});
+    EXPECT_EQ(refused.exit_code, 2) << args[1] << ": " << refused.err;
   }
 }
 

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/live/doctor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/service/robot_on_bus.h"
+
+namespace prescene::service::doctor_test {
+namespace {
+
+using testing::HasSubstr;
+
+int own_domain() { return 10 + static_cast<int>(getpid() % 200); }
+
+const DoctorCheck* find(const Diagnosis& diagnosis, const std::string& name) {
+  for (const DoctorCheck& check : diagnosis.checks)
+    if (check.name == name) return &check;
+  return nullptr;
+}
+
+class DoctorTest : public ::testing::Test {
+ protected:
+  DoctorTest() {
+    const auto scene = load_scene_text(tests::kBoxScene, "box.yaml", {});
+    if (scene) scene_ = *scene;
+    options_.dds.domain = own_domain();
+    options_.seconds = 2.0;
+  }
+  core::Result<Diagnosis> examine() { return examine_bus(options_, scene_, backends_, {}, {}, {}); }
+
+  core::ThreadPool pool_{1};
+  Backends backends_{pool_};
+  std::shared_ptr<const belief::Scene> scene_;
+  DoctorOptions options_;
+};
+
+TEST_F(DoctorTest, FindsARobotUsableAndDrawsTheScene) {
+  ASSERT_NE(scene_, nullptr);
+  tests::RobotOnBus robot(tests::kBoxScene, own_domain());
+  ASSERT_TRUE(robot.good());
+  std::atomic<bool> done = false;
+  std::thread sender([&] { robot.send_until([&] { return done.load(); }, core::wall_now_ns()); });
+  const auto diagnosis = examine();
+  done = true;
+  sender.join();
+  ASSERT_TRUE(diagnosis.ok()) << diagnosis.status().message();
+  for (const DoctorCheck& check : diagnosis->checks)
+    EXPECT_NE(check.status, CheckStatus::kError) << check.name << ": " << check.what;
+  EXPECT_TRUE(diagnosis->usable());
+  ASSERT_TRUE(diagnosis->frame.has_value());
+  EXPECT_EQ(diagnosis->overlay.width(), 80);
+  const DoctorCheck* view = find(*diagnosis, "view");
+  ASSERT_NE(view, nullptr);
+  EXPECT_EQ(view->status, CheckStatus::kOk) << view->what;
+  bool found = false;
+  for (const ExaminedTopic& row : diagnosis->topics) {
+    if (row.topic.name != InputTopics().depth) continue;
+    found = true;
+    EXPECT_EQ(row.topic.type, "sensor_msgs/msg/Image");
+    EXPECT_EQ(row.topic.writers, 1);
+    EXPECT_GT(row.messages, 0u);
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST_F(DoctorTest, SeesATableThatIsNotWhereTheSceneFileSays) {
+  ASSERT_NE(scene_, nullptr);
+  belief::Scene lower = *scene_;
+  lower.supports[0].X_WS.translation.z() -= 0.08;
+  scene_ = std::make_shared<const belief::Scene>(lower);
+  tests::RobotOnBus robot(tests::kBoxScene, own_domain());
+  ASSERT_TRUE(robot.good());
+  std::atomic<bool> done = false;
+  std::thread sender([&] { robot.send_until([&] { return done.load(); }, core::wall_now_ns()); });
+  const auto diagnosis = examine();
+  done = true;
+  sender.join();
+  ASSERT_TRUE(diagnosis.ok()) << diagnosis.status().message();
+  const DoctorCheck* view = find(*diagnosis, "view");
+  ASSERT_NE(view, nullptr);
+  EXPECT_EQ(view->status, CheckStatus::kWarning);
+  EXPECT_THAT(view->remedy, HasSubstr("--overlay"));
+}
+
+TEST_F(DoctorTest, SaysThatNothingComes) {
+  options_.seconds = 0.5;
+  const auto diagnosis = examine();
+  ASSERT_TRUE(diagnosis.ok()) << diagnosis.status().message();
+  EXPECT_FALSE(diagnosis->usable());
+  const DoctorCheck* depth = find(*diagnosis, "depth image");
+  ASSERT_NE(depth, nullptr);
+  EXPECT_EQ(depth->status, CheckStatus::kError);
+  EXPECT_THAT(depth->what, HasSubstr("no depth image on " + InputTopics().depth));
+  EXPECT_FALSE(diagnosis->frame.has_value());
+}
+
+TEST_F(DoctorTest, StopsOnRequest) {
+  options_.seconds = 600.0;
+  core::Cancellation cancellation;
+  cancellation.request();
+  EXPECT_EQ(examine_bus(options_, nullptr, backends_, cancellation, {}, {}).status().code(),
+            core::StatusCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace prescene::service::doctor_test
