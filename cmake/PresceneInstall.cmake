@@ -50,7 +50,7 @@ endforeach()
 string(APPEND _script [[
 cmake_policy(PUSH)
 cmake_policy(VERSION 3.25)
-if(CMAKE_INSTALL_COMPONENT AND NOT prescene_installing)
+if(CMAKE_INSTALL_COMPONENT AND NOT prescene_installing AND NOT DEFINED ENV{PRESCENE_PACKING})
   if(NOT CMAKE_INSTALL_COMPONENT IN_LIST prescene_parts)
     list(JOIN prescene_parts " " prescene_parts)
     message(FATAL_ERROR "There is no component '${CMAKE_INSTALL_COMPONENT}'. There are: ${prescene_parts}")

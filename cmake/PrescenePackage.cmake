@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+# `cpack -G DEB` in the build folder makes three packages: prescene (the program, its man pages, a systemd unit, example
+# scenes), libprescene-dev (static libraries, headers, CMake package) and prescene-doc.
+if(NOT TARGET prescene)
+  return()
+endif()
+
+# What belongs to the program besides itself; the pages are made of what it prints for --help.
+install(CODE "execute_process(COMMAND \"${PROJECT_SOURCE_DIR}/tools/man_pages\" \"$<TARGET_FILE:prescene>\" \"${PROJECT_BINARY_DIR}/man\"
+                      COMMAND_ERROR_IS_FATAL ANY)" COMPONENT program_files)
+install(DIRECTORY "${PROJECT_BINARY_DIR}/man/" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT program_files)
+install(FILES packaging/prescene.service DESTINATION lib/systemd/system COMPONENT program_files)
+install(FILES packaging/service.conf DESTINATION "${CMAKE_INSTALL_DOCDIR}/examples" COMPONENT program_files)
+install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files FILES_MATCHING PATTERN "*.yaml")
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation)
+install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.bib")
+
+set(PRESCENE_MAINTAINER "Prescene <prescene@localhost>" CACHE STRING "Maintainer that the Debian packages name")
+set(CPACK_PACKAGE_NAME prescene)
+set(CPACK_PACKAGE_CONTACT "${PRESCENE_MAINTAINER}")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PROJECT_CONFIG_FILE "${PROJECT_SOURCE_DIR}/cmake/packing.cmake")
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME prescene)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
+# Looked for when it runs; without them it scores poses on the processor.
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libegl-mesa0, libgl1-mesa-dri")
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME libprescene-dev)
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DOC_PACKAGE_NAME prescene-doc)
+set(CPACK_DEBIAN_DOC_PACKAGE_SECTION doc)
+set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
+# The static libraries need what they are built with.
+set(_needed)
+file(STRINGS "${PROJECT_SOURCE_DIR}/tools/packages.txt" _rows REGEX "^run ")
+foreach(_row IN LISTS _rows)
+  if(_row MATCHES "^run +([a-z0-9.+-]+-dev) +([a-z_/]+)" AND NOT CMAKE_MATCH_2 MATCHES "^(tests|benchmarks)")
+    list(APPEND _needed "${CMAKE_MATCH_1}")
+  endif()
+endforeach()
+list(JOIN _needed ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS)
+
+include(CPack)
+cpack_add_component_group(program DISPLAY_NAME Program)
+cpack_add_component_group(dev DISPLAY_NAME "Libraries and headers")
+cpack_add_component_group(doc DISPLAY_NAME Documentation)
+cpack_add_component(service_cli GROUP program)
+cpack_add_component(program_files GROUP program)
+cpack_add_component(documentation GROUP doc)
+cpack_add_component(package GROUP dev)
+get_property(_installed GLOBAL PROPERTY PRESCENE_INSTALLED_MODULES)
+foreach(_library IN LISTS _installed)
+  cpack_add_component(${_library} GROUP dev)
+endforeach()
