@@ -48,6 +48,10 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+std::string counted_text(std::size_t number, const std::string& thing) {
+  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
+}
+
 std::string percent(double share) { return fixed_text(100.0 * share, 0) + " %"; }
 
 std::string size_of(const TopicEvidence& topic) {
@@ -56,7 +60,7 @@ std::string size_of(const TopicEvidence& topic) {
 
 std::string rate_text(const TopicEvidence& topic) {
   const auto rate = topic.rate();
-  return rate ? fixed_text(*rate, 1) + " Hz" : std::to_string(topic.messages) + " message(s)";
+  return rate ? fixed_text(*rate, 1) + " Hz" : counted_text(topic.messages, "message");
 }
 
 int writers_of(const BusSurroundings& around, const std::string& topic, const std::string& type) {
@@ -81,7 +85,8 @@ void check_domain(const BusSurroundings& around, Checks& checks) {
         "start the robot's nodes; give the same domain on both sides (--domain, ROS_DOMAIN_ID); across machines, "
         "let multicast through or name peers in CYCLONEDDS_URI");
   } else {
-    checks.ok("domain", domain + ", " + std::to_string(around.participants) + " other participant(s)");
+    checks.ok("domain",
+              domain + ", " + counted_text(static_cast<std::size_t>(around.participants), "other participant"));
   }
   const std::string name = "network interface";
   for (const auto& [variable, value] : around.ros) {
@@ -193,12 +198,16 @@ bool check_topic(const std::string& name, const std::string& topic, const std::s
   return false;
 }
 
-void check_image(const std::string& name, const std::string& topic, const BusEvidence& evidence, Checks& checks) {
+void check_image(const std::string& name, const std::string& topic, const std::string& type,
+                 const BusEvidence& evidence, const BusSurroundings& around, Checks& checks) {
   const TopicEvidence& seen = evidence.topics().at(topic);
   const std::string what = topic + ": " + size_of(seen) + " " + quote(seen.encoding) + ", " + rate_text(seen) +
                            ", frame " + quote(seen.frame_id);
   const auto rate = seen.rate();
-  if (rate && *rate < kLeastRate)
+  const int writers = writers_of(around, topic, type);
+  if (writers > 1)
+    checks.warn(name, std::to_string(writers) + " nodes publish on it; " + what, "stop all but the camera's driver");
+  else if (rate && *rate < kLeastRate)
     checks.warn(name, what, "objects that move are lost between frames so far apart: raise the camera's rate");
   else
     checks.ok(name, what);
@@ -357,7 +366,7 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
                 "tf does not give the pose of: " + missing + "; they are taken to be where the scene file says",
                 "publish their poses under these names, or rename the bodies in the scene file");
   else if (!evidence.robot().empty())
-    checks.ok("robot", "tf gives the poses of all " + std::to_string(evidence.robot().size()) + " bodies of the scene");
+    checks.ok("robot", "tf gives the pose of " + counted_text(evidence.robot().size(), "robot part") + " of the scene");
 }
 
 void check_clock(const BusEvidence& evidence, Checks& checks) {
@@ -413,12 +422,12 @@ std::vector<DoctorCheck> checks_of(const BusEvidence& evidence, const BusSurroun
   check_services(around, checks);
   const bool has_depth =
       check_topic("depth image", topics.depth, depth_type(topics), true, "--depth-topic", evidence, around, checks);
-  if (has_depth) check_image("depth image", topics.depth, evidence, checks);
+  if (has_depth) check_image("depth image", topics.depth, depth_type(topics), evidence, around, checks);
   if (topics.color.empty()) {
     checks.ok("colour image", "none is asked for");
   } else if (check_topic("colour image", topics.color, color_type(topics), false, "--color-topic", evidence, around,
                          checks)) {
-    check_image("colour image", topics.color, evidence, checks);
+    check_image("colour image", topics.color, color_type(topics), evidence, around, checks);
   }
   const bool has_info = check_topic("camera info", topics.camera_info, "sensor_msgs/msg/CameraInfo", true,
                                     "--camera-info-topic", evidence, around, checks);

@@ -157,6 +157,9 @@ TEST(Doctor, SeesThatNobodyIsThere) {
   BusSurroundings local = healthy();
   local.ros["ROS_LOCALHOST_ONLY"] = "1";
   told({}, {}, local).expect_only("network interface", CheckStatus::kWarning, "ROS_LOCALHOST_ONLY=1");
+  BusSurroundings twice = healthy();
+  twice.topics[0].writers = 2;
+  told({}, {}, twice).expect_only("depth image", CheckStatus::kWarning, "2 nodes publish on it");
   BusSurroundings second = healthy();
   second.other_services = 1;
   told({}, {}, second).expect_only("other services", CheckStatus::kWarning, "another service publishes");
@@ -165,7 +168,7 @@ TEST(Doctor, SeesThatNobodyIsThere) {
 TEST(Doctor, ComparesTheBufferWithTheFrames) {
   BusSurroundings small = healthy();
   small.granted_buffer = 212992;
-  told({}, {}, small).expect_only("receive buffer", CheckStatus::kWarning, "grants 208 KiB");
+  told({}, {}, small).expect_only("receive buffer", CheckStatus::kWarning, "grants 208.0 KiB");
   EXPECT_THAT(told({}, {}, small).of("receive buffer").remedy, HasSubstr("sysctl -w net.core.rmem_max=8388608"));
   BusSurroundings losing = healthy();
   losing.lost_datagrams = 17;
@@ -206,8 +209,9 @@ TEST(Doctor, FollowsTheChainOfFrames) {
 }
 
 TEST(Doctor, MissesBodiesOfTheScene) {
-  const auto scene =
-      load_scene_text(tests::box_on_table("0.3") + "robot:\n  gripper: {box: [0.1, 0.1, 0.1]}\n", "scene.yaml", {});
+  const auto scene = load_scene_text(
+      tests::box_on_table("0.3") + "robot:\n  gripper: {box: [0.1, 0.1, 0.1], pose: {position: [0.3, 0, 0.4]}}\n",
+      "scene.yaml", {});
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   BusEvidence evidence({}, scene->get());
   Robot().send(evidence);

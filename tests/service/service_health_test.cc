@@ -30,6 +30,14 @@ TEST(ServiceHealth, SaysWhatItWaitsForAndWhyFramesAreOfNoUse) {
   EXPECT_THAT(health_text(health), HasSubstr("not a unit quaternion"));
 }
 
+TEST(ServiceHealth, SaysWhatImagesThereAreWhereNoneComes) {
+  ServiceHealth health;
+  health.depth_topic = "/camera/depth";
+  health.nothing_came = "no depth image on /camera/depth; image topics in DDS domain 0: /a (Image)";
+  EXPECT_EQ(health_text(health), health.nothing_came);
+  EXPECT_EQ(to_diagnostic(health, {}, "here").message, health.nothing_came);
+}
+
 TEST(ServiceHealth, IsWellWhileFramesComeAndAnErrorWhenTheyStop) {
   ServiceHealth health;
   health.seconds_since_frame = 0.1;
