@@ -280,6 +280,47 @@ std::string timeline_svg(const TimelineBlock& block) {
   return out + "</svg>";
 }
 
+std::string state_band_svg(const StateBandBlock& block) {
+  // From good to bad: green, yellow, blue, red; states beyond go on with the series.
+  constexpr std::array<std::size_t, 4> kStateColors = {2, 5, 1, 3};
+  const auto color = [&](std::size_t state) {
+    return hex(series_color(state < kStateColors.size() ? kStateColors[state] : state));
+  };
+  double begin = 1e300, end = -1e300;
+  for (const StateBandBlock::Lane& lane : block.lanes)
+    for (const StateBandBlock::Segment& segment : lane.segments) {
+      begin = std::min(begin, segment.begin);
+      end = std::max(end, segment.end);
+    }
+  std::tie(begin, end) = widened(begin, end);
+  const std::size_t count = std::min(block.lanes.size(), kMostLanes);
+  constexpr double kWidth = 860.0, kLane = 24.0, kLeft = 150.0, kRight = 20.0, kTop = 28.0;
+  const double bottom = kTop + kLane * static_cast<double>(count);
+  const Axis x{begin, end, kLeft, kWidth - kRight};
+  std::string out = svg_begin(kWidth, bottom + 44.0 + (count < block.lanes.size() ? 18.0 : 0.0), block.caption);
+  for (std::size_t i = 0; i < block.states.size(); ++i) {
+    const double left = kLeft + 110.0 * static_cast<double>(i);
+    out += rectangle(left, 6.0, 12.0, 10.0, color(i), "");
+    out += text_at(left + 18.0, 15.0, block.states[i], "tick");
+  }
+  out += x_axis(x, kTop, bottom, "time, s");
+  for (std::size_t i = 0; i < count; ++i) {
+    const double top = kTop + kLane * static_cast<double>(i);
+    out += text_at(kLeft - 10.0, top + 16.0, shortened(block.lanes[i].name, 22), "lane end");
+    for (const StateBandBlock::Segment& segment : block.lanes[i].segments) {
+      const auto state = std::find(block.states.begin(), block.states.end(), segment.state);
+      if (state == block.states.end()) continue;
+      out += rectangle(x(segment.begin), top + 4.0, std::max(1.0, x(segment.end) - x(segment.begin)), 16.0,
+                       color(static_cast<std::size_t>(state - block.states.begin())),
+                       block.lanes[i].name + ": " + segment.state + ", " + decimal(segment.begin, 2) + " to " +
+                           decimal(segment.end, 2) + " s");
+    }
+  }
+  if (count < block.lanes.size())
+    out += text_at(kLeft, bottom + 56.0, std::to_string(block.lanes.size() - count) + " more are not shown", "tick");
+  return out + "</svg>";
+}
+
 std::string heat_map_svg(const HeatMapBlock& block) {
   const belief::HeatMap& map = block.map;
   if (map.nx < 1 || map.ny < 1) return "";

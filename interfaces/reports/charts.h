@@ -13,6 +13,7 @@ std::string probability_bar(const belief::OutcomeProbability& outcome);
 std::string chart_svg(const ChartBlock& chart);
 std::string tornado_svg(const TornadoBlock& block);
 std::string timeline_svg(const TimelineBlock& block);
+std::string state_band_svg(const StateBandBlock& block);
 std::string heat_map_svg(const HeatMapBlock& block);
 
 /// About `count` round numbers (1, 2 or 5 times a power of ten apart) within [low, high]; empty when that is no range.

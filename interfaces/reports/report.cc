@@ -139,6 +139,9 @@ std::string html_of(const TimelineBlock& block) {
   if (block.timeline.empty()) return "";
   return figure(timeline_svg(block) + "\n", block.caption);
 }
+std::string html_of(const StateBandBlock& block) {
+  return block.lanes.empty() ? "" : figure(state_band_svg(block) + "\n", block.caption);
+}
 std::string html_of(const HeatMapBlock& block) { return figure(heat_map_svg(block) + "\n", block.caption); }
 
 }  // namespace

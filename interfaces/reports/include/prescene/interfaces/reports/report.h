@@ -79,6 +79,20 @@ struct TimelineBlock {
   belief::Timeline timeline;
   double begin = 0.0, end = 0.0;  ///< s; end <= begin: what the intervals cover.
 };
+/// The state that things are in, as a band over time for each of them.
+struct StateBandBlock {
+  struct Segment {
+    double begin = 0.0, end = 0.0;  ///< s
+    std::string state;              ///< One of `states`; what is none is left empty.
+  };
+  struct Lane {
+    std::string name;
+    std::vector<Segment> segments;
+  };
+  std::string caption;
+  std::vector<std::string> states;  ///< In the order of their colours.
+  std::vector<Lane> lanes;
+};
 /// Where something ends, seen from above, in metres.
 struct HeatMapBlock {
   struct Outline {
@@ -90,7 +104,7 @@ struct HeatMapBlock {
   std::vector<Outline> outlines;
 };
 using ReportBlock = std::variant<TextBlock, PictureBlock, OutcomeBlock, TableBlock, ChartBlock, TornadoBlock,
-                                 TimelineBlock, HeatMapBlock>;
+                                 TimelineBlock, StateBandBlock, HeatMapBlock>;
 
 struct ReportSection {
   std::string title;
