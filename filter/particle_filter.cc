@@ -7,6 +7,7 @@
 #include "prescene/belief/robot_motion.h"
 #include "prescene/core/check.h"
 #include "prescene/filter/operators/learn_colors.h"
+#include "prescene/filter/operators/unknown_objects.h"
 
 namespace prescene::filter {
 namespace {
@@ -268,13 +269,19 @@ void ParticleFilter::recover_all(FrameStep& step) {
 void ParticleFilter::look_for_more(FrameStep& step) {
   const AugmentOptions& options = settings_.augment;
   Belief& belief = step.belief();
-  if (!options.new_objects || belief.step % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0) return;
+  // In the first frame of all, and every so many after it.
+  if (!options.new_objects || (belief.step - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0)
+    return;
   geometry::DepthImage known = step.frame.robot;
   for (std::size_t i = 0; i < step.depths.size(); ++i)
     if (hides_others(belief.objects[i])) merge_nearest(step.depths[i], &known);
   const core::RandomStream stream(belief.seed, core::Purpose::kDetection, belief.step);
-  step.result.counters.new_objects =
-      filter::new_objects(step.frame, step.observation, known, options, settings_.initialise, tools_, stream, belief);
+  const std::size_t before = belief.objects.size();
+  filter::new_objects(step.frame, step.observation, known, options, settings_.initialise, tools_, stream, belief);
+  for (std::size_t i = before; i < belief.objects.size(); ++i) merge_nearest(depth_in(step, i), &known);
+  add_unknown_objects(step.frame, step.observation, known, options, settings_.initialise, tools_, stream, belief);
+  step.result.counters.new_objects = static_cast<int>(belief.objects.size() - before);
+  step.result.counters.forgotten_objects = forget_unknown_objects(belief);
 }
 
 StepResult ParticleFilter::step(const Belief& previous, const belief::Observation& observation,

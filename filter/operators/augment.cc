@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "prescene/filter/operators/track_state.h"
+#include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -208,13 +209,39 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
   return placed;
 }
 
+void append_object(const std::string& name, int model, const Pose& X_WO, const rendering::PoseEvidence& evidence,
+                   core::TimeNs stamp_ns, const InitialiseOptions& spread, const core::RandomStream& stream,
+                   belief::Scene& scene, belief::Belief& belief) {
+  ObjectBelief object;
+  object.name = name;
+  object.model = model;
+  object.particles = particles_about(X_WO, belief::MotionMode::kResting, spread.particles, spread, stream);
+  object.existence = kFoundExistence;
+  object.evidence_per_pixel = evidence.log_ratio_per_visible_pixel();
+  object.last_seen_ns = stamp_ns;
+  object.island = static_cast<int>(belief.objects.size());
+  belief::SceneObject in_scene;
+  in_scene.name = name;
+  in_scene.model = model;
+  in_scene.pose = belief::FixedPose{X_WO};
+  scene.objects.push_back(std::move(in_scene));
+  belief.objects.push_back(std::move(object));
+}
+
 int new_objects(const FilterFrame& frame, const belief::Observation& observation, const geometry::DepthImage& known,
                 const AugmentOptions& options, const InitialiseOptions& spread, const FilterTools& tools,
                 const core::RandomStream& stream, belief::Belief& belief) {
   const SegmentationOptions& segmentation = options.detection.segmentation;
   const SampledDepth sampled = sample_depth(*observation.frame.depth, observation.frame.camera, segmentation);
   std::vector<WantedModel> wanted;
-  for (const belief::ObjectModel& model : belief.scene->models) wanted.push_back({target_of(model, frame, tools), 1});
+  std::vector<int> model_of_wanted;
+  for (std::size_t i = 0; i < belief.scene->models.size(); ++i) {
+    const belief::ObjectModel& model = belief.scene->models[i];
+    if (is_unknown_object(model.name)) continue;  // made for one thing alone
+    wanted.push_back({target_of(model, frame, tools), 1});
+    model_of_wanted.push_back(static_cast<int>(i));
+  }
+  if (wanted.empty()) return 0;
   DetectionOptions detection = options.detection;
   detection.min_log_ratio = std::max(detection.min_log_ratio, options.new_log_ratio);
   rendering::FrameTerms terms;
@@ -224,23 +251,12 @@ int new_objects(const FilterFrame& frame, const belief::Observation& observation
   if (found.empty()) return 0;
   auto scene = std::make_shared<belief::Scene>(*belief.scene);
   for (const Detection& detection_found : found) {
-    const belief::ObjectModel& model = scene->models[static_cast<std::size_t>(detection_found.model)];
-    ObjectBelief object;
-    for (int number = 2; object.name.empty() || belief::find_object(*scene, object.name); ++number)
-      object.name = model.name + "_" + std::to_string(number);
-    object.model = detection_found.model;
-    const Pose X_WO = frame.X_WC * detection_found.X_CO;
-    object.particles = particles_about(X_WO, belief::MotionMode::kResting, spread.particles, spread, stream);
-    object.existence = kFoundExistence;
-    object.evidence_per_pixel = detection_found.evidence.log_ratio_per_visible_pixel();
-    object.last_seen_ns = frame.stamp_ns;
-    object.island = static_cast<int>(belief.objects.size());
-    belief::SceneObject in_scene;
-    in_scene.name = object.name;
-    in_scene.model = object.model;
-    in_scene.pose = belief::FixedPose{X_WO};
-    scene->objects.push_back(std::move(in_scene));
-    belief.objects.push_back(std::move(object));
+    const int model = model_of_wanted[static_cast<std::size_t>(detection_found.model)];
+    std::string name;
+    for (int number = 2; name.empty() || belief::find_object(*scene, name); ++number)
+      name = scene->models[static_cast<std::size_t>(model)].name + "_" + std::to_string(number);
+    append_object(name, model, frame.X_WC * detection_found.X_CO, detection_found.evidence, frame.stamp_ns, spread,
+                  stream, *scene, belief);
   }
   belief.scene = std::move(scene);
   return static_cast<int>(found.size());

@@ -75,6 +75,11 @@ extern const PredictOptions options;
 extern const simulation::SimulatorFactory simulators;
 }  // namespace predict_h
 
+namespace unknown_objects_h {
+extern const AugmentOptions options;
+extern const InitialiseOptions spread;
+}  // namespace unknown_objects_h
+
 namespace watched_renderer_h {
 extern rendering::Renderer& renderer;
 extern const geometry::PinholeCamera camera;

@@ -81,6 +81,7 @@ struct StepCounters {
   int recoveries_tried = 0;
   int recoveries = 0;  ///< That succeeded.
   int new_objects = 0;
+  int forgotten_objects = 0;    ///< Lost things that the scene does not name.
   int inferred_releases = 0;    ///< Objects that were seen to have left their hand.
   int physics_runs = 0;         ///< Simulated to learn physical parameters, ...
   int physics_lessons = 0;      ///< ... episodes that changed what is believed of them, ...

@@ -54,13 +54,20 @@ struct AugmentOptions {
   double exchange_gain = 10.0;
   /// nats per pixel. ... and by so much for each visible pixel. Range 0 to 10. Chosen.
   double exchange_evidence = 1.0;
-  /// switch. Look for more objects of the scene's models than it names. Range true or false. Chosen.
+  /// switch. Look for more objects than the scene names: of its models, and things that no model describes. A scene
+  /// file's `new_objects` and --new-objects set it. Range true or false. Chosen.
   bool new_objects = false;
   /// frames. Between two such searches. Range 1 to 1000. Chosen.
   int new_every = 15;
   /// nats. Smaller finds of new objects are remnants more often than objects. Range 0 to 10000. Measured:
   /// docs/studies/tracking.md.
   double new_log_ratio = 250.0;
+  /// nats. The same of things that no model describes, which get a shape about their points. Range 0 to 10000. Chosen.
+  double unknown_log_ratio = 100.0;
+  /// m. What is larger in any direction is no such thing, ... Range 0.05 to 5. Chosen.
+  double unknown_largest = 0.4;
+  /// m. ... and neither is what rises less above its support. Range 0.005 to 0.5. Chosen.
+  double unknown_lowest = 0.015;
   /// Of new objects.
   DetectionOptions detection;
 };
@@ -96,6 +103,11 @@ bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& o
 /// what the frame expects there without the objects, and those where it expects nothing.
 std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const rendering::FrameTerms& terms,
                                          double tolerance);
+
+/// Appends an object that was found at X_WO to a belief and to the scene that is to become its own.
+void append_object(const std::string& name, int model, const Pose& X_WO, const rendering::PoseEvidence& evidence,
+                   core::TimeNs stamp_ns, const InitialiseOptions& spread, const core::RandomStream& stream,
+                   belief::Scene& scene, belief::Belief& belief);
 
 /// Appends objects found in clusters that nothing explains, to the belief and to a copy of its scene; returns how many.
 /// `known`: depth of everything tracked at frame.terms.camera.
