@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 
+#include "prescene/belief/physical_priors.h"
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
@@ -124,6 +125,12 @@ PhysicalParameters mean_physical(const ObjectModel& model) {
   for (const Parameter& parameter : parameters_of(model)) parameter.value(physical) = mean(*parameter.prior);
   if (!model.contact.impact_friction) physical.impact_friction = physical.friction;
   return physical;
+}
+
+std::vector<PhysicalPrior> physical_priors(const ObjectModel& model) {
+  std::vector<PhysicalPrior> priors;
+  for (const Parameter& parameter : parameters_of(model)) priors.push_back({parameter.name, *parameter.prior});
+  return priors;
 }
 
 bool operator==(const PhysicalBelief& a, const PhysicalBelief& b) {

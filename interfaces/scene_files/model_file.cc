@@ -4,63 +4,31 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <initializer_list>
 
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/scene_files/mesh_use.h"
 #include "read_scene_parts.h"
+#include "value_texts.h"
 
 namespace prescene::interfaces {
 namespace {
 
-using belief::ScalarDistribution;
 using geometry::Vector3d;
 
-std::string list(std::initializer_list<std::string> items) {
-  std::string text = "[";
-  for (const std::string& item : items) text.append(text.size() > 1 ? ", " : "").append(item);
-  return text + "]";
-}
-
-std::string text_of(const Vector3d& v) { return list({number_text(v.x()), number_text(v.y()), number_text(v.z())}); }
-
-std::string text_of(const ScalarDistribution& distribution) {
-  if (const auto* fixed = std::get_if<belief::FixedScalar>(&distribution)) return number_text(fixed->value);
-  if (const auto* uniform = std::get_if<belief::UniformScalar>(&distribution))
-    return "{uniform: " + list({number_text(uniform->low), number_text(uniform->high)}) + "}";
-  if (const auto* sampled = std::get_if<belief::SampledScalar>(&distribution)) {
-    std::string samples;
-    for (const double sample : sampled->samples)
-      samples.append(samples.empty() ? "" : ", ").append(number_text(sample));
-    return "{samples: [" + samples + "]}";
-  }
-  const auto& normal = std::get<belief::NormalScalar>(distribution);
-  std::string text = "{normal: " + list({number_text(normal.mean), number_text(normal.standard_deviation)});
-  if (std::isfinite(normal.low)) text += ", min: " + number_text(normal.low);
-  if (std::isfinite(normal.high)) text += ", max: " + number_text(normal.high);
-  return text + "}";
-}
-
-std::string text_of(const belief::Vector3Distribution& v) { return list({text_of(v.x), text_of(v.y), text_of(v.z)}); }
-
 std::string rotation_text(const geometry::Quaterniond& q) {
-  return "{quaternion_wxyz: " + list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())}) +
-         "}";
-}
-
-std::string text_of(const geometry::Matrix3d& m) {
-  return list({text_of(Vector3d(m.row(0))), text_of(Vector3d(m.row(1))), text_of(Vector3d(m.row(2)))});
+  return "{quaternion_wxyz: " +
+         flow_list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())}) + "}";
 }
 
 // The shortest form that reads back as the same group.
 std::string text_of(const geometry::SymmetryGroup& group) {
   if (group.trivial()) return "none";
-  const std::string center = group.p_BoC.isZero(0.0) ? "" : ", center: " + text_of(group.p_BoC);
+  const std::string center = group.p_BoC.isZero(0.0) ? "" : ", center: " + value_text(group.p_BoC);
   if (group.ball) return center.empty() ? "ball" : "{ball: true" + center + "}";
   if (group.axis)
-    return "{axis: " + text_of(*group.axis) + ", continuous: true" + (group.rotations.empty() ? "" : ", flip: true") +
-           center + "}";
+    return "{axis: " + value_text(*group.axis) + ", continuous: true" +
+           (group.rotations.empty() ? "" : ", flip: true") + center + "}";
   if (geometry::SymmetryGroup::cuboid(group.p_BoC) == group)
     return center.empty() ? "cuboid" : "{cuboid: true" + center + "}";
   if (geometry::SymmetryGroup::cube(group.p_BoC) == group)
@@ -68,7 +36,7 @@ std::string text_of(const geometry::SymmetryGroup& group) {
   const auto order = static_cast<int>(group.rotations.size()) + 1;
   for (const Vector3d& axis : {Vector3d(Vector3d::UnitX()), Vector3d(Vector3d::UnitY()), Vector3d(Vector3d::UnitZ())})
     if (geometry::SymmetryGroup::cyclic(axis, order, group.p_BoC) == group)
-      return "{axis: " + text_of(axis) + ", order: " + std::to_string(order) + center + "}";
+      return "{axis: " + value_text(axis) + ", order: " + std::to_string(order) + center + "}";
   std::string rotations;
   for (const geometry::Quaterniond& rotation : group.rotations)
     rotations.append(rotations.empty() ? "" : ", ").append(rotation_text(rotation));
@@ -154,11 +122,11 @@ std::string key_line(const char* key, const std::string& value) {
 // What recordings of its motion tell of an object.
 std::string fitted_lines(const belief::ObjectModel& model) {
   const belief::ContactProperties& contact = model.contact;
-  std::string text = key_line("center_of_mass", text_of(model.center_of_mass) + "  # m");
-  text += key_line("unit_inertia", text_of(model.unit_inertia) + "  # m^2, of 1 kg about the centre of mass");
-  text += key_line("friction", text_of(contact.friction));
-  if (contact.impact_friction) text += key_line("impact_friction", text_of(*contact.impact_friction));
-  text += key_line("restitution", text_of(contact.restitution));
+  std::string text = key_line("center_of_mass", value_text(model.center_of_mass) + "  # m");
+  text += key_line("unit_inertia", value_text(model.unit_inertia) + "  # m^2, of 1 kg about the centre of mass");
+  text += key_line("friction", value_text(contact.friction));
+  if (contact.impact_friction) text += key_line("impact_friction", value_text(*contact.impact_friction));
+  text += key_line("restitution", value_text(contact.restitution));
   if (contact.rolling_friction != 0.0)
     text += key_line("rolling_friction", number_text(contact.rolling_friction) + "  # m");
   if (contact.edge_radius != 0.0) text += key_line("edge_radius", number_text(contact.edge_radius) + "  # m");
@@ -175,15 +143,16 @@ std::string model_yaml(const ModelFile& file) {
   const auto line = [&](const char* key, const std::string& value) { text += key_line(key, value); };
   line("mesh", "{file: " + quoted_yaml(file.mesh_file) + ", scale: " + number_text(file.scale) +
                    ", up: " + (file.y_up ? "y" : "z") + (file.use ? ", use: " + word_of(*file.use) : "") + "}");
-  line("mass", text_of(model.mass) + "  # kg");
+  line("mass", value_text(model.mass) + "  # kg");
   text += fitted_lines(model);
   line("symmetry", text_of(model.symmetry));
-  line("color", text_of(Vector3d(model.color.r, model.color.g, model.color.b)));
+  line("color", value_text(Vector3d(model.color.r, model.color.g, model.color.b)));
   if (model.surface != belief::SurfaceKind::kOpaque)
     line("surface", model.surface == belief::SurfaceKind::kMirror ? "mirror" : "transparent");
   if (model.learn_colors) line("learn_colors", "true");
   if (model.hollow)
-    line("hollow", "{size: " + text_of(model.hollow->size) + ", position: " + text_of(model.hollow->X_OV.translation) +
+    line("hollow", "{size: " + value_text(model.hollow->size) +
+                       ", position: " + value_text(model.hollow->X_OV.translation) +
                        ", rotation: " + rotation_text(model.hollow->X_OV.rotation) + "}");
   return text;
 }

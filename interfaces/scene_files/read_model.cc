@@ -192,14 +192,17 @@ void read_mass(Binder& binder, const BodyShape& shape, ObjectModel& model) {
                  "give 'mass' instead, or close the mesh");
 }
 
+void report_moments(const LocatedValue& at, Problems& problems) {
+  problems.add(
+      at.place, at.path, "no body has this inertia",
+      "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
+}
+
 void read_moments(const LocatedValue& at, double mass, Problems& problems, ObjectModel& model) {
   const std::optional<Matrix3d> matrix = read_matrix(at, problems);
   if (!matrix) return;
   model.unit_inertia = *matrix / std::max(mass, 1e-9);
-  if (!geometry::MassProperties{1.0, Vector3d::Zero(), model.unit_inertia}.is_physical())
-    problems.add(
-        at.place, at.path, "no body has this inertia",
-        "give it about the centre of mass, symmetric, positive, no principal moment above the sum of the others");
+  if (!geometry::MassProperties{1.0, Vector3d::Zero(), model.unit_inertia}.is_physical()) report_moments(at, problems);
 }
 
 void read_inertia(Binder& binder, const BodyShape& shape, ObjectModel& model) {
@@ -270,6 +273,13 @@ std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneCon
 }
 
 }  // namespace
+
+std::optional<Matrix3d> read_unit_inertia(const LocatedValue& value, Problems& problems) {
+  const std::optional<Matrix3d> matrix = read_matrix(value, problems);
+  if (!matrix) return std::nullopt;
+  if (!geometry::MassProperties{1.0, Vector3d::Zero(), *matrix}.is_physical()) report_moments(value, problems);
+  return matrix;
+}
 
 belief::ObjectModel read_object_model(const LocatedValue& value, const std::string& name, SceneContext& context) {
   ObjectModel model;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -28,6 +29,8 @@ struct SceneContext {
 };
 
 belief::ObjectModel read_object_model(const LocatedValue& value, const std::string& name, SceneContext& context);
+/// [xx, yy, zz] or three rows, about the centre of mass of a body of 1 kg.
+std::optional<geometry::Matrix3d> read_unit_inertia(const LocatedValue& value, Problems& problems);
 belief::Support read_support(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::SceneObject read_object(const LocatedValue& value, const std::string& name, SceneContext& context);

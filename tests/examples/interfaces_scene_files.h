@@ -5,6 +5,7 @@
 #include <string>
 
 #include "prescene/interfaces/scene_files/binder.h"
+#include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 
 namespace prescene::interfaces::given_interfaces_scene_files {
@@ -20,6 +21,12 @@ extern const LocatedValue document;
 extern Settings settings;
 void bind(const LocatedValue& value, Problems& problems, FilterSettings& settings);
 }  // namespace binder_h
+
+namespace learned_file_h {
+extern const std::string text;
+extern const belief::Scene scene;
+extern const belief::Belief belief;
+}  // namespace learned_file_h
 
 namespace scene_file_h {
 extern const MeshReader read_mesh;
