@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
+#include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
@@ -50,25 +51,24 @@ geometry::Vector3d vector_or_zero(const ordered_json& object, const char* key) {
   return vector;
 }
 
-/// What was learned, where the sender says so.
+/// What is not of the form is left out.
 void read_learned(const ordered_json& json, ObjectSummary& object) {
   constexpr std::size_t kMostParameters = 64;
   if (const auto twist = json.find("twist"); twist != json.end() && twist->is_object())
     object.V_WO = {vector_or_zero(*twist, "angular"), vector_or_zero(*twist, "linear")};
-  if (const auto lessons = json.find("lessons"); lessons != json.end() && lessons->is_number_unsigned())
-    object.lessons = static_cast<int>(std::min<std::uint64_t>(lessons->get<std::uint64_t>(), 1'000'000'000));
+  object.lessons = static_cast<int>(std::clamp(number_or(json, "lessons", 0.0), 0.0, 1e9));
+  if (const auto stamp = json.find("learned_ns"); stamp != json.end() && stamp->is_number_integer())
+    object.learned_ns = stamp->get<core::TimeNs>();
   const auto parameters = json.find("parameters");
   if (parameters == json.end() || !parameters->is_array()) return;
-  for (const ordered_json& one : *parameters) {
-    if (object.parameters.size() >= kMostParameters || !one.is_object()) return;
-    const auto name = one.find("name");
-    if (name == one.end() || !name->is_string()) continue;
-    belief::ParameterEstimate& read = object.parameters.emplace_back();
-    read.name = name->get<std::string>();
-    read.mean = number_or(one, "mean", 0.0);
-    read.standard_deviation = number_or(one, "standard_deviation", 0.0);
-    read.low = number_or(one, "low", 0.0);
-    read.high = number_or(one, "high", 0.0);
+  for (const ordered_json& parameter : *parameters) {
+    if (object.parameters.size() >= kMostParameters) return;
+    if (!parameter.is_object()) continue;
+    const auto name = parameter.find("name");
+    if (name == parameter.end() || !name->is_string()) continue;
+    object.parameters.push_back({name->get<std::string>(), number_or(parameter, "mean", 0.0),
+                                 number_or(parameter, "standard_deviation", 0.0), number_or(parameter, "low", 0.0),
+                                 number_or(parameter, "high", 0.0)});
   }
 }
 
@@ -102,6 +102,14 @@ core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
       if (value.is_number()) object.covariance(i / 6, i % 6) = value.get<double>();
     }
   }
+  read_learned(json, object);
+  if (const auto size = json.find("size"); size != json.end() && size->is_array() && size->size() == 3) {
+    object.is_new = true;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const ordered_json& edge = (*size)[static_cast<std::size_t>(i)];
+      if (edge.is_number()) object.size[i] = edge.get<double>();
+    }
+  }
   return object;
 }
 
@@ -116,6 +124,9 @@ BeliefSummary summary_of(const belief::Belief& belief) {
                                estimate.mean, estimate.covariance, estimate.twist, object.evidence_per_pixel,
                                object.visible_share, belief::parameter_estimates(model, object.physics),
                                object.physics.lessons, object.physics.learned_ns});
+    if (!filter::is_unknown_object(object.name)) continue;
+    summary.objects.back().is_new = true;
+    summary.objects.back().size = geometry::bounding_box(mesh_of(model)).sizes();
   }
   return summary;
 }
@@ -138,6 +149,7 @@ ordered_json to_json(const BeliefSummary& summary) {
                        {"parameters", belief::to_json(object.parameters)},
                        {"lessons", object.lessons},
                        {"learned_ns", object.learned_ns}});
+    if (object.is_new) objects.back()["size"] = {object.size.x(), object.size.y(), object.size.z()};
   }
   return {{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
 }
@@ -192,6 +204,14 @@ MarkerMeshes marker_meshes(const belief::Scene& scene) {
     meshes.emplace(model.name, geometry::simplified(mesh_of(model), kMarkerTriangles));
   }
   return meshes;
+}
+
+void add_marker_meshes(const belief::Scene& scene, MarkerMeshes& meshes) {
+  for (const belief::ObjectModel& model : scene.models) {
+    // The name of a thing that was forgotten may be that of another by now.
+    if (!meshes.contains(model.name) || filter::is_unknown_object(model.name))
+      meshes[model.name] = geometry::simplified(mesh_of(model), kMarkerTriangles);
+  }
 }
 
 interfaces::RosMarkerArray markers_of(const BeliefSummary& summary, const belief::Scene& scene,

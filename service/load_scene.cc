@@ -61,11 +61,12 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
 
 bool is_model_file(const std::filesystem::path& path) {
   const auto document = interfaces::read_yaml(path, {});
-  if (!document || document->kind != interfaces::LocatedValue::Kind::kMap) return false;
-  const auto has = [&](const char* name) {
-    return std::ranges::any_of(document->keys, [&](const auto& key) { return key.name == name; });
-  };
-  return has("model") && !has("models") && !has("objects");
+  return document && document->find("model") && !document->find("models") && !document->find("objects");
+}
+
+bool is_learned_file(const std::filesystem::path& path) {
+  const auto document = interfaces::read_yaml(path, {});
+  return document && document->find("learned") && !document->find("models") && !document->find("objects");
 }
 
 core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log) {

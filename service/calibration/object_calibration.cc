@@ -341,6 +341,17 @@ core::Result<std::string> calibrated_yaml(const MotionDataset& dataset, const Ob
                                        found.model, folder, remarks);
 }
 
+interfaces::LearnedFile with_calibrated(interfaces::LearnedFile earlier, const MotionDataset& dataset,
+                                        const ObjectCalibration& found) {
+  const belief::SceneObject& object = dataset.scene->objects[0];
+  interfaces::LearnedModel model = interfaces::learned_model(found.model);
+  model.name = dataset.scene->model_of(object).name;
+  std::erase_if(earlier.models, [&](const auto& other) { return other.name == model.name; });
+  std::erase_if(earlier.objects, [&](const auto& other) { return other.name == object.name; });
+  earlier.models.push_back(std::move(model));
+  return earlier;
+}
+
 nlohmann::ordered_json to_json(const ObjectCalibration& found) {
   nlohmann::ordered_json json;
   json["recordings"] = found.flights + found.slides;

@@ -3,9 +3,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/tracking/camera_presets.h"
 #include "verb.h"
 
@@ -137,6 +140,29 @@ void add_proposals_option(CLI::App& verb, std::string& path) {
       ->check(file_name());
 }
 
+void add_belief_options(CLI::App& verb, TrackerSettings& settings, std::string& learned) {
+  verb.add_option("--learned", learned,
+                  "File in which what is learned of friction, mass, ... is kept: read at the start if it is there, "
+                  "written in the end (docs/reference/scene_files.md)")
+      ->check(file_name());
+  verb.add_flag_function(
+      "--new-objects,!--no-new-objects", [&settings](std::int64_t count) { settings.new_objects = count > 0; },
+      "Whether to look for things that the scene does not name");
+}
+
+core::Status take_learned(const std::string& file, const std::vector<std::string>& inputs, TrackerSettings& settings) {
+  if (file.empty()) return core::ok_status();
+  PRESCENE_RETURN_IF_ERROR(check_output("--learned", file, inputs));
+  settings.learned.clear();
+  settings.learned_file = file;
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return core::ok_status();
+  PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(file, interfaces::YamlLimits{}.max_bytes));
+  settings.learned.assign(bytes.begin(), bytes.end());
+  // Here, so that it is told before anything is opened; and an empty file is none that was learned.
+  return interfaces::parse_learned(settings.learned, file).status();
+}
+
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given) {
   const auto take = [&verb](const char* option, auto& to, const auto& from) {
     if (verb.get_option(option)->count() > 0) to = from;
@@ -157,6 +183,9 @@ TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const
   take("--world-frame", settings.assembler.world_frame, given.assembler.world_frame);
   take("--camera-pose", settings.assembler.X_WC, given.assembler.X_WC);
   take("--rectified", settings.assembler.rectified, given.assembler.rectified);
+  take("--learned", settings.learned, given.learned);
+  take("--learned", settings.learned_file, given.learned_file);
+  take("--new-objects", settings.new_objects, given.new_objects);
   return settings;
 }
 

@@ -20,6 +20,7 @@ struct CalibrateOptions {
   std::string name;
   std::string data;
   std::string output;
+  std::string learned;
   std::vector<std::string> keep;
   std::optional<std::string> start;
   std::optional<int> samples;
@@ -59,8 +60,8 @@ std::string text_of(const nlohmann::ordered_json& start, const nlohmann::ordered
 core::Status run_cube(const CalibrateOptions& options, VerbContext& context) {
   const std::map<std::string, CubeModel> starts = {
       {"measured", measured_cube_model()}, {"described", described_cube_model()}, {"shipped", shipped_cube_model()}};
-  if (!options.output.empty() || !options.keep.empty())
-    return core::invalid_input("cube_tosses takes neither -o nor --keep: its model is part of the program");
+  if (!options.output.empty() || !options.learned.empty() || !options.keep.empty())
+    return core::invalid_input("cube_tosses takes none of -o, --learned and --keep: its model is part of the program");
   const std::string from = options.start.value_or("measured");
   const CubeModel& start = starts.at(from);
   CalibrationOptions search;
@@ -131,9 +132,13 @@ std::string text_of(const ObjectCalibration& found) {
 
 /// A folder with recordings of somebody's own object.
 core::Status run_folder(const CalibrateOptions& options, VerbContext& context) {
-  if (options.output.empty()) return core::invalid_input("-o is missing: name the model file to write");
+  if (options.output.empty() && options.learned.empty())
+    return core::invalid_input("-o is missing: name the model file to write, or with --learned a learned file");
   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(options.name, context.log()));
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.output, dataset.inputs));
+  PRESCENE_RETURN_IF_ERROR(check_apart("--learned", options.learned, "-o", options.output));
+  TrackerSettings earlier;
+  PRESCENE_RETURN_IF_ERROR(take_learned(options.learned, dataset.inputs, earlier));
   BackendSettings settings;
   settings.stepper = Stepper::kAutomatic;
   Backends backends(context.pool(), settings);
@@ -145,12 +150,26 @@ core::Status run_folder(const CalibrateOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ObjectCalibration found,
                calibrate_object(dataset, backends, fit, context.progress("calibrating"), &context.cancellation()));
   context.end_progress();
-  const std::filesystem::path output = options.output;
-  PRESCENE_TRY(const std::string yaml, calibrated_yaml(dataset, found, output.parent_path()));
-  PRESCENE_RETURN_IF_ERROR(interfaces::write_file(output, std::string_view(yaml)));
+  std::string wrote;
+  if (!options.output.empty()) {
+    const std::filesystem::path output = options.output;
+    PRESCENE_TRY(const std::string yaml, calibrated_yaml(dataset, found, output.parent_path()));
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(output, std::string_view(yaml)));
+    wrote += "wrote " + options.output + "\n";
+  }
+  if (!options.learned.empty()) {
+    interfaces::LearnedFile learned;
+    if (!earlier.learned.empty()) {
+      PRESCENE_TRY(learned, interfaces::parse_learned(earlier.learned, options.learned));
+    }
+    const std::string yaml = interfaces::learned_yaml(with_calibrated(std::move(learned), dataset, found));
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(options.learned, std::string_view(yaml)));
+    wrote += "wrote " + options.learned + "\n";
+  }
   nlohmann::ordered_json document = to_json(found);
   document["output"] = options.output;
-  context.print(document, text_of(found) + "wrote " + options.output + "\n");
+  document["learned"] = options.learned;
+  context.print(document, text_of(found) + wrote);
   return core::ok_status();
 }
 
@@ -174,6 +193,9 @@ Verb add_calibrate_verb(CLI::App& app) {
       ->required();
   verb->add_option("-o,--output", options->output,
                    "Model file to write, for scenes to use; required but for cube_tosses")
+      ->check(file_name());
+  verb->add_option("--learned", options->learned,
+                   "Learned file to put what is found into, for serve and replay; made if it is not there")
       ->check(file_name());
   std::vector<std::string> names;
   for (std::size_t i = 0; i < simulation::kMotionParameters; ++i)

@@ -8,6 +8,8 @@
 #include "final_states.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/live/bus_replay.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/recording/foreseen.h"
@@ -31,6 +33,7 @@ struct ReplayOptions {
   std::string scene;
   std::string report;
   std::string proposals;
+  std::string learned;
   bool over_dds = false;
   BusReplayOptions bus;
   RecordingReadOptions read;
@@ -78,6 +81,18 @@ core::Status check_answers(const std::vector<BusReplayResult::Answered>& answers
   return core::ok_status();
 }
 
+/// The frames that were played, now that it is known what was believed of each.
+core::Status add_frames(const ReplayOptions& options, SessionReport& report) {
+  RecordingReadOptions read = options.read;
+  read.check_data = false;  // It was.
+  PRESCENE_TRY(const auto reader, RecordingReader::open(options.input, read));
+  for (;;) {
+    PRESCENE_TRY(const auto entry, reader->next());
+    if (!entry) return core::ok_status();
+    if (!entry->is_json) report.add(entry->message);
+  }
+}
+
 core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   for (const std::string& text : options.questions) {
     PRESCENE_TRY(TimedQuestion question, timed_question(text));
@@ -90,14 +105,14 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   options.bus.read = options.read;
   options.bus.read.check_data = options.read.salvage;  // It was when the input was opened, but its loss is told here.
   TrackingScore score(input.scene());
-  SessionReport report(input.scene(), settings);
+  Backends backends(context.pool(), options.backends);
+  SessionReport report(input.scene(), settings, backends);
   ForeseenAndCame foreseen(input.scene(), settings.topics.depth);
   DamagedRecords damaged;
   FinalStates states;
   PRESCENE_TRY(BusReplayResult result,
                replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
                                context.log(), [&](const RecordedEntry& entry) {
-                                 if (!options.report.empty()) report.add(entry.message);
                                  foreseen.add(entry);
                                  if (!entry.is_json || entry.message.topic != kTruthTopic) return;
                                  const std::string json(entry.message.cdr.begin(), entry.message.cdr.end());
@@ -126,8 +141,8 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   report.set_foreseen(foreseen);
   const std::vector<ObjectTrackingScore> rows = score.rows();
   if (!options.report.empty()) {
-    Backends backends(context.pool());
-    PRESCENE_RETURN_IF_ERROR(report.write(options.report, rows, backends));
+    PRESCENE_RETURN_IF_ERROR(add_frames(options, report));
+    PRESCENE_RETURN_IF_ERROR(report.write(options.report, score));
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   if (!result.loss.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + result.loss);
@@ -150,6 +165,15 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   return check_answers(result.answers);
 }
 
+/// Writes what was learned where it is to be kept.
+core::Status keep_learned(const ReplayOptions& options, const Tracker& tracker, VerbContext& context) {
+  if (options.learned.empty()) return core::ok_status();
+  const std::string text = interfaces::learned_yaml(tracker.learned());
+  PRESCENE_RETURN_IF_ERROR(interfaces::write_file(options.learned, std::string_view(text)));
+  core::log(context.log(), core::LogLevel::kInfo, "what was learned was written to " + options.learned);
+  return core::ok_status();
+}
+
 core::Status run_here(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
   PRESCENE_TRY(TrackerSettings settings, settings_of(options, input));
@@ -163,24 +187,21 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   TrackingScore score(input.scene());
   SupportScore supports;
   FinalStates states;
-  SessionReport report(input.scene(), settings);
+  SessionReport report(input.scene(), settings, backends);
   ordered_json steps = ordered_json::array();
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
     const BeliefSummary summary = summary_of(*at.belief());
     score.add(summary);
     states.add(summary);
     if (!options.report.empty()) {
-      report.add(step.observation);
-      report.add(summary);
       report.set_scene(at.belief()->scene);
+      report.add(summary);
+      report.add(step.observation);
     }
     const std::vector<SupportFrame> support_frames = supports.add(summary.stamp_ns, step.supports);
     if (!context.options().json) return core::ok_status();  // Long recordings have many steps.
     ordered_json record = to_json(step.record);
-    record.erase("seconds");
-    ordered_json objects = to_json(summary)["objects"];
-    for (ordered_json& object : objects) object.erase("covariance");
-    record["objects"] = objects;
+    record["objects"] = to_json(summary)["objects"];
     record["supports"] = ordered_json::array();
     for (const SupportFrame& frame : support_frames) record["supports"].push_back(to_json(frame));
     steps.push_back(std::move(record));
@@ -203,13 +224,14 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
       input.replay(*tracker, context.cancellation(), context.progress("replaying"), on_step, on_json);
   context.end_progress();
   if (!summary) return summary.status();
+  PRESCENE_RETURN_IF_ERROR(keep_learned(options, *tracker, context));
   add_errors(score, steps);
   report.set_supports(supports);
   const std::vector<ObjectTrackingScore> rows = score.rows();
   ordered_json support_rows = ordered_json::array();
   for (const SupportRow& row : supports.rows()) support_rows.push_back(to_json(row));
   if (!options.report.empty()) {
-    PRESCENE_RETURN_IF_ERROR(report.write(options.report, rows, backends));
+    PRESCENE_RETURN_IF_ERROR(report.write(options.report, score));
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   if (context.options().json) {  // The text has them itself.
@@ -231,6 +253,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"loss", summary->loss},
        {"damaged_records", damaged.count()},
        {"unchecked", summary->unchecked},
+       {"learned", options.learned},
        {"degraded", degraded_json(*summary)},
        {"objects", states.json()},
        {"tracking", tracking_json(rows)},
@@ -259,6 +282,10 @@ core::Status check_options(const ReplayOptions& options) {
     for (const char* name : {"--domain", "--ros-distro"})
       if (given(name))
         return core::invalid_input(std::string(name) + " is for --over-dds: leave it out, or give that too");
+  } else {
+    for (const char* name : {"--learned", "--new-objects"})
+      if (given(name))
+        return core::invalid_input(std::string(name) + " goes without --over-dds: give it to the `serve` that tracks");
   }
   if (std::error_code none; std::filesystem::is_directory(options.input, none)) return core::ok_status();
   for (const char* name : {"--depth-scale", "--frame-rate"})
@@ -302,18 +329,22 @@ Verb add_replay_verb(CLI::App& app) {
   add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->bus.dds, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
+  add_belief_options(*verb, options->tracker, options->learned);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;
   verb->footer(
       "Examples: prescene replay milk.mcap --report milk.html\n"
       "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");
-  return {verb, [options](VerbContext& context) -> core::Status {
-            PRESCENE_RETURN_IF_ERROR(check_options(*options));
-            if (options->over_dds) PRESCENE_RETURN_IF_ERROR(take_domain(*options->verb, options->bus.dds));
-            PRESCENE_RETURN_IF_ERROR(check_output("--report", options->report, {options->input, options->scene}));
-            PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
-            return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);
-          }};
+  return {
+      verb, [options](VerbContext& context) -> core::Status {
+        PRESCENE_RETURN_IF_ERROR(check_options(*options));
+        if (options->over_dds) PRESCENE_RETURN_IF_ERROR(take_domain(*options->verb, options->bus.dds));
+        PRESCENE_RETURN_IF_ERROR(check_output("--report", options->report, {options->input, options->scene}));
+        PRESCENE_RETURN_IF_ERROR(check_apart("--learned", options->learned, "--report", options->report));
+        PRESCENE_RETURN_IF_ERROR(take_learned(options->learned, {options->input, options->scene}, options->tracker));
+        PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
+        return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);
+      }};
 }
 
 }  // namespace prescene::service

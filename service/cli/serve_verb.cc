@@ -16,6 +16,7 @@ struct ServeOptions {
   std::string scene;
   std::string record;
   std::string proposals;
+  std::string learned;
   LiveSettings settings;
   BackendSettings backends;
   ViewOptions view;
@@ -48,6 +49,9 @@ core::Status run(ServeOptions& options, VerbContext& context) {
     PRESCENE_TRY(options.settings.tracker.filter.learned, load_proposals(options.proposals, *scene));
   }
   PRESCENE_RETURN_IF_ERROR(check_recording("--record", options.record, {options.scene}));
+  PRESCENE_RETURN_IF_ERROR(check_apart("--learned", options.learned, "--record", options.record));
+  PRESCENE_RETURN_IF_ERROR(take_learned(options.learned, {options.scene}, options.settings.tracker));
+  options.settings.learned_file = options.learned;
   std::unique_ptr<RecordingWriter> recording;
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
@@ -64,7 +68,7 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   const core::Status ran = service->run(context.cancellation());
   if (view) view->set_asker({});
   PRESCENE_RETURN_IF_ERROR(ran);
-  context.print({{"scene", scene->name}, {"recording", options.record}}, "");
+  context.print({{"scene", scene->name}, {"recording", options.record}, {"learned", options.learned}}, "");
   return core::ok_status();
 }
 
@@ -78,6 +82,7 @@ Verb add_serve_verb(CLI::App& app) {
       ->required();
   verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)")
       ->check(file_name());
+  add_belief_options(*verb, options->settings.tracker, options->learned);
   verb->add_option("--question-seconds", options->settings.worker.default_seconds,
                    "Time that a question without limits of its own may take, s")
       ->check(number_between(1e-3, 3600.0))

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/load_scene.h"
 #include "verb.h"
 
@@ -65,20 +66,40 @@ Checked check_model(const std::string& file, VerbContext& context) {
           file + ": valid: a model file" + warnings.count()};
 }
 
+Checked check_learned(const std::string& file) {
+  const auto text = read_scene_text(file);
+  if (!text) return bad(file, text.status());
+  const auto learned = interfaces::parse_learned(*text, file);
+  if (!learned) return bad(file, learned.status());
+  return {{},
+          {{"file", file},
+           {"valid", true},
+           {"learned_models", learned->models.size()},
+           {"learned_objects", learned->objects.size()},
+           {"warnings", nlohmann::ordered_json::array()}},
+          file + ": valid: what was learned of " + counted(learned->models.size(), "model") + " and " +
+              counted(learned->objects.size(), "object")};
+}
+
+Checked check_file(const std::string& file, VerbContext& context) {
+  if (is_learned_file(file)) return check_learned(file);
+  return is_model_file(file) ? check_model(file, context) : check_scene(file, context);
+}
+
 }  // namespace
 
 Verb add_validate_verb(CLI::App& app) {
-  auto* verb =
-      app.add_subcommand("validate", "Check scene and model files: every mistake with its line and the remedy");
+  auto* verb = app.add_subcommand("validate",
+                                  "Check scene, model and learned files: every mistake with its line and the remedy");
   auto files = std::make_shared<std::vector<std::string>>();
-  verb->add_option("FILE", *files, "Scene or model files (docs/reference/scene_files.md)")->required();
+  verb->add_option("FILE", *files, "Scene, model or learned files (docs/reference/scene_files.md)")->required();
   verb->footer("Example: prescene validate scenarios/milk_on_bin.yaml");
   return {verb, [files](VerbContext& context) -> core::Status {
             nlohmann::ordered_json documents = nlohmann::ordered_json::array();
             std::string text;
             core::Status first_bad;
             for (const std::string& file : *files) {
-              const Checked checked = is_model_file(file) ? check_model(file, context) : check_scene(file, context);
+              const Checked checked = check_file(file, context);
               documents.push_back(checked.document);
               text += checked.text + "\n";
               if (first_bad.ok()) first_bad = checked.status;

@@ -118,6 +118,11 @@ void add_web_options(CLI::App& verb, const std::string& prefix, ViewOptions& vie
 void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice);
 /// --proposals.
 void add_proposals_option(CLI::App& verb, std::string& path);
+/// --learned and --new-objects.
+void add_belief_options(CLI::App& verb, TrackerSettings& settings, std::string& learned);
+/// Reads the file that --learned names into the settings, if there is one, after checking that it can be written.
+/// `inputs`: files that it must not be.
+core::Status take_learned(const std::string& file, const std::vector<std::string>& inputs, TrackerSettings& settings);
 /// `settings` (of a recording) with those of the options above that were on the command line.
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given);
 

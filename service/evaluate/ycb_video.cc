@@ -124,6 +124,7 @@ core::Status check_going_on(const core::Cancellation* cancellation) {
 void summarise(const std::vector<double>& adds, const std::vector<double>& add, YcbSection& section) {
   section.n = static_cast<int>(adds.size());
   section.share_adds_below_2cm = share_below(adds, kGood);
+  section.share_add_below_2cm = share_below(add, kGood);
   section.median_adds_m = median_of(adds);
   section.median_add_m = median_of(add);
 }
@@ -318,6 +319,7 @@ nlohmann::ordered_json section_json(const YcbSection& section, bool amortised) {
   nlohmann::ordered_json json;
   json["n"] = section.n;
   json["share_adds_below_2cm"] = section.share_adds_below_2cm;
+  json["share_add_below_2cm"] = section.share_add_below_2cm;
   json["median_adds_m"] = finite_or_null(section.median_adds_m);
   json["median_add_m"] = finite_or_null(section.median_add_m);
   json["ms_per_object"] = section.ms_per_object;

@@ -11,6 +11,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
@@ -75,7 +76,10 @@ struct LiveService::Impl {
         meshes(marker_meshes(*scene)),
         inbox(inbox_limits(settings.tracker.topics)),
         marker_limit(settings.marker_rate),
-        diagnostics_limit(settings.diagnostics_rate) {}
+        diagnostics_limit(settings.diagnostics_rate),
+        learned_limit(1.0 / settings.learned_interval) {
+    learned_limit.due();  // not before there is a frame
+  }
 
   core::Status join_bus();
   /// Takes in what came, in its order, and looks after frames in between.
@@ -91,11 +95,17 @@ struct LiveService::Impl {
   void record_step(const StepRecord& step);
   /// The recording ends here, and is an error of the run.
   void give_up_recording(const core::Status& why);
+  /// Writes what was learned if it is not in the file yet.
+  core::Status keep_learned();
+  /// The same from time to time; a failure is logged and published, and tried again.
+  void look_after_learned();
   /// Steps the belief if a frame is complete, records what was answered, publishes.
   void look_after_frames();
   /// Counts and logs a message that the middleware did not take.
   void check_sent(const core::Status& status);
   void publish();
+  /// Of the pose of an object that was found.
+  void advertise_new(const std::string& object);
   void publish_diagnostics();
   core::TimeNs now();
   std::string domain_text() const { return "DDS domain " + std::to_string(settings.dds.domain); }
@@ -113,6 +123,7 @@ struct LiveService::Impl {
   Inbox inbox;
   RateLimit marker_limit;
   RateLimit diagnostics_limit;
+  RateLimit learned_limit;
 
   DdsPublisher beliefs, detections, markers, diagnostics, answers;
   std::map<std::string, DdsPublisher> poses;
@@ -143,6 +154,9 @@ struct LiveService::Impl {
   std::atomic<std::uint64_t> unreadable_questions{0};  // counted on the bus's thread
   std::string last_failure;
   core::TimeNs last_failure_ns = 0;
+  std::shared_ptr<const belief::Scene> published_scene;  // whose models' meshes the markers have
+  std::string kept_learned;                              // the text that the learned file holds
+  std::string learned_failure;
   ServiceHealth last_reported;
 
   // Last, so that their threads end before what they use.
@@ -264,6 +278,24 @@ void LiveService::Impl::give_up_recording(const core::Status& why) {
   recording.reset();
 }
 
+core::Status LiveService::Impl::keep_learned() {
+  if (settings.learned_file.empty()) return core::ok_status();
+  const std::string text = interfaces::learned_yaml(tracker->learned());
+  if (text == kept_learned) return core::ok_status();
+  const core::Status written = interfaces::write_file(settings.learned_file, std::string_view(text));
+  if (written.ok()) kept_learned = text;
+  learned_failure = written.message();
+  return written;
+}
+
+void LiveService::Impl::look_after_learned() {
+  if (settings.learned_file.empty() || !learned_limit.due()) return;
+  const bool failed_before = !learned_failure.empty();
+  const core::Status kept = keep_learned();
+  if (!kept.ok() && !failed_before)
+    core::log(log, core::LogLevel::kError, "what was learned could not be kept: " + kept.message());
+}
+
 void LiveService::Impl::take_in(ReceivedMessage& message) {
   message.received_ns = std::max(message.received_ns, last_now_ns);
   last_now_ns = message.received_ns;
@@ -320,6 +352,7 @@ void LiveService::Impl::look_after_frames() {
   } catch (const std::exception& error) {
     note_failure("a frame", error);
   }
+  look_after_learned();
   if (diagnostics_limit.due()) publish_diagnostics();
 }
 
@@ -336,13 +369,28 @@ void LiveService::Impl::publish() {
   const std::string json = belief::json_text(to_json(summary));
   check_sent(node->publish(beliefs, interfaces::RosString{json}));
   check_sent(node->publish(detections, detections_of(summary, *belief->scene, world)));
+  if (belief->scene != published_scene) {
+    add_marker_meshes(*belief->scene, meshes);
+    published_scene = belief->scene;
+  }
   for (const ObjectSummary& object : summary.objects) {
+    if (object.state == belief::TrackState::kLost) continue;
+    advertise_new(object.name);
     const auto publisher = poses.find(object.name);
-    if (publisher == poses.end() || object.state == belief::TrackState::kLost) continue;
+    if (publisher == poses.end()) continue;
     check_sent(node->publish(publisher->second, pose_of(object, summary.stamp_ns, world)));
   }
   if (marker_limit.due()) check_sent(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
   record(kBeliefTopic, json);
+}
+
+void LiveService::Impl::advertise_new(const std::string& object) {
+  if (poses.contains(object)) return;
+  auto publisher = node->advertise(pose_topic(object), "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kState);
+  if (publisher)
+    poses.emplace(object, *std::move(publisher));
+  else
+    check_sent(publisher.status());
 }
 
 ServiceHealth LiveService::Impl::health() const {
@@ -368,6 +416,8 @@ ServiceHealth LiveService::Impl::health() const {
   health.other_services = node->other_writers(kBeliefTopic);
   health.is_recording = recording != nullptr;
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
+  health.keeps_learned = !settings.learned_file.empty();
+  health.learned_failure = learned_failure;
   health.questions = worker->counts();
   health.unreadable_questions = unreadable_questions;
   health.failures = failures;
@@ -445,7 +495,9 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     }
   }
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
-  return impl.recording ? impl.recording->close() : impl.recording_status;
+  const core::Status recorded = impl.recording ? impl.recording->close() : impl.recording_status;
+  const core::Status kept = impl.keep_learned();
+  return recorded.ok() ? kept : recorded;
 }
 
 }  // namespace prescene::service

@@ -23,7 +23,7 @@ std::uint64_t losses_of(const ServiceHealth& health) {
 }
 
 RosDiagnosticLevel level_of(const ServiceHealth& health, const ServiceHealth& before) {
-  if (!health.recording_failure.empty()) return RosDiagnosticLevel::kError;
+  if (!health.recording_failure.empty() || !health.learned_failure.empty()) return RosDiagnosticLevel::kError;
   if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
   if (!is_tracking(health)) return RosDiagnosticLevel::kError;
   if (losses_of(health) > losses_of(before)) return RosDiagnosticLevel::kWarn;
@@ -48,6 +48,11 @@ std::string recording_text(const ServiceHealth& health) {
   return health.is_recording ? "on" : "off";
 }
 
+std::string learned_text(const ServiceHealth& health) {
+  if (!health.learned_failure.empty()) return "failed: " + health.learned_failure;
+  return health.keeps_learned ? "yes" : "no";
+}
+
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : "; ") + word;
@@ -59,14 +64,17 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics,
                lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late,
                waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services, is_recording,
-               recording_failure, seconds_since_frame, last_step_seconds, not_simulated, physics_failure, steppers,
-               lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
+               recording_failure, keeps_learned, learned_failure, seconds_since_frame, last_step_seconds, not_simulated,
+               physics_failure, steppers, lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] =
+      health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
   static_cast<void>(nothing_came);       // is in the text
   static_cast<void>(is_recording);       // told, like its failure,
   static_cast<void>(recording_failure);  // by recording_text()
+  static_cast<void>(keeps_learned);      // and by
+  static_cast<void>(learned_failure);    // learned_text()
   const bool question_is_newer = last_failure.empty() || question_failure_ns > last_failure_ns;
   return {{"steps", std::to_string(steps)},
           {"depth topic", depth_topic},
@@ -87,6 +95,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"last control without effect", last_idle_control},
           {"other services in the domain", std::to_string(other_services)},
           {"recording", recording_text(health)},
+          {"keeps what it learns", learned_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},
           {"last step, s", core::rounded_text(last_step_seconds)},
           {"lens", lens},
@@ -120,6 +129,7 @@ bool is_tracking(const ServiceHealth& health) {
 
 std::string health_text(const ServiceHealth& health) {
   std::string end = health.recording_failure.empty() ? "" : "; the recording failed: " + health.recording_failure;
+  if (!health.learned_failure.empty()) end += "; what was learned could not be kept: " + health.learned_failure;
   if (health.other_services > 0) end += "; " + others_text(health.other_services);
   if (is_tracking(health)) {
     std::string text = "tracking";

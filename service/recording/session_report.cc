@@ -12,6 +12,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/pictures/belief_overlay.h"
+#include "tracking_sections.h"
 
 namespace prescene::service {
 namespace {
@@ -19,9 +20,11 @@ namespace {
 using core::fixed_text;
 using nlohmann::ordered_json;
 
-constexpr std::size_t kMaxObservations = 48;              // in memory
+constexpr std::size_t kMaxObservations = 48;              // in memory, evenly spread
 constexpr std::size_t kMaxPixels = std::size_t{1} << 24;  // of all of them: 54 of 640 x 480
-constexpr std::size_t kPictures = 6;                      // on the page
+constexpr std::size_t kPictures = 6;                      // of them on the page
+constexpr std::size_t kMostChanges = 20;                  // of states, on the page
+constexpr int kSmallPicture = 320;                        // columns of what the camera saw, beside the overlay
 
 AssemblerSettings assembler_settings(const belief::Scene& scene, const TrackerSettings& tracker) {
   AssemblerSettings settings = tracker.assembler;
@@ -84,12 +87,25 @@ void add_prediction(const ordered_json& predict, const belief::Scene& scene, int
   }
 }
 
+/// Every n-th pixel.
+geometry::ColorImage smaller(const geometry::ColorImage& image) {
+  const int step = std::max(1, image.width() / kSmallPicture);
+  if (step == 1) return image;
+  geometry::ColorImage small(image.width() / step, image.height() / step);
+  for (int y = 0; y < small.height(); ++y)
+    for (int x = 0; x < small.width(); ++x) small(x, y) = image(step * x, step * y);
+  return small;
+}
+
 }  // namespace
 
-SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings)
+SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings,
+                             Backends& backends)
     : scene_(std::move(scene)),
       topics_(settings.topics),
-      assembler_(assembler_settings(*scene_, settings), robot_names(*scene_), settings.tf) {}
+      assembler_(assembler_settings(*scene_, settings), robot_names(*scene_), settings.tf),
+      backends_(&backends),
+      residual_meter_(backends) {}
 
 void SessionReport::add(const interfaces::ReceivedMessage& message) {
   const MessageIndex index = next_index_++;
@@ -114,6 +130,11 @@ void SessionReport::add(const interfaces::ReceivedMessage& message) {
 }
 
 void SessionReport::add(const belief::Observation& observation) {
+  const auto summary = summaries_.find(observation.stamp_ns);
+  if (summary == summaries_.end()) return;
+  residuals_[observation.stamp_ns] = residual_meter_.measure(*scene_, summary->second, observation);
+  if (changes_.contains(observation.stamp_ns) && at_changes_.size() < kMostChanges)
+    at_changes_[observation.stamp_ns] = observation;
   if (seen_++ % every_ != 0) return;
   observations_.push_back(observation);
   const auto too_many = [&] {
@@ -129,20 +150,23 @@ void SessionReport::add(const belief::Observation& observation) {
   }
 }
 
-void SessionReport::add(const BeliefSummary& summary) { summaries_[summary.stamp_ns] = summary; }
+void SessionReport::add(const BeliefSummary& summary) {
+  const auto next = summaries_.lower_bound(summary.stamp_ns);
+  const std::string what =
+      next == summaries_.begin() ? "the first frame" : state_changes(std::prev(next)->second, summary);
+  if (!what.empty()) changes_[summary.stamp_ns] = what;
+  summaries_[summary.stamp_ns] = summary;
+}
 
-interfaces::PictureBlock SessionReport::pictures(Backends& backends) const {
+interfaces::PictureBlock SessionReport::pictures() const {
   interfaces::PictureBlock block;
-  std::vector<const belief::Observation*> usable;
-  for (const belief::Observation& observation : observations_) {
-    if (summaries_.contains(observation.stamp_ns)) usable.push_back(&observation);
-  }
-  if (usable.empty()) return block;
+  if (observations_.empty()) return block;
   const core::TimeNs first_ns = summaries_.begin()->first;
-  const std::size_t count = std::min(kPictures, usable.size());
+  const std::size_t count = std::min(kPictures, observations_.size());
   for (std::size_t i = 0; i < count; ++i) {
-    const belief::Observation& observation = *usable[count > 1 ? i * (usable.size() - 1) / (count - 1) : 0];
-    auto picture = belief_overlay(*scene_, summaries_.at(observation.stamp_ns), observation, backends);
+    const belief::Observation& observation =
+        observations_[count > 1 ? i * (observations_.size() - 1) / (count - 1) : 0];
+    auto picture = belief_overlay(*scene_, summaries_.at(observation.stamp_ns), observation, *backends_);
     if (!picture) continue;
     block.pictures.push_back(
         {fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", *std::move(picture), false});
@@ -150,24 +174,26 @@ interfaces::PictureBlock SessionReport::pictures(Backends& backends) const {
   return block;
 }
 
-std::vector<interfaces::ReportBlock> SessionReport::curves() const {
-  interfaces::ChartBlock confidence{"Confidence", "time, s", "probability", {}, true};
-  interfaces::ChartBlock height{"Height of the object's origin", "time, s", "m", {}, true};
-  std::map<std::string, std::size_t> number;
-  for (const auto& [stamp_ns, summary] : summaries_) {
-    const double time = core::seconds_of(stamp_ns - summaries_.begin()->first);
-    for (const ObjectSummary& object : summary.objects) {
-      const auto [place, is_new] = number.emplace(object.name, number.size());
-      if (is_new) {
-        confidence.curves.push_back({object.name, {}});
-        height.curves.push_back({object.name, {}});
-      }
-      confidence.curves[place->second].points.emplace_back(time, object.confidence);
-      height.curves[place->second].points.emplace_back(time, object.X_WO.translation.z());
-    }
+void SessionReport::add_changes(interfaces::ReportContents& contents) const {
+  if (changes_.empty()) return;
+  interfaces::ReportSection section{"Each change of a state: what the camera saw, and the belief drawn in", {}};
+  const core::TimeNs first_ns = summaries_.begin()->first;
+  interfaces::PictureBlock block;
+  for (const auto& [stamp_ns, observation] : at_changes_) {
+    const std::string caption = fixed_text(core::seconds_of(stamp_ns - first_ns), 2) + " s: " + changes_.at(stamp_ns);
+    block.pictures.push_back({caption, smaller(picture_of(observation)), false});
+    auto picture = belief_overlay(*scene_, summaries_.at(stamp_ns), observation, *backends_);
+    if (picture) block.pictures.push_back({"the belief then", *std::move(picture), false});
   }
-  if (confidence.curves.empty()) return {};
-  return {std::move(confidence), std::move(height)};
+  section.blocks.emplace_back(std::move(block));
+  if (changes_.size() > at_changes_.size()) {
+    interfaces::TableBlock rest{"Changes without a picture here", {"time, s", "change"}, {}};
+    for (const auto& [stamp_ns, what] : changes_)
+      if (!at_changes_.contains(stamp_ns))
+        rest.rows.push_back({fixed_text(core::seconds_of(stamp_ns - first_ns), 2), what});
+    section.blocks.emplace_back(std::move(rest));
+  }
+  contents.sections.push_back(std::move(section));
 }
 
 void SessionReport::add_supports(interfaces::ReportContents& contents) const {
@@ -254,18 +280,19 @@ void SessionReport::add_answer_section(double at, const ordered_json& answer,
   }
 }
 
-core::Status SessionReport::write(const std::filesystem::path& path, const std::vector<ObjectTrackingScore>& rows,
-                                  Backends& backends) const {
+core::Status SessionReport::write(const std::filesystem::path& path, const TrackingScore& score) const {
   interfaces::ReportContents contents;
   contents.title = scene_->name.empty() ? "Prescene" : scene_->name;
   contents.subtitle = "What was seen, believed and answered";
   contents.facts = {{"steps", std::to_string(summaries_.size())},
                     {"objects", std::to_string(scene_->objects.size())},
                     {"supports", std::to_string(scene_->supports.size())}};
-  interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures(backends)}};
+  interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures()}};
   contents.sections.push_back(std::move(seen));
+  add_changes(contents);
   add_foreseen(contents);
   interfaces::ReportSection tracking{"Tracking", {}};
+  const std::vector<ObjectTrackingScore> rows = score.rows();
   if (!rows.empty()) {
     interfaces::TableBlock table{
         "Against the simulated truth, over frames in which at least half of the object is visible",
@@ -279,12 +306,15 @@ core::Status SessionReport::write(const std::filesystem::path& path, const std::
     }
     tracking.blocks.push_back(std::move(table));
   }
-  for (interfaces::ReportBlock& block : curves()) tracking.blocks.push_back(std::move(block));
+  for (interfaces::ReportBlock& block : tracking_blocks(summaries_, residuals_, score))
+    tracking.blocks.push_back(std::move(block));
   if (tracking.blocks.empty()) {
     tracking.blocks.push_back(
         interfaces::TextBlock{"The scene names no objects; its supports are drawn where they were found."});
   }
   contents.sections.push_back(std::move(tracking));
+  if (auto hidden = hidden_section(summaries_, *scene_, score)) contents.sections.push_back(*std::move(hidden));
+  if (auto learned = learned_section(summaries_)) contents.sections.push_back(*std::move(learned));
   add_supports(contents);
   add_answers(contents);
   return interfaces::write_report(path, contents);

@@ -30,6 +30,12 @@ TrackerSettings settled(TrackerSettings settings) {
   return settings;
 }
 
+filter::FilterSettings filter_settings(const TrackerSettings& settings) {
+  filter::FilterSettings filter = settings.filter;
+  filter.augment.new_objects = filter.augment.new_objects || settings.new_objects.value_or(false);
+  return filter;
+}
+
 std::vector<std::string> degraded_words(const filter::StepResult& result) {
   std::vector<std::string> words;
   if (result.degraded != 0) words.push_back(filter::degraded_text(result.degraded));
@@ -51,23 +57,39 @@ core::Result<std::unique_ptr<Tracker>> Tracker::create(std::shared_ptr<const bel
                                                        const TrackerSettings& settings, std::uint64_t seed,
                                                        Backends& backends) {
   PRESCENE_RETURN_IF_ERROR(validate(*scene));
+  interfaces::LearnedFile learned;
+  if (!settings.learned.empty()) {
+    PRESCENE_TRY(learned, interfaces::parse_learned(settings.learned, settings.learned_file));
+    PRESCENE_TRY(belief::Scene with_models, interfaces::with_learned_models(*scene, learned));
+    scene = std::make_shared<const belief::Scene>(std::move(with_models));
+  }
+  PRESCENE_TRY(auto physics, interfaces::learned_physics(*scene, learned));
   PRESCENE_TRY(auto renderer, backends.make_renderer());
   PRESCENE_TRY(auto likelihood, backends.make_likelihood());
-  return std::unique_ptr<Tracker>(
-      new Tracker(std::move(scene), settings, seed, backends, std::move(renderer), std::move(likelihood)));
+  return std::unique_ptr<Tracker>(new Tracker(std::move(scene), settings, std::move(learned), std::move(physics), seed,
+                                              backends, std::move(renderer), std::move(likelihood)));
 }
 
-Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
+Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings,
+                 interfaces::LearnedFile learned, std::vector<belief::PhysicalBelief> physics, std::uint64_t seed,
                  Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
                  std::unique_ptr<rendering::LikelihoodBatch> likelihood)
     : settings_(settled(settings)),
       rectified_doubt_(rectified_doubt(settings)),
       renderer_(std::move(renderer)),
       likelihood_(std::move(likelihood)),
-      filter_(*likelihood_, *renderer_, backends.pool(), settings.filter, backends.simulator_factory()),
+      filter_(*likelihood_, *renderer_, backends.pool(), filter_settings(settings), backends.simulator_factory()),
       assembler_(settings_.assembler, robot_names(*scene), settings.tf),
       scene_(std::move(scene)),
-      belief_(std::make_shared<belief::Belief>(filter_.start(scene_, seed))) {}
+      learned_(std::move(learned)),
+      physics_(std::move(physics)),
+      belief_(std::make_shared<belief::Belief>(start(seed))) {}
+
+belief::Belief Tracker::start(std::uint64_t seed) const {
+  belief::Belief belief = filter_.start(scene_, seed);
+  for (std::size_t i = 0; i < physics_.size(); ++i) belief.objects[i].physics = physics_[i];
+  return belief;
+}
 
 std::shared_ptr<const belief::Belief> Tracker::belief() const {
   const std::lock_guard lock(mutex_);
@@ -114,7 +136,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   std::shared_ptr<const belief::Belief> before = belief_;
   WaitingControls controls = controls_;
   if (clock_went_back) {  // Nothing is known of the time between.
-    before = std::make_shared<const belief::Belief>(filter_.start(scene_, belief_->seed));
+    before = std::make_shared<const belief::Belief>(start(belief_->seed));
     controls.begin_again();
   }
   // The first frame of a belief predicts nothing, so that no control could act.

@@ -88,6 +88,9 @@ void for_each_setting(Settings& settings, const Visit& visit) {
   visit("tf_max_frames", settings.tf.max_frames);
   visit("tf_max_samples", settings.tf.max_samples);
   visit("tf_max_extrapolation_s", settings.tf.max_extrapolation_s);
+  visit("learned", settings.learned);
+  visit("learned_file", settings.learned_file);
+  visit("new_objects", settings.new_objects);
 }
 
 }  // namespace

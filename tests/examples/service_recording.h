@@ -5,7 +5,9 @@
 #include "prescene/core/log.h"
 #include "prescene/core/progress.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/belief_summary.h"
 #include "prescene/service/recording/replay_input.h"
+#include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/tracker.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
@@ -27,5 +29,18 @@ extern const core::Cancellation cancellation;
 extern const core::ProgressSink progress;
 extern const std::uint64_t seed;
 }  // namespace explained_h
+
+namespace residuals_h {
+extern const belief::Scene scene;
+extern const BeliefSummary summary;
+extern const belief::Observation observation;
+}  // namespace residuals_h
+
+namespace session_report_h {
+extern const std::shared_ptr<const belief::Scene> scene;
+extern const BeliefSummary summary;
+extern const belief::Observation observation;
+extern const TrackingScore score;
+}  // namespace session_report_h
 
 }  // namespace prescene::service::given_service_recording

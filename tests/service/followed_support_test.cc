@@ -97,13 +97,13 @@ TEST(FollowedSupport, IsFoundInAFolderOfImagesAndStaysWhereItIs) {
   const auto tracker = Tracker::create(scene, settings, 1, backends);
   ASSERT_TRUE(tracker.ok());
   SupportScore score;
-  SessionReport report(scene, settings);
+  SessionReport report(scene, settings, backends);
   const auto summary =
       replay_folder(*folder, **tracker, {}, {}, [&](const TrackerStep& step, const Tracker& at) -> core::Status {
         score.add(step.record.stamp_ns, step.supports);
-        report.add(step.observation);
-        report.add(summary_of(*at.belief()));
         report.set_scene(at.belief()->scene);
+        report.add(summary_of(*at.belief()));
+        report.add(step.observation);
         return core::ok_status();
       });
   ASSERT_TRUE(summary.ok()) << summary.status().message();
@@ -123,7 +123,7 @@ TEST(FollowedSupport, IsFoundInAFolderOfImagesAndStaysWhereItIs) {
 
   report.set_supports(score);
   const auto page = scratch.path() / "report.html";
-  ASSERT_TRUE(report.write(page, {}, backends).ok());
+  ASSERT_TRUE(report.write(page, TrackingScore(scene)).ok());
   std::ifstream file(page);
   const std::string html((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   EXPECT_NE(html.find(filter::kFoundSupport), std::string::npos);

@@ -155,5 +155,37 @@ TEST_F(LivePhysics, APushThatWasSeenTellsFriction) {
   }
 }
 
+/// What one session learned is what the next begins with.
+TEST_F(LivePhysics, WhatWasLearnedIsWhatTheNextSessionBeginsWith) {
+  const auto recorded = folder_.path() / "push.mcap";
+  ASSERT_TRUE(tests::record_scene(push_scene("0.3"), {"scene.yaml", push_scene("0.3"), 1, ""}, 30.0, recorded).ok());
+  const auto scene = load_scene_text(push_scene("{uniform: [0.1, 0.9]}"), "scene.yaml", {});
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  TrackerSettings settings;
+  const auto first = Tracker::create(*scene, settings, 1, backends_);
+  ASSERT_TRUE(first.ok()) << first.status().message();
+  settings.learned = interfaces::learned_yaml((*first)->learned());
+  const auto again = Tracker::create(*scene, settings, 1, backends_);
+  ASSERT_TRUE(again.ok()) << again.status().message();
+  EXPECT_EQ(*(*again)->belief(), *(*first)->belief()) << "nothing was learned: the file leaves the priors";
+
+  ASSERT_TRUE(replay_recording(recorded, {}, **first, {}, {}, {}, {}).ok());
+  const belief::PhysicalBelief learned = (*first)->belief()->objects[0].physics;
+  ASSERT_EQ(learned.lessons, 1);
+  settings.learned = interfaces::learned_yaml((*first)->learned());
+  settings.learned_file = "learned.yaml";
+  const auto next = Tracker::create(*scene, settings, 2, backends_);
+  ASSERT_TRUE(next.ok()) << next.status().message();
+  EXPECT_EQ((*next)->belief()->objects[0].physics, learned);
+  EXPECT_EQ(interfaces::learned_yaml((*next)->learned()), settings.learned);
+
+  const auto other = load_scene_text(push_scene("{uniform: [0.1, 0.8]}"), "scene.yaml", {});
+  ASSERT_TRUE(other.ok());
+  const auto refused = Tracker::create(*other, settings, 1, backends_);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.status().code(), core::StatusCode::kInvalidInput);
+  EXPECT_NE(refused.status().message().find("learned.yaml:"), std::string::npos) << refused.status().message();
+}
+
 }  // namespace
 }  // namespace prescene::service::live_physics_test

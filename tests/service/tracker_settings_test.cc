@@ -19,6 +19,9 @@ TrackerSettings unusual() {
       0.07,   0.02,   false,
       true,   true};
   settings.tf = {.history_s = 12.5, .max_frames = 77, .max_samples = 5000, .max_extrapolation_s = 0.3};
+  settings.learned = "learned: {}\n";
+  settings.learned_file = "learned.yaml";
+  settings.new_objects = true;
   return settings;
 }
 

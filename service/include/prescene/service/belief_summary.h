@@ -28,6 +28,9 @@ struct ObjectSummary {
   std::vector<belief::ParameterEstimate> parameters = {};
   int lessons = 0;
   core::TimeNs learned_ns = 0;
+  bool is_new = false;  ///< The scene does not name it: it was found (filter::is_unknown_object).
+  /// Edges of the bounding box of a new one in its own frame, about its origin, m; zero for others.
+  geometry::Vector3d size = geometry::Vector3d::Zero();
 };
 
 struct BeliefSummary {
@@ -39,7 +42,7 @@ struct BeliefSummary {
 BeliefSummary summary_of(const belief::Belief& belief);
 /// {"step", "stamp_ns", "objects": [{"name", "model", "state", "confidence", "existence", "pose", "covariance" (36
 /// numbers, row-major), "twist", "evidence_per_pixel", "visible_share", "parameters": [{"name", "mean",
-/// "standard_deviation", "low", "high"}], "lessons", "learned_ns"}]}
+/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", of new objects "size" ([x, y, z])}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text);
 
@@ -51,6 +54,8 @@ interfaces::RosPoseWithCovarianceStamped pose_of(const ObjectSummary& object, co
 /// Coarse meshes of a scene's models by name, made once for markers.
 using MarkerMeshes = std::map<std::string, geometry::TriangleMesh>;
 MarkerMeshes marker_meshes(const belief::Scene& scene);
+/// The same of models that `meshes` does not have yet, or has with other edges, as of objects that were found.
+void add_marker_meshes(const belief::Scene& scene, MarkerMeshes& meshes);
 /// Each object as a triangle list in its model's colour (paler when not tracked) with its name above.
 interfaces::RosMarkerArray markers_of(const BeliefSummary& summary, const belief::Scene& scene,
                                       const MarkerMeshes& meshes, const std::string& world_frame);

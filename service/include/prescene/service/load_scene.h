@@ -27,6 +27,8 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
 
 /// Whether a YAML file describes one model and no scene; false where it can't be read.
 bool is_model_file(const std::filesystem::path& path);
+/// Whether a YAML file holds what was learned of physical parameters; false where it can't be read.
+bool is_learned_file(const std::filesystem::path& path);
 /// Reads a model file, as `inspect` writes them, and its mesh; errors as those of load_scene.
 core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log);
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "prescene/core/progress.h"
+#include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/calibration/motion_dataset.h"
 #include "prescene/simulation/calibration/flight_calibration.h"
@@ -48,6 +49,11 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
 /// A model file that stands in `folder`: the model as the data set's scene describes it, with what was found.
 core::Result<std::string> calibrated_yaml(const MotionDataset& dataset, const ObjectCalibration& found,
                                           const std::filesystem::path& folder);
+
+/// A learned file with what was found in place of what `earlier` says of the model, and without what it says of the
+/// data set's object, which was learned from other priors.
+interfaces::LearnedFile with_calibrated(interfaces::LearnedFile earlier, const MotionDataset& dataset,
+                                        const ObjectCalibration& found);
 
 /// {"recordings", "flights", "slides", "evaluations", "settled", "score", "start_noise", "friction_scatter", "flight",
 /// "parameters", "remarks"}

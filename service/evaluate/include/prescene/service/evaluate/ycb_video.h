@@ -41,6 +41,7 @@ struct YcbObjectScore {
 struct YcbSection {
   int n = 0;                          ///< Runs of all objects.
   double share_adds_below_2cm = 0.0;  ///< Share of the runs, in [0, 1].
+  double share_add_below_2cm = 0.0;   ///< The same of ADD, for which front and back are not alike.
   double median_adds_m = 0.0;
   double median_add_m = 0.0;
   double ms_per_object = 0.0;  ///< Wall time per run and object, on the given threads, ms.

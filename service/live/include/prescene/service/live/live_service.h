@@ -6,6 +6,7 @@
 // refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its rate.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -31,6 +32,10 @@ struct LiveSettings {
   std::function<void(const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief)> on_step = {};
   std::function<void(const std::string& answer)> on_answer = {};
   std::function<void(const std::string& health)> on_health = {};
+  /// Where what is learned of physical parameters is kept: written anew in the end and, where something was learned
+  /// since, every `learned_interval` s. Empty = nowhere.
+  std::filesystem::path learned_file;
+  double learned_interval = 10.0;
 };
 
 class LiveService {
@@ -43,8 +48,9 @@ class LiveService {
                                                            const core::LogSink& log);
   ~LiveService();
 
-  /// Works until cancelled, then closes the recording. A recording that fails on the way (a full disk) ends there,
-  /// while tracking goes on; the status then tells of it.
+  /// Works until cancelled, then closes the recording and writes the learned file. A recording that fails on the way (a
+  /// full disk) ends there, while tracking goes on; the status then tells of it, as of a learned file that could not be
+  /// written in the end.
   core::Status run(const core::Cancellation& cancellation);
   /// A question as if it had come over the bus, from any thread; its answer goes there, too. See QueryWorker::ask.
   void ask(std::string question_json);

@@ -43,6 +43,8 @@ struct ServiceHealth {
   int other_services = 0;              ///< Which publish beliefs in the same DDS domain.
   bool is_recording = false;
   std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
+  bool keeps_learned = false;
+  std::string learned_failure;  ///< Why what was learned could not be written the last time; "" = it could.
   std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
   double last_step_seconds = 0.0;
   std::uint64_t not_simulated = 0;  ///< Particles that physics could not move and constant velocity did.
@@ -66,8 +68,8 @@ std::string others_text(int other_services);
 std::string health_text(const ServiceHealth& health);
 
 /// kWarn before the first frame, for degraded steps, beside other services, and when something failed, was lost or had
-/// no effect since `before`, the health of the last report (or none); kError when frames stopped or the recording
-/// failed. The values are those since the start.
+/// no effect since `before`, the health of the last report (or none); kError when frames stopped, or the recording or
+/// keeping what was learned failed. The values are those since the start.
 interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const ServiceHealth& before,
                                               const std::string& hardware_id);
 

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page about one tracked session: pictures with the belief drawn in, tracking table, curves, and what was answered.
+// The page about one tracked session: pictures with the belief drawn in at each change of a state, a band of states,
+// curves, what was learned, where hidden things may be, and what was answered.
+//
+//   SessionReport report(scene, settings, backends);
+//   report.add(summary);              // of each step, and then
+//   report.add(observation);          // its frame; or all summaries, then all messages
+//   PRESCENE_RETURN_IF_ERROR(report.write("session.html", score));
 #pragma once
 
 #include <filesystem>
@@ -12,6 +18,7 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/recording/foreseen.h"
+#include "prescene/service/recording/residuals.h"
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/frame_assembler.h"
@@ -20,15 +27,18 @@
 
 namespace prescene::service {
 
-/// Collects while a session runs; keeps a bounded number of pictures, evenly spread.
+/// Collects while a session runs; keeps a bounded number of pictures.
 class SessionReport {
  public:
-  SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings);
+  /// `backends` must outlive the report.
+  SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, Backends& backends);
 
+  /// What was believed after a frame. In the order of their stamps, each before the frame itself.
+  void add(const BeliefSummary& summary);
   /// A message of the robot: its frames are assembled as the tracker does.
   void add(const interfaces::ReceivedMessage& message);
+  /// A frame. Those of which no summary is known are left out.
   void add(const belief::Observation& observation);
-  void add(const BeliefSummary& summary);
   /// The scene as the tracker sees it by now (supports that it found).
   void set_scene(std::shared_ptr<const belief::Scene> scene) { scene_ = std::move(scene); }
   /// Supports as they were followed; the last call counts.
@@ -42,12 +52,12 @@ class SessionReport {
     came_is_truth_ = foreseen.knows_truth();
   }
 
-  core::Status write(const std::filesystem::path& path, const std::vector<ObjectTrackingScore>& rows,
-                     Backends& backends) const;
+  core::Status write(const std::filesystem::path& path, const TrackingScore& score) const;
 
  private:
-  interfaces::PictureBlock pictures(Backends& backends) const;
-  std::vector<interfaces::ReportBlock> curves() const;
+  /// Evenly spread over the session.
+  interfaces::PictureBlock pictures() const;
+  void add_changes(interfaces::ReportContents& contents) const;
   void add_supports(interfaces::ReportContents& contents) const;
   void add_foreseen(interfaces::ReportContents& contents) const;
   void add_answers(interfaces::ReportContents& contents) const;
@@ -57,10 +67,15 @@ class SessionReport {
   InputTopics topics_;
   FrameAssembler assembler_;
   MessageIndex next_index_ = 0;
+  Backends* backends_;
+  ResidualMeter residual_meter_;
   std::vector<belief::Observation> observations_;
   std::size_t every_ = 1;  // observations between two that are kept
   std::size_t seen_ = 0;
   std::map<core::TimeNs, BeliefSummary> summaries_;
+  std::map<core::TimeNs, std::string> changes_;  // of states: what they are
+  std::map<core::TimeNs, belief::Observation> at_changes_;
+  std::map<core::TimeNs, std::map<std::string, double>> residuals_;
   SupportScore supports_;
   std::vector<std::pair<double, std::string>> answers_;
   std::vector<Comparison> comparisons_;

@@ -14,6 +14,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/filter/particle_filter.h"
+#include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/tracking/step_record.h"
@@ -36,7 +37,7 @@ struct TrackerStep {
 /// Not thread-safe but for belief().
 class Tracker {
  public:
-  /// `backends` must outlive the tracker.
+  /// `backends` must outlive the tracker. Errors of the scene, of the learned file in the settings, of the backends.
   static core::Result<std::unique_ptr<Tracker>> create(std::shared_ptr<const belief::Scene> scene,
                                                        const TrackerSettings& settings, std::uint64_t seed,
                                                        Backends& backends);
@@ -67,11 +68,15 @@ class Tracker {
   /// The newest belief; a snapshot that never changes. Safe from any thread.
   std::shared_ptr<const belief::Belief> belief() const;
   const TrackerSettings& settings() const { return settings_; }
+  /// The learned file of the settings, with what the newest belief knows of the scene's objects put in.
+  interfaces::LearnedFile learned() const { return with_learned(learned_, *scene_, belief()->objects); }
 
  private:
-  Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, std::uint64_t seed,
-          Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
-          std::unique_ptr<rendering::LikelihoodBatch> likelihood);
+  Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, interfaces::LearnedFile learned,
+          std::vector<belief::PhysicalBelief> physics, std::uint64_t seed, Backends& backends,
+          std::unique_ptr<rendering::Renderer> renderer, std::unique_ptr<rendering::LikelihoodBatch> likelihood);
+  /// The belief before any frame.
+  belief::Belief start(std::uint64_t seed) const;
 
   TrackerSettings settings_;
   std::string rectified_doubt_;
@@ -81,8 +86,10 @@ class Tracker {
   FrameAssembler assembler_;
   MessageIndex last_index_ = 0;
   WaitingControls controls_;
-  std::shared_ptr<const belief::Scene> scene_;  // as given
-  mutable std::mutex mutex_;                    // guards belief_
+  std::shared_ptr<const belief::Scene> scene_;  // as given, with the values of learned models
+  interfaces::LearnedFile learned_;
+  std::vector<belief::PhysicalBelief> physics_;  // at the start, of the scene's objects
+  mutable std::mutex mutex_;                     // guards belief_
   std::shared_ptr<const belief::Belief> belief_;
 };
 

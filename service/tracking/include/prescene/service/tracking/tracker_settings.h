@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "prescene/core/status.h"
@@ -16,6 +17,12 @@ struct TrackerSettings {
   InputTopics topics;
   AssemblerSettings assembler;
   TfBufferSettings tf;
+  /// What an earlier session learned of physical parameters: the text of a learned file, and its name in messages.
+  /// Empty = nothing.
+  std::string learned;
+  std::string learned_file;
+  /// Look for things that the scene does not name; empty = as the scene says.
+  std::optional<bool> new_objects;
   filter::FilterSettings filter;
 };
 
@@ -25,8 +32,7 @@ bool is_rectified(const TrackerSettings& settings);
 /// which holds. "" if nothing does.
 std::string rectified_doubt(const TrackerSettings& settings);
 
-/// Topics, assembler and tf: all that decides which frames are seen from where. The filter's settings are those of the
-/// program's version.
+/// All but the filter's settings, which are those of the program's version.
 nlohmann::ordered_json to_json(const TrackerSettings& settings);
 /// The settings with what `json` says; kInvalidInput naming the key for a value of another type, a camera pose that is
 /// none, or a number that is not finite. Unknown keys are ignored: a later version may have written them.
