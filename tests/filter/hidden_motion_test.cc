@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "prescene/filter/operators/predict.h"
-#include "pushed_box.h"
+#include "tests/filter/pushed_box.h"
 
 namespace prescene::filter_tests {
 namespace {

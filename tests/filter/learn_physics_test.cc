@@ -10,7 +10,7 @@
 #include <cstdio>
 
 #include "prescene/core/random.h"
-#include "pushed_box.h"
+#include "tests/filter/pushed_box.h"
 
 namespace prescene::filter_tests::learn_physics_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pushed_box.h"
+#include "tests/filter/pushed_box.h"
 
 #include <algorithm>
 #include <cmath>
