@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/tracking/image_messages.h"
 #include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {
@@ -124,7 +125,7 @@ core::Status BusView::Impl::join() {
     const core::Status sent = node->publish(queries, interfaces::RosString{question});
     if (!sent.ok()) core::log(log, core::LogLevel::kWarning, sent.message());
   });
-  const auto subscribe = [&](const std::string& topic, const char* type, TopicQos qos, auto take) {
+  const auto subscribe = [&](const std::string& topic, const std::string& type, TopicQos qos, auto take) {
     return node->subscribe(topic, type, qos, [this, take](ReceivedMessage&& message) { (this->*take)(message); });
   };
   const InputTopics& topics = settings.tracker.topics;
@@ -149,15 +150,15 @@ void BusView::Impl::take_frame_part(const ReceivedMessage& message) {
   const MessageIndex index = next_index++;
   // What is refused here the service refuses too, and says why.
   const auto add = [&](auto decoded, const auto& to) {
-    if (decoded) static_cast<void>(to(*decoded));
+    if (decoded) static_cast<void>(to(*std::move(decoded)));
   };
   using interfaces::decode_cdr;
   if (message.topic == topics.depth) {
-    add(decode_cdr<interfaces::RosImage>(message.cdr),
-        [&](const auto& image) { return assembler.add_depth(image, index, message.received_ns); });
+    add(decode_depth(message, assembler.image_rules()),
+        [&](auto&& image) { return assembler.add_depth(std::move(image), index, message.received_ns); });
   } else if (message.topic == topics.color) {
-    add(decode_cdr<interfaces::RosImage>(message.cdr),
-        [&](const auto& image) { return assembler.add_color(image, index, message.received_ns); });
+    add(decode_color_message(message),
+        [&](auto&& image) { return assembler.add_color(std::move(image), index, message.received_ns); });
   } else if (message.topic == topics.camera_info) {
     add(decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage),
         [&](const auto& info) { return assembler.add_camera_info(info, index); });
