@@ -106,13 +106,14 @@ belief::ObjectModel model_about(const SeenShape& shape, bool round) {
   return model;
 }
 
-/// Share of the points that lie in or about the bounding box of something known.
-double share_near_known(std::span<const Vector3d> points_W, const belief::Belief& belief, MeshCache& meshes) {
+/// Share of the points that lie in or about the bounding box of something known. `scene`: that of the belief to be.
+double share_near_known(std::span<const Vector3d> points_W, const belief::Belief& belief, const belief::Scene& scene,
+                        MeshCache& meshes) {
   std::size_t near = 0;
   std::vector<std::pair<Pose, geometry::Box>> boxes;
   for (const ObjectBelief& object : belief.objects) {
     if (object.state == belief::TrackState::kLost) continue;
-    const belief::ObjectModel& model = belief::model_of(belief, object);
+    const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
     const rendering::MeshHandle mesh = meshes.get(model.visual, model.collision, MeshDetail::kLikelihood);
     geometry::Box box;
     for (const auto& vertex : mesh->vertices) box.extend(vertex.cast<double>());
@@ -203,7 +204,8 @@ int add_unknown_objects(const FilterFrame& frame, const belief::Observation& obs
   for (const Cluster& cluster : find_clusters(sampled, mask, segmentation)) {
     if (!ends_in_image(sampled, cluster)) continue;
     const std::vector<Vector3d> points_W = solid_points(sampled, cluster, frame.X_WC);
-    if (points_W.size() < kFewestPoints || share_near_known(points_W, belief, *tools.meshes) > kMostNearKnown) continue;
+    if (points_W.size() < kFewestPoints || share_near_known(points_W, belief, *scene, *tools.meshes) > kMostNearKnown)
+      continue;
     const auto lowest = std::min_element(points_W.begin(), points_W.end(), [&](const Vector3d& a, const Vector3d& b) {
       return up_W.dot(a) < up_W.dot(b);
     });
