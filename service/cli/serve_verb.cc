@@ -95,6 +95,8 @@ Verb add_serve_verb(CLI::App& app) {
                    "Port of a page for the browser that shows the belief live; 0 = any that is free")
       ->check(CLI::Range(0, 65535));
   add_web_options(*verb, "view-", options->view);
+  for (const char* name : {"--view-address", "--view-token", "--view-origin"})
+    verb->get_option(name)->needs(verb->get_option("--view"));
   add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->settings.dds, options->settings.tracker);
   add_camera_options(*verb, options->settings.tracker.assembler);

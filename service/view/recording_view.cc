@@ -6,6 +6,7 @@
 
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
+#include "prescene/service/live/query_worker.h"
 #include "prescene/service/view/step_store.h"
 #include "prescene/service/view/view_history.h"
 #include "recording_answers.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/view_content.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/hash.h"
 #include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/images/jpeg.h"
 #include "prescene/service/pictures/belief_overlay.h"
@@ -85,14 +85,17 @@ ordered_json ghosts_of(const belief::ObjectBelief& object, const geometry::Pose&
 /// Positions drawn from the mixture of the particles' Gaussians.
 ordered_json region_of(const belief::ObjectBelief& object, core::RandomStream stream) {
   std::vector<double> numbers;
+  const belief::Particle* last = nullptr;
+  geometry::Matrix3d root;
   for_each_by_weight(object.particles, kRegionPoints, [&](const belief::Particle& particle) {
-    const geometry::Matrix3d covariance = particle.covariance.block<3, 3>(3, 3);
-    const Eigen::LLT<geometry::Matrix3d> root(covariance + 1e-10 * geometry::Matrix3d::Identity());
-    geometry::Vector3d p = particle.X_WO.translation;
-    if (root.info() == Eigen::Success) {
-      const double a = stream.normal(), b = stream.normal(), c = stream.normal();
-      p += geometry::Vector3d(root.matrixL() * geometry::Vector3d(a, b, c));
+    if (&particle != last) {  // the same one comes several times in a row
+      const geometry::SymmetricEigen3 eigen = geometry::symmetric_eigen_3(particle.covariance.block<3, 3>(3, 3));
+      root = eigen.vectors;
+      for (Eigen::Index i = 0; i < 3; ++i) root.col(i) *= std::sqrt(std::max(0.0, eigen.values[i]));
+      last = &particle;
     }
+    geometry::Vector3d p = particle.X_WO.translation;
+    for (Eigen::Index i = 0; i < 3; ++i) p += stream.normal() * root.col(i);
     for (Eigen::Index i = 0; i < 3; ++i) numbers.push_back(rounded(p[i], 1e-3));
   });
   return numbers;

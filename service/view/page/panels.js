@@ -54,7 +54,7 @@ export class ObjectList {
         const p = object.pose;
         lines.push(['position', p.slice(0, 3).map((c) => (100 * c).toFixed(1)).join(', ') + ' cm'],
           ['spread', (1000 * object.spread).toFixed(1) + ' mm'], ['speed', object.speed.toFixed(2) + ' m/s'],
-          ['in view', percent(object.visible_share)], ['is there', percent(object.existence)]);
+          ['in view', percent(object.visible_share)], ['existence', percent(object.existence)]);
         for (const q of object.parameters)
           lines.push([q.name.replaceAll('_', ' '), q.mean.toFixed(3) + ' ± ' + q.deviation.toFixed(3) + unitOf(q.name)]);
         if (object.parameters.length)

@@ -240,15 +240,16 @@ export class SpaceView {
     if (answer) this.drawAnswer(answer, clip);
     step.objects.forEach((object) => {
       const color = colors.get(object.name), key = modelKey(scene, object.name);
-      if (object.state !== 'tracked' && object.state !== 'lost') painter.drawMesh(key, object.pose, clip, shade(color, 0.5));
+      const seen = object.state === 'tracked';
+      if (!seen) gl.disable(gl.DEPTH_TEST);  // what is hidden is drawn through what hides it
+      if (!seen && object.state !== 'lost') painter.drawMesh(key, object.pose, clip, shade(color, 0.35));
       if (ghosts) for (const pose of object.ghosts) painter.drawMesh(key, pose, clip, shade(color, object.name === selected ? 0.1 : 0.05), 0.5);
       if (object.region) {
         const numbers = [];
-        for (let i = 0; i < object.region.length; i += 3) numbers.push(...object.region.slice(i, i + 3), ...shade(color, 0.3));
-        gl.disable(gl.DEPTH_TEST);  // what is hidden is seen here all the same
-        painter.drawPaint(gl.POINTS, numbers, clip, 0.03 * painter.canvas.height);
-        gl.enable(gl.DEPTH_TEST);
+        for (let i = 0; i < object.region.length; i += 3) numbers.push(...object.region.slice(i, i + 3), ...shade(color, 0.45));
+        painter.drawPaint(gl.POINTS, numbers, clip, 0.04 * painter.canvas.height);
       }
+      gl.enable(gl.DEPTH_TEST);
     });
     this.drawLabels(step, selected, colors);
   }
