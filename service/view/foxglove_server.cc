@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "json_fields.h"
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
@@ -59,7 +60,11 @@ interfaces::WebMessagePtr text_of(const ordered_json& document) {
 }
 
 ordered_json status_document(StatusLevel level, const std::string& text) {
-  return {{"op", "status"}, {"level", static_cast<int>(level)}, {"message", text}};
+  return JsonFields()
+      .text("op", "status")
+      .count("level", static_cast<std::uint64_t>(level))
+      .text("message", text)
+      .take();
 }
 
 interfaces::RosTfMessage tf_of(const ShownStep& step, const BeliefSummary& summary, const std::string& world_frame) {
@@ -93,12 +98,14 @@ ordered_json FoxgloveServer::channel_list() {
   ordered_json channels = ordered_json::array();
   const auto add = [&](Channel channel, const std::string& topic, const char* encoding, const std::string& schema_name,
                        const char* schema_encoding, const std::string& schema) {
-    channels.push_back({{"id", static_cast<std::uint32_t>(channel)},
-                        {"topic", topic},
-                        {"encoding", encoding},
-                        {"schemaName", schema_name},
-                        {"schema", schema},
-                        {"schemaEncoding", schema_encoding}});
+    channels.push_back(JsonFields()
+                           .count("id", channel)
+                           .text("topic", topic)
+                           .text("encoding", encoding)
+                           .text("schemaName", schema_name)
+                           .text("schema", schema)
+                           .text("schemaEncoding", schema_encoding)
+                           .take());
   };
   const auto add_ros = [&](Channel channel, const std::string& topic, const interfaces::RosType& type) {
     add(channel, topic, "cdr", std::string(type.name), "ros2msg", interfaces::ros2msg_schema(type));
@@ -117,13 +124,15 @@ void FoxgloveServer::open(WebClient client, const Send& send) {
     const std::lock_guard lock(mutex_);
     subscriptions_[client];
   }
-  send(client, text_of({{"op", "serverInfo"},
-                        {"name", "prescene"},
-                        {"capabilities", ordered_json::array()},
-                        {"supportedEncodings", {"cdr", "json"}},
-                        {"metadata", ordered_json::object()},
-                        {"sessionId", std::to_string(core::wall_now_ns())}}));
-  send(client, text_of({{"op", "advertise"}, {"channels", channel_list()}}));
+  send(client, text_of(JsonFields()
+                           .text("op", "serverInfo")
+                           .text("name", "prescene")
+                           .field("capabilities", ordered_json::array())
+                           .texts("supportedEncodings", {"cdr", "json"})
+                           .field("metadata", ordered_json::object())
+                           .text("sessionId", std::to_string(core::wall_now_ns()))
+                           .take()));
+  send(client, text_of(JsonFields().text("op", "advertise").field("channels", channel_list()).take()));
 }
 
 void FoxgloveServer::close(WebClient client) {

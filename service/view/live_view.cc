@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "json_fields.h"
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
 #include "prescene/service/view/view_history.h"
@@ -131,7 +132,7 @@ void LiveView::answer(const std::string& answer) {
 void LiveView::Impl::open(WebClient client) {
   const std::lock_guard lock(shown_mutex);
   if (!server) return;
-  server->send(client, view_text({{"op", "hello"}, {"mode", "live"}}, WebDelivery::kEach));
+  server->send(client, view_text(JsonFields().text("op", "hello").text("mode", "live").take(), WebDelivery::kEach));
   server->send(client, scene);
   server->send(client, view_text(to_json(history), WebDelivery::kEach));
   for (const auto& strip : strips) server->send(client, strip);
@@ -163,7 +164,9 @@ void LiveView::Impl::work() {
     }
     try {
       if (shown) show(*shown);
-      if (health_text) server->send_to_all(view_text({{"op", "health"}, {"text", *health_text}}, WebDelivery::kNewest));
+      if (health_text)
+        server->send_to_all(
+            view_text(JsonFields().text("op", "health").text("text", *health_text).take(), WebDelivery::kNewest));
     } catch (const std::exception&) {  // no memory: the next step is shown, or the one after it
     }
   }

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
+#include "json_fields.h"
 #include "prescene/belief/json.h"
 
 namespace prescene::service {
@@ -19,8 +20,10 @@ core::Result<std::string> question_text(PageQuestion& asked, const nlohmann::ord
   if (number == request.end() || !number->is_number_unsigned() || question == request.end() || !question->is_object())
     return core::invalid_input("ask: not {\"number\": n, \"question\": {...}}");
   asked.number = number->get<std::uint64_t>();
-  nlohmann::ordered_json with_id = {
-      {"id", std::string(kIdPrefix) + std::to_string(asked.client) + "-" + std::to_string(asked.number)}};
+  nlohmann::ordered_json with_id =
+      JsonFields()
+          .text("id", std::string(kIdPrefix) + std::to_string(asked.client) + "-" + std::to_string(asked.number))
+          .take();
   for (const auto& [key, value] : question->items())
     if (key != "id") with_id[key] = value;
   return belief::json_text(with_id);

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "json_fields.h"
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
 #include "prescene/service/live/query_worker.h"
@@ -129,14 +130,21 @@ void RecordingView::finish(const std::vector<std::string>& remarks) {
 }
 
 ordered_json RecordingView::Impl::extent() const {
-  return {{"op", "extent"}, {"steps", store->size()}, {"progress", progress}, {"done", done}, {"remarks", remarks}};
+  return JsonFields()
+      .text("op", "extent")
+      .count("steps", store->size())
+      .number("progress", progress)
+      .flag("done", done)
+      .texts("remarks", remarks)
+      .take();
 }
 
 void RecordingView::Impl::open(WebClient client) {
   const std::lock_guard lock(mutex);
   if (!server) return;
   server->send(client,
-               view_text({{"op", "hello"}, {"mode", "recording"}, {"title", options.title}}, WebDelivery::kEach));
+               view_text(JsonFields().text("op", "hello").text("mode", "recording").text("title", options.title).take(),
+                         WebDelivery::kEach));
   server->send(client, scene);
   server->send(client, view_text(to_json(history), WebDelivery::kEach));
   for (const Strip& strip : strips) server->send(client, strip.message);
@@ -226,7 +234,7 @@ void RecordingView::Impl::send_news() {
     if (anew) {
       rows = view_text(to_json(history), WebDelivery::kEach);
     } else if (!new_rows.empty()) {
-      rows = view_text({{"op", "rows"}, {"rows", new_rows}}, WebDelivery::kEach);
+      rows = view_text(JsonFields().text("op", "rows").field("rows", std::move(new_rows)).take(), WebDelivery::kEach);
     }
     new_rows = ordered_json::array();
     news = view_text(extent(), WebDelivery::kEach);

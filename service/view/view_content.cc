@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "json_fields.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/hash.h"
 #include "prescene/core/random.h"
@@ -24,35 +25,49 @@ constexpr int kMostTriangles = 3000;
 constexpr int kMostGhosts = 24;
 constexpr int kRegionPoints = 160;
 
-double rounded(double value, double unit) { return std::isfinite(value) ? std::round(value / unit) * unit : 0.0; }
+/// To so many parts of the unit, a power of ten: divided by it, the number is the one with the shortest text.
+double rounded(double value, double parts) { return std::isfinite(value) ? std::round(value * parts) / parts : 0.0; }
 
 /// Tenths of a millimetre are more than a page shows; so are they short as text.
 ordered_json pose_numbers(const geometry::Pose& X) {
   const geometry::Vector3d& p = X.translation;
   const geometry::Quaterniond& q = X.rotation;
-  return {rounded(p.x(), 1e-4), rounded(p.y(), 1e-4), rounded(p.z(), 1e-4), rounded(q.w(), 1e-5),
-          rounded(q.x(), 1e-5), rounded(q.y(), 1e-5), rounded(q.z(), 1e-5)};
+  return json_numbers({rounded(p.x(), 1e4), rounded(p.y(), 1e4), rounded(p.z(), 1e4), rounded(q.w(), 1e5),
+                       rounded(q.x(), 1e5), rounded(q.y(), 1e5), rounded(q.z(), 1e5)});
 }
 
-ordered_json color_numbers(const belief::Color& color) { return {color.r, color.g, color.b}; }
+ordered_json color_numbers(const belief::Color& color) {
+  return json_numbers({rounded(color.r, 1e3), rounded(color.g, 1e3), rounded(color.b, 1e3)});
+}
 
 ordered_json mesh_document(const geometry::TriangleMesh& whole) {
   const geometry::TriangleMesh mesh = geometry::simplified(whole, kMostTriangles);
-  const double unit = 1e-4 * std::max(1e-3, geometry::bounding_box(mesh).sizes().maxCoeff());
+  // A ten thousandth of the size, rounded to a power of ten.
+  const double size = std::max(1e-3, geometry::bounding_box(mesh).sizes().maxCoeff());
+  const double parts = std::pow(10.0, std::ceil(4.0 - std::log10(size)));
   std::vector<double> vertices;
   for (const geometry::Vector3d& vertex : mesh.vertices)
-    for (Eigen::Index i = 0; i < 3; ++i) vertices.push_back(static_cast<float>(rounded(vertex[i], unit)));
-  std::vector<std::uint32_t> triangles;
-  for (const auto& triangle : mesh.triangles) triangles.insert(triangles.end(), triangle.begin(), triangle.end());
-  return {{"vertices", vertices}, {"triangles", triangles}};
+    for (Eigen::Index i = 0; i < 3; ++i) vertices.push_back(rounded(vertex[i], parts));
+  ordered_json corners = ordered_json::array();
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) corners.push_back(corner);
+  return JsonFields().numbers("vertices", vertices).field("triangles", std::move(corners)).take();
 }
 
+ordered_json body_document(const std::string& name, const belief::Color& color, const geometry::TriangleMesh& mesh,
+                           const geometry::Pose& pose) {
+  return JsonFields()
+      .text("name", name)
+      .field("color", color_numbers(color))
+      .field("mesh", mesh_document(mesh))
+      .field("pose", pose_numbers(pose))
+      .take();
+}
+
+/// What a camera sees of a body.
 template <class Body>
-ordered_json body_document(const Body& body, const geometry::Pose& pose) {
-  return {{"name", body.name},
-          {"color", color_numbers(body.color)},
-          {"mesh", mesh_document(body.visual ? *body.visual : belief::collision_mesh(body.collision))},
-          {"pose", pose_numbers(pose)}};
+geometry::TriangleMesh seen_mesh(const Body& body) {
+  return body.visual ? *body.visual : belief::collision_mesh(body.collision);
 }
 
 /// Particles by their weights, each as often as its share of `count` is: the same ones for the same belief.
@@ -96,19 +111,21 @@ ordered_json region_of(const belief::ObjectBelief& object, core::RandomStream st
     }
     geometry::Vector3d p = particle.X_WO.translation;
     for (Eigen::Index i = 0; i < 3; ++i) p += stream.normal() * root.col(i);
-    for (Eigen::Index i = 0; i < 3; ++i) numbers.push_back(rounded(p[i], 1e-3));
+    for (Eigen::Index i = 0; i < 3; ++i) numbers.push_back(rounded(p[i], 1e3));
   });
-  return numbers;
+  return json_numbers(numbers);
 }
 
 ordered_json parameters_of(const ObjectSummary& object) {
   ordered_json parameters = ordered_json::array();
   for (const belief::ParameterEstimate& parameter : object.parameters)
-    parameters.push_back({{"name", parameter.name},
-                          {"mean", rounded(parameter.mean, 1e-5)},
-                          {"deviation", rounded(parameter.standard_deviation, 1e-5)},
-                          {"low", rounded(parameter.low, 1e-5)},
-                          {"high", rounded(parameter.high, 1e-5)}});
+    parameters.push_back(JsonFields()
+                             .text("name", parameter.name)
+                             .number("mean", rounded(parameter.mean, 1e5))
+                             .number("deviation", rounded(parameter.standard_deviation, 1e5))
+                             .number("low", rounded(parameter.low, 1e5))
+                             .number("high", rounded(parameter.high, 1e5))
+                             .take());
   return parameters;
 }
 
@@ -119,21 +136,24 @@ ordered_json object_document(const ObjectSummary& summary, const belief::ObjectB
   const geometry::SymmetryGroup symmetry =
       model < models.size() ? models[model].symmetry : geometry::SymmetryGroup::none();
   const double spread = std::sqrt(std::max(0.0, summary.covariance.block<3, 3>(3, 3).trace()));
-  ordered_json document = {{"name", summary.name},
-                           {"state", belief::to_string(summary.state)},
-                           {"confidence", rounded(summary.confidence, 1e-4)},
-                           {"existence", rounded(summary.existence, 1e-4)},
-                           {"pose", pose_numbers(summary.X_WO)},
-                           {"spread", rounded(spread, 1e-5)},
-                           {"speed", rounded(summary.V_WO.linear.norm(), 1e-4)},
-                           {"visible_share", rounded(summary.visible_share, 1e-3)},
-                           {"parameters", parameters_of(summary)},
-                           {"lessons", summary.lessons},
-                           {"ghosts", ghosts_of(object, summary.X_WO, symmetry)}};
-  if (summary.state != belief::TrackState::kTracked)
-    document["region"] = region_of(object, core::RandomStream(belief.seed, core::Purpose::kEvaluation, belief.step,
-                                                              static_cast<std::uint32_t>(index)));
-  return document;
+  JsonFields document;
+  document.text("name", summary.name)
+      .text("state", belief::to_string(summary.state))
+      .number("confidence", rounded(summary.confidence, 1e4))
+      .number("existence", rounded(summary.existence, 1e4))
+      .field("pose", pose_numbers(summary.X_WO))
+      .number("spread", rounded(spread, 1e5))
+      .number("speed", rounded(summary.V_WO.linear.norm(), 1e4))
+      .number("visible_share", rounded(summary.visible_share, 1e3))
+      .field("parameters", parameters_of(summary))
+      .count("lessons", static_cast<std::uint64_t>(std::max(0, summary.lessons)))
+      .field("ghosts", ghosts_of(object, summary.X_WO, symmetry));
+  if (summary.state != belief::TrackState::kTracked) {
+    const core::RandomStream stream(belief.seed, core::Purpose::kEvaluation, belief.step,
+                                    static_cast<std::uint32_t>(index));
+    document.field("region", region_of(object, stream));
+  }
+  return document.take();
 }
 
 geometry::ColorImage reduced(const geometry::ColorImage& image, int factor) {
@@ -153,25 +173,29 @@ geometry::ColorImage reduced(const geometry::ColorImage& image, int factor) {
 }  // namespace
 
 ordered_json scene_document(const belief::Scene& scene) {
-  ordered_json document = {{"op", "scene"},
-                           {"name", scene.name},
-                           {"gravity", {scene.gravity_W.x(), scene.gravity_W.y(), scene.gravity_W.z()}},
-                           {"models", ordered_json::array()},
-                           {"objects", ordered_json::array()},
-                           {"supports", ordered_json::array()},
-                           {"robot", ordered_json::array()}};
+  const geometry::Vector3d& g = scene.gravity_W;
+  ordered_json models = ordered_json::array(), objects = models, supports = models, robot = models;
   for (const belief::ObjectModel& model : scene.models)
-    document["models"].push_back(
-        {{"name", model.name},
-         {"color", color_numbers(model.color)},
-         {"mesh", mesh_document(model.visual ? *model.visual : belief::collision_mesh(model))}});
+    models.push_back(JsonFields()
+                         .text("name", model.name)
+                         .field("color", color_numbers(model.color))
+                         .field("mesh", mesh_document(seen_mesh(model)))
+                         .take());
   for (const belief::SceneObject& object : scene.objects)
-    document["objects"].push_back({{"name", object.name}, {"model", scene.model_of(object).name}});
+    objects.push_back(JsonFields().text("name", object.name).text("model", scene.model_of(object).name).take());
   for (const belief::Support& support : scene.supports)
-    document["supports"].push_back(body_document(support, support.X_WS));
+    supports.push_back(body_document(support.name, support.color, seen_mesh(support), support.X_WS));
   for (const belief::KinematicBody& body : scene.robot)
-    document["robot"].push_back(body_document(body, belief::pose_at(body, 0.0)));
-  return document;
+    robot.push_back(body_document(body.name, body.color, seen_mesh(body), belief::pose_at(body, 0.0)));
+  return JsonFields()
+      .text("op", "scene")
+      .text("name", scene.name)
+      .numbers("gravity", {g.x(), g.y(), g.z()})
+      .field("models", std::move(models))
+      .field("objects", std::move(objects))
+      .field("supports", std::move(supports))
+      .field("robot", std::move(robot))
+      .take();
 }
 
 std::uint64_t scene_shape_hash(const belief::Scene& scene) {
@@ -184,7 +208,7 @@ std::uint64_t scene_shape_hash(const belief::Scene& scene) {
     add(support);
     for (const belief::CollisionShape& shape : support.collision) {
       const geometry::Box box = geometry::bounding_box(belief::collision_mesh({shape}));
-      for (Eigen::Index i = 0; i < 3; ++i) hasher.value(rounded(box.sizes()[i], 0.02));
+      for (Eigen::Index i = 0; i < 3; ++i) hasher.value(rounded(box.sizes()[i], 50.0));
     }
   }
   for (const belief::KinematicBody& body : scene.robot) add(body);
@@ -202,23 +226,26 @@ ordered_json step_document(const ShownStep& step, const BeliefSummary& summary, 
   for (const geometry::Pose& X_WG : belief.robot) robot.push_back(pose_numbers(X_WG));
   for (const belief::Support& support : belief.scene->supports) supports.push_back(pose_numbers(support.X_WS));
   const geometry::PinholeCamera& camera = step.observation.frame.camera;
-  return {{"op", "step"},
-          {"index", index},
-          {"step", belief.step},
-          {"stamp_ns", belief.stamp_ns},
-          {"objects", objects},
-          {"camera",
-           {{"pose", pose_numbers(step.observation.X_WC)},
-            {"width", camera.width},
-            {"height", camera.height},
-            {"fx", camera.fx},
-            {"fy", camera.fy},
-            {"cx", camera.cx},
-            {"cy", camera.cy}}},
-          {"robot", robot},
-          {"supports", supports},
-          {"seconds", rounded(step.seconds, 1e-5)},
-          {"degraded", step.degraded}};
+  return JsonFields()
+      .text("op", "step")
+      .count("index", index)
+      .count("step", belief.step)
+      .field("stamp_ns", ordered_json(belief.stamp_ns))
+      .field("objects", std::move(objects))
+      .field("camera", JsonFields()
+                           .field("pose", pose_numbers(step.observation.X_WC))
+                           .count("width", static_cast<std::uint64_t>(camera.width))
+                           .count("height", static_cast<std::uint64_t>(camera.height))
+                           .number("fx", camera.fx)
+                           .number("fy", camera.fy)
+                           .number("cx", camera.cx)
+                           .number("cy", camera.cy)
+                           .take())
+      .field("robot", std::move(robot))
+      .field("supports", std::move(supports))
+      .number("seconds", rounded(step.seconds, 1e5))
+      .texts("degraded", step.degraded)
+      .take();
 }
 
 std::string picture_jpeg(const belief::Observation& observation, int most_width, int quality) {

@@ -5,10 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "json_fields.h"
+
 namespace prescene::service {
 namespace {
 
-double shortened(double value) { return std::isfinite(value) ? std::round(value * 1e5) * 1e-5 : 0.0; }
+double shortened(double value) { return std::isfinite(value) ? std::round(value * 1e5) / 1e5 : 0.0; }
 
 std::vector<std::string> columns_of(const BeliefSummary& summary) {
   std::vector<std::string> columns;
@@ -54,7 +56,9 @@ bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
 }
 
 nlohmann::ordered_json to_json(const ViewHistory::Row& row) {
-  nlohmann::ordered_json json = {row.index, std::round(row.time * 1e4) * 1e-4};
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  json.push_back(row.index);
+  json.push_back(std::round(row.time * 1e4) / 1e4);
   for (const double value : row.values) json.push_back(value);
   return json;
 }
@@ -62,7 +66,7 @@ nlohmann::ordered_json to_json(const ViewHistory::Row& row) {
 nlohmann::ordered_json to_json(const ViewHistory& history) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const ViewHistory::Row& row : history.rows()) rows.push_back(to_json(row));
-  return {{"op", "history"}, {"columns", history.columns()}, {"rows", rows}};
+  return JsonFields().text("op", "history").texts("columns", history.columns()).field("rows", std::move(rows)).take();
 }
 
 }  // namespace prescene::service
