@@ -409,7 +409,9 @@ class Search {
       low[k] = std::min(centre[k], first * cell);
       high[k] = std::max(centre[k], (last + 1) * cell);
     }
-    const double worth_testing = options_.wanted + 0.5 * (1.0 - options_.wanted);
+    // Peeled a little further than what is worth a test, as what is left looks better than it is.
+    const double worth_testing = options_.wanted + 0.4 * (1.0 - options_.wanted);
+    const double peeled = options_.wanted + 0.8 * (1.0 - options_.wanted);
     constexpr int kTrials = 128, kRounds = 8, kMostBoxTests = 4;
     std::vector<BoxSample> samples;
     int tests = 0;
@@ -421,7 +423,7 @@ class Search {
           std::count_if(newest.begin(), newest.end(), [](const BoxSample& s) { return s.succeeded; });
       const double share = static_cast<double>(succeeded) / static_cast<double>(newest.size());
       if (share < worth_testing) {
-        peel_box(centre, samples, worth_testing, low, high);
+        peel_box(centre, samples, peeled, low, high);
         continue;
       }
       SearchClaim box;

@@ -157,7 +157,7 @@ Query random_query(RandomStream& stream) {
   Effort effort{stream.uniform(0.001, 0.1), stream.uniform(0.5, 0.999), 1 + random_below(stream, 9999), {}, {}};
   if (random_below(stream, 2) == 1) effort.max_seconds = stream.uniform(0.1, 10.0);
   if (random_below(stream, 2) == 1) effort.exact_instances = 1 + random_below(stream, 1000);
-  switch (random_below(stream, 4)) {
+  switch (random_below(stream, 5)) {
     case 0: {
       WhereQuery where;
       if (random_below(stream, 2) == 1) where.object = "block";
@@ -180,6 +180,28 @@ Query random_query(RandomStream& stream) {
       const double move = stream.uniform(0.001, 0.1);
       query.what = StabilityQuery{"block", move, geometry::kDegree * stream.uniform(1.0, 60.0),
                                   stream.uniform(0.1, 9.0), effort};
+      break;
+    }
+    case 3: {
+      AchieveQuery achieve;
+      if (random_below(stream, 2) == 1)
+        achieve.wanted = random_outcome(stream, "wanted");
+      else
+        achieve.outcome = "o";
+      achieve.action = random_below(stream, 2) == 1 ? "place" : "push";
+      if (random_below(stream, 2) == 1) achieve.object = "block";
+      if (random_below(stream, 2) == 1) achieve.support = "table";
+      achieve.free = {{"x", -stream.uniform(), stream.uniform()}, {"yaw", {}, {}}};
+      if (random_below(stream, 2) == 1) achieve.fixed = {{"height", stream.uniform()}};
+      achieve.errors.position = random_vector(stream, 1.0).cwiseAbs();
+      achieve.errors.rotation = geometry::kDegree * Vector3d(stream.uniform(), stream.uniform(), stream.uniform());
+      achieve.errors.delay = UniformScalar{0.0, stream.uniform()};
+      if (random_below(stream, 2) == 1) achieve.errors.disturbance.emplace();
+      achieve.probability = stream.uniform(0.5, 0.99);
+      achieve.survey = random_below(stream, 2) == 1;
+      if (random_below(stream, 2) == 1) achieve.duration = stream.uniform(0.1, 9.0);
+      achieve.effort = effort;
+      query.what = achieve;
       break;
     }
     default: {

@@ -7,7 +7,10 @@
 #include "prescene/belief/belief.h"
 #include "prescene/belief/query.h"
 #include "prescene/core/parallel.h"
+#include "prescene/core/random.h"
+#include "prescene/queries/achieve_comparison.h"
 #include "prescene/queries/explain.h"
+#include "prescene/queries/parameter_search.h"
 #include "prescene/queries/query_engine.h"
 
 namespace prescene::queries::given_queries {
@@ -22,3 +25,18 @@ extern const ExplainContext context;
 }  // namespace explain_h
 
 }  // namespace prescene::queries::given_queries
+
+namespace prescene::queries::given_queries::confidence_sequence_h {
+extern const int successes, draws;
+}
+
+namespace prescene::queries::given_queries::parameter_search_h {
+extern TrialRunner& trials;
+extern const core::RandomStream stream;
+}  // namespace prescene::queries::given_queries::parameter_search_h
+
+namespace prescene::queries::given_queries::achieve_comparison_h {
+extern const std::shared_ptr<const belief::Scene> scene;
+extern const belief::AchieveQuery question;
+extern const QueryContext context;
+}  // namespace prescene::queries::given_queries::achieve_comparison_h
