@@ -40,7 +40,7 @@ class Search {
         on_claim_(on_claim),
         dimensions_(options.periodic.size()),
         net_(static_cast<int>(dimensions_), options.net_seed),
-        draws_(stream.for_purpose(core::Purpose::kAction)) {}
+        draws_(stream.for_purpose(core::Purpose::kAction).at(0)) {}
 
   SearchResult run() {
     find_first();
