@@ -40,8 +40,8 @@ struct CheckedChoice {
   int instances = 0, successes = 0;
 };
 /// Fresh instances of a choice (`values` in the order of the answer's parameters), or of choices drawn evenly between
-/// `low` and `high` where these are given. `seed` has to be another one than that of the question, whose fresh instances
-/// they would be otherwise.
+/// `low` and `high` where these are given. `seed` has to be another one than that of the question, whose fresh
+/// instances they would be otherwise.
 core::Result<CheckedChoice> check_choice(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed,
                                          const belief::AchieveQuery& query, const QueryContext& context,
                                          const belief::ActionChoice& choice, int instances);
