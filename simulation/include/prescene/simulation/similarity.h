@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small and large things are simulated as the similar things of household size: lengths change by a factor, times by
 // its square root, while gravity and masses stay. Mechanics of rigid bodies with Coulomb friction and Newton's
-// restitution has no length of its own, so that what happens is the same [Froude similarity; Bridgman 1922]. Every
+// restitution has no length of its own, so that what happens is the same by Froude similarity [Bridgman 1922]. Every
 // length, speed, time and energy that a stepper has settings or constants for then fits the things, whatever their
 // size.
 //
