@@ -87,7 +87,7 @@ struct Scene {
   DepthNoiseSettings depth_noise;
   Vector3d gravity_W = Vector3d(0.0, 0.0, -9.81);  ///< m/s^2
   std::vector<Action> actions;
-  double duration = 5.0;     ///< Longest simulated time, s.
+  double duration = 5.0;  ///< Longest simulated time, s.
   /// Of the simulation, s; empty = by the size of the smallest object (prescene/simulation/similarity.h).
   std::optional<double> step;
   bool stop_at_rest = true;  ///< Else instances run for the whole duration.

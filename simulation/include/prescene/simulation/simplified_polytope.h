@@ -26,9 +26,9 @@ struct SimplifiedPolytope {
 
 bool within(const ConvexPolytope& polytope, const PolytopeLimits& limits);
 
-/// The polytope itself if it is within the limits. Else it is built up from its extreme vertices and some of the largest
-/// face on which a body of uniform density would rest: the vertex that is farthest outside is added, corners of such
-/// faces first, until the limit is reached. Fails with kInvalidInput when what remains has no thickness.
+/// The polytope itself if it is within the limits. Else it is built up from its extreme vertices and some of the
+/// largest face on which a body of uniform density would rest: the vertex that is farthest outside is added, corners of
+/// such faces first, until the limit is reached. Fails with kInvalidInput when what remains has no thickness.
 core::Result<SimplifiedPolytope> simplified(const ConvexPolytope& polytope, const PolytopeLimits& limits);
 
 /// A polytope within the limits around which a ball of `radius` (m) sweeps about the given one: its faces stay where

@@ -34,8 +34,8 @@ core::Status validate(const LockstepOptions& options);
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
 ///   - one to four objects of boxes, spheres, cylinders, cones, capsules and hulls (convex_hull, convex_parts,
-///     decompose), and at most 16 parts each. Hulls of more than 64 vertices, or with sides of more than 16 corners, are
-///     simplified (prescene/simulation/simplified_polytope.h); StepperUse::hull_error says by how much;
+///     decompose), and at most 16 parts each. Hulls of more than 64 vertices, or with sides of more than 16 corners,
+///     are simplified (prescene/simulation/simplified_polytope.h); StepperUse::hull_error says by how much;
 ///   - supports of the same shapes, at most 256 parts together;
 ///   - robot bodies of the same shapes, at most 16 parts each and 32 bodies with a shape;
 ///   - at most 16 push actions. Simulator::supports() says the same of a request's actions.
