@@ -108,7 +108,7 @@ void add_web_options(CLI::App& verb, const std::string& prefix, ViewOptions& vie
   auto* group = verb.add_option_group("Web", "Who may look");
   group
       ->add_option("--" + prefix + "address", view.address,
-                   "Numeric address to listen on; other machines reach others than the default, and need the token")
+                   "Numeric address to listen on; on any but this machine's own, others need the token")
       ->check(utf8_text())
       ->capture_default_str();
   group->add_option("--" + prefix + "token", view.token,
