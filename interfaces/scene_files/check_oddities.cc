@@ -39,7 +39,7 @@ void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, 
         "an action is at " + number_text(action.time) + " s, after the end at " + number_text(scene.duration) + " s",
         "raise 'duration'");
   }
-  warn_of_mass_ratios(*document.find("objects"), scene, problems);
+  if (const LocatedValue* objects = document.find("objects")) warn_of_mass_ratios(*objects, scene, problems);
 }
 
 }  // namespace prescene::interfaces

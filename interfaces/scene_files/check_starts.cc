@@ -57,8 +57,9 @@ class Solid {
 };
 
 const LocatedValue& pose_of(const LocatedValue& object) {
-  const LocatedValue* pose = object.find("pose");
-  return pose ? *pose : object;
+  for (const char* key : {"pose", "pose_in_camera"})
+    if (const LocatedValue* pose = object.find(key)) return *pose;
+  return object;
 }
 
 void refuse_starts_inside(const LocatedValue& objects, const belief::Scene& scene, const belief::WorldState& start,
@@ -105,7 +106,9 @@ void refuse_starts_outside(const LocatedValue& objects, const belief::Scene& sce
 }  // namespace
 
 void refuse_starts(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
-  const LocatedValue& objects = *document.find("objects");
+  const LocatedValue* named = document.find("objects");
+  if (!named) return;  // new ones are looked for
+  const LocatedValue& objects = *named;
   const belief::WorldState start = belief::mean_start(scene);
   refuse_starts_outside(objects, scene, start, problems);
   refuse_starts_inside(objects, scene, start, problems);

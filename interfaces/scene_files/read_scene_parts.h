@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "prescene/interfaces/scene_files/scene_file.h"
@@ -22,6 +23,9 @@ struct SceneContext {
   std::vector<std::string> models, objects, supports, robot;
   /// Meshes read so far, so that two models of one file share it.
   std::map<std::tuple<std::string, double, bool>, belief::MeshPtr> meshes;
+
+  /// Objects (by their number) whose poses were given in the camera's frame, and where; read before the camera is.
+  std::vector<std::pair<std::size_t, const LocatedValue*>> in_camera = {};
 
   /// Reads a name and looks it up; `what` is what it should be ("a model").
   std::string read_name(const LocatedValue& value, const std::vector<std::string>& names, const std::string& what);

@@ -102,6 +102,40 @@ void read_gravity(Binder& binder, Scene& scene) {
   if (at) scene.gravity_W = read_vector(*at, binder.problems(), kGravity);
 }
 
+/// The distribution of X_WC X for a pose X of the distribution; nothing where it is none of these forms.
+std::optional<belief::PoseDistribution> moved(const geometry::Pose& X_WC, const belief::PoseDistribution& in_camera) {
+  if (const auto* fixed = std::get_if<belief::FixedPose>(&in_camera)) return belief::FixedPose{X_WC * fixed->X_WO};
+  if (const auto* normal = std::get_if<belief::NormalPose>(&in_camera)) {
+    // Rotations are in the object's frame, translations in that of the pose.
+    geometry::Matrix6d turn = geometry::Matrix6d::Identity();
+    turn.bottomRightCorner<3, 3>() = X_WC.rotation.toRotationMatrix();
+    return belief::NormalPose{X_WC * normal->mean, turn * normal->covariance * turn.transpose()};
+  }
+  if (const auto* sampled = std::get_if<belief::SampledPose>(&in_camera)) {
+    belief::SampledPose samples;
+    for (const geometry::Pose& X_CO : sampled->samples) samples.samples.push_back(X_WC * X_CO);
+    return samples;
+  }
+  return std::nullopt;
+}
+
+/// Brings the poses that were given in the camera's frame into the world's.
+void place_in_camera(SceneContext& context) {
+  for (const auto& [index, at] : context.in_camera) {
+    if (!context.scene.camera) {
+      context.problems.add(at->place, at->path, "there is no camera to be in the frame of",
+                           "give the scene a 'camera', or the object a 'pose' in the world");
+      continue;
+    }
+    belief::PoseDistribution& pose = context.scene.objects[index].pose;
+    if (auto in_world = moved(context.scene.camera->X_WC, pose))
+      pose = *std::move(in_world);
+    else
+      context.problems.add(at->place, at->path, "an interval along the camera's axes is none along the world's",
+                           "give 'normal' deviations or 'samples', or a 'pose' in the world");
+  }
+}
+
 void read_sections(const LocatedValue& document, SceneContext& context) {
   Problems& problems = context.problems;
   Scene& scene = context.scene;
@@ -116,7 +150,10 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   const LocatedValue* models = binder.find("models");
   const LocatedValue* supports = binder.find("supports");
   const LocatedValue* robot = binder.find("robot");
-  const LocatedValue* objects = binder.require("objects", "name at least one object that may move");
+  binder.read("new_objects", scene.new_objects);
+  const LocatedValue* objects =
+      scene.new_objects ? binder.find("objects")
+                        : binder.require("objects", "name at least one object that may move, or 'new_objects: true'");
   context.models = read_names(models, problems);
   context.supports = read_names(supports, problems);
   context.robot = read_names(robot, problems);
@@ -136,6 +173,7 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
     scene.objects.push_back(read_object(value, name, context));
   });
   if (const LocatedValue* at = binder.find("camera")) scene.camera = read_camera(*at, context);
+  place_in_camera(context);
   if (const LocatedValue* at = binder.find("depth_noise")) scene.depth_noise = read_depth_noise(*at, problems);
   if (const LocatedValue* at = binder.find("actions")) scene.actions = read_actions(*at, context);
   if (const LocatedValue* at = binder.find("events")) read_events(*at, problems);  // kept by parse_event_weights
@@ -180,8 +218,12 @@ belief::SceneObject read_object(const LocatedValue& value, const std::string& na
     const auto found = std::find(context.models.begin(), context.models.end(), model);
     if (found != context.models.end()) object.model = static_cast<int>(found - context.models.begin());
   }
-  if (const LocatedValue* at = binder.require("pose", "give {position: [x, y, z]} in the world"))
-    object.pose = read_pose_distribution(*at, context.problems);
+  std::string which;
+  const LocatedValue* pose =
+      binder.one_of({"pose", "pose_in_camera"}, "give 'pose: {position: [x, y, z]}' in the world, or 'pose_in_camera'",
+                    false, &which);
+  if (pose) object.pose = read_pose_distribution(*pose, context.problems);
+  if (pose && which == "pose_in_camera") context.in_camera.emplace_back(context.scene.objects.size(), pose);
   if (const LocatedValue* at = binder.find("velocity"))
     object.twist.linear = read_vector_distribution(*at, context.problems, kSpeed);
   if (const LocatedValue* at = binder.find("angular_velocity"))

@@ -147,7 +147,7 @@ void add_belief_options(CLI::App& verb, TrackerSettings& settings, std::string& 
       ->check(file_name());
   verb.add_flag_function(
       "--new-objects,!--no-new-objects", [&settings](std::int64_t count) { settings.new_objects = count > 0; },
-      "Whether to look for things that the scene does not name");
+      "Whether to look for things that the scene does not name; default: as the scene says (new_objects)");
 }
 
 core::Status take_learned(const std::string& file, const std::vector<std::string>& inputs, TrackerSettings& settings) {

@@ -30,9 +30,10 @@ TrackerSettings settled(TrackerSettings settings) {
   return settings;
 }
 
-filter::FilterSettings filter_settings(const TrackerSettings& settings) {
+/// With what the scene decides where the settings do not.
+filter::FilterSettings filter_settings(const TrackerSettings& settings, const belief::Scene& scene) {
   filter::FilterSettings filter = settings.filter;
-  filter.augment.new_objects = filter.augment.new_objects || settings.new_objects.value_or(false);
+  filter.augment.new_objects = filter.augment.new_objects || settings.new_objects.value_or(scene.new_objects);
   return filter;
 }
 
@@ -78,7 +79,8 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
       rectified_doubt_(rectified_doubt(settings)),
       renderer_(std::move(renderer)),
       likelihood_(std::move(likelihood)),
-      filter_(*likelihood_, *renderer_, backends.pool(), filter_settings(settings), backends.simulator_factory()),
+      filter_(*likelihood_, *renderer_, backends.pool(), filter_settings(settings, *scene),
+              backends.simulator_factory()),
       assembler_(settings_.assembler, robot_names(*scene), settings.tf),
       scene_(std::move(scene)),
       learned_(std::move(learned)),

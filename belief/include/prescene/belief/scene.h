@@ -85,6 +85,8 @@ struct Scene {
   std::vector<SceneObject> objects;
   std::optional<SceneCamera> camera;
   DepthNoiseSettings depth_noise;
+  /// A tracker also looks for things that the scene does not name.
+  bool new_objects = false;
   Vector3d gravity_W = Vector3d(0.0, 0.0, -9.81);  ///< m/s^2
   std::vector<Action> actions;
   double duration = 5.0;  ///< Longest simulated time, s.
