@@ -64,6 +64,7 @@ core::Result<const ActionParameter*> find_action_parameter(const ActionSchema& s
   for (const ActionParameter& parameter : schema.parameters) {
     if (parameter.name == name || parameter.name == name + "_deg") return &parameter;
     names.push_back(parameter.name);
+    if (parameter.name == "y") names.push_back("position");  // stands for both in questions
   }
   return core::not_found("'" + schema.name + "' has no parameter '" + name +
                          "': " + meant(name, names, "its parameters are"));

@@ -72,7 +72,7 @@ std::vector<belief::FailureReason> failures_of(const SearchResult& found, Planne
 std::string stop_text(const SearchResult& found, const ActionTrials& trials, const QueryContext& context) {
   switch (found.stop) {
     case SearchStop::kDone:
-      return "converged";
+      return found.first >= 0 ? "converged" : "not_found";
     case SearchStop::kMaxTrials:
       return "max_instances";
     case SearchStop::kExact:

@@ -77,8 +77,8 @@ Verb add_achieve_verb(CLI::App& app) {
       ->check(file_name());
   verb->add_option("--report", options->report, "Write an HTML page with map, tables and profiles")->check(file_name());
   verb->footer(
-      "Example: prescene achieve scenarios/milk_on_bin.yaml --outcome in_bin --action place --free "
-      "position,yaw,height");
+      "Example: prescene achieve scenarios/milk_on_bin.yaml --outcome in_bin --free "
+      "position,pitch=-120:0,height=0:0.3");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 
