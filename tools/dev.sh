@@ -148,7 +148,7 @@ run_tests() {
 
 verb_demo() {
   verb_build release prescene
-  timed "demo" tools/demo build/release/prescene build/demo
+  timed "demo" build/release/prescene demo -o build/demo
 }
 
 # Each program obeys --benchmark_out, be it of Google Benchmark or one of ours that compares with targets.

@@ -142,11 +142,11 @@ int main(int argc, char** argv) {
 
   service::CommonOptions options;
   const std::vector<service::Verb> verbs = {
-      service::add_validate_verb(app), service::add_predict_verb(app),   service::add_inspect_verb(app),
-      service::add_doctor_verb(app),   service::add_record_verb(app),    service::add_replay_verb(app),
-      service::add_explain_verb(app),  service::add_serve_verb(app),     service::add_ask_verb(app),
-      service::add_achieve_verb(app),  service::add_view_verb(app),      service::add_train_verb(app),
-      service::add_evaluate_verb(app), service::add_calibrate_verb(app),
+      service::add_validate_verb(app), service::add_predict_verb(app),  service::add_inspect_verb(app),
+      service::add_doctor_verb(app),   service::add_record_verb(app),   service::add_replay_verb(app),
+      service::add_explain_verb(app),  service::add_serve_verb(app),    service::add_ask_verb(app),
+      service::add_achieve_verb(app),  service::add_view_verb(app),     service::add_train_verb(app),
+      service::add_demo_verb(app),     service::add_evaluate_verb(app), service::add_calibrate_verb(app),
   };
   for (const service::Verb& verb : verbs) add_common_options(*verb.app, options);
 

@@ -100,6 +100,7 @@ Verb add_ask_verb(CLI::App& app);
 Verb add_view_verb(CLI::App& app);
 Verb add_achieve_verb(CLI::App& app);
 Verb add_doctor_verb(CLI::App& app);
+Verb add_demo_verb(CLI::App& app);
 
 /// --domain and --ros-distro.
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);

@@ -30,7 +30,7 @@ TEST(CommandLine, HelpIsThereForTheProgramAndEachVerb) {
   EXPECT_EQ(run_program({"--help"}).exit_code, 0);
   EXPECT_EQ(run_program({"--version"}).exit_code, 0);
   for (const char* verb : {"validate", "predict", "inspect", "doctor", "record", "replay", "explain", "serve", "ask",
-                           "achieve", "view", "train", "evaluate", "calibrate"}) {
+                           "achieve", "view", "train", "demo", "evaluate", "calibrate"}) {
     const Finished help = run_program({verb, "--help"});
     EXPECT_EQ(help.exit_code, 0) << verb;
     EXPECT_NE(help.out.find("--json"), std::string::npos) << verb;

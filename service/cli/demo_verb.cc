@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// The main job end to end, as a robot would use it: each step is this program, run as a user would run it.
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "demo_scene.h"
+#include "prescene/core/text.h"
+#include "prescene/interfaces/bytes/file.h"
+#include "prescene/service/load_scene.h"
+#include "verb.h"
+
+extern char** environ;
+
+namespace prescene::service {
+namespace {
+
+using core::fixed_text;
+using Arguments = std::vector<std::string>;
+
+struct DemoOptions {
+  std::string folder = "prescene_demo";
+};
+
+/// A verb of this program in a process of its own, which is interrupted and waited for if nobody did.
+class RunningVerb {
+ public:
+  /// Its answers go to stderr with `quiet_stdout`.
+  static core::Result<RunningVerb> start(const Arguments& arguments, bool quiet_stdout) {
+    Arguments words = {"prescene"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    if (quiet_stdout) posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+    pid_t process = -1;
+    const int error = ::posix_spawn(&process, "/proc/self/exe", &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0)
+      return core::unavailable("prescene " + arguments[0] + " cannot be started: " + std::strerror(error));
+    return RunningVerb(process, arguments[0]);
+  }
+  RunningVerb(RunningVerb&& other) noexcept
+      : process_(std::exchange(other.process_, -1)), name_(std::move(other.name_)) {}
+  RunningVerb& operator=(RunningVerb&&) = delete;
+  ~RunningVerb() {
+    if (process_ > 0) static_cast<void>(stop());
+  }
+
+  core::Status stop() {
+    ::kill(process_, SIGINT);
+    int status = 0;
+    while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {
+    }
+    process_ = -1;
+    return ended(status);
+  }
+
+  core::Status wait(const core::Cancellation& cancellation) {
+    int status = 0;
+    bool interrupted = false;
+    while (true) {
+      const pid_t done = ::waitpid(process_, &status, WNOHANG);
+      if (done == process_) break;
+      if (cancellation.requested() && !std::exchange(interrupted, true)) ::kill(process_, SIGINT);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    process_ = -1;
+    if (interrupted) return core::cancelled("stopped on request");
+    return ended(status);
+  }
+
+ private:
+  RunningVerb(pid_t process, std::string name) : process_(process), name_(std::move(name)) {}
+  core::Status ended(int status) const {
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return core::ok_status();
+    return core::unavailable("prescene " + name_ + " did not end well: what it said is above");
+  }
+
+  pid_t process_;
+  std::string name_;
+};
+
+/// What is asked while the recording is played: what happens if the hand lets go now, as the scene's robot does later.
+std::string what_if_released_now() {
+  return R"({"predict": {"actions": [{"time": 0.0, "release": {"object": "carton", "retreat": [0, 0, 0.2], )"
+         R"("retreat_duration": 0.4, "velocity": [{"normal": [0, 0.1]}, {"normal": [0, 0.1]}, 0], )"
+         R"("angular_velocity": [0, {"normal": [0, 0.4]}, 0]}}], "effort": {"max_seconds": 0.8}}})";
+}
+
+class Demo {
+ public:
+  Demo(const std::string& folder, VerbContext& context) : folder_(folder), context_(context) {}
+
+  core::Status run(double release) {
+    const std::string scene = path("milk_on_bin.yaml"), milk = path("milk.mcap");
+    PRESCENE_RETURN_IF_ERROR(step("what may happen, before anything was seen", {"predict", scene, "--seed", "1"}));
+    PRESCENE_RETURN_IF_ERROR(
+        step("where must the hand let go, so that the carton lands in the bin?",
+             {"achieve", scene, "--outcome", "in_bin", "--free", "position,pitch=-120:0", "--first", "--seed", "1"}));
+    PRESCENE_RETURN_IF_ERROR(step("record a simulated robot with an RGB-D camera",
+                                  {"record", "--simulate", scene, "-o", milk, "--seed", "3"}));
+    PRESCENE_RETURN_IF_ERROR(live(scene, milk, release));
+    PRESCENE_RETURN_IF_ERROR(
+        step("replay the session that the service recorded: the same bits", {"replay", path("session.mcap")}));
+    return step("what happened after the robot let go?",
+                {"explain", milk, "--from", fixed_text(release - 0.1, 2), "--to", fixed_text(release + 0.7, 2),
+                 "--object", "carton", "--seed", "1"});
+  }
+
+  std::string path(const std::string& name) const { return (std::filesystem::path(folder_) / name).string(); }
+
+ private:
+  void title(const std::string& text) const {
+    std::FILE* out = context_.options().json ? stderr : stdout;
+    std::fprintf(out, "\n== %s\n", text.c_str());
+    std::fflush(out);
+  }
+  Arguments with_common(Arguments arguments) const {
+    if (context_.options().threads > 0) {
+      arguments.emplace_back("--threads");
+      arguments.push_back(std::to_string(context_.options().threads));
+    }
+    if (context_.options().quiet) arguments.emplace_back("-q");
+    return arguments;
+  }
+  core::Status verb(const Arguments& arguments) {
+    PRESCENE_TRY(RunningVerb running, RunningVerb::start(with_common(arguments), context_.options().json));
+    return running.wait(context_.cancellation());
+  }
+  core::Status step(const std::string& text, const Arguments& arguments) {
+    title(text);
+    return verb(arguments);
+  }
+
+  core::Status live(const std::string& scene, const std::string& milk, double release) {
+    const std::string on_the_way = fixed_text(0.5 * release, 2), just_before = fixed_text(release - 0.1, 2);
+    title(
+        "start the service and play the recording to it over DDS; it asks twice 'what if the carton is let go now?':\n"
+        "at " +
+        on_the_way + " s, still on the way to the bin, and at " + just_before +
+        " s, just before the robot lets go of it at " + fixed_text(release, 1) + " s");
+    std::error_code none;
+    std::filesystem::remove(path("session.mcap"), none);
+    PRESCENE_TRY(
+        RunningVerb service,
+        RunningVerb::start({"serve", "--scene", scene, "--seed", "1", "--record", path("session.mcap"), "-q"}, true));
+    PRESCENE_RETURN_IF_ERROR(
+        verb({"replay", milk, "--over-dds", "--report", path("report.html"), "--ask",
+              R"(1.0:{"stability": {"object": "carton"}})", "--ask", on_the_way + ":" + what_if_released_now(), "--ask",
+              just_before + ":" + what_if_released_now(), "--ask", R"(4.5:{"where": {}})"}));
+    return service.stop();
+  }
+
+  std::string folder_;
+  VerbContext& context_;
+};
+
+core::Status run(const DemoOptions& options, VerbContext& context) {
+  std::error_code error;
+  std::filesystem::create_directories(options.folder, error);
+  if (error) return core::unavailable(options.folder + ": cannot be made: " + error.message());
+  // A domain of its own keeps the demo out of a robot's way, and out of that of a demo beside it.
+  if (::setenv("ROS_DOMAIN_ID", std::to_string(100 + ::getpid() % 100).c_str(), 1) != 0)
+    return core::unavailable("the environment cannot be changed");
+  Demo demo(options.folder, context);
+  PRESCENE_RETURN_IF_ERROR(interfaces::write_file(demo.path("milk_on_bin.yaml"), demo_scene()));
+  PRESCENE_TRY(const auto scene, load_scene(demo.path("milk_on_bin.yaml"), context.log()));
+  PRESCENE_RETURN_IF_ERROR(demo.run(scene->actions.at(0).time));
+  const std::string report = demo.path("report.html");
+  context.print({{"folder", options.folder},
+                 {"scene", demo.path("milk_on_bin.yaml")},
+                 {"recording", demo.path("milk.mcap")},
+                 {"session", demo.path("session.mcap")},
+                 {"report", report}},
+                "\nreport: " + report + "\n");
+  return core::ok_status();
+}
+
+}  // namespace
+
+Verb add_demo_verb(CLI::App& app) {
+  auto* verb =
+      app.add_subcommand("demo",
+                         "Records a simulated robot that carries a carton over a bin, tracks it over DDS, asks "
+                         "what happens if it is let go, and explains what came");
+  auto options = std::make_shared<DemoOptions>();
+  verb->add_option("-o,--output", options->folder, "Folder for recordings and report")
+      ->check(file_name())
+      ->capture_default_str();
+  verb->footer("Example: prescene demo -o /tmp/demo");
+  return {verb, [options](VerbContext& context) { return run(*options, context); }};
+}
+
+}  // namespace prescene::service
