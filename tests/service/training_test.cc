@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
 
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/training/proposals_file.h"
 #include "prescene/service/training/train_proposals.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::training_test {
 namespace {
@@ -46,18 +46,6 @@ const TrainedProposals& small_training() {
   PRESCENE_CHECK_MSG(trained.ok(), trained.status().message());
   return *trained;
 }
-
-class Folder {
- public:
-  Folder() : path_(std::filesystem::path(testing::TempDir()) / ("training_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  std::filesystem::path file(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 TEST(Training, LearnsPlacesOfEachModelAndJudgesFits) {
   const TrainedProposals& trained = small_training();
@@ -105,8 +93,8 @@ TEST(Training, StopsOnRequest) {
 }
 
 TEST(ProposalsFile, HoldsWhatWasWritten) {
-  const Folder folder;
-  const auto path = folder.file("proposals.bin");
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "proposals.bin";
   ASSERT_TRUE(write_proposals(path, small_training().proposals).ok());
   const auto loaded = load_proposals(path, two_models());
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
@@ -155,13 +143,13 @@ TEST(ProposalsFile, OfOtherModelsIsRefusedByName) {
 }
 
 TEST(ProposalsFile, ThatIsNoneIsNamedWithItsPath) {
-  const Folder folder;
-  const auto path = folder.file("other.bin");
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "other.bin";
   ASSERT_TRUE(interfaces::write_file(path, std::string_view("ply\nformat ascii 1.0\n")).ok());
   const auto loaded = load_proposals(path, two_models());
   EXPECT_EQ(loaded.status().code(), core::StatusCode::kInvalidInput);
   EXPECT_THAT(loaded.status().message(), AllOf(HasSubstr(path.string()), HasSubstr("bad signature")));
-  EXPECT_EQ(load_proposals(folder.file("none.bin"), two_models()).status().code(), core::StatusCode::kNotFound);
+  EXPECT_EQ(load_proposals(folder.path() / "none.bin", two_models()).status().code(), core::StatusCode::kNotFound);
 }
 
 }  // namespace
