@@ -107,7 +107,7 @@ class Teller {
     }
     if (judged.hypothesis.partner) e.partner = events_->objects()[*judged.hypothesis.partner].name;
     if (judged.draws.empty() || kind == EventKind::kNothing) {
-      e.sentence = sentence_of(e, *events_, window_);
+      e.sentence = sentence_of(e, window_);
       return e;
     }
     const auto value = [&](const auto& of, double centre = 0.0) {
@@ -143,7 +143,7 @@ class Teller {
       if (kind == EventKind::kBumped) e.impulse = value([](const EventDraw& d) { return d.speed * d.mass; });
     }
     add_effects(judged, e);
-    e.sentence = sentence_of(e, *events_, window_);
+    e.sentence = sentence_of(e, window_);
     return e;
   }
 

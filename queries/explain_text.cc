@@ -14,8 +14,8 @@ using core::fixed_text;
 using geometry::Vector3d;
 
 std::string at_time(const Explanation& e) {
-  return e.time ? " at " + fixed_text(e.time->mean, 2) + " s (" + fixed_text(e.time->low, 2) + " to " +
-                      fixed_text(e.time->high, 2) + " s)"
+  return e.time ? " " + fixed_text(e.time->mean, 2) + " s after the window's begin (" + fixed_text(e.time->low, 2) +
+                      " to " + fixed_text(e.time->high, 2) + " s)"
                 : "";
 }
 
@@ -42,8 +42,7 @@ std::string probability_text(double probability) {
 
 }  // namespace
 
-std::string sentence_of(const Explanation& e, const EventPaths& events, const ExplainWindow& window) {
-  static_cast<void>(events);
+std::string sentence_of(const Explanation& e, const ExplainWindow& window) {
   switch (e.kind) {
     case EventKind::kNothing:
       return "Nothing happened but what is known to have been done.";
@@ -85,7 +84,8 @@ std::string paragraph_of(const ExplainAnswer& answer) {
     for (const DecidingFrame& frame : answer.frames)
       if (most == nullptr || frame.against_nothing > most->against_nothing) most = &frame;
     if (most != nullptr && most->against_nothing > 0.0)
-      text += " The frame at " + fixed_text(most->time, 2) + " s speaks most against nothing having happened (" +
+      text += " The frame " + fixed_text(most->time, 2) +
+              " s after the begin speaks most against nothing having happened (" +
               fixed_text(most->against_nothing, 1) + " nats).";
   }
   for (const WhereItIs& object : answer.objects) {

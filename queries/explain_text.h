@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Explanations in plain English.
+// Explanations in plain English. Times in them count from the window's begin.
 #pragma once
 
 #include <string>
 
-#include "event_paths.h"
 #include "prescene/queries/explain.h"
 
 namespace prescene::queries {
 
 /// What happened, if it is this: one sentence.
-std::string sentence_of(const Explanation& explanation, const EventPaths& events, const ExplainWindow& window);
+std::string sentence_of(const Explanation& explanation, const ExplainWindow& window);
 /// The answer as a paragraph.
 std::string paragraph_of(const ExplainAnswer& answer);
 
