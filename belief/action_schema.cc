@@ -46,8 +46,8 @@ std::string meant(const std::string& name, const std::vector<std::string>& known
 }  // namespace
 
 const std::vector<ActionSchema>& action_schemas() {
-  static const std::vector<ActionSchema> schemas = all_schemas();
-  return schemas;
+  static const std::vector<ActionSchema> kSchemas = all_schemas();
+  return kSchemas;
 }
 
 core::Result<const ActionSchema*> find_action_schema(const std::string& name) {

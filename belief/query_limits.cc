@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "prescene/belief/action_schema.h"
 #include "prescene/core/text.h"
 #include "prescene/core/utf8.h"
 
@@ -118,12 +119,17 @@ Status QueryCheck::operator()(const AchieveQuery& achieve) const {
   }
   PRESCENE_RETURN_IF_ERROR(check_count(achieve.free.size(), kMostFree, "free parameters"));
   PRESCENE_RETURN_IF_ERROR(check_count(achieve.fixed.size(), kMostFree, "fixed parameters"));
+  PRESCENE_TRY(const ActionSchema* schema, find_action_schema(achieve.action));
+  const auto check_name = [schema](const std::string& name) -> Status {
+    PRESCENE_RETURN_IF_ERROR(check_text(name, kLongestName, "a parameter's name"));
+    if (name == "position" && find_action_parameter(*schema, "x").ok()) return {};  // x and y
+    return find_action_parameter(*schema, name).status();
+  };
   for (const ParameterRange& range : achieve.free) {
-    PRESCENE_RETURN_IF_ERROR(check_text(range.name, kLongestName, "a parameter's name").at("free"));
+    PRESCENE_RETURN_IF_ERROR(check_name(range.name).at("free"));
     PRESCENE_RETURN_IF_ERROR(check_range(range).at("free." + range.name));
   }
-  for (const ParameterValue& value : achieve.fixed)
-    PRESCENE_RETURN_IF_ERROR(check_text(value.name, kLongestName, "a parameter's name").at("fixed"));
+  for (const ParameterValue& value : achieve.fixed) PRESCENE_RETURN_IF_ERROR(check_name(value.name).at("fixed"));
   PRESCENE_RETURN_IF_ERROR(check_errors(achieve.errors).at("errors"));
   PRESCENE_RETURN_IF_ERROR(check_number(achieve.probability, kWantedProbabilities).at("probability"));
   if (achieve.duration) PRESCENE_RETURN_IF_ERROR(check_number(*achieve.duration, kDurations).at("duration"));

@@ -18,7 +18,7 @@
 namespace prescene::benchmarks {
 namespace {
 
-constexpr double kRate = 30.0;
+constexpr double kCameraRate = 30.0;  // Hz
 constexpr std::array<int, 3> kAsked = {30, 300, 3000};
 
 /// A box that a hand holds just above a slope of 20 degrees: let go, it slides where its friction is below 0.364.
@@ -56,11 +56,11 @@ core::Status add_law(const FilterEffort& effort, core::ThreadPool& threads, Repo
   const tests::ScratchDir folder;
   const auto path = folder.path() / "still.mcap";
   service::Backends backends(threads, {});
-  const std::string yaml = slope_scene((effort.law_frames + 1) / kRate);
+  const std::string yaml = slope_scene((effort.law_frames + 1) / kCameraRate);
   PRESCENE_TRY(const auto scene, service::load_scene_text(yaml, "slope.yaml", {}));
   PRESCENE_TRY(const auto recording, service::RecordingWriter::create(path, {"slope.yaml", yaml, effort.seed, ""}));
   service::SimulatedRecordingOptions options;
-  options.rate = kRate;
+  options.rate = kCameraRate;
   PRESCENE_RETURN_IF_ERROR(simulate_recording(*scene, options, effort.seed, backends, {}, {}, *recording));
   PRESCENE_RETURN_IF_ERROR(recording->close());
   PRESCENE_TRY(const belief::Query query, belief::query_from_json(kLetGo));

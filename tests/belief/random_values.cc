@@ -191,7 +191,10 @@ Query random_query(RandomStream& stream) {
       achieve.action = random_below(stream, 2) == 1 ? "place" : "push";
       if (random_below(stream, 2) == 1) achieve.object = "block";
       if (random_below(stream, 2) == 1) achieve.support = "table";
-      achieve.free = {{"x", -stream.uniform(), stream.uniform()}, {"yaw", {}, {}}};
+      if (achieve.action == "place")
+        achieve.free = {{"x", -stream.uniform(), stream.uniform()}, {"yaw", {}, {}}};
+      else
+        achieve.free = {{"offset", -stream.uniform(), stream.uniform()}, {"direction", {}, {}}};
       if (random_below(stream, 2) == 1) achieve.fixed = {{"height", stream.uniform()}};
       achieve.errors.position = random_vector(stream, 1.0).cwiseAbs();
       achieve.errors.rotation = geometry::kDegree * Vector3d(stream.uniform(), stream.uniform(), stream.uniform());

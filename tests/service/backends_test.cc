@@ -178,11 +178,20 @@ TEST(Backends, AutomaticStepperIsBulletWhereLockstepRefusesTheScene) {
   EXPECT_THAT(refused.status().message(), HasSubstr("lockstep"));
 }
 
+constexpr const char* kThrownBox = R"(name: box
+models:
+  box: {box: [0.1, 0.1, 0.1], mass: 0.4}
+supports:
+  floor: {ground: {size: 20}}
+objects:
+  box: {model: box, pose: {position: [0, 0, 0.2]}}
+)";
+
 /// One of three faces up, of dice thrown with speeds that belong to their size.
 std::vector<int> faces(double size, Stepper stepper) {
   core::ThreadPool pool(2);
   Backends backends(pool, settings_of(stepper));
-  const belief::Scene scene = simulation::scaled(*scene_of(kOneBox), simulation::Similarity{size / 0.1});
+  const belief::Scene scene = simulation::scaled(*scene_of(kThrownBox), simulation::Similarity{size / 0.1});
   const auto simulator = backends.make_simulator(scene);
   EXPECT_TRUE(simulator.ok()) << simulator.status().message();
   const simulation::Similarity similarity{size / 0.1};

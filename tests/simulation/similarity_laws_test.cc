@@ -27,10 +27,9 @@ belief::Scene scene_of_a_box(double edge) {
   scene.models = {*belief::with_derived_properties(model)};
   belief::SceneObject object;
   object.name = "box";
-  belief::NormalPose pose;
-  pose.mean.translation = Vector3d(0.0, 0.0, 3.0 * edge);
-  pose.covariance.diagonal() << 0.1, 0.2, 0.3, edge * edge, 0.5 * edge * edge, 0.25 * edge * edge;
-  pose.covariance(0, 5) = pose.covariance(5, 0) = 0.1 * edge;
+  belief::BoxPose pose;
+  pose.position = {NormalScalar{0.0, 0.5 * edge}, UniformScalar{-edge, edge}, FixedScalar{3.0 * edge}};
+  pose.any_rotation = true;
   object.pose = pose;
   object.twist.angular.z = NormalScalar{1.0, 0.5};
   object.twist.linear.x = UniformScalar{0.0, 1.0};
@@ -59,6 +58,24 @@ TEST(Similarity, DrawsOfTheSimilarSceneAreTheSimilarDraws) {
       EXPECT_EQ(drawn.physical.friction, expected.physical.friction);
     }
   }
+}
+
+// Its axes of the widest uncertainty depend on the units, so that draws differ while their distribution is similar.
+TEST(Similarity, ScalesTheCovarianceOfPoses) {
+  belief::Scene scene = scene_of_a_box(0.1);
+  belief::NormalPose pose;
+  pose.mean.translation = Vector3d(0.1, 0.2, 0.3);
+  pose.covariance.diagonal() << 0.1, 0.2, 0.3, 1e-2, 2e-2, 3e-2;
+  pose.covariance(0, 5) = pose.covariance(5, 0) = 0.01;
+  scene.objects[0].pose = pose;
+  const belief::Scene half = scaled(scene, Similarity{0.5});
+  const auto& similar = std::get<belief::NormalPose>(half.objects[0].pose);
+  geometry::Matrix6d expected = pose.covariance;
+  expected.topRightCorner<3, 3>() *= 0.5;
+  expected.bottomLeftCorner<3, 3>() *= 0.5;
+  expected.bottomRightCorner<3, 3>() *= 0.25;
+  EXPECT_TRUE(similar.covariance.isApprox(expected, 1e-15));
+  EXPECT_EQ(similar.mean.translation, Vector3d(0.05, 0.1, 0.15));
 }
 
 TEST(Similarity, KeepsWhatHasNoLength) {

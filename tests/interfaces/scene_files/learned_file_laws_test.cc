@@ -115,8 +115,9 @@ TEST(LearnedFile, OfNothingIsThePriors) {
   const std::string text = learned_yaml(with_learned({}, known, beliefs_of(known)));
   const auto read = parse_learned(text, "learned.yaml");
   ASSERT_TRUE(read.ok()) << read.status().message();
-  for (const belief::PhysicalBelief& physics : *learned_physics(known, *read))
-    EXPECT_EQ(physics, belief::PhysicalBelief{});
+  const auto learned = learned_physics(known, *read);
+  ASSERT_TRUE(learned.ok());
+  for (const belief::PhysicalBelief& physics : *learned) EXPECT_EQ(physics, belief::PhysicalBelief{});
   EXPECT_EQ(*with_learned_models(known, *read), known);
 }
 

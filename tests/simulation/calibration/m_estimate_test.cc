@@ -127,11 +127,16 @@ TEST(MEstimate, RoundsThatDoNotSettleCountByHowTheyDiffer) {
   };
   simulation::EstimateOptions options;
   options.accuracy = 1e-3;
-  const auto found = m_estimate(three_parameters(), lines.observations, simulate,
-                                core::RandomStream(3, core::Purpose::kTest), options);
-  ASSERT_TRUE(found.ok());
-  EXPECT_FALSE(found->settled);
-  for (int i = 0; i < 2; ++i) EXPECT_NEAR(found->value[i], 1.0 + i, 4.0 * found->standard_error(i));
+  // The jumps are as chance would have them, and the errors come from few rounds: most of the values lie within four.
+  int within = 0;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const auto found = m_estimate(three_parameters(), lines.observations, simulate,
+                                  core::RandomStream(seed, core::Purpose::kTest), options);
+    ASSERT_TRUE(found.ok());
+    EXPECT_FALSE(found->settled);
+    for (int i = 0; i < 2; ++i) within += std::abs(found->value[i] - 1.0 - i) < 4.0 * found->standard_error(i) ? 1 : 0;
+  }
+  EXPECT_GE(within, 18);
 }
 
 TEST(MEstimate, OneStrangeRecordingHardlyCounts) {
