@@ -40,8 +40,8 @@ struct Target {
   std::optional<double> reached;  ///< Nothing only with `why`.
   std::string unit;               ///< "x" for ratios.
   std::int64_t n = 0;             ///< How many measurements it rests on.
-  std::string baseline;           ///< What was compared with, and how.
-  std::string why;                ///< Why it was not measured, or what to know about the figure.
+  std::string baseline = {};      ///< What was compared with, and how.
+  std::string why = {};           ///< Why it was not measured, or what to know about the figure.
 };
 
 inline Goal at_least(double low) { return {low, 0.0}; }

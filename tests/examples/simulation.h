@@ -11,6 +11,7 @@
 #include "prescene/core/status.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/simulation/shape_store.h"
+#include "prescene/simulation/simplified_polytope.h"
 #include "prescene/simulation/simulator.h"
 
 namespace prescene::simulation::given_simulation {
@@ -27,6 +28,10 @@ extern const Decomposer decomposer;
 namespace similarity_h {
 extern std::unique_ptr<Simulator> simulator;
 }  // namespace similarity_h
+
+namespace simplified_polytope_h {
+extern const ConvexPolytope hull;
+}  // namespace simplified_polytope_h
 
 namespace simulator_h {
 core::Result<std::unique_ptr<Simulator>> make_simulator(const belief::Scene& scene);
