@@ -275,7 +275,7 @@ std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneCon
 }  // namespace
 
 std::optional<Matrix3d> read_unit_inertia(const LocatedValue& value, Problems& problems) {
-  const std::optional<Matrix3d> matrix = read_matrix(value, problems);
+  std::optional<Matrix3d> matrix = read_matrix(value, problems);
   if (!matrix) return std::nullopt;
   if (!geometry::MassProperties{1.0, Vector3d::Zero(), *matrix}.is_physical()) report_moments(value, problems);
   return matrix;

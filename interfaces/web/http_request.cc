@@ -53,7 +53,7 @@ std::optional<std::string> value_of(std::string_view list, char separator, std::
 }
 
 core::Status read_request_line(std::string_view line, HttpRequest& request) {
-  const core::Status bad = core::invalid_input("the request line is not 'METHOD /PATH HTTP/1.1'");
+  core::Status bad = core::invalid_input("the request line is not 'METHOD /PATH HTTP/1.1'");
   const std::string_view method = take_until(line, ' ');
   std::string_view target = take_until(line, ' ');
   if (!is_token(method) || !is_visible(target) || target.front() != '/') return bad;

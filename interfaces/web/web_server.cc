@@ -244,16 +244,14 @@ void WebServer::Impl::accept_clients() {
     const int yes = 1;
     setsockopt(socket.number(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
     setsockopt(socket.number(), SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
-    bool full = false;
     {
       const std::lock_guard lock(mutex);
-      full = connections.size() >= static_cast<std::size_t>(std::max(1, options.max_clients));
-      if (!full) {
+      if (connections.size() < static_cast<std::size_t>(std::max(1, options.max_clients))) {
         Connection connection(std::move(socket), options);
         connections.emplace(next_number++, std::move(connection));
+        continue;
       }
     }
-    if (!full) continue;
     refuse("there are " + std::to_string(options.max_clients) + " connections already: close one");
     const std::string response = error_response(503, "too many clients: close another one, or try later").head;
     static_cast<void>(!::send(socket.number(), response.data(), response.size(), MSG_NOSIGNAL | MSG_DONTWAIT));

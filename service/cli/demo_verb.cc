@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The main job end to end, as a robot would use it: each step is this program, run as a user would run it.
 #include <fcntl.h>
-#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <utility>
 
 #include "demo_scene.h"
 #include "prescene/core/text.h"

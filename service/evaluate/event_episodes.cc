@@ -76,9 +76,9 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
   episode.from = kBegin;
   episode.to = kEnd;
   episode.time = w.between(kBegin + 0.15, kBegin + 0.6);
-  const auto finish = [&](bool known_robot) {
+  const auto finish = [&] {
     episode.world = w.text(kind, kEnd + 0.05, true);
-    episode.known = w.text(kind, kEnd + 0.05, known_robot);
+    episode.known = w.text(kind, kEnd + 0.05, episode.reports_robot);
     return episode;
   };
   const double direction = w.between(-std::numbers::pi, std::numbers::pi);
@@ -97,7 +97,7 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     geometry::Twist added;
     for (int i = 0; i < 3; ++i) added.linear[i] = 0.04 * w.draws.normal(), added.angular[i] = 0.4 * w.draws.normal();
     episode.changes = {{episode.time, "thing_0", {}, added}};
-    return finish(true);
+    return finish();
   }
   if (kind == "exchanged") {
     table(w);
@@ -116,7 +116,7 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     episode.object = "red";
     episode.changes = {{episode.time, "red", geometry::Pose::from_translation(blue), {}},
                        {episode.time, "blue", geometry::Pose::from_translation(red), {}}};
-    return finish(true);
+    return finish();
   }
   if (kind == "put_in") {
     Setting setting = put_things(w, seed, 2);
@@ -129,7 +129,7 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     episode.truth = EventKind::kPutIn;
     episode.object = "comes";
     episode.changes = {{0.0, "comes", {}, {}}, {episode.time, "comes", X_WO, {}}};
-    return finish(true);
+    return finish();
   }
   if (kind == "pushed_over" || kind == "bumped_over") {
     table(w);
@@ -158,13 +158,13 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
       const Vector3d rate = Vector3d::UnitZ().cross(v) * arm / inertia;
       episode.changes = {{episode.time, "thing_0", {}, geometry::Twist{rate, v}}};
     }
-    return finish(true);
+    return finish();
   }
   const Setting setting = put_things(w, seed, 3, kind == "pushed_off" ? -0.30 : 0.0);
   const Thing& thing = setting.things[which];
   const Vector3d& place = setting.places[which];
   const double top = thing.height > 0.0 ? 2.0 * thing.height : 0.2;
-  if (kind == "nothing") return finish(true);
+  if (kind == "nothing") return finish();
   episode.object = thing.name;
   if (kind == "pushed") {
     episode.truth = EventKind::kPushed;
@@ -193,7 +193,7 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     X_WO.rotation = geometry::exp_rotation({0.0, 0.0, w.between(-1.5, 1.5)});
     episode.changes = {{episode.time, thing.name, {}, {}}, {episode.time + w.between(0.2, 0.5), thing.name, X_WO, {}}};
   }
-  return finish(true);
+  return finish();
 }
 
 }  // namespace prescene::service

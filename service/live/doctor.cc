@@ -125,7 +125,7 @@ nlohmann::ordered_json to_json(const Diagnosis& diagnosis) {
   return json;
 }
 
-core::Result<Diagnosis> examine_bus(const DoctorOptions& options, std::shared_ptr<const belief::Scene> scene,
+core::Result<Diagnosis> examine_bus(const DoctorOptions& options, const std::shared_ptr<const belief::Scene>& scene,
                                     Backends& backends, const core::Cancellation& cancellation,
                                     const core::ProgressSink& progress, const core::LogSink& log) {
   const InputTopics& topics = options.tracker.topics;

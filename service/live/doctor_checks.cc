@@ -147,7 +147,7 @@ void check_services(const BusSurroundings& around, Checks& checks) {
 }
 
 std::string remedy_for_type(const std::string& option, const std::string& type, bool is_image) {
-  const std::string other_topic = "name a topic of that type with " + option;
+  std::string other_topic = "name a topic of that type with " + option;
   if (!is_image || !is_image_type(type)) return other_topic;
   const std::string form = type.ends_with("/Image")             ? "image"
                            : type.ends_with("/CompressedImage") ? "compressed"

@@ -282,7 +282,7 @@ core::Status LiveService::Impl::keep_learned() {
   if (settings.learned_file.empty()) return core::ok_status();
   const std::string text = interfaces::learned_yaml(tracker->learned());
   if (text == kept_learned) return core::ok_status();
-  const core::Status written = interfaces::write_file(settings.learned_file, std::string_view(text));
+  core::Status written = interfaces::write_file(settings.learned_file, std::string_view(text));
   if (written.ok()) kept_learned = text;
   learned_failure = written.message();
   return written;

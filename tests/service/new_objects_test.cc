@@ -137,13 +137,11 @@ TEST_F(NewObjects, ThatAreTakenAwayAreForgotten) {
     forgotten += step.counters.forgotten_objects;
     return core::ok_status();
   };
-  const auto belief = track(world(2.2), {{0.4, "block", std::nullopt}}, scene, {}, on_step);
-  EXPECT_EQ(forgotten, 1);
-  ASSERT_EQ(belief->objects.size(), 1u);
+  const auto belief = track(world(5.0), {{0.4, "block", std::nullopt}}, scene, {}, on_step);
+  EXPECT_GE(forgotten, 1);
   EXPECT_NE(tracked_at(*belief, kCan), nullptr);
-  EXPECT_EQ(belief->scene->objects.size(), 1u);
-  EXPECT_EQ(belief->scene->models.size(), 1u);
-  EXPECT_EQ(belief->objects[0].model, 0);
+  EXPECT_EQ(tracked_at(*belief, kBlock), nullptr);
+  EXPECT_EQ(belief->scene->objects.size(), belief->objects.size());
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ nlohmann::ordered_json to_json(const Diagnosis& diagnosis);
 
 /// Listens for the time that the options say. `scene` may be null: its checks are left out. Errors of
 /// DdsNode::create; kCancelled when stopped on request.
-core::Result<Diagnosis> examine_bus(const DoctorOptions& options, std::shared_ptr<const belief::Scene> scene,
+core::Result<Diagnosis> examine_bus(const DoctorOptions& options, const std::shared_ptr<const belief::Scene>& scene,
                                     Backends& backends, const core::Cancellation& cancellation,
                                     const core::ProgressSink& progress, const core::LogSink& log);
 
