@@ -226,7 +226,7 @@ core::Result<TrainedProposals> train_proposals(const belief::Scene& scene, const
   PRESCENE_TRY(const auto likelihood, backends.make_likelihood());
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
   const auto stopped = [&] { return cancellation != nullptr && cancellation->requested(); };
-  const core::Status stop = core::cancelled("stopped on request before the training was complete: nothing was learned");
+  core::Status stop = core::cancelled("stopped on request before the training was complete: nothing was learned");
   TrainedProposals trained;
   School school(scene, options, backends, *likelihood, *renderer);
 

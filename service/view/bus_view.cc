@@ -99,7 +99,7 @@ struct BusView::Impl {
   void make_scene(const BeliefSummary& summary);
 };
 
-core::Result<std::unique_ptr<BusView>> BusView::create(std::shared_ptr<const belief::Scene> scene,
+core::Result<std::unique_ptr<BusView>> BusView::create(const std::shared_ptr<const belief::Scene>& scene,
                                                        const BusViewSettings& settings, const core::LogSink& log) {
   auto impl = std::make_unique<Impl>(scene, settings, log);
   auto shown = scene ? scene : std::make_shared<const belief::Scene>();
@@ -155,10 +155,10 @@ void BusView::Impl::take_frame_part(const ReceivedMessage& message) {
   using interfaces::decode_cdr;
   if (message.topic == topics.depth) {
     add(decode_depth(message, assembler.image_rules()),
-        [&](auto&& image) { return assembler.add_depth(std::move(image), index, message.received_ns); });
+        [&](DepthMessage image) { return assembler.add_depth(std::move(image), index, message.received_ns); });
   } else if (message.topic == topics.color) {
     add(decode_color_message(message),
-        [&](auto&& image) { return assembler.add_color(std::move(image), index, message.received_ns); });
+        [&](ColorMessage image) { return assembler.add_color(std::move(image), index, message.received_ns); });
   } else if (message.topic == topics.camera_info) {
     add(decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage),
         [&](const auto& info) { return assembler.add_camera_info(info, index); });

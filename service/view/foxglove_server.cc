@@ -86,8 +86,8 @@ bool is_u32(const ordered_json& number) {
 }  // namespace
 
 const std::vector<std::string>& FoxgloveServer::subprotocols() {
-  static const std::vector<std::string> names = {"foxglove.sdk.v1", "foxglove.websocket.v1"};
-  return names;
+  static const std::vector<std::string> kNames = {"foxglove.sdk.v1", "foxglove.websocket.v1"};
+  return kNames;
 }
 
 bool FoxgloveServer::speaks(const std::string& subprotocol) {

@@ -101,8 +101,7 @@ class Compiler {
   core::Status add_parts(const std::string& name, const std::vector<belief::CollisionShape>& collision,
                          const belief::ContactProperties& contact, const Pose& X_LB, std::vector<ConvexPart>& parts) {
     const double rounding = std::max(compiled_.options.edge_rounding, contact.edge_radius);
-    const core::Status status =
-        add_shapes(name, collision, X_LB, rounding, shapes_, compiled_.options.decomposition, parts);
+    core::Status status = add_shapes(name, collision, X_LB, rounding, shapes_, compiled_.options.decomposition, parts);
     for (const ConvexPart& part : parts) compiled_.hull_error = std::max(compiled_.hull_error, part.hull_error);
     return status;
   }

@@ -22,7 +22,7 @@ struct BusViewSettings {
 class BusView {
  public:
   /// Joins the bus and serves the page; `scene` may be null. Errors of DdsNode::create and LiveView::create.
-  static core::Result<std::unique_ptr<BusView>> create(std::shared_ptr<const belief::Scene> scene,
+  static core::Result<std::unique_ptr<BusView>> create(const std::shared_ptr<const belief::Scene>& scene,
                                                        const BusViewSettings& settings, const core::LogSink& log);
   ~BusView();
 
