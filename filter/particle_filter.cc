@@ -270,8 +270,11 @@ void ParticleFilter::look_for_more(FrameStep& step) {
   const AugmentOptions& options = settings_.augment;
   Belief& belief = step.belief();
   // In the first frame of all, and every so many after it.
-  if (!options.new_objects || (belief.step - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0)
+  if (!options.new_objects) return;
+  if ((belief.step - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0) {
+    step.result.counters.forgotten_objects = forget_unknown_objects(belief);
     return;
+  }
   geometry::DepthImage known = step.frame.robot;
   for (std::size_t i = 0; i < step.depths.size(); ++i)
     if (hides_others(belief.objects[i])) merge_nearest(step.depths[i], &known);

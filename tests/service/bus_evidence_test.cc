@@ -88,9 +88,9 @@ struct Told {
   const DoctorCheck& of(const std::string& name) const {
     const auto found =
         std::find_if(checks.begin(), checks.end(), [&](const DoctorCheck& check) { return check.name == name; });
-    static const DoctorCheck none;
+    static const DoctorCheck kNothing;
     EXPECT_NE(found, checks.end()) << name;
-    return found == checks.end() ? none : *found;
+    return found == checks.end() ? kNothing : *found;
   }
   /// The only check that is not ok.
   void expect_only(const std::string& name, CheckStatus status, const std::string& what) const {

@@ -41,10 +41,10 @@ core::Result<TrainedProposals> train(const belief::Scene& scene, const TrainingO
 
 /// Small, yet with all parts.
 const TrainedProposals& small_training() {
-  static const core::Result<TrainedProposals> trained =
+  static const core::Result<TrainedProposals> kTrained =
       train(two_models(), {.seed = 3, .views = 12, .places = 2, .scenes = 6});
-  PRESCENE_CHECK_MSG(trained.ok(), trained.status().message());
-  return *trained;
+  PRESCENE_CHECK_MSG(kTrained.ok(), kTrained.status().message());
+  return *kTrained;
 }
 
 TEST(Training, LearnsPlacesOfEachModelAndJudgesFits) {
