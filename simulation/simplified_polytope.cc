@@ -193,7 +193,8 @@ core::Result<RoundedPolytope> rounded(const ConvexPolytope& polytope, double rad
   }
   PRESCENE_TRY(SimplifiedPolytope core, simplified(result.core, limits));
   result.core = std::move(core.polytope);
-  result.error = std::max(0.0, largest_height(result.core, polytope.vertices) - result.radius);
+  if (hull.error > 0.0 || core.error > 0.0)
+    result.error = std::max(0.0, largest_height(result.core, polytope.vertices) - result.radius);
   return result;
 }
 

@@ -67,17 +67,6 @@ ConvexPart primitive_part(const geometry::Primitive& primitive, const Placement&
   return part;
 }
 
-/// Empty if it takes more vertices or corners than lanes have room for.
-std::optional<RoundedPolytope> rounded_as_it_is(const ConvexPolytope& hull, double radius) {
-  if (hull.vertices.size() > 2 * kLimits.vertices) return std::nullopt;  // to find its core would take long
-  RoundedPolytope result{hull, 0.0, 0.0};
-  if (std::optional<ConvexPolytope> smaller = inset(hull, radius)) {
-    result.core = std::move(*smaller);
-    result.radius = radius;
-  }
-  return within(result.core, kLimits) ? std::optional(std::move(result)) : std::nullopt;
-}
-
 ConvexPart hull_part(const ConvexPolytope& hull, const RoundedPolytope& rounded, const Placement& X) {
   ConvexPart part;
   part.kind = CoreKind::kHull;
@@ -126,18 +115,10 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
   }
   PRESCENE_TRY(const auto hulls, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
   std::vector<double> radii;
-  std::vector<std::optional<RoundedPolytope>> cores;
-  for (const ConvexPolytope& hull : *hulls) {
-    radii.push_back(rounded_edge(rounding, hull.inner_radius()));
-    cores.push_back(rounded_as_it_is(hull, radii.back()));
-  }
-  std::shared_ptr<const std::vector<RoundedPolytope>> simplified;
-  for (std::size_t i = 0; i < cores.size(); ++i) {
-    if (!cores[i] && !simplified) {
-      PRESCENE_TRY(simplified, shapes.rounded_parts(*mesh.mesh, mesh.use, decomposition, radii, kLimits));
-    }
-    parts.push_back(hull_part((*hulls)[i], cores[i] ? *cores[i] : (*simplified)[i], placed(mesh.X_OS)));
-  }
+  for (const ConvexPolytope& hull : *hulls) radii.push_back(rounded_edge(rounding, hull.inner_radius()));
+  PRESCENE_TRY(const auto rounded, shapes.rounded_parts(*mesh.mesh, mesh.use, decomposition, radii, kLimits));
+  for (std::size_t i = 0; i < hulls->size(); ++i)
+    parts.push_back(hull_part((*hulls)[i], (*rounded)[i], placed(mesh.X_OS)));
   return core::ok_status();
 }
 
