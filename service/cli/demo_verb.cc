@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "demo_scene.h"
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/load_scene.h"
@@ -96,17 +97,17 @@ class RunningVerb {
 };
 
 /// What is asked while the recording is played: what happens if the hand lets go now, as the scene's robot does later.
-std::string what_if_released_now() {
-  return R"({"predict": {"actions": [{"time": 0.0, "release": {"object": "carton", "retreat": [0, 0, 0.2], )"
-         R"("retreat_duration": 0.4, "velocity": [{"normal": [0, 0.1]}, {"normal": [0, 0.1]}, 0], )"
-         R"("angular_velocity": [0, {"normal": [0, 0.4]}, 0]}}], "effort": {"max_seconds": 0.8}}})";
+std::string what_if_done_now(belief::Action action) {
+  action.time = 0.0;
+  return R"({"predict": {"actions": [)" + belief::json_text(belief::to_json(action)) +
+         R"(], "effort": {"max_seconds": 0.8}}})";
 }
 
 class Demo {
  public:
   Demo(const std::string& folder, VerbContext& context) : folder_(folder), context_(context) {}
 
-  core::Status run(double release) {
+  core::Status run(const belief::Action& release) {
     const std::string scene = path("milk_on_bin.yaml"), milk = path("milk.mcap");
     PRESCENE_RETURN_IF_ERROR(step("what may happen, before anything was seen", {"predict", scene, "--seed", "1"}));
     PRESCENE_RETURN_IF_ERROR(step("where must the hand let go, so that the carton lands in the bin?",
@@ -143,13 +144,13 @@ class Demo {
     return verb(arguments);
   }
 
-  core::Status live(const std::string& scene, const std::string& milk, double release) {
-    const std::string on_the_way = fixed_text(0.5 * release, 2), just_before = fixed_text(release - 0.1, 2);
+  core::Status live(const std::string& scene, const std::string& milk, const belief::Action& release) {
+    const std::string on_the_way = fixed_text(0.5 * release.time, 2), just_before = fixed_text(release.time - 0.1, 2);
     title(
         "start the service and play the recording to it over DDS; it asks twice 'what if the carton is let go now?':\n"
         "at " +
         on_the_way + " s, still on the way to the bin, and at " + just_before +
-        " s, just before the robot lets go of it at " + fixed_text(release, 1) + " s");
+        " s, just before the robot lets go of it at " + fixed_text(release.time, 1) + " s");
     std::error_code none;
     std::filesystem::remove(path("session.mcap"), none);
     PRESCENE_TRY(
@@ -157,8 +158,8 @@ class Demo {
         RunningVerb::start({"serve", "--scene", scene, "--seed", "1", "--record", path("session.mcap"), "-q"}, true));
     PRESCENE_RETURN_IF_ERROR(
         verb({"replay", milk, "--over-dds", "--report", path("report.html"), "--ask",
-              R"(1.0:{"stability": {"object": "carton"}})", "--ask", on_the_way + ":" + what_if_released_now(), "--ask",
-              just_before + ":" + what_if_released_now(), "--ask", R"(4.5:{"where": {}})"}));
+              R"(1.0:{"stability": {"object": "carton"}})", "--ask", on_the_way + ":" + what_if_done_now(release),
+              "--ask", just_before + ":" + what_if_done_now(release), "--ask", R"(4.5:{"where": {}})"}));
     return service.stop();
   }
 
@@ -176,7 +177,7 @@ core::Status run(const DemoOptions& options, VerbContext& context) {
   Demo demo(options.folder, context);
   PRESCENE_RETURN_IF_ERROR(interfaces::write_file(demo.path("milk_on_bin.yaml"), demo_scene()));
   PRESCENE_TRY(const auto scene, load_scene(demo.path("milk_on_bin.yaml"), context.log()));
-  PRESCENE_RETURN_IF_ERROR(demo.run(scene->actions.at(0).time));
+  PRESCENE_RETURN_IF_ERROR(demo.run(scene->actions.at(0)));
   const std::string report = demo.path("report.html");
   context.print({{"folder", options.folder},
                  {"scene", demo.path("milk_on_bin.yaml")},
