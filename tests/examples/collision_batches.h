@@ -15,7 +15,7 @@ namespace prescene::collision::given_collision_batches {
 extern QueryScratch scratch;
 extern const TriangleTree cup, table;
 extern const Transform X_CT;
-extern const geometry::Pose X_AB_start, X_AB_end, X_WC;
+extern const geometry::Pose X_WC;
 
 namespace body_set_h {
 extern const std::shared_ptr<const TriangleTree> cup_tree;

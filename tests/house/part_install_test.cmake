@@ -24,8 +24,8 @@ step("${CMAKE_COMMAND}" --install "${PRESCENE_BUILD_DIR}" --prefix "${work}/pref
 file(GLOB_RECURSE libraries RELATIVE "${work}/prefix" "${work}/prefix/*.a")
 list(TRANSFORM libraries REPLACE ".*/" "")
 list(SORT libraries)
-set(expected libprescene_collision.a libprescene_collision_batches.a libprescene_collision_dops.a
-             libprescene_collision_spheres.a libprescene_core.a libprescene_geometry.a)
+set(expected libprescene_collision.a libprescene_collision_batches.a libprescene_collision_continuous.a
+             libprescene_collision_dops.a libprescene_collision_spheres.a libprescene_core.a libprescene_geometry.a)
 if(NOT libraries STREQUAL expected)
   message(FATAL_ERROR "installed are ${libraries}")
 endif()
