@@ -110,6 +110,27 @@ PredictDetail detail_from(const JsonAt& at) {
   return detail;
 }
 
+Json detail_json(const StabilityDetail& detail) {
+  Json json = Json::array();
+  if (detail.margin) json.push_back("margin");
+  if (detail.removal) json.push_back("removal");
+  return json;
+}
+
+StabilityDetail stability_detail_from(const JsonAt& at) {
+  StabilityDetail detail;
+  for (const JsonAt& item : at.items()) {
+    const std::string asked = item.text();
+    if (asked == "margin")
+      detail.margin = true;
+    else if (asked == "removal")
+      detail.removal = true;
+    else
+      item.fail("one of margin, removal is needed");
+  }
+  return detail;
+}
+
 struct QueryJson {
   Json operator()(const WhereQuery& where) const {
     Json json = Json::object();
@@ -134,7 +155,8 @@ struct QueryJson {
             {"max_move", stability.max_move},
             {"max_turn_deg", geometry::exact_degrees(stability.max_turn)},
             {"duration", stability.duration},
-            {"effort", effort_json(stability.effort)}};
+            {"effort", effort_json(stability.effort)},
+            {"detail", detail_json(stability.detail)}};
   }
   Json operator()(const ViewQuery& view) const {
     return {{"actions", actions_json(view.actions)}, {"time", view.time}};
@@ -169,6 +191,7 @@ StabilityQuery stability_from(JsonObject& fields) {
     stability.max_turn = geometry::kDegree * *degrees;
   read_number(fields, "duration", kDurations, stability.duration);
   if (const auto at = fields.find("effort")) stability.effort = effort_from(*at);
+  if (const auto at = fields.find("detail")) stability.detail = stability_detail_from(*at);
   return stability;
 }
 
@@ -206,6 +229,32 @@ Json estimate_json(const ObjectEstimate& estimate) {
           {"effective_sample_size", estimate.effective_sample_size}};
 }
 
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json margin_json(const StabilityMargin& margin) {
+  Json falls = Json::array(), directions = Json::array();
+  for (const FallImpulse& fall : margin.falls)
+    falls.push_back({{"share", fall.share},
+                     {"impulse", or_null(fall.impulse)},
+                     {"interval", Json::array({or_null(fall.low), or_null(fall.high)})}});
+  for (const StabilityMargin::Direction& direction : margin.directions)
+    directions.push_back({{"direction", vector_json(direction.direction_W)}, {"impulse", or_null(direction.impulse)}});
+  return {{"weakest_direction", vector_json(margin.weakest_W)},
+          {"falls", std::move(falls)},
+          {"directions", std::move(directions)},
+          {"most_speed", margin.most_speed},
+          {"starts", margin.starts},
+          {"instances", margin.instances}};
+}
+
+Json removal_json(const Removal& removal) {
+  Json moves = Json::array();
+  for (const OutcomeProbability& other : removal.moves) moves.push_back(outcome_probability_json(other));
+  return {{"others_stay", outcome_probability_json(removal.others_stay)},
+          {"moves", std::move(moves)},
+          {"instances", removal.instances}};
+}
+
 struct AnswerJson {
   Json operator()(const std::monostate&) const { return nullptr; }
   Json operator()(const WhereAnswer& where) const {
@@ -226,6 +275,8 @@ struct AnswerJson {
     Json json{{"object", stability.object},
               {"stable", outcome_probability_json(stability.stable)},
               {"likely_event", stability.likely_event}};
+    if (stability.margin) json["margin"] = margin_json(*stability.margin);
+    if (stability.removal) json["removal"] = removal_json(*stability.removal);
     add_basis(stability, json);
     return json;
   }

@@ -7,6 +7,7 @@
 #include "prescene/queries/typical_runs.h"
 #include "remarks.h"
 #include "stability.h"
+#include "stability_margin.h"
 
 namespace prescene::queries {
 namespace {
@@ -69,6 +70,7 @@ core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief
   }
   remark_on_leaving(foresight.estimate, answer.remarks);
   remark_on_certainty(foresight.estimate, answer.remarks);
+  PRESCENE_RETURN_IF_ERROR(add_stability_detail(prior, index, query, context, answer));
   return answer;
 }
 

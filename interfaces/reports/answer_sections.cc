@@ -41,6 +41,22 @@ std::vector<ReportSection> sections_of(const belief::StabilityAnswer& answer, co
                      " s.";
   if (!answer.likely_event.empty()) text += " When it does not stay, it typically " + answer.likely_event + ".";
   section.blocks.push_back(TextBlock{std::move(text)});
+  if (answer.margin) {
+    const geometry::Vector3d& d = answer.margin->weakest_W;
+    std::string margin =
+        "It falls most easily along (" + decimal(d.x(), 2) + " " + decimal(d.y(), 2) + " " + decimal(d.z(), 2) + "):";
+    for (const belief::FallImpulse& fall : answer.margin->falls)
+      margin +=
+          " in " + percent(fall.share) +
+          (fall.impulse ? " of instances at " + decimal(*fall.impulse, 3) + " N s." : " of instances at none tried.");
+    section.blocks.push_back(TextBlock{std::move(margin)});
+  }
+  if (answer.removal) {
+    OutcomeBlock block{"Where it is taken away", {answer.removal->others_stay}};
+    for (const belief::OutcomeProbability& other : answer.removal->moves) block.outcomes.push_back(other);
+    for (std::size_t i = 1; i < block.outcomes.size(); ++i) block.outcomes[i].name += " moves";
+    section.blocks.push_back(std::move(block));
+  }
   for (const std::string& remark : answer.remarks) section.blocks.push_back(TextBlock{remark});
   return {std::move(section)};
 }

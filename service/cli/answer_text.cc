@@ -54,10 +54,36 @@ std::string learned_text(const nlohmann::ordered_json& item) {
          ", the last at " + fixed_text(learned, 1) + " s:\n" + text;
 }
 
+std::string impulse_text(const nlohmann::ordered_json& impulse) {
+  return impulse.is_number() ? fixed_text(impulse.get<double>(), 3) : "more";
+}
+
+/// How hard it may be knocked, and what its removal does; "" = neither was asked for.
+std::string stability_detail_text(const nlohmann::ordered_json& stability) {
+  std::string text;
+  if (const auto margin = stability.find("margin"); margin != stability.end()) {
+    const auto& d = margin->at("weakest_direction");
+    text += "falls most easily along (" + fixed_text(d.at(0).get<double>(), 2) + " " +
+            fixed_text(d.at(1).get<double>(), 2) + " " + fixed_text(d.at(2).get<double>(), 2) + "):";
+    for (const auto& fall : margin->at("falls"))
+      text += (fall.is_object() && &fall != &margin->at("falls").front() ? ", " : " ") + std::string("in ") +
+              fixed_text(100.0 * fall.value("share", 0.0), 0) + " % at " + impulse_text(fall.at("impulse")) + " N s (" +
+              impulse_text(fall.at("interval").at(0)) + " to " + impulse_text(fall.at("interval").at(1)) + ")";
+    text += "\n";
+  }
+  if (const auto removal = stability.find("removal"); removal != stability.end()) {
+    text += "if it is taken away, the others stay: " + interval(removal->at("others_stay")) + "\n";
+    for (const auto& other : removal->at("moves"))
+      if (other.value("probability", 0.0) > 0.0)
+        text += "  " + other.value("name", "") + " moves: " + interval(other) + "\n";
+  }
+  return text;
+}
+
 std::string short_form(const nlohmann::ordered_json& answer) {
   if (const auto stability = answer.find("stability"); stability != answer.end()) {
     return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n" +
-           basis(*stability);
+           stability_detail_text(*stability) + basis(*stability);
   }
   if (const auto achieve = answer.find("achieve"); achieve != answer.end()) return achieve_text(*achieve);
   if (const auto predict = answer.find("predict"); predict != answer.end()) {

@@ -18,6 +18,8 @@ struct AskOptions {
   std::string object;
   std::string json;
   std::optional<double> timeout;
+  bool margin = false;
+  bool removal = false;
   AchieveOptions achieve;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
@@ -34,6 +36,8 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
   }
   if (options.kind != "achieve" && !(options.achieve == AchieveOptions{}))
     return core::invalid_input("--action, --free and what goes with them are of 'ask achieve': leave them out");
+  if (options.kind != "stability" && (options.margin || options.removal))
+    return core::invalid_input("--margin and --removal are of 'ask stability': leave them out");
   const auto needs_object = [&]() -> core::Status {
     return options.object.empty() ? core::invalid_input("ask " + options.kind + " OBJECT: name the object")
                                   : core::ok_status();
@@ -44,7 +48,10 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
   }
   if (options.kind == "stability") {
     PRESCENE_RETURN_IF_ERROR(needs_object());
-    return nlohmann::ordered_json{{"stability", {{"object", options.object}}}};
+    nlohmann::ordered_json stability = {{"object", options.object}};
+    if (options.margin) stability["detail"].push_back("margin");
+    if (options.removal) stability["detail"].push_back("removal");
+    return nlohmann::ordered_json{{"stability", std::move(stability)}};
   }
   if (options.kind == "release") {
     PRESCENE_RETURN_IF_ERROR(needs_object());
@@ -92,6 +99,9 @@ Verb add_ask_verb(CLI::App& app) {
           "--timeout", options->timeout,
           "How long to wait for an answer, s; default: 15, or 3 more than a --question's max_seconds if that is longer")
       ->check(in_range(belief::kWallSeconds));
+  verb->add_flag("--margin", options->margin,
+                 "Of stability: also how hard a knock makes it fall, and in which direction");
+  verb->add_flag("--removal", options->removal, "Of stability: also whether the others stay where it is taken away");
   add_achieve_options(*verb, options->achieve);
   options->verb = verb;
   add_domain_option(*verb, options->dds);

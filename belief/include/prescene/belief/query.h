@@ -43,6 +43,12 @@ struct PredictQuery {
   PredictDetail detail;
   friend bool operator==(const PredictQuery&, const PredictQuery&) = default;
 };
+/// What an answer about stability has besides the probability; each takes instances of its own.
+struct StabilityDetail {
+  bool margin = false;   ///< How hard it may be knocked. Not of what is held.
+  bool removal = false;  ///< Whether the others stay where it is taken away.
+  friend bool operator==(const StabilityDetail&, const StabilityDetail&) = default;
+};
 /// Does it stay as it is (released now, if it is held)?
 struct StabilityQuery {
   std::string object;
@@ -50,6 +56,7 @@ struct StabilityQuery {
   double max_turn = 0.0873;  ///< ...and turns less (rad).
   double duration = 3.0;     ///< s looked ahead
   Effort effort;
+  StabilityDetail detail = {};
   friend bool operator==(const StabilityQuery&, const StabilityQuery&) = default;
 };
 /// What will the camera see after `actions`?
@@ -83,12 +90,46 @@ struct WhereAnswer {
 
   friend bool operator==(const WhereAnswer&, const WhereAnswer&) = default;
 };
+/// The least impulse, N s, that makes an object fall in a share of the instances. What is missing is above
+/// StabilityMargin::most_speed.
+struct FallImpulse {
+  double share = 0.0;             ///< Of the instances that fall at it or below.
+  std::optional<double> impulse;  ///< N s
+  std::optional<double> low;      ///< Interval of this quantile at the effort's confidence, ...
+  std::optional<double> high;     ///< ... N s.
+  friend bool operator==(const FallImpulse&, const FallImpulse&) = default;
+};
+/// How hard an object may be knocked, horizontally at the height of its centre of mass, before it falls: before it ends
+/// tilted by more than 30 degrees, more than 5 cm lower, or out of the world.
+struct StabilityMargin {
+  struct Direction {
+    Vector3d direction_W = Vector3d::UnitX();  ///< Unit vector across gravity.
+    std::optional<double> impulse;             ///< N s at which it falls in half of the instances, roughly.
+    friend bool operator==(const Direction&, const Direction&) = default;
+  };
+  Vector3d weakest_W = Vector3d::UnitX();  ///< Of the directions tried, where half fall at the least impulse.
+  std::vector<FallImpulse> falls;          ///< In that direction, at 5 % and at 50 %.
+  std::vector<Direction> directions;
+  double most_speed = 0.0;  ///< m/s: impulses per mass up to here were tried.
+  int starts = 0;           ///< Starts, each with an impulse of its own, that `falls` rests on; none of `directions`.
+  int instances = 0;        ///< Simulated for all of it.
+  friend bool operator==(const StabilityMargin&, const StabilityMargin&) = default;
+};
+/// What becomes of the others where an object is taken away at once.
+struct Removal {
+  OutcomeProbability others_stay;         ///< That all do, by StabilityQuery's limits at the end of its duration.
+  std::vector<OutcomeProbability> moves;  ///< That it does not, of each other object by name.
+  int instances = 0;
+  friend bool operator==(const Removal&, const Removal&) = default;
+};
 struct StabilityAnswer : Basis {
   std::string object;
   OutcomeProbability stable;
   /// What happens in the typical run that is not stable; empty if none is, or if the time ran out before that was
   /// known, which the remarks say.
   std::string likely_event;
+  std::optional<StabilityMargin> margin;  ///< Where asked for; missing if the time ran out, which the remarks say.
+  std::optional<Removal> removal;         ///< The same.
 
   friend bool operator==(const StabilityAnswer&, const StabilityAnswer&) = default;
 };

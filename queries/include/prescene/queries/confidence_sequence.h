@@ -7,6 +7,9 @@
 //   if (now.low >= 0.95) ... now.low      // draw on, or stop at any time
 #pragma once
 
+#include <limits>
+#include <span>
+
 namespace prescene::queries {
 
 struct ShareInterval {
@@ -29,5 +32,14 @@ ShareInterval confidence_sequence(int successes, int draws, double error, const 
 
 /// The interval of Clopper and Pearson [1934] for a number of draws that was fixed before the first.
 ShareInterval clopper_pearson(int successes, int draws, double error);
+
+struct QuantileInterval {
+  double value = 0.0;                                     ///< The least draw that at least that share does not exceed.
+  double low = -std::numeric_limits<double>::infinity();  ///< Infinite: so few draws say nothing of that side.
+  double high = std::numeric_limits<double>::infinity();
+};
+/// Of the quantile at `share`, in (0, 1), from independent draws in ascending order, at least one: the draws between
+/// which it lies with probability 1 - error, whatever their distribution [Scheffe and Tukey 1945].
+QuantileInterval quantile_interval(std::span<const double> sorted, double share, double error);
 
 }  // namespace prescene::queries
