@@ -2,30 +2,24 @@
 #include "prescene/filter/proposals/detection.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
 
-#include "prescene/filter/proposals/fit_judgement.h"
 #include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
+#include "proposal_judge.h"
 
 namespace prescene::filter {
 namespace {
 
-constexpr int kKept = 4;                // best poses of a cluster and model that compete
-constexpr int kRounds = 2;              // the second looks at what the first left unexplained
-constexpr double kMinOutline = 0.7;     // share of the outline at which the measured surface ends (outline_support) ...
-constexpr double kOutlineStep = 0.02;   // m; ... by at least so much
-constexpr double kMinEvidence = 4.0;    // nats per visible pixel
-constexpr double kMinVisible = 0.35;    // of the pixels that a pose shows, known things in front or not
-constexpr double kMostSinking = 0.03;   // m that a pose may reach into a support: planes and meshes are off by 15 mm
-constexpr double kMostFloating = 0.03;  // m between the lowest points and what they stand on
-constexpr double kMostOverlap = 0.1;    // share of an object that others may cut off (SupportSurfaces::overlap), ...
-constexpr double kContact = 0.012;      // m; ... each side of it so much smaller
-constexpr double kFloatingCost = 60.0;  // nats that a pose costs which stands on nothing known, ...
-constexpr double kFloatingShare = 0.7;  // ... and a share of its log ratio
+constexpr int kKept = 4;                 // best poses of a cluster and model that compete
+constexpr int kRounds = 2;               // the second looks at what the first left unexplained
+constexpr double kOutlineStep = 0.02;    // m; the measured surface ends by at least so much (kLeastOutline)
+constexpr double kMostSinking = 0.03;    // m that a pose may reach into a support: planes and meshes are off by 15 mm
+constexpr double kMostFloating = 0.03;   // m between the lowest points and what they stand on
+constexpr double kMostOverlap = 0.1;     // share of an object that others may cut off (SupportSurfaces::overlap), ...
+constexpr double kContact = 0.012;       // m; ... each side of it so much smaller
 constexpr double kStandingStarts = 0.3;  // share of the starts with a side of the model's box down
 constexpr int kFloatingClusters = 3;     // clusters that are over no support and yet looked at
 // m; a measurement so little in front of a known surface, or up to twice as much behind it, is explained.
@@ -39,7 +33,6 @@ constexpr double kLeastSupportArea = 0.05;  // m^2; a smaller flat patch may be 
 constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much larger than the largest face of an object
 // Joint refinement of what is accepted.
 constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
-constexpr double kHitPower = 8.0;       // how much a pose's score suffers from pixels that do not match
 constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
 // Where a learned judge decides, only what is hopeless is not shown to it.
 constexpr int kKeptForJudge = 6;
@@ -47,144 +40,8 @@ constexpr double kHopelessLogRatio = 20.0;  // nats
 constexpr double kHopelessHits = 0.5;
 constexpr double kHopelessVisible = 0.15;
 // Candidates of one cluster and model that are so near and explain so much the same are one.
-constexpr double kSamePlace = 0.01;   // m
-constexpr double kSameShare = 0.03;   // of the log ratio
-constexpr double kMostLogOdds = 8.0;  // of a find that the judge is sure of
-
-struct Proposal {
-  int model = 0;
-  PoseCandidate candidate{};
-  int cluster = 0;    ///< Of those that were looked at.
-  double cost = 0.0;  ///< nats
-  bool stands = false;
-  FitNumbers numbers{};  ///< Of `judged` ...
-  bool is_judged = false;
-  rendering::PoseEvidence judged{};
-  bool judged_standing = false;
-  double log_odds = 0.0;  ///< ... and what the judge says of them.
-
-  /// A wrong model that explains much of a large thing badly must not go before a right one that explains little well.
-  double score() const {
-    return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kHitPower) - cost;
-  }
-  void weigh(bool on_something) {
-    stands = on_something;
-    cost = stands ? 0.0 : kFloatingCost + kFloatingShare * std::max(0.0, candidate.evidence.log_ratio);
-  }
-};
-
-bool acceptable(const rendering::PoseEvidence& evidence, double cost, const DetectionOptions& options) {
-  return evidence.log_ratio - cost > options.min_log_ratio && evidence.hit_share() >= options.min_hit_share &&
-         evidence.log_ratio_per_visible_pixel() >= kMinEvidence && evidence.visible >= kMinVisible * evidence.in_view;
-}
-
-/// Who decides about candidates where something was learned of all that is looked for.
-class Judge {
- public:
-  Judge(std::span<const WantedModel> wanted, const Vector3d& up_C, const DetectionOptions& options,
-        const FilterTools& tools, DetectionTrace* trace)
-      : wanted_(wanted), up_C_(up_C), options_(options), tools_(tools), trace_(trace) {
-    all_learned_ = tools.learned != nullptr && !wanted.empty() &&
-                   std::all_of(wanted.begin(), wanted.end(), [](const auto& w) { return w.target.learned != nullptr; });
-  }
-
-  /// Whether it decides; else the thresholds of DetectionOptions do.
-  bool decides() const { return all_learned_ && (!tools_.learned->fit.empty() || trace_ != nullptr); }
-
-  /// While nothing was learned of fits, the thresholds decide whose numbers are recorded as a find's.
-  double log_odds(const Proposal& p) const {
-    if (!tools_.learned->fit.empty()) return tools_.learned->fit.log_odds(p.numbers);
-    const bool good = acceptable(p.candidate.evidence, p.cost, options_) &&
-                      static_cast<double>(p.numbers[kFitOutline]) >= kMinOutline && p.score() > 1.0;
-    return good ? std::log(p.score()) : -kMostLogOdds;
-  }
-  /// Whether a find is still worth what a candidate must be.
-  bool believes(double log_odds_at_end) const {
-    return tools_.learned->fit.empty() || log_odds_at_end >= options_.least_log_odds;
-  }
-  double probability(double accepted, double at_end) const {
-    const auto& c = tools_.learned->confidence;
-    const double odds = std::clamp(c[0] + c[1] * at_end + c[2] * accepted, -kMostLogOdds, kMostLogOdds);
-    return 1.0 / (1.0 + std::exp(-odds));
-  }
-
-  /// Judges those of which something has changed.
-  void judge(const rendering::FrameTerms& terms, const std::vector<Cluster>& clusters,
-             std::vector<Proposal>& proposals) const {
-    std::vector<std::uint8_t> fresh(proposals.size(), 0);
-    tools_.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
-      Proposal& p = proposals[i];
-      const rendering::PoseEvidence& e = p.candidate.evidence;
-      const bool same = p.is_judged && p.judged_standing == p.stands && p.judged.log_ratio == e.log_ratio &&
-                        p.judged.covered == e.covered && p.judged.visible == e.visible && p.judged.hits == e.hits;
-      Fit fit = fit_of(p.model, p.candidate.X_CO, e, clusters[static_cast<std::size_t>(p.cluster)], p.stands);
-      set_rivals_among(proposals, i, fit);
-      const FitNumbers before = p.numbers;
-      if (same)
-        set_rivals(fit, p.numbers);
-      else
-        p.numbers = fit_numbers(fit, terms, *tools_.renderer);
-      if (same && p.numbers == before) return;
-      fresh[i] = 1;
-      p.is_judged = true;
-      p.judged = e;
-      p.judged_standing = p.stands;
-      p.log_odds = log_odds(p);
-    });
-    if (trace_ == nullptr) return;
-    for (std::size_t i = 0; i < proposals.size(); ++i)
-      if (fresh[i] != 0)
-        trace_->candidates.push_back({proposals[i].model, proposals[i].candidate.X_CO, proposals[i].numbers});
-  }
-
-  /// Of a find as it is at the end.
-  FitNumbers numbers_of(const rendering::FrameTerms& terms, const Cluster& cluster, const Detection& found) const {
-    Fit fit = fit_of(found.model, found.X_CO, found.evidence, cluster, found.stands);
-    FitNumbers numbers = fit_numbers(fit, terms, *tools_.renderer);
-    // Who its rivals were is known from when it was accepted.
-    numbers[kFitRivalModels] = found.numbers[kFitRivalModels];
-    numbers[kFitRivalPoses] = found.numbers[kFitRivalPoses];
-    return numbers;
-  }
-
-  DetectionTrace* trace() const { return trace_; }
-
- private:
-  Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, const Cluster& cluster,
-             bool stands) const {
-    Fit fit;
-    fit.target = &wanted_[static_cast<std::size_t>(model)].target;
-    fit.learned = fit.target->learned;
-    fit.X_CO = X_CO;
-    fit.evidence = evidence;
-    fit.cluster_C = cluster.points_C;
-    fit.up_C = up_C_;
-    fit.stands = stands;
-    return fit;
-  }
-
-  void set_rivals_among(const std::vector<Proposal>& proposals, std::size_t mine, Fit& fit) const {
-    const Proposal& own = proposals[mine];
-    const Vector3d centre = own.candidate.X_CO * fit.target->centre();
-    const double apart = 0.5 * static_cast<double>(fit.target->mesh->radius);
-    for (std::size_t i = 0; i < proposals.size(); ++i) {
-      const Proposal& other = proposals[i];
-      const double log_ratio = other.candidate.evidence.log_ratio;
-      if (other.model != own.model) {
-        if (other.cluster == own.cluster) fit.rival_models = std::max(fit.rival_models, log_ratio);
-      } else if ((other.candidate.X_CO * fit.target->centre() - centre).norm() > apart) {
-        fit.rival_poses = std::max(fit.rival_poses, log_ratio);
-      }
-    }
-  }
-
-  std::span<const WantedModel> wanted_;
-  Vector3d up_C_;
-  const DetectionOptions& options_;
-  const FilterTools& tools_;
-  DetectionTrace* trace_;
-  bool all_learned_ = false;
-};
+constexpr double kSamePlace = 0.01;  // m
+constexpr double kSameShare = 0.03;  // of the log ratio
 
 /// The best of each group of candidates that are one, best first.
 void keep_distinct(const Vector3d& centre, std::size_t most, std::vector<PoseCandidate>& candidates) {
@@ -239,8 +96,8 @@ std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled,
 /// The best poses of each wanted model in each cluster from `first` on, ordered by cluster, model, rank.
 std::vector<Proposal> propose(const rendering::FrameTerms& terms, const SampledDepth& sampled,
                               const std::vector<Cluster>& clusters, std::size_t first, const Surroundings& surroundings,
-                              std::span<const WantedModel> wanted, std::span<const int> left, const Judge& judge,
-                              const DetectionOptions& options, const FilterTools& tools,
+                              std::span<const WantedModel> wanted, std::span<const int> left,
+                              const ProposalJudge& judge, const DetectionOptions& options, const FilterTools& tools,
                               const core::RandomStream& stream, std::uint64_t round) {
   struct Task {
     int cluster;
@@ -301,7 +158,7 @@ std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, st
 
 /// Accepts the strongest proposal, puts it into the frame, judges the others again, until none is acceptable.
 void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>& clusters,
-                     const Surroundings& surroundings, std::span<const WantedModel> wanted, const Judge& judge,
+                     const Surroundings& surroundings, std::span<const WantedModel> wanted, const ProposalJudge& judge,
                      const DetectionOptions& options, const FilterTools& tools, rendering::FrameTerms& terms,
                      geometry::DepthImage& known, std::vector<int>& left, std::vector<Detection>& found) {
   SupportSurfaces things = surfaces_of(found, wanted, surroundings.X_WC);
@@ -339,7 +196,7 @@ void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>
       proposals.erase(best);
       continue;
     }
-    if (!judge.decides() && outline_support(terms, depth, kOutlineStep) < kMinOutline) {
+    if (!judge.decides() && outline_support(terms, depth, kOutlineStep) < kLeastOutline) {
       // Its surface may end where a neighbour is that is not found yet.
       waiting.push_back(*best);
       proposals.erase(best);
@@ -398,7 +255,7 @@ void settle(const rendering::FrameTerms& terms, std::span<const WantedModel> wan
 
 /// Gives each find the probability that it is right; returns the judge's log odds of each with all others known.
 std::vector<double> believe(const rendering::FrameTerms& terms, const std::vector<Cluster>& clusters,
-                            std::span<const WantedModel> wanted, const Judge& judge, const FilterTools& tools,
+                            std::span<const WantedModel> wanted, const ProposalJudge& judge, const FilterTools& tools,
                             std::vector<Detection>& found) {
   const std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
   std::vector<double> log_odds(found.size(), 0.0);
@@ -420,7 +277,7 @@ std::vector<double> believe(const rendering::FrameTerms& terms, const std::vecto
 }
 
 /// Takes back what is no longer acceptable now that the others are where they are.
-void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const Judge& judge,
+void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const ProposalJudge& judge,
                const DetectionOptions& options, std::span<const double> log_odds, std::vector<int>& left,
                std::vector<Detection>& found) {
   for (std::size_t i = found.size(); i-- > 0;) {
@@ -437,7 +294,7 @@ void take_back(const Surroundings& surroundings, std::span<const WantedModel> wa
     proposal.candidate = {detection.X_CO, detection.evidence};
     proposal.weigh(detection.stands);
     if (judge.decides() ? !hopeless(detection.evidence) && judge.believes(log_odds[i])
-                        : acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kMinOutline)
+                        : acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kLeastOutline)
       continue;
     ++left[model];
     found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
@@ -542,7 +399,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const ge
                               const FilterTools& tools, const core::RandomStream& stream, DetectionTrace* trace) {
   rendering::FrameTerms terms;
   with_known_surfaces(frame_terms, walls_in(frame_terms, sampled, surroundings), &terms);
-  const Judge judge(wanted, surroundings.X_WC.rotation.conjugate() * surroundings.up_W, options, tools, trace);
+  const ProposalJudge judge(wanted, surroundings.X_WC.rotation.conjugate() * surroundings.up_W, options, tools, trace);
   std::vector<int> left;
   for (const WantedModel& model : wanted) left.push_back(model.count);
   rendering::FrameTerms explained_terms = terms;
