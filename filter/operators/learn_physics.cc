@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "episode_evidence.h"
 #include "motion_following.h"
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
@@ -34,32 +35,6 @@ double seconds_of(const MotionEpisode& episode, const MotionSample& sample) {
   return 1e-9 * static_cast<double>(sample.stamp_ns - episode.samples.front().stamp_ns);
 }
 
-/// A body that is seen at each frame starts and stops between frames. Where its velocity changes, the interval gets the
-/// corner at which the straight motions before and after it meet: joining the frames by straight lines would let a
-/// pusher brake for a frame's length, and what it pushes leave it too early.
-std::vector<belief::KinematicBody::Waypoint> with_corners(const std::vector<belief::KinematicBody::Waypoint>& seen) {
-  std::vector<belief::KinematicBody::Waypoint> path;
-  for (std::size_t k = 0; k < seen.size(); ++k) {
-    path.push_back(seen[k]);
-    if (k == 0 || k + 2 >= seen.size()) continue;
-    const auto velocity = [&](std::size_t from) -> geometry::Vector3d {
-      return (seen[from + 1].X_WG.translation - seen[from].X_WG.translation) / (seen[from + 1].time - seen[from].time);
-    };
-    const geometry::Vector3d before = velocity(k - 1), after = velocity(k + 1), change = before - after;
-    const double fastest = std::max(before.norm(), after.norm());
-    if (!(change.norm() > 0.2 * fastest)) continue;
-    const double length = seen[k + 1].time - seen[k].time;
-    const geometry::Vector3d step = seen[k + 1].X_WG.translation - seen[k].X_WG.translation;
-    const double corner = (step - length * after).dot(change) / change.squaredNorm();
-    if (!(corner > 0.02 * length && corner < 0.98 * length)) continue;
-    Pose X_WG = geometry::interpolate(seen[k].X_WG, seen[k + 1].X_WG, corner / length);
-    X_WG.translation =
-        0.5 * (seen[k].X_WG.translation + corner * before + seen[k + 1].X_WG.translation - (length - corner) * after);
-    path.push_back({seen[k].time + corner, X_WG});
-  }
-  return path;
-}
-
 /// One episode of one object, and how to simulate it.
 class Judge {
  public:
@@ -77,7 +52,7 @@ class Judge {
     }
     keep_within_reach();
     place_ = static_cast<std::size_t>(std::find(present_.begin(), present_.end(), object) - present_.begin());
-    draw_starts();
+    choose_samples();
   }
 
   double duration() const { return seconds_of(episode_, episode_.samples.back()); }
@@ -100,10 +75,16 @@ class Judge {
     return scene;
   }
 
-  int variants() const { return static_cast<int>(starts_.size()); }
+  /// So many runs a draw.
+  int variants() const { return std::max(1, options_.variants); }
+  int samples() const { return static_cast<int>(compared_.size()); }
+  std::size_t error_size() const { return kErrorSize * compared_.size(); }
 
-  /// The start of one variant under one draw.
-  belief::WorldState start(const PhysicalDraw& draw, int variant) const {
+  /// Whether these can be errors of whole runs, as far as they were simulated.
+  bool fits(const std::vector<double>& errors) const { return !compared_.empty() && errors.size() % error_size() == 0; }
+
+  /// The start of a run under a draw: no two runs of an episode have the same. Without a run's number, the mean.
+  belief::WorldState start(const PhysicalDraw& draw, std::optional<std::size_t> run) const {
     belief::WorldState state;
     for (const std::size_t i : present_) {
       const belief::ObjectBelief& other = belief_.objects[i];
@@ -112,7 +93,7 @@ class Judge {
       to.mode =
           holder_of(*belief_.scene, static_cast<int>(i)) ? belief::MotionMode::kHeld : belief::MotionMode::kMoving;
       if (i == object_) {
-        to = starts_[static_cast<std::size_t>(variant)];
+        to = run ? drawn_start(*run) : mean_start();
         to.physical = belief::physical_at(model, draw.uniforms);
       } else {
         to.X_WO = episode_.others[i];
@@ -123,35 +104,36 @@ class Judge {
     return state;
   }
 
-  /// Mean squared standardised error of a run, or nothing where it is no prediction.
-  std::optional<double> misfit(const belief::Trajectory& run) const {
-    if (run.end != belief::TrajectoryEnd::kDuration || run.states.size() < 2) return std::nullopt;
-    double sum = 0.0, path = 0.0, turned = 0.0;
-    const MotionSample* before = &episode_.samples.front();
-    for (std::size_t k = 1; k < episode_.samples.size(); ++k) {
-      const MotionSample& sample = episode_.samples[k];
-      path += (sample.X_WO * p_OQ_ - before->X_WO * p_OQ_).norm();
-      turned += geometry::symmetric_angle(sample.X_WO, before->X_WO, *symmetry_);
-      before = &sample;
-      const Pose X_WO = pose_at(run, seconds_of(episode_, sample));
-      if (!X_WO.is_finite()) return std::nullopt;
-      const auto variance = [&](double deviation, double share, double floor) {
-        return deviation * deviation + share * share + floor * floor;
-      };
-      const double shift = variance(sample.deviation.tail<3>().norm() / std::sqrt(3.0), options_.model_share * path,
-                                    options_.shift_floor);
-      const double turn = variance(sample.deviation.head<3>().norm() / std::sqrt(3.0), options_.model_share * turned,
-                                   options_.turn_floor);
-      const double angle = geometry::symmetric_angle(X_WO, sample.X_WO, *symmetry_);
-      const double square = (X_WO * p_OQ_ - sample.X_WO * p_OQ_).squaredNorm() / shift + angle * angle / turn;
-      sum += std::min(square, kMostSquares);
+  /// Appends by how many standard deviations a run is off each sample that is compared, to three decimals, as the
+  /// belief keeps them meanwhile; kNoPrediction throughout where it is no prediction.
+  void add_errors(const belief::Trajectory& run, std::vector<double>& errors) const {
+    const std::size_t begin = errors.size();
+    bool whole = run.end == belief::TrajectoryEnd::kDuration && run.states.size() >= 2;
+    for (const Compared& at : compared_) {
+      if (!whole) break;
+      const MotionSample& sample = episode_.samples[at.sample];
+      const Pose X_WO =
+          geometry::closest_equivalent(pose_at(run, seconds_of(episode_, sample)), sample.X_WO, *symmetry_);
+      Vector6d off;
+      off.head<3>() = geometry::log_rotation(sample.X_WO.rotation.conjugate() * X_WO.rotation) / at.turn;
+      off.tail<3>() = (X_WO * p_OQ_ - sample.X_WO * p_OQ_) / at.shift;
+      whole = off.allFinite();
+      for (int i = 0; i < kErrorSize; ++i) errors.push_back(1e-3 * std::round(1e3 * off[i]));
     }
-    return sum / static_cast<double>(episode_.samples.size() - 1);
+    if (whole) return;
+    errors.resize(begin);
+    errors.resize(begin + error_size(), kNoPrediction);
   }
 
   /// How many of the samples count as independent.
   double independent_samples() const {
-    return std::min(1.0 + duration() / options_.correlation_time, static_cast<double>(episode_.samples.size() - 1));
+    return std::min(1.0 + duration() / options_.correlation_time, static_cast<double>(compared_.size()));
+  }
+
+  /// Errors of these runs beside each other.
+  EpisodeRuns runs(std::span<const double> errors) const {
+    const double step = duration() / static_cast<double>(compared_.size());
+    return {errors, samples(), independent_samples(), kMostSquares, std::exp(-step / options_.correlation_time)};
   }
 
  private:
@@ -206,35 +188,66 @@ class Judge {
     return geometry::interpolate(pose_of(from, place_), pose_of(*after, place_), share);
   }
 
-  /// What lies on something is shifted along the plane across gravity and turned about gravity only: it lies.
-  void draw_starts() {
-    const MotionSample& first = episode_.samples.front();
-    const geometry::Vector3d gravity = belief_.scene->gravity_W;
-    const bool lies = episode_.kind != EpisodeKind::kRelease && gravity.norm() > 0.0;
-    const core::RandomStream stream(belief_.seed, core::Purpose::kLearning, static_cast<std::uint64_t>(first.stamp_ns));
-    const int wanted = episode_.kind == EpisodeKind::kRest ? 1 : std::max(1, options_.variants);
-    for (int v = 0; v < wanted; ++v) {
-      belief::ObjectState state;
-      state.mode = belief::MotionMode::kMoving;
-      state.X_WO = first.X_WO;
-      state.V_WO = episode_.V_start;
-      core::RandomStream mine = stream.at(static_cast<std::uint64_t>(first.stamp_ns), static_cast<std::uint32_t>(v));
-      Vector6d d;
-      for (int k = 0; k < 6; ++k) d[k] = mine.normal() * first.deviation[k];
-      if (v > 0 && lies) {
-        const geometry::Vector3d up = -gravity.normalized();
-        const geometry::Vector3d shift = d.tail<3>() - up * up.dot(d.tail<3>());
-        const geometry::Vector3d p_WQ = first.X_WO * p_OQ_;
-        state.X_WO.rotation = (geometry::exp_rotation(up * d[2]) * first.X_WO.rotation).normalized();
-        state.X_WO.translation = p_WQ + shift - state.X_WO.rotation * p_OQ_;
-      } else if (v > 0) {
-        state.X_WO = geometry::normalized(geometry::box_plus(first.X_WO, d));
-        for (int k = 0; k < 3; ++k) state.V_WO.linear[k] += options_.release_speed_error * mine.normal();
-      }
-      starts_.push_back(state);
+  /// Samples half a correlation time apart, and how well each is known and can be foreseen.
+  void choose_samples() {
+    double path = 0.0, turned = 0.0, last = 0.0;
+    const auto deviation = [&](double seen, double share, double floor) {
+      return std::sqrt(seen * seen + share * share + floor * floor);
+    };
+    for (std::size_t k = 1; k < episode_.samples.size(); ++k) {
+      const MotionSample& sample = episode_.samples[k];
+      const MotionSample& before = episode_.samples[k - 1];
+      path += (sample.X_WO * p_OQ_ - before.X_WO * p_OQ_).norm();
+      turned += geometry::symmetric_angle(sample.X_WO, before.X_WO, *symmetry_);
+      const double time = seconds_of(episode_, sample);
+      if (time - last < 0.5 * options_.correlation_time && k + 1 < episode_.samples.size()) continue;
+      last = time;
+      compared_.push_back({k,
+                           deviation(sample.deviation.tail<3>().norm() / std::sqrt(3.0), options_.model_share * path,
+                                     options_.shift_floor),
+                           deviation(sample.deviation.head<3>().norm() / std::sqrt(3.0), options_.model_share * turned,
+                                     options_.turn_floor)});
     }
   }
 
+  belief::ObjectState mean_start() const {
+    belief::ObjectState state;
+    state.mode = belief::MotionMode::kMoving;
+    state.X_WO = episode_.samples.front().X_WO;
+    state.V_WO = episode_.V_start;
+    return state;
+  }
+
+  /// What lies on something before it is pushed is shifted along the plane across gravity and turned about gravity
+  /// only: it lies. Whether something lies still may depend on how it stands, for example where it leans.
+  belief::ObjectState drawn_start(std::size_t run) const {
+    const MotionSample& first = episode_.samples.front();
+    const geometry::Vector3d gravity = belief_.scene->gravity_W;
+    const bool lies = episode_.kind == EpisodeKind::kMotion && gravity.norm() > 0.0;
+    const core::RandomStream stream(belief_.seed, core::Purpose::kLearning, static_cast<std::uint64_t>(first.stamp_ns));
+    belief::ObjectState state = mean_start();
+    core::RandomStream mine = stream.at(static_cast<std::uint64_t>(first.stamp_ns), static_cast<std::uint32_t>(run));
+    Vector6d d;
+    for (int k = 0; k < 6; ++k) d[k] = mine.normal() * first.deviation[k];
+    if (lies) {
+      const geometry::Vector3d up = -gravity.normalized();
+      const geometry::Vector3d shift = d.tail<3>() - up * up.dot(d.tail<3>());
+      const geometry::Vector3d p_WQ = first.X_WO * p_OQ_;
+      state.X_WO.rotation = (geometry::exp_rotation(up * d[2]) * first.X_WO.rotation).normalized();
+      state.X_WO.translation = p_WQ + shift - state.X_WO.rotation * p_OQ_;
+    } else {
+      state.X_WO = geometry::normalized(geometry::box_plus(first.X_WO, d));
+      if (episode_.kind == EpisodeKind::kRest) return state;
+      for (int k = 0; k < 3; ++k) state.V_WO.linear[k] += options_.release_speed_error * mine.normal();
+      for (int k = 0; k < 3; ++k) state.V_WO.angular[k] += options_.release_turn_error * mine.normal();
+    }
+    return state;
+  }
+
+  struct Compared {
+    std::size_t sample;  // of the episode
+    double shift, turn;  // standard deviations, m and rad
+  };
   const belief::Belief& belief_;
   std::size_t object_;
   const LearnPhysicsOptions& options_;
@@ -243,7 +256,7 @@ class Judge {
   geometry::Vector3d p_OQ_;
   std::vector<std::size_t> present_;  // indices of the belief's objects in the simulated scene
   std::size_t place_ = 0;             // of the object among them
-  std::vector<belief::ObjectState> starts_;
+  std::vector<Compared> compared_;
 };
 
 /// The draws at the ends of each coordinate: where even these end alike, there is nothing to learn.
@@ -259,18 +272,11 @@ std::vector<std::size_t> extreme_draws(const std::vector<PhysicalDraw>& draws) {
   return extreme;
 }
 
-/// Simulates these draws; the logarithm of the mean likelihood over the variants, and the least misfit, of each.
-struct Judged {
-  std::vector<double> log_likelihoods;
-  std::vector<double> misfits;
-};
-core::Result<Judged> judge_draws(const Judge& judge, const std::vector<PhysicalDraw>& draws,
-                                 std::span<const std::size_t> chosen, const belief::Belief& belief,
-                                 const simulation::SimulatorFactory& simulators, core::ThreadPool& threads) {
+/// Simulates the motion from these starts and appends the errors.
+core::Status add_runs(const Judge& judge, std::span<const belief::WorldState> starts, const belief::Belief& belief,
+                      const simulation::SimulatorFactory& simulators, core::ThreadPool& threads,
+                      std::vector<double>& errors) {
   PRESCENE_TRY(const auto simulator, simulators(judge.scene(), 1.0));
-  std::vector<belief::WorldState> starts;
-  for (const std::size_t i : chosen)
-    for (int v = 0; v < judge.variants(); ++v) starts.push_back(judge.start(draws[i], v));
   simulation::RunRequest request;
   request.stop.duration = judge.duration();
   request.stop.stop_at_rest = false;
@@ -278,32 +284,27 @@ core::Result<Judged> judge_draws(const Judge& judge, const std::vector<PhysicalD
   request.sample_interval = kSampleInterval;
   std::vector<belief::Trajectory> runs(starts.size());
   simulator->run(starts, request, core::RandomStream(belief.seed, core::Purpose::kLearning), 0, threads, runs);
-  Judged judged;
-  const double count = judge.independent_samples();
-  const auto variants = static_cast<std::size_t>(judge.variants());
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    std::vector<double> logs;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t v = 0; v < variants; ++v) {
-      const std::optional<double> misfit = judge.misfit(runs[i * variants + v]);
-      if (!misfit) continue;
-      least = std::min(least, *misfit);
-      logs.push_back(-0.5 * count * *misfit);
-    }
-    double log_mean = -std::numeric_limits<double>::infinity();
-    if (!logs.empty()) {
-      const double largest = *std::max_element(logs.begin(), logs.end());
-      double sum = 0.0;
-      for (const double value : logs) sum += std::exp(value - largest);
-      log_mean = largest + std::log(sum / static_cast<double>(variants));
-    }
-    judged.log_likelihoods.push_back(log_mean);
-    judged.misfits.push_back(least);
-  }
-  return judged;
+  for (const belief::Trajectory& run : runs) judge.add_errors(run, errors);
+  return core::ok_status();
 }
 
-/// Judges some more draws of an object's closed episode; ends it when all are judged.
+/// Of a rest that a few draws at the ends of each coordinate were simulated for: whether it says anything.
+void probe_rest(const Judge& judge, const LearnPhysicsOptions& options, std::span<const double> errors,
+                belief::MotionRecord& motion, LearnReport& report) {
+  const std::vector<double> misfits = misfits_of(judge.runs(errors));
+  const auto [low, high] = std::minmax_element(misfits.begin(), misfits.end());
+  if (0.5 * judge.independent_samples() * (*high - *low) < kLeastDifference) {  // it stays whatever they are
+    motion.episode.reset();
+  } else if (*low > options.largest_misfit) {
+    motion.episode.reset();
+    ++motion.episodes_unexplained;
+    ++report.unexplained;
+  } else {
+    motion.episode->probed = true;
+  }
+}
+
+/// Simulates some more runs of an object's closed episode; ends it when there are all.
 void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
                    const simulation::SimulatorFactory& simulators, core::ThreadPool& threads, int& runs_left,
                    belief::Belief& belief, LearnReport& report) {
@@ -312,55 +313,51 @@ void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
   const belief::ObjectModel& model = belief::model_of(belief, object);
   const std::vector<PhysicalDraw> draws = belief::draws_of(model, object.physics, belief.seed + index);
   const Judge judge(belief, index, options);
-  std::vector<std::size_t> chosen;
+  std::vector<belief::WorldState> starts;
   const bool probe = episode.kind == EpisodeKind::kRest && !episode.probed;
-  if (probe) {
-    chosen = extreme_draws(draws);
-  } else {
-    const std::size_t first = episode.log_likelihoods.size();
-    const auto most = static_cast<std::size_t>(std::max(1, runs_left / judge.variants()));
-    for (std::size_t i = first; i < std::min(draws.size(), first + most); ++i) chosen.push_back(i);
-  }
-  const auto judged = judge_draws(judge, draws, chosen, belief, simulators, threads);
-  const int runs = static_cast<int>(chosen.size()) * judge.variants();
-  runs_left -= runs;
-  report.runs += runs;
-  if (!judged) {
-    report.failure = "what was learned of '" + object.name + "' is incomplete: " + judged.status().message();
+  const std::size_t wanted = draws.size() * static_cast<std::size_t>(judge.variants());
+  if (!judge.fits(episode.log_likelihoods)) {  // nothing to compare, or begun by another version
     object.motion.episode.reset();
     return;
   }
   if (probe) {
-    const auto [low, high] = std::minmax_element(judged->misfits.begin(), judged->misfits.end());
-    if (0.5 * judge.independent_samples() * (*high - *low) < kLeastDifference) {  // it stays whatever they are
-      object.motion.episode.reset();
-    } else if (*low > options.largest_misfit) {
-      object.motion.episode.reset();
-      ++object.motion.episodes_unexplained;
-      ++report.unexplained;
-    } else {
-      episode.probed = true;
-    }
+    for (const std::size_t i : extreme_draws(draws)) starts.push_back(judge.start(draws[i], std::nullopt));
+  } else {
+    const std::size_t first = episode.log_likelihoods.size() / judge.error_size();
+    for (std::size_t r = first; r < std::min(wanted, first + static_cast<std::size_t>(runs_left)); ++r)
+      starts.push_back(judge.start(draws[r % draws.size()], r));
+  }
+  std::vector<double> errors = probe ? std::vector<double>{} : std::move(episode.log_likelihoods);
+  const core::Status done = add_runs(judge, starts, belief, simulators, threads, errors);
+  runs_left -= static_cast<int>(starts.size());
+  report.runs += static_cast<int>(starts.size());
+  if (!done.ok()) {
+    report.failure = "what was learned of '" + object.name + "' is incomplete: " + done.message();
+    object.motion.episode.reset();
     return;
   }
-  episode.log_likelihoods.insert(episode.log_likelihoods.end(), judged->log_likelihoods.begin(),
-                                 judged->log_likelihoods.end());
-  if (episode.log_likelihoods.size() < draws.size()) return;
-  std::vector<double> logs = std::move(episode.log_likelihoods);
+  if (probe) {
+    probe_rest(judge, options, errors, object.motion, report);
+    return;
+  }
+  if (errors.size() < wanted * judge.error_size()) {
+    episode.log_likelihoods = std::move(errors);
+    return;
+  }
+  const core::TimeNs began_ns = episode.samples.front().stamp_ns;
   const core::TimeNs ended_ns = std::min(episode.samples.back().stamp_ns, belief.stamp_ns);
   object.motion.episode.reset();
-  const double best = *std::max_element(logs.begin(), logs.end());
-  if (!(best >= -0.5 * judge.independent_samples() * options.largest_misfit)) {
+  const core::RandomStream stream(belief.seed, core::Purpose::kLearning, static_cast<std::uint64_t>(began_ns) + 1);
+  const EpisodeEvidence evidence = evidence_of(judge.runs(errors), draws, options.other_cause, stream);
+  if (!(evidence.least_misfit <= options.largest_misfit)) {
     ++object.motion.episodes_unexplained;
     ++report.unexplained;
     return;
   }
-  if (best - *std::min_element(logs.begin(), logs.end()) < kLeastDifference) return;
-  // Something else would have moved it so whatever its parameters are: with that probability, before and after.
-  double evidence = 0.0;
-  for (std::size_t i = 0; i < draws.size(); ++i) evidence += std::exp(draws[i].log_weight + logs[i] - best);
-  for (double& value : logs) value = std::log(std::exp(value - best) + options.other_cause * evidence);
-  object.physics = belief::after_evidence(model, object.physics, belief.seed + index, logs, ended_ns);
+  const auto [low, high] = std::minmax_element(evidence.log_likelihoods.begin(), evidence.log_likelihoods.end());
+  if (*high - *low < kLeastDifference) return;
+  object.physics =
+      belief::after_evidence(model, object.physics, belief.seed + index, evidence.log_likelihoods, ended_ns);
   ++report.lessons;
 }
 

@@ -99,6 +99,29 @@ MotionEpisode motion_episode(const belief::Belief& belief, const MotionSample& n
 
 }  // namespace
 
+std::vector<belief::KinematicBody::Waypoint> with_corners(const std::vector<belief::KinematicBody::Waypoint>& seen) {
+  std::vector<belief::KinematicBody::Waypoint> path;
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    path.push_back(seen[k]);
+    if (k == 0 || k + 2 >= seen.size()) continue;
+    const auto velocity = [&](std::size_t from) -> geometry::Vector3d {
+      return (seen[from + 1].X_WG.translation - seen[from].X_WG.translation) / (seen[from + 1].time - seen[from].time);
+    };
+    const geometry::Vector3d before = velocity(k - 1), after = velocity(k + 1), change = before - after;
+    const double fastest = std::max(before.norm(), after.norm());
+    if (!(change.norm() > 0.2 * fastest)) continue;
+    const double length = seen[k + 1].time - seen[k].time;
+    const geometry::Vector3d step = seen[k + 1].X_WG.translation - seen[k].X_WG.translation;
+    const double corner = (step - length * after).dot(change) / change.squaredNorm();
+    if (!(corner > 0.02 * length && corner < 0.98 * length)) continue;
+    Pose X_WG = geometry::interpolate(seen[k].X_WG, seen[k + 1].X_WG, corner / length);
+    X_WG.translation =
+        0.5 * (seen[k].X_WG.translation + corner * before + seen[k + 1].X_WG.translation - (length - corner) * after);
+    path.push_back({seen[k].time + corner, X_WG});
+  }
+  return path;
+}
+
 void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsOptions& options, MotionRecord& record) {
   const belief::ObjectBelief& mine = belief.objects[static_cast<std::size_t>(object)];
   const bool judging = record.episode && record.episode->closed;

@@ -2,6 +2,8 @@
 // When an object lies still, starts to move, is let go, and lies still again: the episodes that are learned from.
 #pragma once
 
+#include <vector>
+
 #include "prescene/filter/operators/learn_physics.h"
 
 namespace prescene::filter {
@@ -9,5 +11,10 @@ namespace prescene::filter {
 /// Brings the motion record of one object up to the belief's last frame; a new or ended episode is in the record.
 void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsOptions& options,
                    belief::MotionRecord& record);
+
+/// A body that is seen at each frame starts and stops between frames. Where its velocity changes, the interval gets the
+/// corner at which the straight motions before and after it meet: joining the frames by straight lines would let a
+/// pusher brake for a frame's length, and what it pushes leave it too early.
+std::vector<belief::KinematicBody::Waypoint> with_corners(const std::vector<belief::KinematicBody::Waypoint>& seen);
 
 }  // namespace prescene::filter

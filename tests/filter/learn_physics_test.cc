@@ -23,18 +23,19 @@ struct Learned {
   belief::MotionRecord motion;
   LearnReport total;
   int most_runs_a_frame = 0;
+  std::vector<belief::ParameterEstimate> parameters;
   belief::ParameterEstimate friction;
 };
 
-/// Follows the frames of a push; the object's record goes from frame to frame as in the filter.
-Learned learn(const Push& push, std::uint64_t seed, core::ThreadPool& threads,
-              const filter::LearnPhysicsOptions& options = {}) {
+/// Follows the frames of one recording; the object's record goes from frame to frame as in the filter, whose seed is
+/// `filter_seed`.
+Learned learn(std::vector<Belief> frames, std::uint64_t filter_seed, core::ThreadPool& threads) {
   Learned learned;
-  std::vector<Belief> frames = tracked_push(push, seed, threads);
   for (Belief& belief : frames) {
+    belief.seed = filter_seed;
     belief.objects[0].physics = learned.physics;
     belief.objects[0].motion = learned.motion;
-    const LearnReport report = filter::learn_physics(belief, options, push_simulators(), threads);
+    const LearnReport report = filter::learn_physics(belief, {}, push_simulators(), threads);
     EXPECT_EQ(report.failure, "");
     learned.total.runs += report.runs;
     learned.total.lessons += report.lessons;
@@ -43,8 +44,29 @@ Learned learn(const Push& push, std::uint64_t seed, core::ThreadPool& threads,
     learned.physics = belief.objects[0].physics;
     learned.motion = belief.objects[0].motion;
   }
-  learned.friction = belief::parameter_estimates(frames[0].scene->models[0], learned.physics)[0];
+  learned.parameters = belief::parameter_estimates(frames[0].scene->models[0], learned.physics);
+  learned.friction = learned.parameters[0];
   return learned;
+}
+
+Learned learn(const Push& push, std::uint64_t seed, core::ThreadPool& threads) {
+  return learn(tracked_push(push, seed, threads), seed, threads);
+}
+
+bool holds(const belief::ParameterEstimate& estimate, double truth) {
+  return estimate.low <= truth && truth <= estimate.high;
+}
+
+/// One of the drops of a test, whose parameters are drawn from the priors.
+Drop drawn_drop(std::uint64_t seed) {
+  core::RandomStream draws(seed, core::Purpose::kParameters);
+  Drop drop;
+  drop.friction = std::clamp(0.4 + 0.1 * draws.normal(), 0.1, 0.8);
+  drop.restitution = std::clamp(0.2 + 0.1 * draws.normal(), 0.0, 0.6);
+  drop.height = draws.uniform(0.05, 0.2);
+  drop.over = draws.uniform(-0.01, 0.03);
+  drop.tilt = draws.uniform(-0.2, 0.2);
+  return drop;
 }
 
 class LearnPhysics : public ::testing::Test {
@@ -130,7 +152,7 @@ TEST_F(LearnPhysics, IsTheSameForAnyNumberOfThreads) {
 /// After one push the 90 % interval holds the true friction, which is drawn from the prior, in 85 to 95 % of pushes.
 TEST_F(LearnPhysics, IntervalsHoldTheTruthAsOftenAsTheySay) {
   constexpr int kPushes = 60;
-  int holds = 0, lessons = 0;
+  int held = 0, lessons = 0;
   double width = 0.0;
   for (int i = 0; i < kPushes; ++i) {
     core::RandomStream draws(static_cast<std::uint64_t>(i), core::Purpose::kParameters);
@@ -141,17 +163,63 @@ TEST_F(LearnPhysics, IntervalsHoldTheTruthAsOftenAsTheySay) {
     push.aside = draws.uniform(-0.015, 0.015);
     const Learned learned = learn(push, static_cast<std::uint64_t>(100 + i), threads_);
     lessons += learned.total.lessons;
-    holds += learned.friction.low <= push.friction && push.friction <= learned.friction.high;
+    held += holds(learned.friction, push.friction);
     width += (learned.friction.high - learned.friction.low) / kPushes;
   }
   std::printf(
       "compared: friction after one push, 90 %% interval: holds the truth in %d of %d, width %.3f of the prior's "
       "%.3f\n",
-      holds, kPushes, width, 0.72);
+      held, kPushes, width, 0.72);
   EXPECT_GE(lessons, kPushes * 9 / 10);
   // 90 % of 60, with the room of a false alarm in a thousand on either side.
-  EXPECT_GE(holds, 46);
+  EXPECT_GE(held, 46);
   EXPECT_LT(width, 0.40);
+}
+
+/// What is dropped onto an edge tumbles, and a small error of its start ends elsewhere. Which runs come near to what
+/// was seen is then mostly chance, which must not be taken for knowledge: the filter's seed decides about the runs, and
+/// what is learned of one recording must not depend on it.
+TEST_F(LearnPhysics, SeedsAgreeAboutWhatIsDroppedOntoAnEdge) {
+  constexpr int kSeeds = 3;
+  double between = 0.0, stated = 0.0;
+  int lessons = 0;
+  for (const std::uint64_t drop : {100, 101, 104}) {
+    const std::vector<Belief> frames = tracked_drop(drawn_drop(drop), drop, threads_);
+    std::vector<Learned> learned;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) learned.push_back(learn(frames, seed, threads_));
+    for (std::size_t k = 0; k < learned[0].parameters.size(); ++k) {
+      double mean = 0.0;
+      for (const Learned& one : learned) mean += one.parameters[k].mean / kSeeds;
+      for (const Learned& one : learned) {
+        const belief::ParameterEstimate& estimate = one.parameters[k];
+        between += (estimate.mean - mean) * (estimate.mean - mean) / (kSeeds - 1);
+        stated += estimate.standard_deviation * estimate.standard_deviation / kSeeds;
+      }
+    }
+    for (const Learned& one : learned) lessons += one.total.lessons;
+  }
+  EXPECT_GE(lessons, kSeeds) << "nothing is learned: the test says nothing";
+  EXPECT_LT(std::sqrt(between), 0.5 * std::sqrt(stated));
+}
+
+/// As for pushes: friction and restitution are drawn from their priors, and the box is simulated by another stepper.
+TEST_F(LearnPhysics, IntervalsHoldTheTruthAfterDropsOntoAnEdge) {
+  constexpr int kDrops = 60;
+  int lessons = 0, friction = 0, restitution = 0;
+  for (int i = 0; i < kDrops; ++i) {
+    const auto seed = static_cast<std::uint64_t>(200 + i);
+    const Drop drop = drawn_drop(seed);
+    const Learned learned = learn(tracked_drop(drop, seed, threads_), seed, threads_);
+    lessons += learned.total.lessons;
+    friction += holds(learned.parameters[0], drop.friction);
+    restitution += holds(learned.parameters[1], drop.restitution);
+  }
+  std::printf("compared: 90 %% intervals after one drop hold the truth: friction in %d, restitution in %d of %d\n",
+              friction, restitution, kDrops);
+  EXPECT_GE(lessons, kDrops / 2);
+  // 90 % of 60, with the room of a false alarm in a thousand.
+  EXPECT_GE(friction, 46);
+  EXPECT_GE(restitution, 46);
 }
 
 }  // namespace

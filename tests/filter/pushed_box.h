@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A box on a table that a known pusher pushes, and what a tracker reports of it: poses with noise of the covariance
-// that is stated. Its motion is simulated with a friction that the belief does not know.
+// that is stated. Its motion is simulated with a friction that the belief does not know. Or a hand drops the box onto
+// the edge of a block, from where it tumbles to the table.
 #pragma once
 
 #include <memory>
@@ -28,6 +29,21 @@ struct Push {
 std::shared_ptr<const belief::Scene> push_scene(const Push& push);
 /// Bullet's or the lockstep stepper, whichever can do it.
 simulation::SimulatorFactory push_simulators();
+struct Drop {
+  double friction = 0.4;     ///< The true one.
+  double restitution = 0.2;  ///< The true one.
+  double height = 0.1;       ///< m, of the box above the block's top.
+  double over = 0.01;        ///< m by which the box's middle is outside the block's edge.
+  double tilt = 0.1;         ///< rad about the edge.
+  int frames = 50;           ///< At 15 Hz; the hand lets go after a fifth of them.
+};
+
+/// The scene as a user describes it: friction 0.4 +- 0.1, restitution 0.2 +- 0.1. A hand holds the box.
+std::shared_ptr<const belief::Scene> drop_scene(const Drop& drop);
+/// As tracked_push. The hand gives the box a small velocity (0.05 m/s and 0.3 rad/s in each direction), which the
+/// tracker knows as well as that.
+std::vector<belief::Belief> tracked_drop(const Drop& drop, std::uint64_t seed, core::ThreadPool& threads);
+
 /// One belief a frame, as a tracker would have it that learned nothing.
 std::vector<belief::Belief> tracked_push(const Push& push, std::uint64_t seed, core::ThreadPool& threads);
 

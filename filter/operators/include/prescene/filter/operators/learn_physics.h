@@ -7,6 +7,9 @@
 //
 // Frames in which nothing happens change nothing. Posterior = prior times likelihood; the simulator's prediction of a
 // whole piece of motion stands in for the likelihood of its frames, through the tracked poses and their covariances.
+// What impacts throw about is hardly predictable: how much a run's likeness to what was seen says is found out with the
+// runs themselves, one of which takes the part of what was seen in turn (approximate Bayesian computation with a kernel
+// chosen by cross-validation [Sisson et al. 2018]).
 #pragma once
 
 #include <string>
@@ -25,7 +28,7 @@ struct LearnPhysicsOptions {
   double start_shift = 0.008;
   /// rad. ... or turned further, each at least three of its standard deviations. Range 0.01 to 1. Chosen.
   double start_turn = 0.09;
-  /// count. Starts a draw is simulated from, drawn from the start's covariance; the same for all draws. Range 1 to 64.
+  /// count. Runs of a draw, each from a start of its own that is drawn from the start's covariance. Range 1 to 64.
   /// Chosen.
   int variants = 4;
   /// count. Simulated at most in a frame, so that none takes long. Range 1 to 10000. Chosen.
@@ -39,8 +42,11 @@ struct LearnPhysicsOptions {
   double turn_floor = 0.015;
   /// s. Samples nearer to each other count as one. Range 0.01 to 1. Chosen.
   double correlation_time = 0.15;
-  /// m/s. Standard deviation of the velocity with which something is let go. Range 0 to 1. Chosen.
-  double release_speed_error = 0.03;
+  /// m/s. Standard deviation of the velocity with which something is let go, about the tracked one. Range 0 to 1.
+  /// Chosen.
+  double release_speed_error = 0.05;
+  /// rad/s. ... and of the velocity of turning. Range 0 to 10. Chosen.
+  double release_turn_error = 0.3;
   /// squared deviations. Mean squared standardised error of the best run beyond which nothing was explained. Range 1
   /// to 49. Chosen.
   double largest_misfit = 12.0;
