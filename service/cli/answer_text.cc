@@ -49,9 +49,12 @@ std::string learned_text(const nlohmann::ordered_json& item) {
             fixed_text(parameter.value("standard_deviation", 0.0), 3) +
             " (90 %: " + fixed_text(parameter.value("low", 0.0), 3) + " to " +
             fixed_text(parameter.value("high", 0.0), 3) + ")\n";
-  const double learned = 1e-9 * static_cast<double>(item.value("learned_ns", std::int64_t{0}));
-  return item.value("object", "") + ", learned from " + counted(static_cast<std::size_t>(lessons), "motion") +
-         ", the last at " + fixed_text(learned, 1) + " s:\n" + text;
+  std::string when;  // not told by a service of another version
+  if (const auto learned = item.find("learned_s"); learned != item.end() && learned->is_number())
+    when = learned->get<double>() < 0.0 ? ", the last in an earlier session"
+                                        : ", the last at " + fixed_text(learned->get<double>(), 1) + " s";
+  return item.value("object", "") + ", learned from " + counted(static_cast<std::size_t>(lessons), "motion") + when +
+         ":\n" + text;
 }
 
 std::string impulse_text(const nlohmann::ordered_json& impulse) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "final_states.h"
 #include "prescene/belief/json.h"
@@ -11,6 +12,7 @@
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/live/bus_replay.h"
+#include "prescene/service/live/query_worker.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/recording/foreseen.h"
 #include "prescene/service/recording/replay_input.h"
@@ -188,9 +190,12 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   SupportScore supports;
   FinalStates states;
   SessionReport report(input.scene(), settings, backends);
+  report.set_proposals(options.proposals);
   ordered_json steps = ordered_json::array();
+  std::optional<core::TimeNs> first_ns;
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
     const BeliefSummary summary = summary_of(*at.belief());
+    if (!first_ns) first_ns = summary.stamp_ns;
     score.add(summary);
     states.add(summary);
     if (!options.report.empty()) {
@@ -202,6 +207,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     if (!context.options().json) return core::ok_status();  // Long recordings have many steps.
     ordered_json record = to_json(step.record);
     record["objects"] = to_json(summary)["objects"];
+    add_learned_seconds(*first_ns, record["objects"]);
     record["supports"] = ordered_json::array();
     for (const SupportFrame& frame : support_frames) record["supports"].push_back(to_json(frame));
     steps.push_back(std::move(record));
@@ -254,6 +260,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"damaged_records", damaged.count()},
        {"unchecked", summary->unchecked},
        {"learned", options.learned},
+       {"proposals", options.proposals},
        {"degraded", degraded_json(*summary)},
        {"objects", states.json()},
        {"tracking", tracking_json(rows)},
@@ -261,6 +268,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"steps", steps}},
       std::to_string(summary->steps) + " steps from " + std::to_string(summary->messages) + " messages, " +
           std::to_string(summary->skipped) + " frames skipped\n" +
+          (options.proposals.empty() ? "" : "proposals of " + options.proposals + "\n") +
           (summary->followed_step_records ? std::to_string(summary->compared - summary->different) + " of " +
                                                 std::to_string(summary->compared) + " steps have the recorded bits\n"
                                           : "") +

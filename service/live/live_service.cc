@@ -339,6 +339,7 @@ void LiveService::Impl::look_after_frames() {
   try {
     if (const auto step = tracker->step(now_ns)) {
       record_step(step->record);  // first: whatever fails below, the step was made
+      if (step->record.step == 1) worker->begin_session(step->record.stamp_ns);
       ++steps;
       since_frame.emplace();
       step_seconds = step->record.seconds;

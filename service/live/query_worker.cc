@@ -52,6 +52,15 @@ std::string error_answer(const std::string& id, const core::Status& error) {
   return belief::json_text(answer);
 }
 
+void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& objects) {
+  for (nlohmann::ordered_json& object : objects) {
+    const core::TimeNs learned_ns = object.value("learned_ns", core::TimeNs{0});
+    object["learned_s"] = object.value("lessons", 0) > 0
+                              ? nlohmann::ordered_json(1e-9 * static_cast<double>(learned_ns - first_frame_ns))
+                              : nlohmann::ordered_json();
+  }
+}
+
 QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
                          std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
     : backends_(backends),
@@ -225,7 +234,10 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query) {
   // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
   const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)
                                                   : queries::answer(*belief, query, context);
-  return {belief::json_text(belief::to_json(answer)), answer.what.index() > 0};
+  nlohmann::ordered_json document = belief::to_json(answer);
+  if (std::holds_alternative<belief::WhereAnswer>(answer.what))
+    add_learned_seconds(session_begin_ns_, document["where"]["items"]);
+  return {belief::json_text(document), answer.what.index() > 0};
 }
 
 void QueryWorker::refuse(const std::string& id, const core::Status& reason) {

@@ -287,6 +287,7 @@ core::Status SessionReport::write(const std::filesystem::path& path, const Track
   contents.facts = {{"steps", std::to_string(summaries_.size())},
                     {"objects", std::to_string(scene_->objects.size())},
                     {"supports", std::to_string(scene_->supports.size())}};
+  if (!proposals_.empty()) contents.facts.push_back({"proposals", proposals_});
   interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures()}};
   contents.sections.push_back(std::move(seen));
   add_changes(contents);

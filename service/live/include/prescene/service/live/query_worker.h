@@ -4,12 +4,14 @@
 // So `where` never waits for a simulation.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <thread>
 
@@ -74,6 +76,9 @@ class QueryWorker {
 
   QueryCounts counts() const;
 
+  /// The stamp of the session's first frame, from which answers to `where` count "learned_s". Any thread.
+  void begin_session(core::TimeNs first_frame_ns) { session_begin_ns_ = first_frame_ns; }
+
  private:
   // No exception leaves these.
   void read_questions();
@@ -104,6 +109,7 @@ class QueryWorker {
   std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
   AnswerSink on_answer_;
   core::Cancellation stop_;
+  std::atomic<core::TimeNs> session_begin_ns_{0};
 
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable read_changed_, simulate_changed_;
@@ -119,5 +125,10 @@ class QueryWorker {
 
 /// {"id": `id` unless it is empty, "error": why, "code": ...}, see belief::error_to_json.
 std::string error_answer(const std::string& id, const core::Status& error);
+
+/// Adds "learned_s" to each item of an answer to `where`, or object of a summary of a belief: when the last motion that
+/// it was learned from ended, in seconds after the session's first frame. Negative = in an earlier session, of which a
+/// learned file told; null = nothing was learned.
+void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& objects);
 
 }  // namespace prescene::service

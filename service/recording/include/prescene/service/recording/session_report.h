@@ -46,6 +46,9 @@ class SessionReport {
   /// An answer as JSON, and when it was asked for (s into the session).
   void add_answer(double at, const std::string& json) { answers_.emplace_back(at, json); }
 
+  /// The file of `prescene train` that objects were looked for with; "" = none.
+  void set_proposals(std::string file) { proposals_ = std::move(file); }
+
   /// What was foreseen beside what came.
   void set_foreseen(const ForeseenAndCame& foreseen) {
     comparisons_ = foreseen.comparisons();
@@ -80,6 +83,7 @@ class SessionReport {
   std::vector<std::pair<double, std::string>> answers_;
   std::vector<Comparison> comparisons_;
   bool came_is_truth_ = false;
+  std::string proposals_;
 };
 
 }  // namespace prescene::service
