@@ -2,11 +2,12 @@
 // What the filter reaches: physics that stays uncertain and is learned, tracking and finding where the truth is known,
 // confidence, cost and memory.
 //
-//   bench_filter [--all] [--seed=N] [--sequences=N] [--benchmark_out=PATH]
+//   bench_filter [--all] [--only=PART] [--seed=N] [--sequences=N] [--benchmark_out=PATH]
 //
 // --all: as many seeds, frames and rooms as the targets ask for, which takes hours. --seed: the first seed (301).
-// --sequences: of each kind of the simulated suite (2).
+// --sequences: of each kind of the simulated suite (2). --only: memory, cost, physics, tracking or finding alone.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -23,7 +24,10 @@ namespace {
 struct FilterArguments {
   FilterEffort effort;
   std::string out;
+  std::string only;  // "" = all parts
 };
+
+constexpr std::array<std::string_view, 5> kParts = {"memory", "cost", "physics", "tracking", "finding"};
 
 bool parse(int count, char** words, FilterArguments* arguments) {
   for (int i = 1; i < count; ++i)
@@ -39,6 +43,12 @@ bool parse(int count, char** words, FilterArguments* arguments) {
     if (word == "--all") continue;
     if (word.starts_with("--benchmark_out=")) {
       arguments->out = value;
+    } else if (word.starts_with("--only=")) {
+      arguments->only = value;
+      if (std::find(kParts.begin(), kParts.end(), arguments->only) == kParts.end()) {
+        std::fprintf(stderr, "%s: give memory, cost, physics, tracking or finding\n", words[i]);
+        return false;
+      }
     } else if (word.starts_with("--seed=")) {
       const long n = number(1);
       if (n < 1) return false;
@@ -48,8 +58,10 @@ bool parse(int count, char** words, FilterArguments* arguments) {
       if (n < 1) return false;
       arguments->effort.sequences = static_cast<int>(std::min(n, 1000L));
     } else {
-      std::fprintf(stderr, "bench_filter [--all] [--seed=N] [--sequences=N] [--benchmark_out=PATH]; this is none: %s\n",
-                   words[i]);
+      std::fprintf(
+          stderr,
+          "bench_filter [--all] [--only=PART] [--seed=N] [--sequences=N] [--benchmark_out=PATH]; this is none: %s\n",
+          words[i]);
       return false;
     }
   }
@@ -62,16 +74,20 @@ int run(const FilterArguments& arguments) {
   Report report("filter", best_simd_target());
   report.note("seeds from " + std::to_string(effort.seed) + " on; settings were chosen on others");
   const core::Stopwatch watch;
-  const auto part = [&](const char* what, const core::Status& status) {
+  const auto part = [&](const char* what, const auto& add) {
+    if (!arguments.only.empty() && arguments.only != what) return true;
+    const core::Status status = add();
     std::fprintf(stderr, "%s: %s, %.0f s so far\n", what, status.ok() ? "done" : status.message().c_str(),
                  watch.seconds());
     return status.ok();
   };
-  const bool good = part("memory", add_memory_targets(effort, threads, &report)) &&
-                    part("cost", add_cost_targets(effort, threads, &report)) &&
-                    part("physics", add_physics_targets(effort, threads, &report)) &&
-                    part("tracking", add_tracking_targets(effort, tests::data_dir("carried_cube"), threads, &report)) &&
-                    part("finding", add_finding_targets(effort, tests::data_dir("ycb_video"), threads, &report));
+  const bool good =
+      part("memory", [&] { return add_memory_targets(effort, threads, &report); }) &&
+      part("cost", [&] { return add_cost_targets(effort, threads, &report); }) &&
+      part("physics", [&] { return add_physics_targets(effort, threads, &report); }) &&
+      part("tracking",
+           [&] { return add_tracking_targets(effort, tests::data_dir("carried_cube"), threads, &report); }) &&
+      part("finding", [&] { return add_finding_targets(effort, tests::data_dir("ycb_video"), threads, &report); });
   std::fputs(report.text().c_str(), stdout);
   const int written = report.finish(arguments.out);
   return good ? written : 1;

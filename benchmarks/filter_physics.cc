@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Physical parameters: still frames leave live answers at the priors, and a push tells friction.
+// Physical parameters: still frames leave live answers at the priors, a push tells friction, and a drop onto an edge
+// little.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "benchmarks/filter_targets.h"
 #include "prescene/belief/json.h"
@@ -102,14 +104,12 @@ core::Status add_law(const FilterEffort& effort, core::ThreadPool& threads, Repo
 
 struct Learned {
   bool lesson = false;
-  bool holds = false;
-  double width = 0.0;
+  std::vector<belief::ParameterEstimate> parameters;
 };
 
-Learned learned_from(const filter_tests::Push& push, std::uint64_t seed, core::ThreadPool& threads) {
+Learned learned_from(std::vector<belief::Belief> frames, core::ThreadPool& threads) {
   belief::PhysicalBelief physics;
   belief::MotionRecord motion;
-  std::vector<belief::Belief> frames = filter_tests::tracked_push(push, seed, threads);
   for (belief::Belief& belief : frames) {
     belief.objects[0].physics = physics;
     belief.objects[0].motion = motion;
@@ -117,13 +117,42 @@ Learned learned_from(const filter_tests::Push& push, std::uint64_t seed, core::T
     physics = belief.objects[0].physics;
     motion = belief.objects[0].motion;
   }
-  const auto friction = belief::parameter_estimates(frames[0].scene->models[0], physics)[0];
-  return {physics.lessons > 0, friction.low <= push.friction && push.friction <= friction.high,
-          friction.high - friction.low};
+  return {physics.lessons > 0, belief::parameter_estimates(frames[0].scene->models[0], physics)};
+}
+
+bool holds(const belief::ParameterEstimate& estimate, double truth) {
+  return estimate.low <= truth && truth <= estimate.high;
+}
+
+/// A box is dropped onto an edge and tumbles: little can be learned, and no more must be.
+void add_drops(const FilterEffort& effort, core::ThreadPool& threads, Report* report) {
+  int held = 0, lessons = 0;
+  for (int i = 0; i < effort.pushes; ++i) {
+    const std::uint64_t seed = 1000 * effort.seed + static_cast<std::uint64_t>(i);
+    core::RandomStream draws(seed, core::Purpose::kParameters);
+    filter_tests::Drop drop;
+    drop.friction = std::clamp(0.4 + 0.1 * draws.normal(), 0.1, 0.8);
+    drop.restitution = std::clamp(0.2 + 0.1 * draws.normal(), 0.0, 0.6);
+    drop.height = draws.uniform(0.05, 0.2);
+    drop.over = draws.uniform(-0.01, 0.03);
+    drop.tilt = draws.uniform(-0.2, 0.2);
+    const Learned learned = learned_from(filter_tests::tracked_drop(drop, seed, threads), threads);
+    lessons += learned.lesson;
+    held += holds(learned.parameters[0], drop.friction) + holds(learned.parameters[1], drop.restitution);
+  }
+  report->add({.work = "friction and restitution after one drop onto an edge: 90 % interval holds the truth",
+               .better = Better::kWithin,
+               .must = Goal{85.0, 95.0},
+               .aim = Goal{88.0, 92.0},
+               .reached = 50.0 * held / std::max(1, effort.pushes),
+               .unit = "%",
+               .n = 2 * effort.pushes,
+               .baseline = "the simulated values, drawn from the priors",
+               .why = std::to_string(lessons) + " of " + std::to_string(effort.pushes) + " drops were learned from"});
 }
 
 void add_pushes(const FilterEffort& effort, core::ThreadPool& threads, Report* report) {
-  int holds = 0, lessons = 0;
+  int held = 0, lessons = 0;
   double width = 0.0;
   for (int i = 0; i < effort.pushes; ++i) {
     const std::uint64_t seed = 1000 * effort.seed + static_cast<std::uint64_t>(i);
@@ -133,10 +162,11 @@ void add_pushes(const FilterEffort& effort, core::ThreadPool& threads, Report* r
     push.mass = std::clamp(0.4 + 0.05 * draws.normal(), 0.2, 0.6);
     push.speed = draws.uniform(0.3, 0.8);
     push.aside = draws.uniform(-0.015, 0.015);
-    const Learned learned = learned_from(push, seed, threads);
+    const Learned learned = learned_from(filter_tests::tracked_push(push, seed, threads), threads);
+    const belief::ParameterEstimate& friction = learned.parameters[0];
     lessons += learned.lesson;
-    holds += learned.holds;
-    width += learned.width / effort.pushes;
+    held += holds(friction, push.friction);
+    width += (friction.high - friction.low) / effort.pushes;
   }
   constexpr double kPriorWidth = 0.9 * 0.8;  // 90 % of a uniform prior from 0.1 to 0.9
   const std::string why = std::to_string(lessons) + " of the pushes were learned from";
@@ -144,7 +174,7 @@ void add_pushes(const FilterEffort& effort, core::ThreadPool& threads, Report* r
                .better = Better::kWithin,
                .must = Goal{85.0, 95.0},
                .aim = Goal{88.0, 92.0},
-               .reached = 100.0 * holds / std::max(1, effort.pushes),
+               .reached = 100.0 * held / std::max(1, effort.pushes),
                .unit = "%",
                .n = effort.pushes,
                .baseline = "the simulated friction, drawn from the prior",
@@ -164,6 +194,7 @@ void add_pushes(const FilterEffort& effort, core::ThreadPool& threads, Report* r
 core::Status add_physics_targets(const FilterEffort& effort, core::ThreadPool& threads, Report* report) {
   PRESCENE_RETURN_IF_ERROR(add_law(effort, threads, report));
   add_pushes(effort, threads, report);
+  add_drops(effort, threads, report);
   return core::ok_status();
 }
 
