@@ -23,6 +23,9 @@ double sharpness_of(int k) { return k + 1 == kSharpnesses ? 0.0 : std::exp2(-k);
 /// than a hundred draws do not tell more.
 constexpr double kLeastWidth = 0.02;
 
+/// Bounds the score of a twin whose draw is ruled out.
+constexpr double kLeastDensity = 1e-12;
+
 /// Mean squares by which each run is off what was seen, or off a twin.
 std::vector<double> misfits_from(const EpisodeRuns& runs, std::span<const double> seen) {
   const auto length = static_cast<std::size_t>(kErrorSize * runs.samples);
@@ -73,7 +76,7 @@ class Evidence {
       evidence += std::exp(draws_[i].log_weight) * result[i];
     }
     for (std::size_t i = 0; i < draws_.size(); ++i)
-      if (i != left_out) result[i] += other_cause_ * evidence / all;
+      if (i != left_out && all > 0.0) result[i] += other_cause_ * evidence / all;
     return result;
   }
 
@@ -83,7 +86,7 @@ class Evidence {
     double sum = 0.0, squares = 0.0;
     for (std::size_t i = 0; i < draws_.size(); ++i)
       sum += weights.emplace_back(std::exp(draws_[i].log_weight) * likelihoods[i]);
-    if (!(sum > 0.0)) return -kNever;
+    if (!(sum > 0.0)) return static_cast<double>(draws_.front().uniforms.size()) * std::log(kLeastDensity);
     for (double& weight : weights) {
       weight /= sum;
       squares += weight * weight;
@@ -104,7 +107,7 @@ class Evidence {
         const double off = (coordinates_[i * size + d] - coordinates_[truth * size + d]) / width;
         density += weights[i] * std::exp(-0.5 * off * off);
       }
-      score += std::log(std::max(density / width, 1e-12));
+      score += std::log(std::max(density / width, kLeastDensity));
     }
     return score;
   }
@@ -140,14 +143,13 @@ struct TwinScore {
 /// The least sharp kernel whose mean score is less than a standard error below the best: sharper ones are not known to
 /// be better (the one-standard-error rule of cross-validation [Breiman et al. 1984]).
 double chosen_sharpness(const std::vector<TwinScore>& twins) {
-  if (twins.empty()) return 0.0;
+  double all = 0.0;
+  for (const TwinScore& twin : twins) all += twin.weight;
+  if (!(all > 0.0)) return 0.0;
   const auto mean = [&](auto value) {
-    double sum = 0.0, weights = 0.0;
-    for (const TwinScore& twin : twins) {
-      sum += twin.weight * value(twin.scores);
-      weights += twin.weight;
-    }
-    return sum / weights;
+    double sum = 0.0;
+    for (const TwinScore& twin : twins) sum += twin.weight * value(twin.scores);
+    return sum / all;
   };
   std::size_t best = 0;
   std::vector<double> means;
@@ -182,7 +184,7 @@ EpisodeEvidence evidence_of(const EpisodeRuns& runs, const std::vector<PhysicalD
   if (!std::isfinite(result.least_misfit)) return result;
   std::vector<TwinScore> twins;
   for (std::size_t i = 0; i < draws.size(); ++i) {
-    // Another run's number of each draw, so that no start is preferred.
+    // Not always the first run of a draw, so that no start is preferred.
     const std::size_t twin = i + draws.size() * (i % (evidence.runs() / draws.size()));
     const std::span<const double> run = evidence.run(twin);
     if (run[0] == kNoPrediction) continue;
@@ -198,10 +200,12 @@ EpisodeEvidence evidence_of(const EpisodeRuns& runs, const std::vector<PhysicalD
     if (!scores.empty()) twins.push_back({std::move(scores), std::exp(draws[i].log_weight)});
   }
   result.sharpness = chosen_sharpness(twins);
-  if (result.sharpness > 0.0) {
-    result.log_likelihoods = evidence.likelihoods(misfits, result.sharpness, draws.size());
-    for (double& value : result.log_likelihoods) value = std::log(value);
-  }
+  if (!(result.sharpness > 0.0)) return result;
+  const std::vector<double> likelihoods = evidence.likelihoods(misfits, result.sharpness, draws.size());
+  double probability = 0.0;
+  for (std::size_t i = 0; i < draws.size(); ++i) probability += std::exp(draws[i].log_weight) * likelihoods[i];
+  if (!(probability > 0.0)) return result;  // the draws that remain explain nothing
+  for (std::size_t i = 0; i < draws.size(); ++i) result.log_likelihoods[i] = std::log(likelihoods[i]);
   return result;
 }
 
