@@ -235,8 +235,10 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query) {
   const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)
                                                   : queries::answer(*belief, query, context);
   nlohmann::ordered_json document = belief::to_json(answer);
-  if (std::holds_alternative<belief::WhereAnswer>(answer.what))
-    add_learned_seconds(session_begin_ns_, document["where"]["items"]);
+  // Before the first frame nothing was learned in this session.
+  if (const core::TimeNs begin_ns = session_begin_ns_;
+      begin_ns != 0 && std::holds_alternative<belief::WhereAnswer>(answer.what))
+    add_learned_seconds(begin_ns, document["where"]["items"]);
   return {belief::json_text(document), answer.what.index() > 0};
 }
 

@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 
@@ -38,6 +40,28 @@ nlohmann::ordered_json without_times(const std::string& answer) {
     if (document.contains(task))
       for (const char* time : {"wall_seconds", "cpu_seconds"}) document[task].erase(time);
   return document;
+}
+
+/// Stamps count from 1970, which tells nobody anything.
+TEST(QueryWorker, WhereTellsInSecondsOfTheSessionWhenParametersWereLearned) {
+  constexpr core::TimeNs kBegin = 1'700'000'000'000'000'000;
+  const auto learned_s = [](std::optional<double> seconds, bool is_begun) {
+    const auto belief = tests::belief_of(tests::kBoxScene);
+    belief->step = 9;
+    if (seconds) {
+      belief->objects[0].physics.lessons = 1;
+      belief->objects[0].physics.learned_ns = kBegin + std::llround(1e9 * *seconds);
+    }
+    WorkerUnderTest worker({}, belief);
+    if (is_begun) worker.begin_session(kBegin);
+    worker.ask(R"({"where": {}})");
+    const auto item = nlohmann::json::parse(worker.answers(1)[0]).at("where").at("items").at(0);
+    return item.value("learned_s", nlohmann::json("absent"));
+  };
+  EXPECT_NEAR(learned_s(12.3, true).get<double>(), 12.3, 1e-6);
+  EXPECT_NEAR(learned_s(-4.0, true).get<double>(), -4.0, 1e-6) << "in an earlier session";
+  EXPECT_TRUE(learned_s({}, true).is_null());
+  EXPECT_EQ(learned_s(12.3, false), "absent");
 }
 
 TEST(QueryWorker, NoQuestionKeepsTheOthersWaitingForEver) {

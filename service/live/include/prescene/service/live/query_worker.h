@@ -76,7 +76,8 @@ class QueryWorker {
 
   QueryCounts counts() const;
 
-  /// The stamp of the session's first frame, from which answers to `where` count "learned_s". Any thread.
+  /// The stamp of the session's first frame, from which answers to `where` count "learned_s"; they do without before.
+  /// From any thread.
   void begin_session(core::TimeNs first_frame_ns) { session_begin_ns_ = first_frame_ns; }
 
  private:
