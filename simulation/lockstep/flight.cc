@@ -52,15 +52,27 @@ HWY_INLINE void store(const Mat3<V>& m, const Rows<9>& rows, int at) {
   store(m.r2, Rows<3>{rows[6], rows[7], rows[8]}, at);
 }
 
-void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* state) {
+HWY_INLINE std::uint32_t bits_of_slots(std::span<const std::uint8_t> wanted, int slot) {
+  const auto count = static_cast<int>(wanted.size());
+  std::uint32_t bits = 0;
+  for (int i = 0; i < static_cast<int>(hn::Lanes(D())) && slot + i < count; ++i) {
+    bits |= static_cast<std::uint32_t>(wanted[static_cast<std::size_t>(slot + i)] != 0) << i;
+  }
+  return bits;
+}
+
+void fly_lanes(const LockstepScene* scene, int object, const std::span<const std::uint8_t>* wanted, LaneState* state) {
   const D d;
   const LaneBody& body = scene->bodies[static_cast<std::size_t>(object)];
-  const V dt = set<V>(scene->settings.dt);
-  const V half_dt = set<V>(0.5 * scene->settings.dt);
   const Vec3<V> gravity = set3<V>(scene->settings.gravity);
   const V radius = set<V>(body.radius);
   const int first = state->at(object, 0);
+  const auto count = static_cast<int>(wanted->size());
   for (int at = first; at < first + count; at += static_cast<int>(hn::Lanes(d))) {
+    if (bits_of_slots(*wanted, at - first) == 0) continue;
+    const V share = hn::Load(d, state->share + at);
+    const V dt = set<V>(scene->settings.dt) * share;
+    const V half_dt = set<V>(0.5 * scene->settings.dt) * share;
     const Vec3<V> p = load(state->p, at);
     const Vec3<V> v = load(state->v, at);
     const Vec3<V> w = load(state->w, at);
@@ -69,7 +81,7 @@ void fly_lanes(const LockstepScene* scene, int object, int count, LaneState* sta
     const Vec3<V> flown_v = v + gravity * dt;
     const Vec3<V> flown_p = p + (v + flown_v) * half_dt;
     const Mat3<V> R = matrix_of(q);
-    const Spin<V> flown = spun(body, Spin<V>{q, transposed(R, w)});
+    const Spin<V> flown = spun(body, Spin<V>{q, transposed(R, w)}, share);
     const Vec3<V> flown_w = rotated(flown.q, flown.w_P);
     store(flown_p, state->flown_p, at);
     store(flown_v, state->flown_v, at);
@@ -88,15 +100,6 @@ HWY_INLINE std::uint32_t bits_of(hn::Mask<D> mask) {
   return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
 }
 
-HWY_INLINE std::uint32_t wanted_of(const PartQuery& query, int slot) {
-  const auto count = static_cast<int>(query.wanted.size());
-  std::uint32_t bits = 0;
-  for (int i = 0; i < static_cast<int>(hn::Lanes(D())) && slot + i < count; ++i) {
-    bits |= static_cast<std::uint32_t>(query.wanted[static_cast<std::size_t>(slot + i)] != 0) << i;
-  }
-  return bits;
-}
-
 HWY_INLINE const ConvexPart& part_of(const LockstepScene& scene, const PartQuery& query) {
   return scene.bodies[static_cast<std::size_t>(query.object)].parts[static_cast<std::size_t>(query.part)];
 }
@@ -108,7 +111,7 @@ void find_pairs_lanes(const LockstepScene* scene, const PartQuery* query, LaneSt
   const V ball = set<V>(part.ball);
   const auto lanes = static_cast<int>(hn::Lanes(d));
   for (int slot = 0; slot < static_cast<int>(query->wanted.size()); slot += lanes) {
-    const std::uint32_t allowed = wanted_of(*query, slot);
+    const std::uint32_t allowed = bits_of_slots(query->wanted, slot);
     if (allowed == 0) continue;
     const int at = state->at(query->object, slot);
     const Mat3<V> R = load(state->R, at);
@@ -171,7 +174,7 @@ void find_body_pairs_lanes(const LockstepScene* scene, const PartQuery* query, i
   const auto first_part = static_cast<std::size_t>(scene->first_part[static_cast<std::size_t>(body)]);
   const auto lanes = static_cast<int>(hn::Lanes(d));
   for (int slot = 0; slot < static_cast<int>(query->wanted.size()); slot += lanes) {
-    const std::uint32_t allowed = wanted_of(*query, slot);
+    const std::uint32_t allowed = bits_of_slots(query->wanted, slot);
     if (allowed == 0) continue;
     const int at = state->at(query->object, slot);
     const int at_other = state->at(body, slot);
@@ -227,8 +230,8 @@ HWY_EXPORT(find_pairs_lanes);
 HWY_EXPORT(find_body_pairs_lanes);
 HWY_EXPORT(measure_lanes);
 
-void fly(const LockstepScene& scene, int object, int count, LaneState& state) {
-  HWY_DYNAMIC_DISPATCH(fly_lanes)(&scene, object, count, &state);
+void fly(const LockstepScene& scene, int object, std::span<const std::uint8_t> wanted, LaneState& state) {
+  HWY_DYNAMIC_DISPATCH(fly_lanes)(&scene, object, &wanted, &state);
 }
 
 void find_pairs(const LockstepScene& scene, const PartQuery& query, LaneState& state, LanePairs& pairs) {

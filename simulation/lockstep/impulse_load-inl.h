@@ -186,8 +186,8 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
       put3(row, kPosition, position);
     }
   }
-  const V dt = set<V>(settings_.dt);
-  const V per_dt = set<V>(1.0 / settings_.dt);
+  const V dt = set<V>(settings_.dt) * a.share;
+  const V per_dt = set<V>(1.0 / settings_.dt) / a.share;
   const V half = set<V>(0.5);
   V acceleration = (speed - speed_before) * per_dt;
   if constexpr (kMany) {
@@ -213,7 +213,7 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   put(row, kHit, hn::IfThenElseZero(hit, one));
   put(row, kBounced, hn::IfThenElseZero(hn::And(hit, hn::Gt(bounce, zero)), one));
   put(row, kHitTime, hit_time);
-  const V push = select(open, close_by, close_by * set<V>(settings_.overlap_recovery));
+  const V push = select(open, close_by, close_by * set<V>(settings_.overlap_recovery) * a.share);
   put(row, kPush, push);
   overlap_ = overlap_ || !hn::AllFalse(d, hn::Gt(push, set<V>(settings_.accuracy)));
   const auto impact = hn::And(closes, hn::Lt(speed_before, set<V>(-settings_.impact_speed)));

@@ -78,7 +78,7 @@ struct ObjectLanes {
   Mat3<V> R;
   Vec3<V> p;
   Rates before, flown;
-  V friction, impact_friction, restitution, travel;
+  V friction, impact_friction, restitution, travel, share;
   V inverse_mass;
   Vec3<V> root, inverse_root;  // of the moments
 };
@@ -275,6 +275,7 @@ void ContactRows<kMany>::load_objects() {
     o.impact_friction = lanes_of(state_.impact_friction, index);
     o.restitution = lanes_of(state_.restitution, index);
     o.travel = lanes_of(state_.travel, index);
+    o.share = lanes_of(state_.share, index);
     if constexpr (kMany) o.inverse_mass = lanes_of(state_.inverse_mass, index);
   }
 }
@@ -344,6 +345,9 @@ void ContactRows<kMany>::warm_start(Rates* changes) {
         impulse = select(nearer, column(3), impulse);
         slip = select(nearer, Vec3<V>{column(4), column(5), column(6)}, slip);
       }
+      // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
+      impulse = impulse * object(group.a).share;
+      slip = slip * object(group.a).share;
       V slip_1 = dot(slip, get3(row, kTangent1));
       V slip_2 = dot(slip, get3(row, kTangent2));
       const V limit = get(row, kMu) * impulse;

@@ -283,7 +283,8 @@ void LaneSolver<kMany>::push_out() {
 template <bool kMany>
 void LaneSolver<kMany>::finish(int object) {
   const V zero = set<V>(0.0);
-  const V dt = set<V>(settings_.dt);
+  const ObjectLanes& o = rows_.object(object);
+  const V dt = set<V>(settings_.dt) * o.share;
   const V half = set<V>(0.5);
   auto touched = hn::Lt(zero, zero);
   auto supported = touched;
@@ -303,7 +304,6 @@ void LaneSolver<kMany>::finish(int object) {
       hit_time = select(lands, hn::Min(hit_time, rows_.get(k, kHitTime)), hit_time);
     }
   }
-  const ObjectLanes& o = rows_.object(object);
   // What is held goes its way.
   if constexpr (kMany) touched = hn::And(touched, hn::Gt(o.inverse_mass, zero));
   const V before = hn::IfThenElseZero(any_hit, hit_time);
@@ -322,7 +322,7 @@ void LaneSolver<kMany>::finish(int object) {
   // Not touched, it has the spin that it flew with.
   const Vec3<V> change_w = times(change.spin, o.inverse_root);
   const Spin<V> begun{rows_.lanes_of(state_.q, object), times(o.before.spin, o.inverse_root) + change_w};
-  const Spin<V> reacting = spun(*o.body, begun);
+  const Spin<V> reacting = spun(*o.body, begun, o.share);
   const Quat<V> flown_q = rows_.lanes_of(state_.flown_q, object);
   const Vec3<V> flown_w = rows_.lanes_of(state_.flown_w, object);
   const Spin<V> ahead{select(touched, reacting.q, flown_q),

@@ -54,6 +54,9 @@ LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
   touching_.reserve(most);
   flying_.reserve(of_objects);
   totals_.reserve(most);
+  for (auto* flags : {&going_, &shortened_}) flags->reserve(most);
+  for (auto* parts : {&left_, &taken_}) parts->reserve(most);
+  pressed_.reserve(8 * most);
   starts_.resize(static_cast<std::size_t>(kMaxContacts * lanes.objects) + 2);
 }
 
@@ -242,10 +245,10 @@ void LaneEngine::place(int slot, int body, const Pose& X_now, const Pose& X_next
   present_[kinematic_of(body, slot)] = 1;
 }
 
-void LaneEngine::guide(int count) {
+void LaneEngine::guide(std::span<const std::uint8_t> wanted) {
   const auto dt = static_cast<Real>(scene_->options.step);
   for (int object = 0; object < objects(); ++object) {
-    for (int slot = 0; slot < count; ++slot) {
+    for (int slot = 0; slot < static_cast<int>(wanted.size()); ++slot) {
       const int at = state_.at(object, slot);
       const Moved& moved = moved_[static_cast<std::size_t>(at)];
       if (moved.motion == LaneMotion::kFree) continue;
@@ -348,14 +351,12 @@ void LaneEngine::part(int object, std::span<const std::uint8_t> wanted) {
   }
 }
 
-void LaneEngine::find_contacts(std::span<const std::uint8_t> wanted) {
-  const auto count = static_cast<int>(wanted.size());
-  for (int object = 0; object < objects(); ++object) {
-    fly(scene_->lanes, object, count, state_);
-    std::fill_n(state_.contact_count.begin() + state_.at(object, 0), count, 0);
-    std::fill_n(state_.dropped_count.begin() + state_.at(object, 0), count, 0);
-  }
-  guide(count);
+void LaneEngine::fly_all(std::span<const std::uint8_t> wanted) {
+  for (int object = 0; object < objects(); ++object) fly(scene_->lanes, object, wanted, state_);
+  guide(wanted);
+}
+
+void LaneEngine::touch_all(std::span<const std::uint8_t> wanted) {
   for (int object = 0; object < objects(); ++object) {
     touch_objects(object, wanted);
     touch_surroundings(object, wanted);
@@ -363,7 +364,16 @@ void LaneEngine::find_contacts(std::span<const std::uint8_t> wanted) {
   }
 }
 
-void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
+void LaneEngine::find_contacts(std::span<const std::uint8_t> wanted) {
+  for (int object = 0; object < objects(); ++object) {
+    std::fill_n(state_.contact_count.begin() + state_.at(object, 0), wanted.size(), 0);
+    std::fill_n(state_.dropped_count.begin() + state_.at(object, 0), wanted.size(), 0);
+  }
+  fly_all(wanted);
+  touch_all(wanted);
+}
+
+void LaneEngine::end_part(std::span<const std::uint8_t> wanted) {
   const auto count = static_cast<int>(wanted.size());
   touching_.clear();
   flying_.clear();
@@ -395,7 +405,6 @@ void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
   }
   solve(scene_->lanes, touching_, state_, scratch_);
   land(flying_, state_);
-  for (int object = 0; object < objects(); ++object) measure(scene_->lanes, object, count, state_);
 }
 
 bool LaneEngine::diverged(int slot) const {

@@ -59,6 +59,10 @@ class LaneEngine {
   /// Flies slots [0, wanted.size()) and finds the contacts of those with wanted[slot] != 0.
   void find_contacts(std::span<const std::uint8_t> wanted);
   /// Ends the step of those with wanted[slot] != 0: impulses and poses. After find_contacts.
+  ///
+  /// Where something hits fast, the step is split (lane_impacts.cc): it goes on to the impact, takes that by itself,
+  /// and searches again for contacts for what is left. Contacts that pressed in a part of the step are then among
+  /// contacts().
   void advance(std::span<const std::uint8_t> wanted);
 
   // Of an object after a step.
@@ -100,7 +104,17 @@ class LaneEngine {
   }
   void set_pose(int slot, int object, const geometry::Pose& X_WO);
   void set_motion(int slot, int object, LaneMotion motion);
-  void guide(int count);
+  void guide(std::span<const std::uint8_t> wanted);
+  void fly_all(std::span<const std::uint8_t> wanted);
+  void touch_all(std::span<const std::uint8_t> wanted);
+  void end_part(std::span<const std::uint8_t> wanted);
+  // Split steps: lane_impacts.cc.
+  bool may_split(int slot) const;
+  int parts_to_impact(int slot, int left);
+  void split(std::span<const std::uint8_t> wanted);
+  void set_share(int slot, int parts);
+  void keep_pressed(int slot);
+  void give_back_pressed();
   bool list_pair(int object, int body, std::span<const std::uint8_t> wanted);
   void touch_objects(int object, std::span<const std::uint8_t> wanted);
   void touch_surroundings(int object, std::span<const std::uint8_t> wanted);
@@ -116,6 +130,15 @@ class LaneEngine {
   std::vector<std::int32_t> touching_, flying_;
   std::vector<int> totals_;  // contacts by slot
   std::vector<int> starts_;  // of counting sort
+  // Of split steps.
+  struct Pressed {
+    int slot, object;
+    LaneContact contact;
+    Vector3d position_W, normal_W;
+  };
+  std::vector<std::uint8_t> going_, shortened_;
+  std::vector<int> left_, taken_;  // parts of the step
+  std::vector<Pressed> pressed_;
 };
 
 }  // namespace prescene::simulation

@@ -24,13 +24,13 @@ HWY_INLINE Vec3<V> set3(const Eigen::Vector3d& p) {
   return set3<V>(p.x(), p.y(), p.z());
 }
 
-/// After a step without torque.
+/// After a share of a step without torque.
 template <class V>
-HWY_INLINE Spin<V> spun(const LaneBody& body, const Spin<V>& spin) {
+HWY_INLINE Spin<V> spun(const LaneBody& body, const Spin<V>& spin, V share) {
   const Vec3<V> moments = set3<V>(body.unit_moments);
   const Vec3<V> inverse = set3<V>(1.0 / body.unit_moments[0], 1.0 / body.unit_moments[1], 1.0 / body.unit_moments[2]);
-  const Vec3<V> about_least = set3<V>(body.spin_rates.about_least);
-  const Vec3<V> about_most = set3<V>(body.spin_rates.about_most);
+  const Vec3<V> about_least = set3<V>(body.spin_rates.about_least) * share;
+  const Vec3<V> about_most = set3<V>(body.spin_rates.about_most) * share;
   Vec3<V> momentum = times(moments, spin.w_P);
   Quat<V> q = spin.q;
   for (const Vec3<V>* about : {&about_least, &about_most, &about_least}) {
@@ -38,7 +38,7 @@ HWY_INLINE Spin<V> spun(const LaneBody& body, const Spin<V>& spin) {
     q = q * turn;
     momentum = rotated(conjugate(turn), momentum);
   }
-  return {turned(q, rotated(q, momentum) * set<V>(body.spin_rates.about_momentum)), times(inverse, momentum)};
+  return {turned(q, rotated(q, momentum) * (set<V>(body.spin_rates.about_momentum) * share)), times(inverse, momentum)};
 }
 
 /// Turned by a rotation vector in the body's axes, without a change of its energy: the spin turns along, but for where

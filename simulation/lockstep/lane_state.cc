@@ -7,7 +7,7 @@ namespace prescene::simulation {
 
 LaneState::LaneState(int slots, int bodies, int objects)
     : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple) {
-  constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 4 + 3 * 3 + 4 + 9 + 1 + 3;
+  constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 4 + 3 * 3 + 4 + 9 + 2 + 3;
   const auto size = static_cast<std::size_t>(slots_ * bodies);
   memory_.reset(static_cast<Real*>(::operator new[](kRows* size * sizeof(Real), std::align_val_t{64})));
   std::fill_n(memory_.get(), kRows * size, Real(0));
@@ -31,9 +31,10 @@ LaneState::LaneState(int slots, int bodies, int objects)
   rows(flown_w);
   rows(flown_q);
   rows(R);
-  for (Real** one : {&travel, &energy, &distance2, &speed2}) *one = row();
+  for (Real** one : {&travel, &share, &energy, &distance2, &speed2}) *one = row();
   // Slots that hold nothing are computed with the others.
   std::fill_n(q[0], size, Real(1));
+  std::fill_n(share, size, Real(1));
   const auto of_objects = static_cast<std::size_t>(slots_ * objects);
   contact_count.assign(of_objects, 0);
   warm_count.assign(of_objects, 0);

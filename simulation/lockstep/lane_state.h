@@ -153,6 +153,7 @@ class LaneState {
   Rows<4> flown_q;
   Rows<9> R;  ///< R_WP at the start of the step.
   Real* travel;
+  Real* share;  ///< Of objects: of a whole step that the step takes (LaneEngine::advance); 1 or less.
   Real *energy, *distance2, *speed2;  ///< After the step: per mass, from W's origin, the larger of both speeds.
 
   // Of objects: with the objects after it, then with all else.
@@ -212,9 +213,9 @@ struct PartQuery {
   std::span<const std::uint8_t> wanted;
 };
 
-/// Free flight of an object in slots [0, count): where it ends, and how far a point of it can get. `count` is rounded
-/// up to whole vectors.
-void fly(const LockstepScene& scene, int object, int count, LaneState& state);
+/// Free flight of an object in slots [0, wanted.size()) by their share of a step: where it ends, and how far a point of
+/// it can get. Other slots of a vector fly with those with wanted[slot] != 0.
+void fly(const LockstepScene& scene, int object, std::span<const std::uint8_t> wanted, LaneState& state);
 /// Pairs with fixed parts.
 void find_pairs(const LockstepScene& scene, const PartQuery& query, LaneState& state, LanePairs& pairs);
 /// Pairs with parts of another body.

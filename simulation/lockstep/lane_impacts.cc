@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps that are split at impacts. A body that turns by a third of a radian in a step hits with another corner, at
+// another time and about another arm than the one it has when the step begins; and where it hits with two corners, the
+// second one hits with the speed that the first one gave it. Errors of both kinds are as large as the step is long. So
+// the step goes on to the impact, without it; then follows a part that is hardly longer than the impact itself, for
+// which all contacts are found anew; then what is left, in the same way. Impacts become as exact as in steps of that
+// part's length, and flights, slides and rest keep theirs.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lane_engine.h"
+
+namespace prescene::simulation {
+namespace {
+
+constexpr int kParts = 64;  ///< Of a step: an impact takes one.
+/// Of a step; then what is left is taken at once, so that none of them takes for ever.
+constexpr int kMostSplits = 16;
+
+Vector3d vector_of(const Real (&v)[3]) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+Vector3d row_at(const Rows<3>& rows, int at) {
+  return {static_cast<double>(rows[0][at]), static_cast<double>(rows[1][at]), static_cast<double>(rows[2][at])};
+}
+
+/// When gap + speed t + acceleration t^2 / 2 becomes zero; speed < 0.
+double time_to_close(double gap, double speed, double acceleration) {
+  const double discriminant = speed * speed - 2.0 * acceleration * gap;
+  return discriminant > 0.0 ? 2.0 * gap / (std::sqrt(discriminant) - speed) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+/// Not where something is moved by other than contacts: those go from the begin of a step to its end.
+bool LaneEngine::may_split(int slot) const {
+  for (int object = 0; object < objects(); ++object)
+    if (motion(slot, object) == LaneMotion::kHeld) return false;
+  for (int body = objects(); body < static_cast<int>(scene_->lanes.bodies.size()); ++body)
+    if (present_[kinematic_of(body, slot)] != 0 && state_.travel[state_.at(body, slot)] > 0) return false;
+  return true;
+}
+
+/// Whole parts of the step that end before the first impact, of `left`, at least one; `left` if there is none.
+int LaneEngine::parts_to_impact(int slot, int left) {
+  const StepSettings& settings = scene_->lanes.settings;
+  const double part = settings.dt / kParts;
+  const double time = part * left;
+  const Vector3d gravity(settings.gravity[0], settings.gravity[1], settings.gravity[2]);
+  double first = std::numeric_limits<double>::infinity();
+  for (int object = 0; object < objects(); ++object) {
+    const int at = state_.at(object, slot);
+    const auto contacts = this->contacts(slot, object);
+    if (contacts.empty()) continue;
+    const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
+    const Vector3d v = row_at(state_.v, at), w = row_at(state_.w, at);
+    for (const LaneContact& c : contacts) {
+      const Vector3d normal = R * vector_of(c.normal);
+      const Vector3d arm = R * vector_of(c.position);
+      double speed = normal.dot(v + w.cross(arm));
+      double acceleration = normal.dot(gravity);
+      const int other = scene_->lanes.parts[static_cast<std::size_t>(c.part)].body;
+      if (other >= 0 && other < objects()) {
+        const int at_other = state_.at(other, slot);
+        const Vector3d other_arm = row_at(state_.p, at) + arm - row_at(state_.p, at_other);
+        speed -= normal.dot(row_at(state_.v, at_other) + row_at(state_.w, at_other).cross(other_arm));
+        acceleration = 0.0;
+      }
+      if (speed >= -settings.restitution_speed) continue;
+      if (-speed * settings.dt <
+          scene_->options.split_travel * scene_->lanes.bodies[static_cast<std::size_t>(object)].radius)
+        continue;
+      const auto gap = static_cast<double>(c.gap);
+      // What is jammed gets one impulse a step: many that are not settled would add energy.
+      if (gap < -scene_->options.touching_distance) continue;
+      first = std::min(first, gap > 0.0 ? time_to_close(gap, speed, acceleration) : 0.0);
+    }
+  }
+  if (first >= time) return left;
+  return std::max(1, static_cast<int>(first / part));
+}
+
+void LaneEngine::set_share(int slot, int parts) {
+  for (int object = 0; object < objects(); ++object)
+    state_.share[state_.at(object, slot)] = static_cast<Real>(parts) / static_cast<Real>(kParts);
+}
+
+/// How far each slot goes: to the next impact, or on through it, or to the end of the step.
+void LaneEngine::split(std::span<const std::uint8_t> wanted) {
+  bool any = false;
+  shortened_.assign(wanted.size(), 0);
+  for (int slot = 0; slot < static_cast<int>(wanted.size()); ++slot) {
+    const auto i = static_cast<std::size_t>(slot);
+    taken_[i] = left_[i];
+    if (!wanted[i]) continue;
+    int total = 0;
+    for (int object = 0; object < objects(); ++object) total += state_.contact_count[place_of(object, slot)];
+    if (total == 0 || !may_split(slot)) continue;
+    taken_[i] = parts_to_impact(slot, left_[i]);
+    if (taken_[i] == left_[i]) continue;
+    set_share(slot, taken_[i]);
+    shortened_[i] = 1;
+    any = true;
+  }
+  if (any) fly_all(shortened_);
+}
+
+/// Contacts that pressed, before those of the next part take their place.
+void LaneEngine::keep_pressed(int slot) {
+  for (int object = 0; object < objects(); ++object) {
+    const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
+    for (const LaneContact& c : contacts(slot, object))
+      if (c.impulse > 0) pressed_.push_back({slot, object, c, R * vector_of(c.position), R * vector_of(c.normal)});
+  }
+}
+
+void LaneEngine::give_back_pressed() {
+  for (Pressed& kept : pressed_) {
+    const int at = state_.at(kept.object, kept.slot);
+    int& count = state_.contact_count[static_cast<std::size_t>(at)];
+    if (count == kMaxContacts) continue;
+    const geometry::Matrix3d R = rotation(kept.slot, kept.object).toRotationMatrix();
+    const Vector3d position = R.transpose() * kept.position_W, normal = R.transpose() * kept.normal_W;
+    for (int k = 0; k < 3; ++k) {
+      kept.contact.position[k] = static_cast<Real>(position[k]);
+      kept.contact.normal[k] = static_cast<Real>(normal[k]);
+    }
+    state_.contacts(at)[count++] = kept.contact;
+  }
+  pressed_.clear();
+}
+
+void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
+  const auto count = static_cast<int>(wanted.size());
+  going_.assign(wanted.begin(), wanted.end());
+  left_.assign(wanted.size(), kParts);
+  taken_.resize(wanted.size());
+  for (int splits = 0;; ++splits) {
+    if (splits < kMostSplits) {
+      split(going_);
+    } else {
+      taken_ = left_;
+    }
+    end_part(going_);
+    bool any = false;
+    for (int slot = 0; slot < count; ++slot) {
+      const auto i = static_cast<std::size_t>(slot);
+      if (!going_[i]) continue;
+      left_[i] -= taken_[i];
+      going_[i] = left_[i] > 0 ? 1 : 0;
+      if (!going_[i]) {
+        set_share(slot, kParts);
+        continue;
+      }
+      any = true;
+      keep_pressed(slot);
+      set_share(slot, left_[i]);
+      for (int object = 0; object < objects(); ++object) state_.contact_count[place_of(object, slot)] = 0;
+    }
+    if (!any) break;
+    fly_all(going_);
+    touch_all(going_);
+  }
+  give_back_pressed();
+  for (int object = 0; object < objects(); ++object) measure(scene_->lanes, object, count, state_);
+}
+
+}  // namespace prescene::simulation
