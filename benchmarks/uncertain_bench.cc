@@ -2,9 +2,10 @@
 // Compares the estimator of outcome probabilities (nets, flights without contact search, certificates) with plain Monte
 // Carlo in the same simulator, which steps every instance to rest and stops by Wald's interval.
 //
-//   bench_uncertain [--quick] [--seeds=N] [--instances=N] [--benchmark_out=PATH]
+//   bench_uncertain [--quick] [--seeds=N] [--instances=N] [--dice=N] [--dice-only] [--benchmark_out=PATH]
 //
 // --seeds: estimates a scene (1000; quick 24). --instances: runs to rest a scene (13500; quick 400).
+// --dice: throws a die, way of throwing and step (400; quick 32); with --dice-only nothing else is measured.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include <string_view>
 #include <utility>
 
+#include "benchmarks/dice_steps.h"
 #include "benchmarks/heat_map_measure.h"
 #include "benchmarks/report.h"
 #include "benchmarks/statistics.h"
@@ -38,6 +40,8 @@ struct Arguments {
   int walls = 100;
   int map_truth = 200'000;
   int maps = 12;
+  int dice = 400;
+  bool dice_only = false;
   std::string out;
 };
 
@@ -51,19 +55,28 @@ bool parse(int count, char** words, Arguments* arguments) {
       arguments->walls = 10;
       arguments->map_truth = 8192;
       arguments->maps = 3;
+      arguments->dice = 32;
     }
   for (int i = 1; i < count; ++i) {
     const std::string_view word = words[i];
     const char* value = words[i] + std::min(word.find('=') + 1, word.size());
     if (word == "--quick") continue;
+    if (word == "--dice-only") {
+      arguments->dice_only = true;
+      continue;
+    }
     if (word.starts_with("--benchmark_out=")) {
       arguments->out = value;
     } else if (word.starts_with("--seeds=") && std::atoi(value) > 1) {
       arguments->seeds = std::atoi(value);
+    } else if (word.starts_with("--dice=") && std::atoi(value) > 1) {
+      arguments->dice = std::atoi(value);
     } else if (word.starts_with("--instances=") && std::atoi(value) > 0) {
       arguments->instances = std::atoi(value);
     } else {
-      std::fprintf(stderr, "usage: %s [--quick] [--seeds=N] [--instances=N] [--benchmark_out=PATH]\n", words[0]);
+      std::fprintf(stderr,
+                   "usage: %s [--quick] [--seeds=N] [--instances=N] [--dice=N] [--dice-only] [--benchmark_out=PATH]\n",
+                   words[0]);
       return false;
     }
   }
@@ -209,6 +222,12 @@ void add_tosses(Report* report) {
 int run(const Arguments& arguments) {
   Report report("uncertain", best_simd_target());
   report.note("Scenes A to D of tests/support/uncertain_scenes.cc, 240 Hz, one thread but for wall times.");
+  Table dice = measure_dice_steps(arguments.dice, &report);
+  report.add(dice);
+  if (arguments.dice_only) {
+    std::printf("%s\n%s", report.text().c_str(), text_of(dice).c_str());
+    return report.finish(arguments.out);
+  }
   Tables tables;
   int certified = 0, wrong = 0;
   const std::vector<tests::NamedScene> scenes = tests::uncertain_scenes();
@@ -254,7 +273,7 @@ int run(const Arguments& arguments) {
   report.add(tables.coverage);
   report.add(tables.certificates);
   std::fputs(report.text().c_str(), stdout);
-  for (const Table* table : {&contacts, &tables.cost, &tables.coverage, &tables.certificates})
+  for (const Table* table : {&dice, &contacts, &tables.cost, &tables.coverage, &tables.certificates})
     std::printf("\n%s", text_of(*table).c_str());
   return report.finish(arguments.out);
 }
