@@ -143,16 +143,24 @@ Outcome outcome_fields(const JsonAt& at, const std::string* name, const std::str
     const std::vector<Condition> more = listed_conditions(*list);
     outcome.all_of.insert(outcome.all_of.end(), more.begin(), more.end());
   }
+  if (const auto list = fields.find("any_of")) {
+    for (const JsonAt& item : list->items()) {
+      const std::vector<Condition> read = conditions_of(item);
+      if (read.size() != 1) item.fail("one condition is needed: of any_of each stands by itself");
+      outcome.any_of.insert(outcome.any_of.end(), read.begin(), read.end());
+    }
+    if (outcome.any_of.empty()) list->fail("at least one condition is needed");
+  }
   return outcome;
 }
 
 Outcome outcome_from(const JsonAt& at, const std::string* name, const std::string& object) {
   Outcome outcome = outcome_fields(at, name, object);
   // After unknown keys were reported: a mistyped condition explains it.
-  if (outcome.all_of.empty())
+  if (outcome.all_of.empty() && outcome.any_of.empty())
     at.fail(
         "the outcome has no condition: give inside, resting_on, upright, face_up, below, moved_more_than, "
-        "turned_more_than_deg, touched, moving, not, or all_of with a list of them");
+        "turned_more_than_deg, touched, moving, not, or all_of or any_of with a list of them");
   return outcome;
 }
 
@@ -205,7 +213,10 @@ std::vector<ExclusiveOutcomes> groups_from(const JsonAt& at) {
 Json to_json(const Outcome& outcome) {
   Json conditions = Json::array();
   for (const Condition& condition : outcome.all_of) conditions.push_back(condition_json(condition));
-  return {{"name", outcome.name}, {"object", outcome.object}, {"all_of", std::move(conditions)}};
+  Json json{{"name", outcome.name}, {"object", outcome.object}};
+  if (!conditions.empty() || outcome.any_of.empty()) json["all_of"] = std::move(conditions);
+  for (const Condition& condition : outcome.any_of) json["any_of"].push_back(condition_json(condition));
+  return json;
 }
 
 core::Result<Outcome> outcome_from_json(const Json& value) {

@@ -128,15 +128,21 @@ ExclusiveOutcomes which_face_up(const std::string& name, const std::string& obje
   return faces;
 }
 
+std::vector<Condition> all_conditions(const Outcome& outcome) {
+  std::vector<Condition> conditions = outcome.all_of;
+  conditions.insert(conditions.end(), outcome.any_of.begin(), outcome.any_of.end());
+  return conditions;
+}
+
 core::Status complete_outcome(const Scene& scene, Outcome& outcome) {
   if (outcome.object.empty()) {
     if (scene.objects.size() != 1)
       return core::invalid_input(outcome.name + ": the key 'object' is missing: name the object that is judged");
     outcome.object = scene.objects[0].name;
   }
-  for (Condition& condition : outcome.all_of) {
+  const auto complete = [&](Condition& condition) -> core::Status {
     auto* inside = std::get_if<InsideVolume>(&condition.predicate);
-    if (!inside || inside->hollow_of.empty()) continue;
+    if (!inside || inside->hollow_of.empty()) return core::ok_status();
     const std::optional<int> index = find_support(scene, inside->hollow_of);
     if (!index)
       return core::not_found(outcome.name + ": there is no support '" + inside->hollow_of +
@@ -148,14 +154,19 @@ core::Status complete_outcome(const Scene& scene, Outcome& outcome) {
     inside->X_WV = support.X_WS * support.hollow->X_OV;
     inside->size = support.hollow->size;
     inside->hollow_of.clear();
-  }
+    return core::ok_status();
+  };
+  for (Condition& condition : outcome.all_of) PRESCENE_RETURN_IF_ERROR(complete(condition));
+  for (Condition& condition : outcome.any_of) PRESCENE_RETURN_IF_ERROR(complete(condition));
   return core::ok_status();
 }
 
 bool needs_states_along_the_way(const Outcome& outcome) {
-  return std::any_of(outcome.all_of.begin(), outcome.all_of.end(), [](const Condition& condition) {
+  const auto needs = [](const Condition& condition) {
     return condition.when != When::kAtEnd && !std::holds_alternative<Touched>(condition.predicate);
-  });
+  };
+  return std::any_of(outcome.all_of.begin(), outcome.all_of.end(), needs) ||
+         std::any_of(outcome.any_of.begin(), outcome.any_of.end(), needs);
 }
 
 bool holds(const Scene& scene, const Trajectory& trajectory, const Outcome& outcome) {
@@ -163,9 +174,11 @@ bool holds(const Scene& scene, const Trajectory& trajectory, const Outcome& outc
   PRESCENE_CHECK_MSG(object, "an outcome about an object that the scene does not have: " + outcome.object);
   PRESCENE_CHECK(!trajectory.states.empty());
   const Judge judge(scene, trajectory, static_cast<std::size_t>(*object));
-  return std::all_of(outcome.all_of.begin(), outcome.all_of.end(), [&](const Condition& condition) {
+  const auto met = [&](const Condition& condition) {
     return holds_plain(judge, condition, trajectory) != condition.negated;
-  });
+  };
+  return std::all_of(outcome.all_of.begin(), outcome.all_of.end(), met) &&
+         (outcome.any_of.empty() || std::any_of(outcome.any_of.begin(), outcome.any_of.end(), met));
 }
 
 int classify(const Scene& scene, const Trajectory& trajectory, const ExclusiveOutcomes& exclusive) {

@@ -32,7 +32,7 @@ struct Judged {
 
   Status add(const Outcome& outcome) {
     ++outcomes;
-    conditions += outcome.all_of.size();
+    conditions += outcome.all_of.size() + outcome.any_of.size();
     return check_text(outcome.name, kLongestName, "an outcome's name");
   }
   Status check() const {

@@ -209,13 +209,19 @@ Status check_outcome(const Scene& scene, const Outcome& outcome) {
   if (outcome.name.empty()) return invalid_input("an outcome has no name: name it");
   const std::string place = quoted("outcome", outcome.name);
   PRESCENE_RETURN_IF_ERROR(check_object_name(scene, outcome.object).at(place));
-  if (outcome.all_of.empty()) return invalid_input("it has no condition: give at least one").at(place);
-  for (const Condition& condition : outcome.all_of)
+  if (outcome.all_of.empty() && outcome.any_of.empty())
+    return invalid_input("it has no condition: give at least one").at(place);
+  for (const Condition& condition : all_conditions(outcome))
     PRESCENE_RETURN_IF_ERROR(std::visit(PredicateCheck{scene, outcome.object}, condition.predicate).at(place));
   for (std::size_t i = 0; i < outcome.all_of.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if (contradict(outcome.all_of[i], outcome.all_of[j]))
         return invalid_input("a condition and its opposite never hold together: take one of them out").at(place);
+  for (std::size_t i = 0; i < outcome.any_of.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (contradict(outcome.any_of[i], outcome.any_of[j]))
+        return invalid_input("any_of always holds, as it has a condition and its opposite: take one of them out")
+            .at(place);
   return {};
 }
 
@@ -252,10 +258,16 @@ Status check_outcomes(const Scene& scene) {
 }  // namespace
 
 bool is_implied(const Outcome& earlier, const Outcome& later) {
-  return earlier.object == later.object &&
-         std::all_of(earlier.all_of.begin(), earlier.all_of.end(), [&](const Condition& condition) {
-           return std::find(later.all_of.begin(), later.all_of.end(), condition) != later.all_of.end();
-         });
+  const auto is_in = [](const std::vector<Condition>& conditions) {
+    return [&conditions](const Condition& condition) {
+      return std::find(conditions.begin(), conditions.end(), condition) != conditions.end();
+    };
+  };
+  if (earlier.object != later.object || !std::all_of(earlier.all_of.begin(), earlier.all_of.end(), is_in(later.all_of)))
+    return false;
+  // Whichever of the later one's holds, it is one of the earlier one's.
+  return earlier.any_of.empty() || std::any_of(later.all_of.begin(), later.all_of.end(), is_in(earlier.any_of)) ||
+         (!later.any_of.empty() && std::all_of(later.any_of.begin(), later.any_of.end(), is_in(earlier.any_of)));
 }
 
 Status validate(const Scene& scene) {

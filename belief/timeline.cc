@@ -63,7 +63,7 @@ std::vector<NamedVolume> volumes_for(const Scene& scene, const std::string& obje
     if (support.hollow) volumes.push_back({support.name, support.X_WS * support.hollow->X_OV, support.hollow->size});
   const auto add = [&](const Outcome& outcome) {
     if (outcome.object != object) return;
-    for (const Condition& condition : outcome.all_of) {
+    for (const Condition& condition : all_conditions(outcome)) {
       const auto* inside = std::get_if<InsideVolume>(&condition.predicate);
       if (!inside) continue;
       const bool known = std::any_of(volumes.begin(), volumes.end(), [&](const NamedVolume& volume) {

@@ -154,7 +154,10 @@ std::string WantedOutcome::instead(const belief::Scene& scene, const belief::Tra
     opposite.negated = !condition.negated;
     return condition_text(opposite);
   }
-  return "";
+  std::string none;
+  for (const Condition& condition : outcome.any_of)
+    none += (none.empty() ? "none of '" : "', '") + condition_text(condition);
+  return none.empty() ? "" : none + "'";
 }
 
 core::Result<WantedOutcome> find_wanted(const belief::Scene& scene, const belief::AchieveQuery& query,
@@ -205,7 +208,7 @@ core::Result<WantedOutcome> find_wanted(const belief::Scene& scene, const belief
 
 std::optional<std::string> named_absent(const WantedOutcome& wanted, const std::vector<std::string>& absent) {
   const auto speaks_of = [&](const belief::Outcome& outcome) -> std::optional<std::string> {
-    for (const Condition& condition : outcome.all_of) {
+    for (const Condition& condition : belief::all_conditions(outcome)) {
       const auto* resting = std::get_if<belief::RestingOn>(&condition.predicate);
       const auto* touched = std::get_if<belief::Touched>(&condition.predicate);
       const std::string name = resting ? resting->support : touched ? touched->other : "";

@@ -23,8 +23,7 @@ const std::vector<std::string> kConditionKeys{"inside",          "resting_on",  
                                               "moved_more_than", "turned_more_than_deg", "touched", "moving"};
 constexpr const char* kConditionRemedy =
     "give a condition: inside, resting_on, upright, face_up, below, moved_more_than, turned_more_than_deg, touched, "
-    "moving, "
-    "not, or all_of with a list of them";
+    "moving, not, or all_of or any_of with a list of them";
 
 class ConditionReader {
  public:
@@ -47,6 +46,30 @@ class ConditionReader {
       conditions.push_back(std::move(condition));
     }
     if (const LocatedValue* negated = binder.find("not")) read_negated(*negated, conditions);
+    return conditions;
+  }
+
+  /// One condition an item: of any_of each stands by itself.
+  std::vector<Condition> read_choices(const LocatedValue& value) {
+    std::vector<Condition> conditions;
+    if (value.kind != LocatedValue::Kind::kList || value.items.empty()) {
+      report_type(value, problems_, "give a list of at least one condition");
+      return conditions;
+    }
+    for (const LocatedValue& item : value.items) {
+      const std::size_t before = problems_.errors().size();
+      std::vector<Condition> read;
+      {
+        Binder binder(item, problems_);
+        read = read_keys(binder);
+        binder.finish();
+      }
+      if (read.size() != 1 && problems_.errors().size() == before)
+        problems_.add(item.place, item.path,
+                      "it holds " + std::to_string(read.size()) + " conditions, and of any_of each stands by itself",
+                      "give one condition an item: any_of: [{...}, {...}]");
+      conditions.insert(conditions.end(), read.begin(), read.end());
+    }
     return conditions;
   }
 
@@ -203,7 +226,8 @@ belief::Outcome read_outcome(const LocatedValue& value, const std::string& name,
     const std::vector<Condition> more = reader.read_list(*list);
     outcome.all_of.insert(outcome.all_of.end(), more.begin(), more.end());
   }
-  if (outcome.all_of.empty()) {
+  if (const LocatedValue* list = binder.find("any_of")) outcome.any_of = reader.read_choices(*list);
+  if (outcome.all_of.empty() && outcome.any_of.empty()) {
     binder.finish();  // a mistyped key explains it
     if (value.kind == LocatedValue::Kind::kMap && context.problems.errors().size() == before)
       context.problems.add(value.place, value.path, "the outcome has no condition", kConditionRemedy);

@@ -38,9 +38,19 @@ class Judge {
 
   std::optional<bool> came(const belief::Trajectory& trajectory, const belief::Outcome& outcome) const {
     belief::Outcome seen = outcome;
-    if (!knows_contacts_) std::erase_if(seen.all_of, needs_contacts);
+    if (!knows_contacts_) {
+      std::erase_if(seen.all_of, needs_contacts);
+      std::erase_if(seen.any_of, needs_contacts);
+    }
+    bool known = seen.all_of.size() == outcome.all_of.size();
+    // One of those that can be judged is enough; if none of them holds, one of the others may.
+    if (seen.any_of.size() < outcome.any_of.size() &&
+        (seen.any_of.empty() || !belief::holds(scene_, trajectory, {outcome.name, outcome.object, {}, seen.any_of}))) {
+      seen.any_of.clear();
+      known = false;
+    }
     if (!belief::holds(scene_, trajectory, seen)) return false;
-    if (seen.all_of.size() < outcome.all_of.size()) return std::nullopt;
+    if (!known) return std::nullopt;
     return true;
   }
 

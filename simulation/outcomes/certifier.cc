@@ -168,7 +168,8 @@ bool understood(const belief::Condition& condition) {
 bool understood(const Variable& variable) {
   return !variable.outcomes.empty() && variable.classes.size() == variable.outcomes.size() + 1 &&
          std::all_of(variable.outcomes.begin(), variable.outcomes.end(), [](const belief::Outcome& outcome) {
-           return std::all_of(outcome.all_of.begin(), outcome.all_of.end(),
+           const std::vector<belief::Condition> conditions = belief::all_conditions(outcome);
+           return std::all_of(conditions.begin(), conditions.end(),
                               [](const belief::Condition& condition) { return understood(condition); });
          });
 }
@@ -192,7 +193,7 @@ class EnergyCertifier final : public Certifier {
   };
   struct Answer {
     std::size_t object = 0;
-    std::vector<Question> all_of;
+    std::vector<Question> all_of, any_of;
   };
 
   EnergyCertifier(std::shared_ptr<const belief::Scene> scene, std::unique_ptr<const MotionCertifier> certifier)
@@ -223,16 +224,26 @@ class EnergyCertifier final : public Certifier {
 
  private:
   Truth judge(const Answer& answer, const std::vector<SureMotion>& motions, double seconds_left) const {
-    Truth all = Truth::kYes;
-    for (const Question& question : answer.all_of) {
+    const auto truth_of = [&](const Question& question) {
       const Judge judge_of(*scene_, *certifier_, motions, answer.object,
                            question.passage ? &*question.passage : nullptr, seconds_left);
-      Truth one = std::visit(judge_of, question.condition.predicate);
-      if (question.condition.negated) one = negated(one);
+      const Truth one = std::visit(judge_of, question.condition.predicate);
+      return question.condition.negated ? negated(one) : one;
+    };
+    Truth all = Truth::kYes;
+    for (const Question& question : answer.all_of) {
+      const Truth one = truth_of(question);
       if (one == Truth::kNo) return one;
       if (one == Truth::kPerhaps) all = one;
     }
-    return all;
+    if (answer.any_of.empty()) return all;
+    Truth any = Truth::kNo;
+    for (const Question& question : answer.any_of) {
+      const Truth one = truth_of(question);
+      if (one == Truth::kYes) return all;
+      if (one == Truth::kPerhaps) any = one;
+    }
+    return any;
   }
 
   std::shared_ptr<const belief::Scene> scene_;
@@ -281,9 +292,12 @@ std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const beli
       if (!object) return nullptr;
       EnergyCertifier::Answer& answer = answers.emplace_back();
       answer.object = static_cast<std::size_t>(*object);
-      for (const belief::Condition& condition : outcome.all_of) {
+      const std::vector<belief::Condition> conditions = belief::all_conditions(outcome);
+      for (std::size_t i = 0; i < conditions.size(); ++i) {
+        const belief::Condition& condition = conditions[i];
         if (options.cancellation && options.cancellation->requested()) return nullptr;
-        EnergyCertifier::Question& question = answer.all_of.emplace_back();
+        EnergyCertifier::Question& question =
+            (i < outcome.all_of.size() ? answer.all_of : answer.any_of).emplace_back();
         question.condition = condition;
         const auto* volume = std::get_if<belief::InsideVolume>(&condition.predicate);
         if (volume && objects[answer.object].inner_radius > kCornerLoss * motions->support_edge_radius())

@@ -75,7 +75,7 @@ TEST(OutcomeLaws, AlwaysImpliesAtTheEndImpliesEver) {
   }));
 }
 
-TEST(OutcomeLaws, AllOfIsTheConjunctionAndAGroupIsAPartition) {
+TEST(OutcomeLaws, AllOfIsTheConjunctionAnyOfTheDisjunctionAndAGroupIsAPartition) {
   const Scene scene = tests::small_scene();
   EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
@@ -87,6 +87,9 @@ TEST(OutcomeLaws, AllOfIsTheConjunctionAndAGroupIsAPartition) {
       const Outcome outcome = tests::random_outcome(stream, std::string(1, static_cast<char>('a' + i)));
       bool each = true;
       for (const Condition& condition : outcome.all_of) each = each && holds_one(scene, trajectory, condition);
+      bool any = outcome.any_of.empty();
+      for (const Condition& condition : outcome.any_of) any = any || holds_one(scene, trajectory, condition);
+      each = each && any;
       RC_ASSERT(holds(scene, trajectory, outcome) == each);
       if (!found && each) {
         found = true;

@@ -148,6 +148,9 @@ Outcome random_outcome(RandomStream& stream, const std::string& name) {
     condition.negated = random_below(stream, 2) == 1;
     outcome.all_of.push_back(condition);
   }
+  if (random_below(stream, 2) == 0) return outcome;
+  for (int i = random_below(stream, 2); i >= 0; --i)
+    outcome.any_of.push_back({random_predicate(stream), When::kAtEnd, random_below(stream, 2) == 1});
   return outcome;
 }
 

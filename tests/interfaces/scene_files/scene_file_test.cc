@@ -158,7 +158,8 @@ TEST(SceneFile, ReadsOutcomesWithTheirTimesAndNegations) {
                      "  a: {below: 0.1, when: ever, not: {touched: bin}}\n"
                      "  b: {moving: false}\n"
                      "  c: {not: {upright: {within_deg: 20, axis: -x}, when: always}}\n"
-                     "  d: {all_of: [{touched: table}, {touched: bin}]}\n"));
+                     "  d: {all_of: [{touched: table}, {touched: bin}]}\n"
+                     "  e: {any_of: [{face_up: z}, {face_up: -z}, {not: {moving: true}}]}\n"));
   using belief::Condition;
   const std::vector<Condition>& a = scene.outcomes[0].all_of;
   EXPECT_EQ(a[0], (Condition{belief::BelowHeight{0.1}, belief::When::kEver, false}));
@@ -167,6 +168,10 @@ TEST(SceneFile, ReadsOutcomesWithTheirTimesAndNegations) {
   EXPECT_EQ(scene.outcomes[2].all_of[0],
             (Condition{belief::UprightWithin{-Vector3d::UnitX(), 20 * kDegree}, belief::When::kAlways, true}));
   EXPECT_EQ(scene.outcomes[3].all_of.size(), 2U);
+  EXPECT_TRUE(scene.outcomes[4].all_of.empty());
+  EXPECT_EQ(scene.outcomes[4].any_of, (std::vector<Condition>{{belief::FaceUp{Vector3d::UnitZ()}},
+                                                              {belief::FaceUp{-Vector3d::UnitZ()}},
+                                                              {belief::StillMoving{}, belief::When::kAtEnd, true}}));
   EXPECT_EQ(scene.outcomes[3].object, "block") << "the only object need not be named";
 }
 

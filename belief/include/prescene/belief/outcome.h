@@ -78,7 +78,9 @@ struct Condition {
 struct Outcome {
   std::string name;
   std::string object;             ///< Whose trajectory is judged; "" until complete_outcome().
-  std::vector<Condition> all_of;  ///< At least one.
+  std::vector<Condition> all_of;  ///< Each of these holds. At least one here or in any_of.
+  /// At least one of these holds, too; empty = nothing more is asked.
+  std::vector<Condition> any_of = {};
   friend bool operator==(const Outcome&, const Outcome&) = default;
 };
 
@@ -100,6 +102,8 @@ inline constexpr double kMovingTurn = 0.2;
 /// scene lacks, kInvalidInput a support without a hollow or an outcome without an object.
 core::Status complete_outcome(const Scene& scene, Outcome& outcome);
 
+/// Those of all_of, then those of any_of.
+std::vector<Condition> all_conditions(const Outcome& outcome);
 /// Whether judging needs states between the first and the last: simulators keep these only when asked to.
 bool needs_states_along_the_way(const Outcome& outcome);
 bool holds(const Scene& scene, const Trajectory& trajectory, const Outcome& outcome);
