@@ -26,6 +26,7 @@ constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
 constexpr std::size_t kMaxIds = 65535;  // of schemas and of channels: they have 16 bits
 constexpr std::uint64_t kDataEndBytes = records::kFrameBytes + sizeof(std::uint32_t);
 constexpr std::size_t kCheckStep = std::size_t{1} << 20;
+constexpr std::uint64_t kMaxAttachmentHead = std::uint64_t{8} << 10;  // with its name
 constexpr std::uint64_t kMaxChunkHead = records::ChunkHead::kBytesBeforeName + records::ChunkHead::kMaxNameBytes + 8;
 
 struct Frame {
@@ -322,10 +323,35 @@ class LayoutFinder {
         }
         break;
       }
+      case Op::kAttachment:
+        return add_attachment(frame);
       default:
-        break;  // Attachments, indexes, and what later versions may add.
+        break;  // Indexes, and what later versions may add.
     }
     position_ += bytes;
+    return true;
+  }
+
+  /// Its name is kept, not its data.
+  Result<bool> add_attachment(const Frame& frame) {
+    const std::uint64_t begin = position_ + records::kFrameBytes;
+    PRESCENE_TRY(
+        const std::span<const std::uint8_t> head,
+        source_.peek(begin, static_cast<std::size_t>(std::min<std::uint64_t>(frame.length, kMaxAttachmentHead))));
+    McapStoredAttachment stored;
+    if (!records::parse(head, &stored.head)) return false;
+    const std::uint64_t beside_data = stored.head.bytes() + records::AttachmentHead::kChecksumBytes;
+    if (frame.length < beside_data || stored.head.data_size != frame.length - beside_data) return false;
+    metadata_bytes_ += stored.head.bytes() + sizeof stored;
+    if (metadata_bytes_ > kMaxMetadataBytes) {
+      return core::resource_exhausted(source_.name() +
+                                      ": the names of its attachments and its metadata have more than " +
+                                      size_text(kMaxMetadataBytes) + ", which is the limit");
+    }
+    stored.offset = begin;
+    stored.length = frame.length;
+    out_.attachments.push_back(std::move(stored));
+    position_ = begin + frame.length;
     return true;
   }
 

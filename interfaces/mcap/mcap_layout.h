@@ -41,6 +41,13 @@ struct McapSegment {
   std::vector<std::uint16_t> channel_ids;  ///< Of a chunk by the index; empty when not known.
 };
 
+/// An attachment whose data are read when they are asked for.
+struct McapStoredAttachment {
+  mcap_records::AttachmentHead head;
+  std::uint64_t offset = 0;  ///< Of the record's content.
+  std::uint64_t length = 0;  ///< Of that content.
+};
+
 struct McapLayout {
   mcap_records::Header header;
   /// The channels of the whole file are known from its summary, so that segments may be read in any order.
@@ -49,6 +56,7 @@ struct McapLayout {
   std::vector<mcap_records::Channel> channels;  ///< Of the summary.
   std::optional<mcap_records::Statistics> statistics;
   std::vector<McapMetadata> metadata;
+  std::vector<McapStoredAttachment> attachments;
   std::deque<McapSegment> segments;  ///< In the order of the file.
   McapLoss loss;                     ///< As far as it can be seen from outside of the chunks.
   McapUnchecked unchecked;           ///< The same.

@@ -11,6 +11,7 @@
 #include "mcap_records.h"
 #include "mcap_source.h"
 #include "prescene/core/check.h"
+#include "prescene/interfaces/bytes/byte_reader.h"
 #include "prescene/interfaces/bytes/crc32.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -361,6 +362,39 @@ const std::vector<McapChannel>& McapReader::channels() const { return impl_->cha
 const std::vector<McapMetadata>& McapReader::metadata() const { return impl_->layout.metadata; }
 const McapLoss& McapReader::loss() const { return impl_->loss; }
 const McapUnchecked& McapReader::unchecked() const { return impl_->unchecked; }
+
+std::vector<McapReader::AttachedFile> McapReader::attachments() const {
+  std::vector<AttachedFile> files;
+  for (const McapStoredAttachment& stored : impl_->layout.attachments)
+    files.push_back({stored.head.name, stored.head.media_type, stored.head.data_size});
+  return files;
+}
+
+Result<McapAttachment> McapReader::attachment(const std::string& name, std::size_t max_bytes) const {
+  const auto& stored = impl_->layout.attachments;
+  const auto found =
+      std::find_if(stored.rbegin(), stored.rend(), [&](const auto& one) { return one.head.name == name; });
+  const std::string file = impl_->source.name() + ": ";
+  if (found == stored.rend()) return core::not_found(file + "has no attachment " + quote(name));
+  if (found->length > max_bytes) {
+    return core::resource_exhausted(file + "its attachment " + quote(name) + " has " +
+                                    size_text(static_cast<std::size_t>(found->length)) + "; up to " +
+                                    size_text(max_bytes) + " are read");
+  }
+  std::vector<std::uint8_t> content(static_cast<std::size_t>(found->length));
+  PRESCENE_RETURN_IF_ERROR(impl_->source.read(found->offset, content));
+  const std::span<const std::uint8_t> covered(content.data(), content.size() - records::AttachmentHead::kChecksumBytes);
+  ByteReader tail(std::span<const std::uint8_t>(content).subspan(covered.size()));
+  const auto expected = tail.read<std::uint32_t>();
+  if (expected != 0 && expected != crc32(covered))
+    return core::data_loss(file + "its attachment " + quote(name) + " is damaged" + kDamageRemedy);
+  const std::span<const std::uint8_t> data = covered.subspan(found->head.bytes());
+  return McapAttachment{found->head.name,
+                        found->head.media_type,
+                        {data.begin(), data.end()},
+                        saturated(found->head.log_time),
+                        saturated(found->head.create_time)};
+}
 
 std::optional<std::uint64_t> McapReader::message_count() const {
   if (!impl_->layout.statistics) return std::nullopt;

@@ -6,6 +6,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/byte_reader.h"
+#include "prescene/interfaces/bytes/crc32.h"
 
 namespace prescene::interfaces::mcap_records {
 namespace {
@@ -182,6 +183,16 @@ bool parse(std::span<const std::uint8_t> content, McapMetadata* out) {
   return read_texts(&in, &out->values);
 }
 
+bool parse(std::span<const std::uint8_t> content, AttachmentHead* out) {
+  ByteReader in(content);
+  out->log_time = in.read<std::uint64_t>();
+  out->create_time = in.read<std::uint64_t>();
+  out->name = read_string(&in);
+  out->media_type = read_string(&in);
+  out->data_size = in.read<std::uint64_t>();
+  return in.ok();
+}
+
 void append(const Header& record, Bytes* out) {
   put_record(Op::kHeader, out, [&] {
     put_string(record.profile, out);
@@ -290,6 +301,31 @@ void append(const MetadataIndex& record, Bytes* out) {
     put(record.offset, out);
     put(record.length, out);
     put_string(record.name, out);
+  });
+}
+
+void append(const AttachmentHead& head, std::span<const std::uint8_t> data, Bytes* out) {
+  put_record(Op::kAttachment, out, [&] {
+    const std::size_t begin = out->size();
+    put(head.log_time, out);
+    put(head.create_time, out);
+    put_string(head.name, out);
+    put_string(head.media_type, out);
+    put(static_cast<std::uint64_t>(data.size()), out);
+    put_bytes(data, out);
+    put(crc32(std::span(*out).subspan(begin)), out);
+  });
+}
+
+void append(const AttachmentIndex& record, Bytes* out) {
+  put_record(Op::kAttachmentIndex, out, [&] {
+    put(record.offset, out);
+    put(record.length, out);
+    put(record.head.log_time, out);
+    put(record.head.create_time, out);
+    put(record.head.data_size, out);
+    put_string(record.head.name, out);
+    put_string(record.head.media_type, out);
   });
 }
 

@@ -112,6 +112,24 @@ struct Statistics {
   std::map<std::uint16_t, std::uint64_t> channel_message_counts;
 };
 
+/// What stands before the data of an attachment; a checksum of all before it follows the data.
+struct AttachmentHead {
+  static constexpr std::size_t kBytesBesideTexts = 32;  ///< Two times and three lengths.
+  static constexpr std::size_t kChecksumBytes = 4;
+  std::uint64_t log_time = 0;
+  std::uint64_t create_time = 0;
+  std::string name;
+  std::string media_type;
+  std::uint64_t data_size = 0;
+  std::size_t bytes() const { return kBytesBesideTexts + name.size() + media_type.size(); }
+};
+
+struct AttachmentIndex {
+  std::uint64_t offset = 0;
+  std::uint64_t length = 0;  ///< With the frame.
+  AttachmentHead head;
+};
+
 struct MetadataIndex {
   std::uint64_t offset = 0;
   std::uint64_t length = 0;
@@ -129,6 +147,8 @@ bool parse(std::span<const std::uint8_t> content, ChunkHead* out);
 bool parse(std::span<const std::uint8_t> content, ChunkIndex* out);
 bool parse(std::span<const std::uint8_t> content, Statistics* out);
 bool parse(std::span<const std::uint8_t> content, McapMetadata* out);
+/// Needs the head only.
+bool parse(std::span<const std::uint8_t> content, AttachmentHead* out);
 
 // A whole record, appended.
 using Bytes = std::vector<std::uint8_t>;
@@ -143,6 +163,8 @@ void append(const ChunkIndex& record, Bytes* out);
 void append(const Statistics& record, Bytes* out);
 void append(const McapMetadata& record, Bytes* out);
 void append(const MetadataIndex& record, Bytes* out);
+void append(const AttachmentHead& head, std::span<const std::uint8_t> data, Bytes* out);
+void append(const AttachmentIndex& record, Bytes* out);
 void append_data_end(std::uint32_t data_section_crc, Bytes* out);
 void append_summary_offset(Op op, std::uint64_t group_start, std::uint64_t group_length, Bytes* out);
 

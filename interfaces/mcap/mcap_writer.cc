@@ -11,6 +11,7 @@
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/crc32.h"
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
 
 namespace prescene::interfaces {
@@ -42,6 +43,7 @@ struct McapWriter::Impl {
   std::vector<records::Schema> schemas;
   std::vector<records::ChunkIndex> chunk_indexes;
   std::vector<records::MetadataIndex> metadata_indexes;
+  std::vector<records::AttachmentIndex> attachment_indexes;
   records::Statistics statistics;
 
   // The open chunk.
@@ -195,11 +197,13 @@ Status McapWriter::Impl::write_summary() {
   };
   statistics.schema_count = static_cast<std::uint16_t>(schemas.size());
   statistics.channel_count = static_cast<std::uint32_t>(channels.size());
+  statistics.attachment_count = static_cast<std::uint32_t>(attachment_indexes.size());
   statistics.metadata_count = static_cast<std::uint32_t>(metadata_indexes.size());
   group(records::Op::kSchema, schemas);
   group(records::Op::kChannel, channel_records);
   group(records::Op::kStatistics, std::span(&statistics, 1));
   group(records::Op::kChunkIndex, chunk_indexes);
+  group(records::Op::kAttachmentIndex, attachment_indexes);
   group(records::Op::kMetadataIndex, metadata_indexes);
 
   records::Footer footer;
@@ -295,6 +299,23 @@ Status McapWriter::write_metadata(const McapMetadata& metadata) {
   std::vector<std::uint8_t> out;
   records::append(metadata, &out);
   impl.metadata_indexes.push_back({impl.position, out.size(), metadata.name});
+  return impl.write_bytes(out);
+}
+
+Status McapWriter::write_attachment(const McapAttachment& attachment) {
+  Impl& impl = *impl_;
+  PRESCENE_CHECK(!impl.closed);
+  if (attachment.log_time_ns < 0 || attachment.create_time_ns < 0) {
+    return core::invalid_input(impl.file.path().string() + ": the attachment " + quote(attachment.name) +
+                               " has a negative time; times begin with 1970");
+  }
+  PRESCENE_RETURN_IF_ERROR(impl.end_chunk());
+  const records::AttachmentHead head{static_cast<std::uint64_t>(attachment.log_time_ns),
+                                     static_cast<std::uint64_t>(attachment.create_time_ns), attachment.name,
+                                     attachment.media_type, attachment.data.size()};
+  std::vector<std::uint8_t> out;
+  records::append(head, attachment.data, &out);
+  impl.attachment_indexes.push_back({impl.position, out.size(), head});
   return impl.write_bytes(out);
 }
 

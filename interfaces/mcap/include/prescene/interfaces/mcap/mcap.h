@@ -43,4 +43,14 @@ struct McapMetadata {
   friend bool operator==(const McapMetadata&, const McapMetadata&) = default;
 };
 
+/// A file that the recording carries.
+struct McapAttachment {
+  std::string name;        ///< As a path, "meshes/cup.ply".
+  std::string media_type;  ///< "application/yaml", "model/ply", "" = not said.
+  std::vector<std::uint8_t> data;
+  std::int64_t log_time_ns = 0;     ///< When it was recorded; 0 = not said.
+  std::int64_t create_time_ns = 0;  ///< When it was made; 0 = not said.
+  friend bool operator==(const McapAttachment&, const McapAttachment&) = default;
+};
+
 }  // namespace prescene::interfaces

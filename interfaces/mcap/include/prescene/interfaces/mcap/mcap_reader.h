@@ -16,6 +16,8 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "prescene/core/status.h"
 #include "prescene/interfaces/mcap/mcap.h"
@@ -85,6 +87,19 @@ class McapReader {
   /// Grows while a cut file is read.
   const std::vector<McapChannel>& channels() const;
   const std::vector<McapMetadata>& metadata() const;
+  /// A file that the recording carries, and how many bytes it claims.
+  struct AttachedFile {
+    std::string name;
+    std::string media_type;
+    std::uint64_t bytes = 0;
+  };
+  /// In the order of the file.
+  std::vector<AttachedFile> attachments() const;
+  /// The content of the attachment of this name (of the last, where several have it). kNotFound where there is none,
+  /// kResourceExhausted above `max_bytes`, kDataLoss where its checksum is wrong.
+  core::Result<McapAttachment> attachment(const std::string& name,
+                                          std::size_t max_bytes = std::size_t{256} << 20) const;
+
   /// Messages in the file if it has statistics.
   std::optional<std::uint64_t> message_count() const;
 

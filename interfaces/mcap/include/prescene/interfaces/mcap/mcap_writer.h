@@ -44,6 +44,8 @@ class McapWriter {
   /// Where memory ends in the middle of it, the exception is passed on and the recording is as it was before.
   core::Status write(const McapMessage& message);
   core::Status write_metadata(const McapMetadata& metadata);
+  /// A file to carry along; readers need none of it to read the messages. kInvalidInput for negative times.
+  core::Status write_attachment(const McapAttachment& attachment);
   /// Ends the current chunk and hands everything to the operating system.
   core::Status flush();
   /// Writes the index, statistics and footer. Nothing can be written afterwards.
