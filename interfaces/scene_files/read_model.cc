@@ -237,6 +237,13 @@ void check_hulls(const BodyShape& shape, Problems& problems) {
   }
 }
 
+core::Result<LocatedValue> model_document(const std::filesystem::path& path, const SceneFileOptions& options) {
+  if (!options.read_file) return read_yaml(path, options.limits);
+  PRESCENE_TRY(const std::vector<std::uint8_t> bytes, options.read_file(path));
+  return parse_yaml(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path.string(),
+                    options.limits);
+}
+
 // The map under `model:` of the file, with the keys of the scene put over it.
 std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneContext& context) {
   const LocatedValue& file = *value.find("file");
@@ -247,7 +254,7 @@ std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneCon
     return std::nullopt;
   }
   const core::Result<LocatedValue> document =
-      read_yaml(std::filesystem::path(*file.place.file).parent_path() / *name, context.options.limits);
+      model_document(std::filesystem::path(*file.place.file).parent_path() / *name, context.options);
   if (!document) {
     context.problems.add(file.place, file.path, "the model file can't be used", document.status().message());
     return std::nullopt;

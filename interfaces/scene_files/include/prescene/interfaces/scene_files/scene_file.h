@@ -8,6 +8,7 @@
 //   if (!scene) ... scene.status()                        // every mistake: file, line, key, reason, remedy
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -31,8 +32,12 @@ struct MeshRequest {
 /// Reads a mesh into metres with z up; its messages name file and remedy.
 using MeshReader = std::function<core::Result<geometry::TriangleMesh>(const MeshRequest&)>;
 
+/// Reads another file that a scene names whole; errors of read_file().
+using FileReader = std::function<core::Result<std::vector<std::uint8_t>>(const std::filesystem::path&)>;
+
 struct SceneFileOptions {
   MeshReader read_mesh;      ///< Empty: meshes and model files that name one are errors.
+  FileReader read_file;      ///< Of model files; empty: from the disk.
   bool follow_files = true;  ///< Else `file:` of a model is an error: the text comes from somebody else.
   YamlLimits limits;
 };
