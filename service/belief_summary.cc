@@ -198,6 +198,16 @@ interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, cons
   return array;
 }
 
+interfaces::RosTfMessage transforms_of(const BeliefSummary& summary, const std::string& world_frame) {
+  interfaces::RosTfMessage message;
+  for (const ObjectSummary& object : summary.objects) {
+    if (object.state == belief::TrackState::kLost) continue;
+    message.transforms.push_back(interfaces::to_ros_transform(
+        interfaces::FrameTransform{world_frame, "prescene/" + object.name, summary.stamp_ns, object.X_WO}));
+  }
+  return message;
+}
+
 MarkerMeshes marker_meshes(const belief::Scene& scene) {
   MarkerMeshes meshes;
   for (const belief::ObjectModel& model : scene.models) {

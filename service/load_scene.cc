@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/interfaces/scene_files/located_value.h"
@@ -12,17 +13,81 @@
 namespace prescene::service {
 namespace {
 
-interfaces::SceneFileOptions options(const core::LogSink& log) {
+interfaces::MeshReadOptions mesh_options(const interfaces::MeshRequest& request) {
+  interfaces::MeshReadOptions read;
+  read.metres_per_unit = request.scale;
+  read.up_axis = request.y_up ? interfaces::UpAxis::kY : interfaces::UpAxis::kDeclared;
+  return read;
+}
+
+void tell(const interfaces::MeshRequest& request, const interfaces::LoadedMesh& mesh, const core::LogSink& log) {
+  for (const std::string& warning : mesh.warnings)
+    core::log(log, core::LogLevel::kWarning, request.path.string() + ": " + warning);
+}
+
+/// PLY, OBJ and STL are whole in one file.
+bool is_whole(interfaces::MeshFormat format) {
+  return format != interfaces::MeshFormat::kGltf && format != interfaces::MeshFormat::kCollada;
+}
+
+/// Of a file that a scene names, in FilesOfScene.
+std::string carried_name(const std::filesystem::path& path, const std::filesystem::path& scene) {
+  const std::filesystem::path relative =
+      scene.parent_path().empty() ? path : path.lexically_relative(scene.parent_path());
+  return (relative.empty() ? path : relative).generic_string();  // empty: absolute, beside a scene whose path is not
+}
+
+std::string carried_mesh_name(const interfaces::MeshRequest& request, const std::filesystem::path& scene) {
+  const std::string name = carried_name(request.path, scene);
+  const auto format = interfaces::mesh_format(request.path);
+  if (!format || is_whole(*format)) return name;
+  return name + "@" + core::rounded_text(request.scale) + (request.y_up ? "y" : "") + ".ply";
+}
+
+interfaces::SceneFileOptions options(const core::LogSink& log, const std::filesystem::path& scene = {},
+                                     FilesOfScene* files = nullptr) {
   interfaces::SceneFileOptions options;
-  options.read_mesh = [log](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
-    interfaces::MeshReadOptions read;
-    read.metres_per_unit = request.scale;
-    read.up_axis = request.y_up ? interfaces::UpAxis::kY : interfaces::UpAxis::kDeclared;
+  options.read_mesh = [=](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
+    const interfaces::MeshReadOptions read = mesh_options(request);
+    const auto format = interfaces::mesh_format(request.path);
+    if (files && format && is_whole(*format)) {
+      PRESCENE_TRY(std::vector<std::uint8_t> bytes, interfaces::read_file(request.path, read.max_file_bytes));
+      auto mesh = interfaces::decode_mesh(*format, bytes, read);
+      if (!mesh) return mesh.status().at(request.path.string());
+      (*files)[carried_mesh_name(request, scene)] = std::move(bytes);
+      tell(request, *mesh, log);
+      return std::move(mesh->mesh);
+    }
     PRESCENE_TRY(interfaces::LoadedMesh mesh, interfaces::read_mesh(request.path, read));
-    for (const std::string& warning : mesh.warnings) {
-      core::log(log, core::LogLevel::kWarning, request.path.string() + ": " + warning);
+    tell(request, mesh, log);
+    if (files) {
+      const std::string ply = interfaces::encode_ply(mesh.mesh);
+      (*files)[carried_mesh_name(request, scene)] = {ply.begin(), ply.end()};
     }
     return std::move(mesh.mesh);
+  };
+  if (!files) return options;
+  options.read_file = [=, limit = options.limits.max_bytes](const std::filesystem::path& path) {
+    auto bytes = interfaces::read_file(path, limit);
+    if (bytes) (*files)[carried_name(path, scene)] = *bytes;
+    return bytes;
+  };
+  return options;
+}
+
+interfaces::SceneFileOptions carried_options(const std::filesystem::path& scene, const CarriedFiles& files) {
+  interfaces::SceneFileOptions options;
+  options.read_file = [=](const std::filesystem::path& path) { return files(carried_name(path, scene)); };
+  options.read_mesh = [=](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
+    const auto format = interfaces::mesh_format(request.path);
+    if (!format) return core::unsupported(request.path.string() + ": is no mesh that can be read");
+    PRESCENE_TRY(const std::vector<std::uint8_t> bytes, files(carried_mesh_name(request, scene)));
+    // Scale and axis are in the PLY already. What is odd about the mesh was said when it was recorded.
+    const bool whole = is_whole(*format);
+    auto mesh = interfaces::decode_mesh(whole ? *format : interfaces::MeshFormat::kPly, bytes,
+                                        whole ? mesh_options(request) : interfaces::MeshReadOptions{});
+    if (!mesh) return mesh.status().at(request.path.string());
+    return std::move(mesh->mesh);
   };
   return options;
 }
@@ -54,9 +119,17 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesys
 
 core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
                                                                    const std::filesystem::path& path,
-                                                                   const core::LogSink& log) {
+                                                                   const core::LogSink& log, FilesOfScene* files) {
   interfaces::FileReport report;
-  return shared(interfaces::parse_scene(text, path.string(), options(log), &report), report, log);
+  return shared(interfaces::parse_scene(text, path.string(), options(log, path, files), &report), report, log);
+}
+
+core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std::string& text,
+                                                                      const std::filesystem::path& path,
+                                                                      const CarriedFiles& files,
+                                                                      const core::LogSink& log) {
+  interfaces::FileReport report;
+  return shared(interfaces::parse_scene(text, path.string(), carried_options(path, files), &report), report, log);
 }
 
 bool is_model_file(const std::filesystem::path& path) {

@@ -85,9 +85,9 @@ core::Status add_recording(const std::filesystem::path& path, const core::Progre
 core::Result<DepthNoise> depth_noise_of(const std::filesystem::path& path, double metres_per_unit,
                                         const core::ProgressSink& progress, const core::Cancellation& cancellation) {
   DepthNoiseEstimator estimator;
-  const core::Status added = std::filesystem::is_directory(path)
-                                 ? add_folder(path, metres_per_unit, progress, cancellation, estimator)
-                                 : add_recording(path, progress, cancellation, estimator);
+  const core::Status added = interfaces::is_bag(path)
+                                 ? add_recording(path, progress, cancellation, estimator)
+                                 : add_folder(path, metres_per_unit, progress, cancellation, estimator);
   if (!added.ok()) return added.at(path.string());
   auto noise = estimator.finish();
   if (!noise) return noise.status().at(path.string());

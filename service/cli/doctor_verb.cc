@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "prescene/core/text.h"
@@ -75,6 +76,10 @@ std::string text_of(const Diagnosis& diagnosis) {
 }
 
 core::Status run(DoctorVerbOptions& options, VerbContext& context) {
+  for (const char* extension : {".mcap", ".db3"})
+    if (options.scene.ends_with(extension) || std::filesystem::is_directory(options.scene))
+      return core::invalid_input(options.scene + " is a recording, and doctor looks at the bus: `prescene inspect " +
+                                 options.scene + "` says what is in it and what is wrong with it");
   PRESCENE_RETURN_IF_ERROR(validate(options.doctor.tracker.topics));
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.doctor.dds));
   if (!options.overlay.empty() && options.scene.empty())

@@ -92,7 +92,8 @@ Verb add_explain_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("explain",
                                   "Explains what a recording shows in a window of time: which event, when, where from");
   auto options = std::make_shared<ExplainVerbOptions>();
-  verb->add_option("RECORDING", options->input, "MCAP file, or folder of images as for replay")->required();
+  verb->add_option("RECORDING", options->input, "MCAP or .db3 file, folder of rosbag2, or of images as for replay")
+      ->required();
   verb->add_option("--from", options->explain.from, "Begin of the window, s since the first frame")
       ->check(number_between(0.0, 1e6))
       ->required();

@@ -8,6 +8,7 @@
 #include "prescene/interfaces/images/png.h"
 #include "prescene/service/pictures/belief_overlay.h"
 #include "prescene/service/pictures/likelihood_picture.h"
+#include "prescene/service/recording/recording_overview.h"
 #include "prescene/service/tracking/tracker.h"
 
 namespace prescene::service {
@@ -68,6 +69,43 @@ std::string text_of(const BeliefSummary& summary, const std::vector<ObjectEviden
   return summary.objects.empty() ? "nothing is believed to be there\n" : table(rows);
 }
 
+std::string megabytes(std::uint64_t bytes) { return fixed_text(1e-6 * static_cast<double>(bytes), 2) + " MB"; }
+
+std::string cameras_text(const RecordingOverview& overview) {
+  std::string text;
+  for (const RecordedImages& images : overview.images)
+    text += images.topic + ": " + images.encoding +
+            (images.width > 0 ? ", " + std::to_string(images.width) + " x " + std::to_string(images.height) : "") +
+            ", frame " + images.frame + "\n";
+  for (const RecordedCamera& camera : overview.cameras)
+    text += camera.topic + ": " + std::to_string(camera.width) + " x " + std::to_string(camera.height) + ", fx " +
+            fixed_text(camera.fx, 1) + ", fy " + fixed_text(camera.fy, 1) + ", cx " + fixed_text(camera.cx, 1) +
+            ", cy " + fixed_text(camera.cy, 1) + ", frame " + camera.frame + ", " +
+            (camera.is_distorted ? "distorted (" + camera.distortion_model + ")" : "not distorted") + "\n";
+  return text;
+}
+
+std::string text_of(const std::string& path, const RecordingOverview& overview) {
+  std::string text = path + ": " + overview.storage + ", " + std::to_string(overview.files.size()) +
+                     (overview.files.size() == 1 ? " file, " : " files, ") + megabytes(overview.bytes) + ", " +
+                     fixed_text(overview.seconds, 2) + " s, " + std::to_string(overview.messages) + " messages\n";
+  if (overview.has_scene)
+    text += "scene " + (overview.scene_file.empty() ? "without a name" : overview.scene_file) + ", seed " +
+            std::to_string(overview.seed) + ", " + std::to_string(overview.attachments.size()) + " attached files\n";
+  std::vector<std::vector<std::string>> rows = {
+      {"topic", "type", "of", "messages", "rate, Hz", "longest gap, s", "size"}};
+  for (const RecordedTopic& topic : overview.topics)
+    rows.push_back({topic.name, topic.type, topic.of == "robot" ? "" : "prescene", std::to_string(topic.messages),
+                    topic.rate() ? fixed_text(*topic.rate(), 1) : "",
+                    topic.messages > 1 ? fixed_text(topic.longest_gap, 3) : "", megabytes(topic.bytes)});
+  text += "\n" + table(rows) + "\n" + cameras_text(overview);
+  std::size_t fixed = 0;
+  for (const RecordedTransform& transform : overview.transforms) fixed += transform.is_static ? 1 : 0;
+  text += std::to_string(overview.transforms.size()) + " transforms, " + std::to_string(fixed) + " of them static\n";
+  for (const std::string& problem : overview.problems) text += "problem: " + problem + "\n";
+  return text + (overview.problems.empty() ? "no problems found\n" : "");
+}
+
 core::Status write_picture(const std::string& path, const geometry::ColorImage& picture, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(interfaces::write_png(path, picture.view()));
   core::log(context.log(), core::LogLevel::kInfo, "picture written to " + path);
@@ -75,6 +113,16 @@ core::Status write_picture(const std::string& path, const geometry::ColorImage& 
 }
 
 }  // namespace
+
+core::Status describe_recording(const std::string& path, VerbContext& context) {
+  const auto overview = overview_of(path, context.cancellation(), context.progress("reading"));
+  context.end_progress();
+  if (!overview) return overview.status();
+  ordered_json document = {{"recording", path}};
+  document.update(service::to_json(*overview));
+  context.print(document, text_of(path, *overview));
+  return core::ok_status();
+}
 
 core::Status inspect_recording(const RecordingInspection& options, VerbContext& context) {
   const std::string place = options.input.path.string();

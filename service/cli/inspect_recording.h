@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One frame of a recording and what is believed of it.
+// A recording: what it holds; and one frame of it and what is believed of it.
 #pragma once
 
 #include <string>
@@ -20,5 +20,8 @@ struct RecordingInspection {
 /// Replays up to the frame, prints what is believed there and writes the pictures. kInvalidInput where the recording is
 /// shorter.
 core::Status inspect_recording(const RecordingInspection& options, VerbContext& context);
+
+/// Prints what the recording holds: topics, rates, gaps, cameras, problems.
+core::Status describe_recording(const std::string& path, VerbContext& context);
 
 }  // namespace prescene::service

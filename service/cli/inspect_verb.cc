@@ -36,7 +36,7 @@ constexpr const char* kRecordingOptions[] = {"--frame",          "--scene",     
                                              "--likelihood-map", "--depth-scale", "--depth-noise"};
 
 bool is_recording(const std::filesystem::path& path) {
-  return path.extension() == ".mcap" || std::filesystem::is_directory(path);
+  return path.extension() == ".mcap" || path.extension() == ".db3" || std::filesystem::is_directory(path);
 }
 
 /// kInvalidInput for an option that is for the other kind of file.
@@ -44,9 +44,10 @@ core::Status check_options(const InspectOptions& options, bool recording) {
   for (const char* name :
        recording ? std::span<const char* const>(kMeshOptions) : std::span<const char* const>(kRecordingOptions))
     if (options.verb->count(name) > 0)
-      return core::invalid_input(
-          std::string(name) + " is for " + (recording ? "meshes" : "recordings") + ", and " + options.file + " is " +
-          (recording ? "a recording" : "no recording (.mcap, or a folder)") + ": leave it out, or name another file");
+      return core::invalid_input(std::string(name) + " is for " + (recording ? "meshes" : "recordings") + ", and " +
+                                 options.file + " is " +
+                                 (recording ? "a recording" : "no recording (.mcap, .db3, or a folder)") +
+                                 ": leave it out, or name another file");
   return core::ok_status();
 }
 
@@ -167,6 +168,10 @@ core::Status run(InspectOptions& options, VerbContext& context) {
     context.print(to_json(noise), text_of(noise));
     return core::ok_status();
   }
+  const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
+  if (interfaces::is_bag(options.file) && !given("--frame") && !given("--scene") && !given("--overlay") &&
+      !given("--likelihood-map"))
+    return describe_recording(options.file, context);
   options.recording.input.path = options.file;
   options.recording.input.scene_file = options.scene;
   return inspect_recording(options.recording, context);
@@ -177,11 +182,11 @@ core::Status run(InspectOptions& options, VerbContext& context) {
 Verb add_inspect_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
       "inspect",
-      "What a mesh holds (scale, closedness, mass, symmetry, how it can lie), and a model file of it; or what is "
-      "believed at a frame of a recording, and why");
+      "What a mesh holds (scale, closedness, mass, symmetry, how it can lie), and a model file of it; what a recording "
+      "holds (topics, rates, gaps, cameras, problems); or what is believed at one of its frames, and why");
   auto options = std::make_shared<InspectOptions>();
   verb->add_option("FILE", options->file,
-                   "Mesh (PLY, OBJ, STL, glTF, COLLADA), or recording (.mcap, or a folder of images)")
+                   "Mesh (PLY, OBJ, STL, glTF, COLLADA), or recording (.mcap, .db3, folder of rosbag2 or of images)")
       ->required();
   verb->add_option("-o,--output", options->model, "Write a model file that scene files can name")->check(file_name());
   verb->add_option("--use", options->use,
@@ -215,6 +220,7 @@ Verb add_inspect_verb(CLI::App& app) {
   options->verb = verb;
   verb->footer(
       "Examples: prescene inspect cup.stl --scale 0.001 -o cup.yaml --report cup.html\n"
+      "          prescene inspect milk.mcap\n"
       "          prescene inspect milk.mcap --frame 40 --overlay seen.png --likelihood-map why.png");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

@@ -35,9 +35,9 @@ core::Status with_name(const core::Status& status, const std::filesystem::path& 
 
 /// Writes the recording `aside`; kCancelled with what is done in it.
 core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene& scene, const std::string& text,
-                         const RecordOptions& options, VerbContext& context) {
+                         FilesOfScene files, const RecordOptions& options, VerbContext& context) {
   PRESCENE_TRY(const auto recording,
-               RecordingWriter::create(aside, {options.simulate, text, context.options().seed, ""}));
+               RecordingWriter::create(aside, {options.simulate, text, context.options().seed, "", std::move(files)}));
   Backends backends(context.pool());
   core::Status simulated = simulate_recording(scene, options.simulation, context.options().seed, backends,
                                               context.cancellation(), context.progress("recording"), *recording);
@@ -59,14 +59,15 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   }
   options.simulation.reports_robot = !options.unreported_robot;
   PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
-  PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log()));
+  FilesOfScene files;
+  PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log(), &files));
   // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
   std::error_code error;
   const bool replaces = std::filesystem::exists(options.output, error);
   const std::filesystem::path target =
       replaces ? std::filesystem::canonical(options.output, error) : std::filesystem::path(options.output);
   PRESCENE_TRY(const std::filesystem::path aside, interfaces::create_beside(target, options.output));
-  core::Status status = simulate_to(aside, *scene, text, options, context);
+  core::Status status = simulate_to(aside, *scene, text, std::move(files), options, context);
   const bool cancelled = status.code() == core::StatusCode::kCancelled;
   const bool keeps = status.ok() || (cancelled && !replaces);
   if (keeps) std::filesystem::rename(aside, target, error);

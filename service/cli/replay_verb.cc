@@ -69,6 +69,13 @@ core::Result<TrackerSettings> settings_of(const ReplayOptions& options, const Re
   return with_given(*options.verb, std::move(recorded), options.tracker);
 }
 
+/// ", from 2 to 3 s"; "" of a whole recording.
+std::string window_text(const RecordingReadOptions& read) {
+  if (read.from <= 0.0 && !std::isfinite(read.to)) return "";
+  return ", from " + core::rounded_text(read.from) +
+         (std::isfinite(read.to) ? " to " + core::rounded_text(read.to) + " s" : " s on");
+}
+
 void tell_unchecked(const ReplayOptions& options, const std::string& unchecked, VerbContext& context) {
   if (!unchecked.empty()) core::log(context.log(), core::LogLevel::kInfo, options.input + ": " + unchecked);
 }
@@ -182,6 +189,10 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   if (!options.proposals.empty()) {
     PRESCENE_TRY(settings.filter.learned, load_proposals(options.proposals, *input.scene()));
   }
+  if (options.read.from > 0.0)
+    core::log(context.log(), core::LogLevel::kInfo,
+              "the belief begins anew at " + core::rounded_text(options.read.from) +
+                  " s, so its steps are not compared with recorded ones");
   Backends backends(context.pool(), options.backends);
   const std::uint64_t seed =
       context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
@@ -278,7 +289,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
                              " is the first that differs from the recording: another version, machine or setting?");
   }
-  return check_steps(*summary, settings.topics).at(options.input);
+  return check_steps(*summary, settings.topics).at(options.input + window_text(options.read));
 }
 
 /// kInvalidInput for an option that would do nothing.
@@ -295,7 +306,14 @@ core::Status check_options(const ReplayOptions& options) {
       if (given(name))
         return core::invalid_input(std::string(name) + " goes without --over-dds: give it to the `serve` that tracks");
   }
-  if (std::error_code none; std::filesystem::is_directory(options.input, none)) return core::ok_status();
+  if (!(options.read.from < options.read.to))
+    return core::invalid_input("--from " + core::rounded_text(options.read.from) + " is not before --to " +
+                               core::rounded_text(options.read.to) + ": exchange them");
+  if (!interfaces::is_bag(options.input)) {
+    for (const char* name : {"--from", "--to"})
+      if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out");
+    return core::ok_status();
+  }
   for (const char* name : {"--depth-scale", "--frame-rate"})
     if (given(name))
       return core::invalid_input(std::string(name) + " is for folders of images, and " + options.input +
@@ -309,8 +327,9 @@ Verb add_replay_verb(CLI::App& app) {
   auto* verb = app.add_subcommand(
       "replay", "Replay a recording or a folder of images: here, or onto the bus for a running `serve`");
   auto options = std::make_shared<ReplayOptions>();
-  verb->add_option("RECORDING", options->input,
-                   "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
+  verb->add_option(
+          "RECORDING", options->input,
+          "MCAP or .db3 file, folder of rosbag2, or folder with frames/, intrinsics.K.txt and camera_poses.csv")
       ->required();
   verb->add_option(
           "--scene", options->scene,
@@ -330,6 +349,12 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
       ->check(positive_number())
       ->capture_default_str();
+  verb->add_option("--from", options->read.from,
+                   "Begin so many seconds after the recording's first message: the belief begins anew there")
+      ->check(number_between(0.0, 1e9))
+      ->capture_default_str();
+  verb->add_option("--to", options->read.to, "End so many seconds after the recording's first message")
+      ->check(number_between(0.0, 1e9));
   verb->add_flag("--salvage", options->read.salvage,
                  "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
@@ -342,6 +367,7 @@ Verb add_replay_verb(CLI::App& app) {
   options->verb = verb;
   verb->footer(
       "Examples: prescene replay milk.mcap --report milk.html\n"
+      "          prescene replay bag_folder --scene table.yaml --from 12 --to 20\n"
       "          prescene replay milk.mcap --over-dds --ask '2.4:{\"predict\": {}}'");
   return {
       verb, [options](VerbContext& context) -> core::Status {

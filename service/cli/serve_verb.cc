@@ -44,7 +44,9 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(validate(options.settings.tracker.topics));
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.settings.dds));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
-  PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log()));
+  FilesOfScene files;
+  PRESCENE_TRY(const auto scene,
+               load_scene_text(text, options.scene, context.log(), options.record.empty() ? nullptr : &files));
   if (!options.proposals.empty()) {
     PRESCENE_TRY(options.settings.tracker.filter.learned, load_proposals(options.proposals, *scene));
   }
@@ -56,8 +58,9 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
     PRESCENE_TRY(recording,
-                 RecordingWriter::create(options.record, {options.scene, text, context.options().seed,
-                                                          belief::json_text(to_json(options.settings.tracker))}));
+                 RecordingWriter::create(options.record,
+                                         {options.scene, text, context.options().seed,
+                                          belief::json_text(to_json(options.settings.tracker)), std::move(files)}));
   }
   Backends backends(context.pool(), options.backends);
   PRESCENE_TRY(const auto view, open_view(options, scene, context));

@@ -110,8 +110,7 @@ core::Status check_options(const ViewVerbOptions& options) {
       return core::invalid_input(std::string(name) +
                                  " is for what is on the bus, and a recording needs none of it: "
                                  "leave it out");
-  std::error_code none;
-  const bool is_folder = std::filesystem::is_directory(options.recording, none);
+  const bool is_folder = !interfaces::is_bag(options.recording);
   for (const char* name : {"--depth-scale", "--frame-rate"})
     if (!is_folder && given(name))
       return core::invalid_input(std::string(name) + " is for folders of images, and " + options.recording +
@@ -124,9 +123,10 @@ core::Status check_options(const ViewVerbOptions& options) {
 Verb add_view_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("view", "Show a recording, or a running `serve`, in the browser");
   auto options = std::make_shared<ViewVerbOptions>();
-  verb->add_option(
-          "RECORDING", options->recording,
-          "MCAP file, or folder with frames/, intrinsics.K.txt and camera_poses.csv; default: what is on the bus")
+  verb->add_option("RECORDING", options->recording,
+                   "MCAP or .db3 file, folder of rosbag2, or folder with frames/, intrinsics.K.txt and "
+                   "camera_poses.csv; default: "
+                   "what is on the bus")
       ->check(file_name());
   verb->add_option("--port", options->view.port, "Port of the page; 0 = any that is free")
       ->check(CLI::Range(0, 65535))

@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -179,6 +180,17 @@ bool is_robots(const RecordedEntry& entry) {
   return !entry.is_json && topic != kQueryTopic && topic != kAnswerTopic;
 }
 
+/// The publisher of a topic; none of a type that no service of ours reads, as bags of robots have many.
+core::Result<std::optional<DdsPublisher>> publisher_for(const interfaces::ReceivedMessage& message, BusPlayer& player,
+                                                        std::set<std::string>& passed_over) {
+  if (passed_over.contains(message.topic)) return std::optional<DdsPublisher>();
+  const auto publisher = player.publisher_of(message);
+  if (publisher) return std::optional<DdsPublisher>(*publisher);
+  if (publisher.status().code() != core::StatusCode::kUnsupported) return publisher.status();
+  passed_over.insert(message.topic);
+  return std::optional<DdsPublisher>();
+}
+
 }  // namespace
 
 core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path, const BusReplayOptions& options,
@@ -193,14 +205,17 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   BusPlayer player(*node, listener);
   PRESCENE_RETURN_IF_ERROR(player.open());
 
+  std::set<std::string> passed_over;
   {  // Advertise everything first, so that the service has found it all before the first frame.
     PRESCENE_TRY(const auto reader, RecordingReader::open(path, options.read));
     while (!cancellation.requested()) {
       PRESCENE_TRY(const auto entry, reader->next());
       if (!entry) break;
-      if (is_robots(*entry)) PRESCENE_RETURN_IF_ERROR(player.publisher_of(entry->message).status());
+      if (is_robots(*entry)) PRESCENE_RETURN_IF_ERROR(publisher_for(entry->message, player, passed_over).status());
     }
   }
+  for (const std::string& topic : passed_over)
+    core::log(log, core::LogLevel::kInfo, topic + " is not played: no service reads messages of its type");
   const bool heard =
       options.wait_for_service <= 0.0 || player.wait_for_listeners(options.wait_for_service, cancellation);
   if (cancellation.requested()) return core::cancelled("stopped on request, before anything was played");
@@ -219,7 +234,6 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   PRESCENE_TRY(const auto reader, RecordingReader::open(path, again));
   BusReplayResult result;
   const auto start = steady_clock::now();
-  std::optional<core::TimeNs> first_ns;
   core::TimeNs last_stamp_ns = 0;
   double at = 0.0;
   std::size_t asked = 0;
@@ -228,17 +242,19 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   while (!cancellation.requested()) {
     PRESCENE_TRY(const auto entry, reader->next());
     if (!entry) break;
-    if (!first_ns) first_ns = entry->message.received_ns;
-    at = core::seconds_of(entry->message.received_ns - *first_ns);
-    listener.wait_until(start + seconds(at / options.speed), cancellation);
+    at = reader->seconds_into(*entry);
+    // What is needed from before goes first.
+    const double after = std::max(0.0, at - options.read.from);
+    listener.wait_until(start + seconds(after / options.speed), cancellation);
     if (cancellation.requested()) break;
     for (; asked < options.questions.size() && options.questions[asked].at <= at; ++asked)
       PRESCENE_RETURN_IF_ERROR(player.ask(asked, options.questions[asked].at, options.questions[asked]));
     if (on_entry) on_entry(*entry);
     if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
     if (!is_robots(*entry)) continue;
-    PRESCENE_TRY(const DdsPublisher publisher, player.publisher_of(entry->message));
-    const core::Status published = node->publish_cdr(publisher, entry->message.cdr);
+    PRESCENE_TRY(const auto publisher, publisher_for(entry->message, player, passed_over));
+    if (!publisher) continue;
+    const core::Status published = node->publish_cdr(*publisher, entry->message.cdr);
     if (!published.ok()) core::log(log, core::LogLevel::kWarning, entry->message.topic + ": " + published.message());
     last_stamp_ns = std::max(last_stamp_ns, is_image_type(entry->message.type) ? entry->message.source_ns : 0);
     ++result.messages;

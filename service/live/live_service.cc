@@ -29,6 +29,10 @@ using interfaces::ReceivedMessage;
 using interfaces::TopicQos;
 using std::chrono::steady_clock;
 
+constexpr const char* kDetectionsType = "vision_msgs/msg/Detection3DArray";
+constexpr const char* kMarkersType = "visualization_msgs/msg/MarkerArray";
+constexpr const char* kPoseType = "geometry_msgs/msg/PoseWithCovarianceStamped";
+
 // How often a stop request is looked for while nothing comes in.
 constexpr std::chrono::milliseconds kPollInterval(100);
 
@@ -91,6 +95,12 @@ struct LiveService::Impl {
   /// Counts and logs actions of controls that changed nothing.
   void note_idle(const IdleControls& idle);
   void record(const std::string& topic, const std::string& json);
+  /// What was published, for those who play the recording.
+  template <class Message>
+  void record_output(const std::string& topic, const std::string& type, const Message& message, core::TimeNs stamp_ns);
+  template <class Message>
+  void publish(const DdsPublisher& publisher, const std::string& topic, const std::string& type, const Message& message,
+               core::TimeNs stamp_ns);
   /// Without one of its steps a recording can't be replayed: it ends where that can't be written.
   void record_step(const StepRecord& step);
   /// The recording ends here, and is an error of the run.
@@ -200,13 +210,12 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
 
 core::Status LiveService::Impl::join_bus() {
   PRESCENE_TRY(beliefs, node->advertise(kBeliefTopic, "std_msgs/msg/String", TopicQos::kState));
-  PRESCENE_TRY(detections, node->advertise(kDetectionsTopic, "vision_msgs/msg/Detection3DArray", TopicQos::kState));
-  PRESCENE_TRY(markers, node->advertise(kMarkersTopic, "visualization_msgs/msg/MarkerArray", TopicQos::kState));
+  PRESCENE_TRY(detections, node->advertise(kDetectionsTopic, kDetectionsType, TopicQos::kState));
+  PRESCENE_TRY(markers, node->advertise(kMarkersTopic, kMarkersType, TopicQos::kState));
   PRESCENE_TRY(diagnostics,
                node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState));
   for (const belief::SceneObject& object : scene->objects) {
-    PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name),
-                                                     "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kState));
+    PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name), kPoseType, TopicQos::kState));
   }
   const std::function<void(ReceivedMessage &&)> deliver = [this](ReceivedMessage&& message) {
     inbox.put(std::move(message));
@@ -262,6 +271,22 @@ void LiveService::Impl::record(const std::string& topic, const std::string& json
   if (!recording) return;
   const core::Status written = recording->write_json(topic, json, last_now_ns);
   if (!written.ok()) give_up_recording(written);
+}
+
+template <class Message>
+void LiveService::Impl::record_output(const std::string& topic, const std::string& type, const Message& message,
+                                      core::TimeNs stamp_ns) {
+  if (!recording) return;
+  const core::Status written =
+      recording->write_output(topic, type, interfaces::encode_cdr(message), stamp_ns, last_now_ns);
+  if (!written.ok()) give_up_recording(written);
+}
+
+template <class Message>
+void LiveService::Impl::publish(const DdsPublisher& publisher, const std::string& topic, const std::string& type,
+                                const Message& message, core::TimeNs stamp_ns) {
+  check_sent(node->publish(publisher, message));
+  record_output(topic, type, message, stamp_ns);
 }
 
 void LiveService::Impl::record_step(const StepRecord& step) {
@@ -369,7 +394,8 @@ void LiveService::Impl::publish() {
   const std::string& world = settings.tracker.assembler.world_frame;
   const std::string json = belief::json_text(to_json(summary));
   check_sent(node->publish(beliefs, interfaces::RosString{json}));
-  check_sent(node->publish(detections, detections_of(summary, *belief->scene, world)));
+  const core::TimeNs stamp_ns = summary.stamp_ns;
+  publish(detections, kDetectionsTopic, kDetectionsType, detections_of(summary, *belief->scene, world), stamp_ns);
   if (belief->scene != published_scene) {
     add_marker_meshes(*belief->scene, meshes);
     published_scene = belief->scene;
@@ -379,15 +405,18 @@ void LiveService::Impl::publish() {
     advertise_new(object.name);
     const auto publisher = poses.find(object.name);
     if (publisher == poses.end()) continue;
-    check_sent(node->publish(publisher->second, pose_of(object, summary.stamp_ns, world)));
+    publish(publisher->second, pose_topic(object.name), kPoseType, pose_of(object, stamp_ns, world), stamp_ns);
   }
-  if (marker_limit.due()) check_sent(node->publish(markers, markers_of(summary, *belief->scene, meshes, world)));
+  if (marker_limit.due())
+    publish(markers, kMarkersTopic, kMarkersType, markers_of(summary, *belief->scene, meshes, world), stamp_ns);
+  // On the bus it would come back as the robot's.
+  record_output(settings.tracker.topics.tf, "tf2_msgs/msg/TFMessage", transforms_of(summary, world), stamp_ns);
   record(kBeliefTopic, json);
 }
 
 void LiveService::Impl::advertise_new(const std::string& object) {
   if (poses.contains(object)) return;
-  auto publisher = node->advertise(pose_topic(object), "geometry_msgs/msg/PoseWithCovarianceStamped", TopicQos::kState);
+  auto publisher = node->advertise(pose_topic(object), kPoseType, TopicQos::kState);
   if (publisher)
     poses.emplace(object, *std::move(publisher));
   else

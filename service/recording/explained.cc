@@ -22,7 +22,7 @@ constexpr double kRounding = 1e-6;  // s
 /// What the robot said that it does, by the clock of the frames; controls that can't be placed are counted.
 core::Status read_actions(const ExplainOptions& options, queries::ExplainWindow& window,
                           std::vector<std::string>& remarks) {
-  if (std::error_code none; std::filesystem::is_directory(options.path, none)) return core::ok_status();
+  if (!interfaces::is_bag(options.path)) return core::ok_status();
   PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
   const core::TimeNs begin = window.start->stamp_ns, end = window.frames.back().observation.stamp_ns;
   int placeless = 0;

@@ -16,13 +16,19 @@ constexpr std::size_t kMostDegraded = 100;  // different ones, as some name a nu
 
 /// Whether Prescene wrote step records into this recording.
 core::Result<bool> has_step_records(const std::filesystem::path& path, const RecordingReadOptions& options) {
+  // Only a file of ours has them; and a belief that begins later goes its own way.
+  if (std::filesystem::is_directory(path) || path.extension() == ".db3" || options.from > 0.0) return false;
   interfaces::McapReaderOptions only_steps;
   only_steps.topics = {kStepTopic};
   only_steps.salvage = options.salvage;
   only_steps.check_data = false;  // It was, just now.
   PRESCENE_TRY(const auto reader, interfaces::McapReader::open(path, only_steps));
-  PRESCENE_TRY(const auto first, reader->next());
-  return first.has_value();
+  for (;;) {
+    PRESCENE_TRY(const auto message, reader->next());
+    if (!message) return false;
+    // Another program may have recorded that topic when a recording was played.
+    if (holds_own_json(reader->channels()[static_cast<std::size_t>(message->channel)])) return true;
+  }
 }
 
 class Replay {

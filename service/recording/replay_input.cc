@@ -12,7 +12,8 @@ namespace prescene::service {
 core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, const core::LogSink& log) {
   ReplayInput input;
   input.path_ = options.path;
-  if (std::filesystem::is_directory(options.path)) {
+  std::unique_ptr<RecordingReader> reader;
+  if (!interfaces::is_bag(options.path)) {
     interfaces::FrameFolderOptions folder_options;
     folder_options.metres_per_unit = options.metres_per_unit;
     folder_options.frames_per_second = options.frames_per_second;
@@ -20,7 +21,7 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
     PRESCENE_TRY(input.folder_, interfaces::FrameFolder::open(options.path, folder_options));
     if (options.scene_file.empty()) input.scene_ = unknown_scene(options.path, input.folder_->frames().front().X_WC);
   } else {
-    PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
+    PRESCENE_TRY(reader, RecordingReader::open(options.path, options.read));
     input.info_ = reader->info();
     input.read_ = options.read;
     // Once is enough, and chunks are checked whenever they are read; but what is salvaged has its loss told at the end.
@@ -31,7 +32,10 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
     PRESCENE_TRY(input.scene_, load_scene(options.scene_file, log));
     PRESCENE_TRY(input.scene_text_, read_scene_text(options.scene_file));
   } else if (!input.info_.scene_text.empty()) {
-    PRESCENE_TRY(input.scene_, load_scene_text(input.info_.scene_text, input.info_.scene_file, log));
+    const auto attached = [&reader](const std::string& name) { return reader->read_attached(name); };
+    PRESCENE_TRY(input.scene_, reader->has_attached_scene()
+                                   ? load_carried_scene(input.info_.scene_text, input.info_.scene_file, attached, log)
+                                   : load_scene_text(input.info_.scene_text, input.info_.scene_file, log));
     input.scene_text_ = input.info_.scene_text;
   } else {
     return core::invalid_input(options.path.string() + " names no scene: give one with --scene FILE");

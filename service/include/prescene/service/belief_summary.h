@@ -51,6 +51,8 @@ interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, cons
                                               const std::string& world_frame);
 interfaces::RosPoseWithCovarianceStamped pose_of(const ObjectSummary& object, core::TimeNs stamp_ns,
                                                  const std::string& world_frame);
+/// The frame prescene/OBJECT of each, from the world's.
+interfaces::RosTfMessage transforms_of(const BeliefSummary& summary, const std::string& world_frame);
 /// Coarse meshes of a scene's models by name, made once for markers.
 using MarkerMeshes = std::map<std::string, geometry::TriangleMesh>;
 MarkerMeshes marker_meshes(const belief::Scene& scene);

@@ -2,9 +2,13 @@
 // Scenes from files, with the meshes they name.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "prescene/belief/scene.h"
 #include "prescene/core/log.h"
@@ -20,10 +24,26 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesys
 /// The text of a scene file, to be recorded. Errors of interfaces::read_file.
 core::Result<std::string> read_scene_text(const std::filesystem::path& path);
 
-/// load_scene from such a text; files that it names are looked for relative to `path`.
+/// The model files and meshes that a scene names, by their paths from the scene's folder ("../models/cup.yaml";
+/// absolute where the scene names them so). Meshes are in their own format, but for those of glTF and COLLADA, which
+/// are PLY of the mesh as it was read: such a file may need others.
+using FilesOfScene = std::map<std::string, std::vector<std::uint8_t>>;
+
+/// load_scene from such a text; files that it names are looked for relative to `path`. `files`, if given, gets their
+/// content, for load_carried_scene.
 core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
                                                                    const std::filesystem::path& path,
-                                                                   const core::LogSink& log);
+                                                                   const core::LogSink& log,
+                                                                   FilesOfScene* files = nullptr);
+
+/// Content of a file of FilesOfScene by its name.
+using CarriedFiles = std::function<core::Result<std::vector<std::uint8_t>>(const std::string& name)>;
+/// The same scene, bit for bit, from files that were kept: nothing is read from the disk. `text` and `path` are those
+/// that load_scene_text was given.
+core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std::string& text,
+                                                                      const std::filesystem::path& path,
+                                                                      const CarriedFiles& files,
+                                                                      const core::LogSink& log);
 
 /// Whether a YAML file describes one model and no scene; false where it can't be read.
 bool is_model_file(const std::filesystem::path& path);

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings: MCAP files with the robot's messages as they came, and what Prescene did with them, as JSON under
-// /prescene/.
+// Recordings: MCAP files with the robot's messages as they came, and what Prescene did with them: JSON in
+// std_msgs/String under /prescene/, and poses, detections, markers and transforms of the objects for other programs.
+// All is CDR, so that any ROS 2 and Foxglove play it. The scene file and what it names are attached.
 #pragma once
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "prescene/interfaces/bags/bag_reader.h"
 #include "prescene/interfaces/dds/dds_node.h"
-#include "prescene/interfaces/mcap/mcap_reader.h"
 #include "prescene/interfaces/mcap/mcap_writer.h"
+#include "prescene/service/load_scene.h"
 #include "prescene/service/tracking/step_record.h"
 
 namespace prescene::service {
@@ -25,11 +29,20 @@ struct RecordingInfo {
   std::string scene_text;  ///< Its YAML.
   std::uint64_t seed = 0;
   std::string settings;  ///< JSON of the settings that were used; "" = none.
+  /// To be attached, with the scene's text: all that the scene names; nothing: a replay looks for them on the disk.
+  /// RecordingReader leaves it empty: its read_attached() gives single files.
+  std::optional<FilesOfScene> files = std::nullopt;
 };
 
 /// Where to record a robot: `path`, or where that is a file already, "run-2.mcap", "run-3.mcap", ... beside it. What a
 /// robot saw can't be seen again, so nothing live is written over it.
 std::filesystem::path unused_recording_path(const std::filesystem::path& path);
+
+/// Whether a channel holds JSON of ours: in a std_msgs/String that says so in the channel's metadata, or bare, as in
+/// recordings of earlier versions.
+bool holds_own_json(const interfaces::McapChannel& channel);
+/// Whether it holds what we made for other programs (RecordingWriter::write_output).
+bool is_own_output(const interfaces::McapChannel& channel);
 
 /// Writes one recording. Not thread-safe: owned by the thread that steps the belief.
 class RecordingWriter {
@@ -41,65 +54,90 @@ class RecordingWriter {
   /// kLatestRecordedNs: a sender's clock may say anything. What ends in an exception is not in the recording, and has
   /// no number.
   core::Result<MessageIndex> write(const interfaces::ReceivedMessage& message);
-  /// One JSON document on a /prescene/ topic. kResourceExhausted, writing nothing, above most_json_bytes().
+  /// One JSON document of ours on a /prescene/ topic, in a std_msgs/String. kResourceExhausted, writing nothing, above
+  /// most_json_bytes().
   core::Status write_json(const std::string& topic, const std::string& json, core::TimeNs time_ns);
+  /// What we make of the belief for other programs. A replay makes it anew, so RecordingReader passes over it.
+  core::Status write_output(const std::string& topic, const std::string& type, std::vector<std::uint8_t> cdr,
+                            core::TimeNs stamp_ns, core::TimeNs time_ns);
   core::Status flush() { return writer_->flush(); }
   core::Status close() { return writer_->close(); }
 
  private:
   explicit RecordingWriter(std::unique_ptr<interfaces::McapWriter> writer) : writer_(std::move(writer)) {}
-  core::Status write(const interfaces::McapChannel& channel, std::uint32_t sequence, core::TimeNs log_ns,
-                     core::TimeNs publish_ns, std::vector<std::uint8_t> data);
+  core::Status write(const std::string& topic, const std::string& type, const std::string& kind, std::uint32_t sequence,
+                     core::TimeNs log_ns, core::TimeNs publish_ns, std::vector<std::uint8_t> data);
 
   std::unique_ptr<interfaces::McapWriter> writer_;
-  std::map<std::string, int> channels_;
-  std::map<std::string, std::uint32_t> sequences_;
+  std::map<std::pair<std::string, std::string>, int> channels_;  // by topic and kind: /tf is the robot's and ours
+  std::map<std::string, std::uint32_t> sequences_;               // of what is ours
   MessageIndex next_index_ = 0;
 };
 
 /// One entry of a recording in its order.
 struct RecordedEntry {
   interfaces::ReceivedMessage message;  ///< `cdr` holds the JSON text of entries that are JSON.
-  bool is_json = false;
+  bool is_json = false;                 ///< Ours, not the robot's.
   /// Of a robot message, as when it was written, whatever was lost before it. In a recording of another program,
   /// or one whose description is damaged: its place among those that are read.
   MessageIndex index = 0;
 };
 
 struct RecordingReadOptions {
-  bool salvage = false;    ///< As interfaces::McapReaderOptions.
+  bool salvage = false;    ///< As interfaces::BagReaderOptions.
   bool check_data = true;  ///< The same.
+  /// Seconds since the recording's first message. Of what came before `from`, the transforms of the last 10 s, the
+  /// static ones and the camera infos are read, without which no later frame could be used; of what came after `to`,
+  /// nothing.
+  double from = 0.0;
+  double to = std::numeric_limits<double>::infinity();
 };
 
+/// Reads our recordings, and those of ROS 2 (interfaces::BagReader).
 class RecordingReader {
  public:
-  /// Errors of McapReader::open; kDataLoss where the checksum of what it says about itself is wrong or missing (with
+  /// Errors of BagReader::open; kDataLoss where the checksum of what it says about itself is wrong or missing (with
   /// `salvage`, that is left out).
   static core::Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path,
                                                              const RecordingReadOptions& options = {});
 
   /// From the recording's metadata; defaults where it has none (a recording made by other tools).
   const RecordingInfo& info() const { return info_; }
-  /// In the order of log times; empty at the end. Errors of McapReader::next; kResourceExhausted for JSON that would be
+  /// In the order of log times; empty at the end. Errors of BagReader::next; kResourceExhausted for JSON that would be
   /// parsed and is longer than kMostParsedJsonBytes (with `salvage`, that is left out and counted).
   core::Result<std::optional<RecordedEntry>> next();
+  /// Whether the recording carries what its scene names. Older ones do not.
+  bool has_attached_scene() const { return has_attached_scene_; }
+  /// A file of FilesOfScene. Errors of McapReader::attachment.
+  core::Result<std::vector<std::uint8_t>> read_attached(const std::string& name) const;
+  /// Seconds from the recording's first message to this one, by their times of receiving; 0 before anything is read.
+  double seconds_into(const RecordedEntry& entry) const {
+    return first_ns_ ? core::seconds_of(entry.message.received_ns - *first_ns_) : 0.0;
+  }
   /// What could not be read, and what could not be checked: a sentence each, empty = nothing. Complete at the end.
   std::string loss_text() const;
-  std::string unchecked_text() const { return reader_->unchecked().text(); }
+  std::string unchecked_text() const { return reader_->unchecked_text(); }
   std::optional<std::uint64_t> message_count() const { return reader_->message_count(); }
 
  private:
-  RecordingReader(std::unique_ptr<interfaces::McapReader> reader, bool salvage)
-      : reader_(std::move(reader)), salvage_(salvage) {}
+  RecordingReader(std::unique_ptr<interfaces::BagReader> reader, const RecordingReadOptions& options)
+      : reader_(std::move(reader)), options_(options) {}
   MessageIndex index_of(std::uint32_t sequence);
+  /// Whether a message of the robot is read although it came before `from`.
+  bool is_needed_later(const interfaces::McapChannel& channel, double before) const;
+  core::Result<std::optional<RecordedEntry>> own_json(const interfaces::McapChannel& channel,
+                                                      interfaces::McapMessage message);
 
-  std::unique_ptr<interfaces::McapReader> reader_;
-  bool salvage_ = false;
+  std::unique_ptr<interfaces::BagReader> reader_;
+  RecordingReadOptions options_;
+  std::optional<core::TimeNs> first_ns_;  // when the first message came
   RecordingInfo info_;
   bool has_info_ = false;
   bool info_is_damaged_ = false;
+  bool has_attached_scene_ = false;
   bool is_numbered_ = false;         // sequences are the lower bits of the messages' numbers
   std::uint64_t too_long_json_ = 0;  // left out
+  std::uint64_t damaged_json_ = 0;   // the same
   MessageIndex next_index_ = 0;
 };
 
