@@ -178,6 +178,32 @@ core::Result<std::string> fitted_model_yaml(const std::filesystem::path& scene, 
   return text + fitted_lines(fitted);
 }
 
+ModelThrows read_model_throws(const LocatedValue& value, Problems& problems) {
+  ModelThrows throws;
+  Binder binder(value, problems);
+  binder.read("position_noise", throws.position_noise, {0.0, 1.0, "give metres between 0 and 1", "m"});
+  binder.read("rotation_noise", throws.rotation_noise, {0.0, 3.0, "give radians between 0 and 3", "rad"});
+  binder.read("friction_scatter", throws.friction_scatter,
+              {0.0, 3.0, "give a share between 0 and 3: 0.05 is 5 % from throw to throw"});
+  return throws;
+}
+
+std::string throws_yaml(const ModelThrows& throws) {
+  return "throws:\n" + key_line("position_noise", number_text(throws.position_noise) + "  # m") +
+         key_line("rotation_noise", number_text(throws.rotation_noise) + "  # rad") +
+         key_line("friction_scatter", number_text(throws.friction_scatter));
+}
+
+core::Result<std::optional<ModelThrows>> read_throws(const std::filesystem::path& path, const YamlLimits& limits) {
+  PRESCENE_TRY(const LocatedValue document, read_yaml(path, limits));
+  const LocatedValue* at = document.find("throws");
+  if (!at) return std::optional<ModelThrows>();
+  Problems problems;
+  const ModelThrows throws = read_model_throws(*at, problems);
+  if (!problems.empty()) return problems.status();
+  return std::optional<ModelThrows>(throws);
+}
+
 core::Status write_model(const std::filesystem::path& path, const ModelFile& file) {
   return write_file(path, std::string_view(model_yaml(file)));
 }
@@ -199,6 +225,7 @@ core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& doc
     Binder binder(*document, problems);
     if (const LocatedValue* value = binder.require("model", "a model file holds one key 'model' with the model's keys"))
       model = read_object_model(*value, name, context);
+    if (const LocatedValue* throws = binder.find("throws")) read_model_throws(*throws, problems);
   }
   if (problems.empty())
     if (const core::Status status = belief::validate(model); !status.ok())

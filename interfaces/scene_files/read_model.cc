@@ -261,6 +261,7 @@ std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneCon
   }
   Binder binder(*document, context.problems);
   const LocatedValue* model = binder.require("model", "a model file holds one key 'model' with the model's keys");
+  if (const LocatedValue* throws = binder.find("throws")) read_model_throws(*throws, context.problems);
   if (!model) return std::nullopt;
   LocatedValue merged = *model;
   for (std::size_t i = 0; i < value.items.size(); ++i) {

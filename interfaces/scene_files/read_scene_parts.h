@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "read_values.h"
 
@@ -33,6 +34,7 @@ struct SceneContext {
 };
 
 belief::ObjectModel read_object_model(const LocatedValue& value, const std::string& name, SceneContext& context);
+ModelThrows read_model_throws(const LocatedValue& value, Problems& problems);
 /// [xx, yy, zz] or three rows, about the centre of mass of a body of 1 kg.
 std::optional<geometry::Matrix3d> read_unit_inertia(const LocatedValue& value, Problems& problems);
 belief::Support read_support(const LocatedValue& value, const std::string& name, SceneContext& context);

@@ -4,17 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <span>
 
-#include "prescene/core/order_statistics.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/service/calibration/motion_units.h"
-#include "prescene/simulation/calibration/find_beginning.h"
-#include "prescene/simulation/calibration/free_fall.h"
 #include "prescene/simulation/calibration/keep_prior.h"
-#include "prescene/simulation/calibration/sliding_fit.h"
+#include "usable_motions.h"
 
 namespace prescene::service {
 namespace {
@@ -25,7 +21,6 @@ using simulation::MotionBeginning;
 using simulation::MotionParameter;
 using simulation::RecordedMotion;
 
-constexpr std::size_t kLeastFlights = 3;
 // A tracker that claims to be better than that is a simulation.
 constexpr double kLeastPositionNoise = 1e-5;  // m
 constexpr double kLeastRotationNoise = 1e-4;  // rad
@@ -33,14 +28,6 @@ constexpr double kLeastRotationNoise = 1e-4;  // rad
 constexpr double kLittle = 0.6;
 // A tracker's metre is worth a remark when it is off by so much, and by three standard errors.
 constexpr double kScaleRemark = 0.003;
-// And no metre at all when gravity is off by such a share, and by so many errors.
-constexpr double kScaleRefused = 0.1;
-constexpr double kScaleErrors = 4.0;
-// s of a flight in which its fall is measured: a contact that comes earlier than simulated is seldom among them.
-constexpr double kFallSeconds = 0.1;
-// Of the recordings, that may be left out, and how many of them a refusal names.
-constexpr double kMostLeftOut = 0.25;
-constexpr std::size_t kMostNamed = 3;
 // Times as uncertain as frames show, that starts may be before the fit is called poor.
 constexpr double kPoorFit = 10.0;
 // Nothing that a lab throws or pushes has less friction.
@@ -48,6 +35,19 @@ constexpr double kNoFriction = 0.02;
 constexpr double kLeastFrameRate = 100.0;  // Hz
 // m: twice the gap at which things still count as touching, and more.
 constexpr double kNoisySlide = 5e-4;
+// Parts of the recordings, each of which is foretold by what the others tell.
+constexpr int kFolds = 5;
+// Simulated starts: of a recording, and of all of them at most as long as each has the least.
+constexpr std::size_t kSamples = 16;
+constexpr std::size_t kLeastSamples = 8;
+constexpr std::size_t kMostStarts = 2000;
+// Of random numbers: the parts, and the held-out forecasts.
+constexpr std::uint32_t kFoldDraws = 3;
+constexpr std::uint32_t kHeldOutDraws = 4;
+
+int samples_for(std::size_t recordings) {
+  return static_cast<int>(std::clamp(kMostStarts / recordings, kLeastSamples, kSamples));
+}
 
 std::size_t place_of(MotionParameter parameter) { return static_cast<std::size_t>(parameter); }
 
@@ -74,33 +74,13 @@ std::string words(MotionParameter parameter) {
   return text;
 }
 
-/// What of the recordings can be used; what cannot is left out with a remark, unless too little remains.
-core::Result<std::vector<RecordedMotion>> beginnings(const MotionDataset& dataset, std::size_t least,
-                                                     Backends& backends, std::vector<std::string>* remarks) {
-  PRESCENE_TRY(const auto simulator, backends.make_simulator(*dataset.scene));
-  std::vector<std::span<const simulation::TimedPose>> frames;
-  for (const MotionRecording& recording : dataset.recordings) frames.emplace_back(recording.frames);
-  const double noise = simulation::position_noise_of(frames);
-  std::vector<RecordedMotion> motions;
-  std::vector<std::string> refused;
-  for (const MotionRecording& recording : dataset.recordings) {
-    auto motion = simulation::find_beginning(recording.name, recording.frames, *dataset.scene, *simulator,
-                                             backends.pool(), noise);
-    if (motion)
-      motions.push_back(*std::move(motion));
-    else
-      refused.push_back(motion.status().message());
+simulation::MotionPrior kept_prior(const belief::Scene& scene, const std::vector<std::string>& keep) {
+  simulation::MotionPrior prior = simulation::motion_prior(scene.model_of(scene.objects[0]));
+  for (std::size_t i = 0; i < simulation::kMotionParameters; ++i) {
+    const std::string name = to_string(static_cast<MotionParameter>(i));
+    if (std::ranges::find(keep, name) != keep.end()) prior[i].deviation = 0.0;
   }
-  const double share = static_cast<double>(refused.size()) / static_cast<double>(dataset.recordings.size());
-  if (refused.empty() || (motions.size() >= least && share <= kMostLeftOut)) {
-    for (const std::string& reason : refused) remarks->push_back("left out: " + reason);
-    return motions;
-  }
-  std::string text =
-      std::to_string(refused.size()) + " of " + std::to_string(dataset.recordings.size()) + " recordings can't be used";
-  for (std::size_t i = 0; i < std::min(refused.size(), kMostNamed); ++i) text += (i == 0 ? ": " : "; ") + refused[i];
-  if (refused.size() > kMostNamed) text += "; ...";
-  return core::invalid_input(dataset.table_file().string() + ": " + text);
+  return prior;
 }
 
 /// What flights tell becomes the prior of what contacts, which come later, are asked.
@@ -116,83 +96,6 @@ void use_flights(const FlightCalibration& flight, const simulation::FlightPrior&
       belief = {flight.center_of_mass[i], std::max(flight.standard_error(static_cast<FlightParameter>(i)),
                                                    simulation::least_center_error(flight.position_noise))};
   }
-}
-
-core::Result<FlightCalibration> fly(const std::vector<RecordedMotion>& motions, const simulation::FlightPrior& prior) {
-  std::vector<std::span<const simulation::TimedPose>> flights;
-  for (const RecordedMotion& motion : motions) {
-    if (motion.beginning == MotionBeginning::kFlight)
-      flights.push_back(std::span(motion.frames).first(motion.first_frames));
-  }
-  return simulation::calibrate_flights(flights, prior);
-}
-
-std::string unit_guess(double ratio) {
-  struct Unit {
-    const char* name;
-    double metres;
-  };
-  for (const Unit& unit : {Unit{"feet", 0.3048}, Unit{"inches", 0.0254}, Unit{"decimetres", 0.1}}) {
-    const double off = ratio * unit.metres;
-    if (off > 1.0 - kScaleRefused && off < 1.0 + kScaleRefused)
-      return std::string("; if they are in ") + unit.name + " multiply them by " + core::rounded_text(unit.metres);
-  }
-  return {};
-}
-
-/// By how flights fall before they touch anything, whatever the fit of the model makes of it.
-core::Status check_gravity(const MotionDataset& dataset, const std::vector<RecordedMotion>& motions) {
-  const belief::Scene& scene = *dataset.scene;
-  const geometry::Vector3d center = belief::mean(scene.model_of(scene.objects[0]).center_of_mass);
-  std::vector<std::span<const simulation::TimedPose>> flights;
-  for (const RecordedMotion& motion : motions) {
-    if (motion.beginning != MotionBeginning::kFlight) continue;
-    std::size_t count = std::min(simulation::kLeastFallFrames, motion.first_frames);
-    while (count < motion.first_frames && motion.frames[count].time - motion.frames[0].time <= kFallSeconds) ++count;
-    flights.push_back(std::span(motion.frames).first(count));
-  }
-  if (flights.empty()) return core::ok_status();
-  const double noise = simulation::position_noise_of(flights);
-  std::vector<double> falls;
-  double variance = 0.0;
-  for (const auto& flight : flights) {
-    const simulation::FreeFall fall = simulation::measure_whole_fall(flight, center, scene.gravity_W, noise);
-    falls.push_back(fall.acceleration);
-    variance += fall.error * fall.error;
-  }
-  const auto n = static_cast<double>(falls.size());
-  const double fall = core::upper_median(falls);
-  std::vector<double> deviations;
-  for (const double each : falls) deviations.push_back(std::abs(each - fall));
-  // Of a median of normal numbers.
-  const double error =
-      1.2533 * std::max(std::sqrt(variance / n), 1.4826 * core::upper_median(deviations)) / std::sqrt(n);
-  const double given = scene.gravity_W.norm();
-  if (std::abs(fall - given) <= std::max(kScaleRefused * given, kScaleErrors * error)) return core::ok_status();
-  return core::invalid_input(dataset.table_file().string() + ": flights fall with " + core::rounded_text(fall) +
-                             " +- " + core::rounded_text(error) + " m/s^2, the scene's gravity is " +
-                             core::rounded_text(given) + ": x, y, z must be in metres and t in seconds" +
-                             unit_guess(fall / given));
-}
-
-/// Noise of the tracker, from slides where there are no flights.
-core::Status measure_noise(const std::vector<RecordedMotion>& motions, simulation::MotionCalibrationOptions* options) {
-  std::vector<double> positions;
-  std::vector<double> rotations;
-  for (const RecordedMotion& motion : motions) {
-    if (motion.beginning != MotionBeginning::kSlide) continue;
-    const auto fit = simulation::fit_sliding(std::span(motion.frames).first(motion.first_frames));
-    if (!fit) return fit.status().at(motion.name);
-    const auto n = static_cast<double>(motion.first_frames);
-    // Two numbers a coordinate are fitted, three along the motion.
-    const double freedom = 3.0 * n / (3.0 * n - 7.0);
-    positions.push_back(fit->state.position_rms * std::sqrt(freedom));
-    rotations.push_back(fit->state.rotation_rms * std::sqrt(freedom));
-  }
-  if (positions.empty()) return core::ok_status();
-  options->position_noise = core::upper_median(std::move(positions));
-  options->rotation_noise = core::upper_median(std::move(rotations));
-  return core::ok_status();
 }
 
 void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
@@ -251,6 +154,45 @@ void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
   }
 }
 
+/// How throws differ, from recordings that parameters were not fitted to. `scene` as the fit had it.
+core::Status hold_out(const UsableMotions& usable, const std::vector<int>& folds, const belief::Scene& scene,
+                      Backends& backends, const core::RandomStream& stream, const core::ProgressSink& progress,
+                      const core::Cancellation* cancellation, ObjectCalibration* found) {
+  std::vector<belief::Scene> scenes;
+  for (const std::vector<double>& values : found->motion.without) {
+    simulation::MotionCalibration without = found->motion;
+    for (std::size_t i = 0; i < values.size(); ++i) without.parameters[i].value = values[i];
+    belief::Scene& with = scenes.emplace_back(scene);
+    belief::ObjectModel& model = with.models[static_cast<std::size_t>(with.objects[0].model)];
+    model = calibrated_model(model, without);
+  }
+  std::vector<HeldOutMotion> motions;
+  for (std::size_t i = 0; i < usable.motions.size(); ++i) {
+    if (usable.rests[i])
+      motions.push_back({usable.motions[i], *usable.rests[i], usable.numbers[i], usable.groups[i],
+                         static_cast<std::size_t>(folds[i])});
+  }
+  PRESCENE_TRY(found->held_out,
+               held_out_scatter(motions, scenes, found->throws, backends, stream, progress, cancellation));
+  if (found->held_out) {
+    found->throws = found->held_out->scatter;
+  } else {
+    found->remarks.push_back("only " + std::to_string(motions.size()) +
+                             " recordings come to rest: how throws differ is as the fit has it, not checked against "
+                             "recordings that it did not see; it takes " +
+                             std::to_string(kLeastHeldOut));
+  }
+  return core::ok_status();
+}
+
+/// Progress as a part of a whole.
+core::ProgressSink part_of(const core::ProgressSink& progress, double begin, double end) {
+  if (!progress) return {};
+  return [progress, begin, end](const core::Progress& now) {
+    progress({begin + (end - begin) * now.fraction, std::nullopt, now.text});
+  };
+}
+
 }  // namespace
 
 core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, Backends& backends,
@@ -259,34 +201,38 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
                                                  const core::Cancellation* cancellation) {
   if (core::Status status = check_units(dataset.recordings, dataset.scene->gravity_W.norm()); !status.ok())
     return status.at(dataset.table_file().string());
+  const belief::Scene& scene = *dataset.scene;
+  const simulation::MotionPrior prior = kept_prior(scene, options.keep);
+  const auto free = static_cast<std::size_t>(
+      std::ranges::count_if(prior, [](const simulation::MotionBelief& belief) { return belief.deviation > 0.0; }));
+  PRESCENE_TRY(const UsableMotions usable, usable_motions(dataset, simulation::least_recordings(free), backends));
+  return calibrate_usable(dataset, usable, backends, options, progress, cancellation);
+}
+
+core::Result<ObjectCalibration> calibrate_usable(const MotionDataset& dataset, const UsableMotions& all,
+                                                 Backends& backends, const ObjectCalibrationOptions& options,
+                                                 const core::ProgressSink& progress,
+                                                 const core::Cancellation* cancellation) {
   ObjectCalibration found;
+  found.remarks = all.remarks;
+  // A twin tells nothing that the other does not.
+  const UsableMotions usable = all.without_twins();
+  const std::vector<RecordedMotion>& motions = usable.motions;
   belief::Scene scene = *dataset.scene;
   const belief::ObjectModel& model = scene.model_of(scene.objects[0]);
-  found.prior = simulation::motion_prior(model);
-  for (std::size_t i = 0; i < simulation::kMotionParameters; ++i) {
-    const std::string name = to_string(static_cast<MotionParameter>(i));
-    if (std::ranges::find(options.keep, name) != options.keep.end()) found.prior[i].deviation = 0.0;
-  }
-
-  const auto free = static_cast<std::size_t>(std::ranges::count_if(
-      found.prior, [](const simulation::MotionBelief& belief) { return belief.deviation > 0.0; }));
-  PRESCENE_TRY(const std::vector<RecordedMotion> motions,
-               beginnings(dataset, simulation::least_recordings(free), backends, &found.remarks));
+  found.prior = kept_prior(scene, options.keep);
   PRESCENE_RETURN_IF_ERROR(check_gravity(dataset, motions));
   for (const RecordedMotion& motion : motions)
     ++(motion.beginning == MotionBeginning::kFlight ? found.flights : found.slides);
   simulation::MotionPrior prior = found.prior;
   simulation::MotionCalibrationOptions motion;
   motion.max_evaluations = options.max_evaluations;
-  motion.samples = options.samples;
+  motion.samples = options.samples > 0 ? options.samples : samples_for(motions.size());
+  const core::RandomStream stream(options.seed, core::Purpose::kEvaluation);
+  const int folds = static_cast<int>(std::min<std::size_t>(kFolds, motions.size()));
+  motion.estimate.folds = folds_of(usable.groups, folds, stream.at(0, kFoldDraws));
   if (found.flights >= static_cast<int>(kLeastFlights)) {
-    simulation::FlightPrior flight;
-    const simulation::MotionBelief& x = found.prior[place_of(MotionParameter::kCenterOfMassX)];
-    flight.center_of_mass = {x.mean, found.prior[place_of(MotionParameter::kCenterOfMassY)].mean,
-                             found.prior[place_of(MotionParameter::kCenterOfMassZ)].mean};
-    if (x.deviation > 0.0) flight.center_of_mass_deviation = x.deviation;
-    flight.gravity_W = scene.gravity_W;
-    flight.unit_inertia = model.unit_inertia;
+    const simulation::FlightPrior flight = flight_prior(scene, found.prior);
     PRESCENE_TRY(found.flight, fly(motions, flight));
     use_flights(*found.flight, flight, &scene, &prior);
     motion.position_noise = found.flight->position_noise;
@@ -298,9 +244,8 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
   found.rotation_noise = motion.rotation_noise;
   motion.position_noise = std::max(motion.position_noise, kLeastPositionNoise);
   motion.rotation_noise = std::max(motion.rotation_noise, kLeastRotationNoise);
-  PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, backends.simulator_factory(),
-                                               core::RandomStream(options.seed, core::Purpose::kEvaluation),
-                                               backends.pool(), motion, progress, cancellation));
+  PRESCENE_TRY(found.motion, calibrate_motions(motions, scene, prior, backends.simulator_factory(), stream,
+                                               backends.pool(), motion, part_of(progress, 0.0, 0.8), cancellation));
   for (simulation::CalibratedParameter& p : found.motion.parameters) {
     const simulation::MotionBelief& before = found.prior[place_of(p.parameter)];
     // What flights tell was the prior; their frames also begin the simulated motions.
@@ -320,7 +265,11 @@ core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, B
         dataset.table_file().string() +
         ": these recordings say nothing about any parameter; record tosses that bounce and spin, "
         "and long slides");
+  found.throws = {found.motion.start_noise * motion.position_noise, found.motion.start_noise * motion.rotation_noise,
+                  found.motion.friction_scatter};
   found.model = calibrated_model(model, found.motion);
+  PRESCENE_RETURN_IF_ERROR(hold_out(usable, motion.estimate.folds, scene, backends, stream.at(0, kHeldOutDraws),
+                                    part_of(progress, 0.8, 1.0), cancellation, &found));
   add_remarks(dataset, &found);
   return found;
 }
@@ -337,8 +286,14 @@ core::Result<std::string> calibrated_yaml(const MotionDataset& dataset, const Ob
       remarks.push_back("edge radius: +- " + core::fixed_text(1e3 * p.standard_error, 2) + " mm");
   }
   remarks.insert(remarks.end(), found.remarks.begin(), found.remarks.end());
-  return interfaces::fitted_model_yaml(dataset.scene_file(), dataset.scene->model_of(dataset.scene->objects[0]).name,
-                                       found.model, folder, remarks);
+  if (found.held_out)
+    remarks.push_back("throws: as wide as " + std::to_string(found.held_out->scores.n) +
+                      " recordings need that the parameters were not fitted to");
+  PRESCENE_TRY(
+      const std::string yaml,
+      interfaces::fitted_model_yaml(dataset.scene_file(), dataset.scene->model_of(dataset.scene->objects[0]).name,
+                                    found.model, folder, remarks));
+  return yaml + interfaces::throws_yaml({found.throws.position, found.throws.rotation, found.throws.friction});
 }
 
 interfaces::LearnedFile with_calibrated(interfaces::LearnedFile earlier, const MotionDataset& dataset,
@@ -362,6 +317,11 @@ nlohmann::ordered_json to_json(const ObjectCalibration& found) {
   json["score"] = {{"prior", found.motion.start_cost}, {"found", found.motion.cost}};
   json["start_noise"] = found.motion.start_noise;
   json["friction_scatter"] = found.motion.friction_scatter;
+  json["throws"] = {{"position_noise", found.throws.position},
+                    {"rotation_noise", found.throws.rotation},
+                    {"friction_scatter", found.throws.friction}};
+  if (found.held_out)
+    json["held_out"] = {{"factor", found.held_out->factor}, {"scores", to_json(found.held_out->scores)}};
   if (found.flight) {
     const FlightCalibration& flight = *found.flight;
     json["flight"] = {{"gravity", {flight.gravity_W.x(), flight.gravity_W.y(), flight.gravity_W.z()}},

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "evaluate_folder.h"
 #include "prescene/core/text.h"
 #include "prescene/service/evaluate/cleargrasp.h"
 #include "prescene/service/evaluate/credible_regions.h"
@@ -34,7 +35,16 @@ struct EvaluateOptions {
   ExplainedEventsOptions explain;
   std::string proposals;
   std::string train;
+  EvaluateFolderOptions own;
 };
+
+const std::vector<std::string>& known_names() {
+  static const std::vector<std::string> kNames = {"cube_tosses", "ycb_video", "cleargrasp", "credible_regions",
+                                                  "finding",     "tracking",  "explain"};
+  return kNames;
+}
+
+bool is_known(const std::string& name) { return std::ranges::find(known_names(), name) != known_names().end(); }
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
 
@@ -143,6 +153,18 @@ core::Result<filter::LearnedModels> learned_of_rooms(const EvaluateOptions& opti
 }
 
 core::Status run(const EvaluateOptions& options, VerbContext& context) {
+  if (!is_known(options.name)) {
+    if (!options.data.empty())
+      return core::invalid_input("--data goes with data sets that have a name; give the folder itself");
+    EvaluateFolderOptions own = options.own;
+    own.folder = options.name;
+    return evaluate_folder(own, context);
+  }
+  if (!options.own.model.empty() || options.own.folds || options.own.max_evaluations || options.own.each)
+    return core::invalid_input(
+        "--model, --folds, --max-evaluations and --each go with a folder of your own tosses, "
+        "not with " +
+        options.name);
   if (options.name != "finding" && !(options.proposals.empty() && options.train.empty()))
     return core::invalid_input("--proposals and --train go with finding only: leave them out");
   if (options.name == "tracking") return run_tracking(options, context);
@@ -211,14 +233,24 @@ Verb add_evaluate_verb(CLI::App& app) {
   auto options = std::make_shared<EvaluateOptions>();
   verb->add_option(
           "NAME", options->name,
-          "cube_tosses (forecasts), ycb_video (poses), cleargrasp (share of pixels of transparent things that "
+          "Folder with scene.yaml and tosses.csv (docs/reference/calibration.md); or cube_tosses (forecasts), "
+          "ycb_video (poses), cleargrasp (share of pixels of transparent things that "
           "the transparent material explains better than the opaque one), or, on simulated frames, which need "
           "no data: credible_regions (tempering), finding (objects without start poses, several supports), "
           "tracking (sequences of eleven kinds, and with --data a real cube in a robot's hand), explain (events that "
           "nobody told of)")
       ->required()
-      ->check(CLI::IsMember(
-          {"cube_tosses", "ycb_video", "cleargrasp", "credible_regions", "finding", "tracking", "explain"}));
+      ->check(CLI::IsMember(known_names()) | CLI::ExistingDirectory);
+  verb->add_option("--model", options->own.model,
+                   "Of a folder: model file to foretell with; else the scene's own model")
+      ->check(file_name());
+  verb->add_option("--folds", options->own.folds,
+                   "Of a folder: foretell each of so many parts with a model that is fitted to the others")
+      ->check(CLI::Range(2, 1000));
+  verb->add_option("--max-evaluations", options->own.max_evaluations,
+                   "Of a folder, with --folds: models that each fit's search tries at most; 1500")
+      ->check(CLI::Range(1, 100000));
+  verb->add_flag("--each", options->own.each, "Of a folder: print a line for each toss (--json always has them)");
   verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(CLI::IsMember({"calibrate", "report", "all"}))
@@ -250,7 +282,7 @@ Verb add_evaluate_verb(CLI::App& app) {
           "Of finding: learn the rooms' models first, as `prescene train` does with seed 1, and write this file")
       ->check(file_name())
       ->excludes("--proposals");
-  verb->footer("Example: prescene evaluate ycb_video --data data --json");
+  verb->footer("Example: prescene evaluate recordings --model mug.yaml");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "prescene/geometry/dense_solvers.h"
-#include "prescene/service/evaluate/forecast_scores.h"
+#include "prescene/service/calibration/forecast_scores.h"
 #include "prescene/simulation/calibration/coordinate_search.h"
 
 namespace prescene::service {

@@ -7,7 +7,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
-#include "prescene/service/evaluate/forecast_scores.h"
+#include "prescene/service/calibration/forecast_scores.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 
 namespace prescene::service {

@@ -87,11 +87,12 @@ struct Step {
   MatrixXd covariance;
 };
 
-Step step_from(const VectorXd& u, const PointResponse& response, const Neighbourhood& around, const Problem& problem) {
-  const MatrixXd slopes = response.slopes(u);
+/// `slopes`: of the recordings' scores at u; `curvature`: of their mean.
+Step step_from(const VectorXd& u, const MatrixXd& slopes, const MatrixXd& curvature, const Neighbourhood& around,
+               const Problem& problem) {
   const auto cases = static_cast<double>(slopes.rows());
   // Directions in which the scores do not rise tell nothing.
-  const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(response.curvature(u));
+  const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(curvature);
   const MatrixXd H = product(eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal(), eigen.vectors.transpose());
   const VectorXd slope = slopes.colwise().mean().transpose();
   const MatrixXd centred = slopes.rowwise() - slope.transpose();
@@ -136,17 +137,42 @@ Neighbourhood about(const VectorXd& center, const Neighbourhood& before, const M
 struct RoundEstimate {
   VectorXd value;
   MatrixXd covariance;
+  std::vector<VectorXd> without;  ///< For each fold, the value without its recordings.
 };
 
-RoundEstimate estimate_of(const PointResponse& response, const Neighbourhood& around, const Problem& problem) {
+/// In u, from `u`: where the others' scores and the prior agree, for each fold.
+std::vector<VectorXd> without_folds(const VectorXd& u, const PointResponse& response, const Neighbourhood& around,
+                                    const Problem& problem, const std::vector<int>& folds) {
+  if (folds.empty()) return {};
+  const MatrixXd slopes = response.slopes(u);
+  const std::vector<MatrixXd> curvatures = response.curvatures(u);
+  std::vector<VectorXd> all;
+  for (int fold = 0; fold <= *std::ranges::max_element(folds); ++fold) {
+    std::vector<Index> others;
+    MatrixXd curvature = MatrixXd::Zero(u.size(), u.size());
+    for (std::size_t i = 0; i < folds.size(); ++i) {
+      if (folds[i] == fold) continue;
+      others.push_back(static_cast<Index>(i));
+      curvature += curvatures[i];
+    }
+    curvature = (0.5 * (curvature + curvature.transpose()) / static_cast<double>(others.size())).eval();
+    const Step step = step_from(u, slopes(others, Eigen::all), curvature, around, problem);
+    all.push_back(around.center + around.factor * (u + shortened(step.move, kLongestStep)));
+  }
+  return all;
+}
+
+RoundEstimate estimate_of(const PointResponse& response, const Neighbourhood& around, const Problem& problem,
+                          const std::vector<int>& folds) {
   VectorXd u = VectorXd::Zero(around.center.size());
   Step step;
   for (int k = 0; k < kSteps; ++k) {
-    step = step_from(u, response, around, problem);
+    step = step_from(u, response.slopes(u), response.curvature(u), around, problem);
     u = shortened(u + shortened(step.move, kLongestStep), kLongestMove);
   }
   return {around.center + around.factor * u,
-          product(product(around.factor, step.covariance), around.factor.transpose())};
+          product(product(around.factor, step.covariance), around.factor.transpose()),
+          without_folds(u, response, around, problem, folds)};
 }
 
 /// Their mean; its error by how much they differ is added. Of rounds that did not settle, which may follow each other,
@@ -159,6 +185,10 @@ void combine(std::span<const RoundEstimate> rounds, bool settled, Estimate* resu
     result->value += round.value / count;
     result->covariance += round.covariance / count;
   }
+  result->without.assign(rounds.front().without.size(), VectorXd::Zero(result->value.size()));
+  for (const RoundEstimate& round : rounds)
+    for (std::size_t fold = 0; fold < round.without.size(); ++fold)
+      result->without[fold] += round.without[fold] / count;
   if (rounds.size() < 2) return;
   for (const RoundEstimate& round : rounds) {
     const VectorXd off = round.value - result->value;
@@ -179,6 +209,7 @@ core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& paramet
                                   const EstimateOptions& options, const EstimateProgress& progress) {
   const auto n = static_cast<Index>(parameters.size());
   PRESCENE_CHECK(observations.count() >= n + 3 && observations.samples > 1);
+  PRESCENE_CHECK(options.folds.empty() || std::ssize(options.folds) == observations.count());
   const auto count = static_cast<Index>(std::ceil(options.trials * static_cast<double>(1 + n)));
   const Problem problem = problem_of(parameters);
   Neighbourhood around{VectorXd(n), MatrixXd::Zero(n, n)};
@@ -216,7 +247,8 @@ core::Result<Estimate> m_estimate(const std::vector<EstimatedParameter>& paramet
       best = around;
       best_score = score;
     }
-    const RoundEstimate found = estimate_of(PointResponse(observations, trials, simulated), around, problem);
+    const RoundEstimate found =
+        estimate_of(PointResponse(observations, trials, simulated), around, problem, options.folds);
     const double moved =
         rms(geometry::solve_lower(geometry::cholesky_factor(found.covariance), found.value - around.center));
     if (settled > 0 || (round > 0 && moved < options.accuracy)) ++settled;

@@ -141,6 +141,31 @@ std::vector<CalibratedParameter> told(const Estimate& estimate, const VariedPara
   return all;
 }
 
+/// Of each fold; what the recordings do not tell stays as all of them leave it.
+std::vector<std::vector<double>> values_without(const Estimate& estimate, const VariedParameters& varied,
+                                                const std::vector<CalibratedParameter>& told_values) {
+  const std::vector<EstimatedParameter> estimated = varied.estimated({});
+  std::vector<std::vector<double>> all;
+  for (const Eigen::VectorXd& without : estimate.without) {
+    std::vector<double>& values = all.emplace_back();
+    for (std::size_t i = 0; i < told_values.size(); ++i) {
+      const bool unidentifiable = told_values[i].left_of_prior >= kUnidentifiable;
+      values.push_back(unidentifiable
+                           ? told_values[i].value
+                           : std::clamp(without[static_cast<Eigen::Index>(i)], estimated[i].low, estimated[i].high));
+    }
+  }
+  return all;
+}
+
+/// Places of the recordings that the search looks at, evenly spread.
+std::vector<std::size_t> searched(std::size_t count) {
+  std::vector<std::size_t> places;
+  const std::size_t most = std::min(count, kSearchRecordings);
+  for (std::size_t i = 0; i < most; ++i) places.push_back(i * count / most);
+  return places;
+}
+
 }  // namespace
 
 double least_center_error(double position_noise) { return std::max(kCommonError * position_noise, kLeastCenterError); }
@@ -230,23 +255,29 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
                                                   const core::ProgressSink& progress,
                                                   const core::Cancellation* cancellation) {
   PRESCENE_RETURN_IF_ERROR(check(motions, scene, prior, options));
+  if (!options.estimate.folds.empty() && options.estimate.folds.size() != motions.size())
+    return core::invalid_input("a calibration takes one fold for each recording, or none");
   MotionJudge judge(scene, make_simulator, stream, pool, options, cancellation);
   for (const RecordedMotion& motion : motions) PRESCENE_RETURN_IF_ERROR(judge.add(motion));
+  // The valley shows in some of the recordings as well.
+  MotionJudge search_judge(scene, make_simulator, stream, pool, options, cancellation);
+  for (const std::size_t i : searched(motions.size())) PRESCENE_RETURN_IF_ERROR(search_judge.add(motions[i]));
   const VariedParameters varied(prior, radius_of_gyration(scene.model_of(scene.objects[0])));
 
   core::Status failure;
-  const auto cost_of = [&](const MotionHypothesis& hypothesis) {
+  const auto cost_by = [&](const MotionJudge& by, const MotionHypothesis& hypothesis) {
     if (!failure.ok()) return std::numeric_limits<double>::infinity();
-    const auto points = judge.simulated(hypothesis);
+    const auto points = by.simulated(hypothesis);
     if (!points) failure = points.status();
-    return points ? mean_of(recording_scores(judge.observations(), *points)) : std::numeric_limits<double>::infinity();
+    return points ? mean_of(recording_scores(by.observations(), *points)) : std::numeric_limits<double>::infinity();
   };
+  const auto cost_of = [&](const MotionHypothesis& hypothesis) { return cost_by(search_judge, hypothesis); };
   MotionCalibration result;
   int tried = 0;
   const auto cost = [&](std::span<const double> values) {
     const double found = cost_of(varied.hypothesis_of(values));
     // The first is what is believed.
-    if (tried++ == 0) result.start_cost = found;
+    if (tried++ == 0) result.start_cost = cost_by(judge, varied.hypothesis_of(values));
     return found;
   };
   const auto report = [&](const SearchResult& best) {
@@ -263,16 +294,20 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
   MotionHypothesis best = varied.hypothesis_of(found.values);
   Estimate estimate;
   for (int turn = 0; turn < kTurns; ++turn) {
+    const bool last = turn + 1 == kTurns;
+    const MotionJudge& by = last ? judge : search_judge;
+    EstimateOptions estimate_options = options.estimate;
+    if (!last) estimate_options.folds.clear();
     const auto simulate = [&](std::span<const double> values) {
-      return judge.simulated(varied.with_parameters(best, values));
+      return by.simulated(varied.with_parameters(best, values));
     };
     const auto refined = [&](double share) {
       if (progress) progress({0.5 + 0.5 * (turn + share) / kTurns, std::nullopt, "errors"});
     };
     const std::vector<EstimatedParameter> estimated = varied.estimated(best);
     PRESCENE_TRY(estimate,
-                 m_estimate(estimated, judge.observations(), simulate,
-                            stream.at(static_cast<std::uint64_t>(turn), kTrialDraws), options.estimate, refined));
+                 m_estimate(estimated, by.observations(), simulate,
+                            stream.at(static_cast<std::uint64_t>(turn), kTrialDraws), estimate_options, refined));
     // What the recordings hardly identify may end beyond what can be.
     for (std::size_t i = 0; i < estimated.size(); ++i) {
       double& value = estimate.value[static_cast<Eigen::Index>(i)];
@@ -280,7 +315,7 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     }
     best = varied.with_parameters(best, std::span(estimate.value.data(), varied.free().size()));
     result.evaluations += estimate.evaluations;
-    if (turn + 1 == kTurns) break;
+    if (last) break;
     const auto noise_cost = [&](std::span<const double> values) {
       return cost_of(VariedParameters::with_noise(best, values));
     };
@@ -293,6 +328,7 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
   const auto slides = std::ranges::count(motions, MotionBeginning::kSlide, &RecordedMotion::beginning);
   const double slide_share = static_cast<double>(slides) / static_cast<double>(motions.size());
   result.parameters = told(estimate, varied, prior, slide_share, options.position_noise);
+  result.without = values_without(estimate, varied, result.parameters);
   result.start_noise = best.start_noise;
   result.friction_scatter = best.friction_scatter;
   result.search_settled = found.settled;

@@ -6,17 +6,14 @@
 #include <cmath>
 #include <string>
 
+#include "motion_starts.h"
 #include "prescene/core/sobol.h"
-#include "prescene/geometry/dense_solvers.h"
-#include "prescene/simulation/calibration/sliding_fit.h"
 
 namespace prescene::simulation {
 namespace {
 
 using geometry::Vector3d;
 
-// Of a start: position, rotation, velocity, spin, friction.
-constexpr int kStartDimensions = 13;
 // Distances below this share of the radius of gyration count by their size, larger ones by their logarithm.
 constexpr double kScoreWidth = 0.02;
 
@@ -30,48 +27,6 @@ PosePoint point_of(const geometry::Pose& X_WO, const Vector3d& center_of_mass, d
   // |R - R'|_F^2 = 8 sin^2(angle / 2), about twice the squared angle.
   point.tail<9>() = (gyration / std::sqrt(2.0)) * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(R.data());
   return point;
-}
-
-/// Standard deviations of value and slope at the end of a polynomial that is fitted to n frames which are `step` apart,
-/// for noise one.
-struct EndErrors {
-  double value;
-  double slope;
-};
-EndErrors end_errors(std::size_t frames, double step, int degree) {
-  const auto n = static_cast<Eigen::Index>(frames);
-  Eigen::MatrixXd powers = Eigen::MatrixXd::Ones(n, degree + 1);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (int d = 1; d <= degree; ++d) powers(i, d) = powers(i, d - 1) * static_cast<double>(i + 1 - n);
-  }
-  const Eigen::MatrixXd covariance = geometry::inverse(geometry::product(powers.transpose(), powers));
-  return {std::sqrt(covariance(0, 0)), std::sqrt(covariance(1, 1)) / step};
-}
-
-/// A start and what its errors are made of, for noise one.
-struct Beginning {
-  BallisticState state;
-  geometry::Matrix3d place, turn, velocity, spin;
-};
-
-core::Result<Beginning> fit_beginning(std::span<const TimedPose> frames, bool slides, const Vector3d& center_of_mass,
-                                      const Vector3d& gravity_W) {
-  const double step = (frames.back().time - frames.front().time) / static_cast<double>(frames.size() - 1);
-  const EndErrors line = end_errors(frames.size(), step, 1);
-  const geometry::Matrix3d all = geometry::Matrix3d::Identity();
-  if (!slides) {
-    PRESCENE_TRY(const BallisticState state, fit_ballistic(frames, center_of_mass, gravity_W));
-    return Beginning{state, line.value * all, line.value * all, line.slope * all, line.slope * all};
-  }
-  PRESCENE_TRY(const SlidingState sliding, fit_sliding(frames));
-  const EndErrors parabola = end_errors(frames.size(), step, 2);
-  const auto along = [&](const Vector3d& axis, double otherwise, double along_it) {
-    return geometry::Matrix3d(otherwise * all + (along_it - otherwise) * axis * axis.transpose());
-  };
-  return Beginning{sliding.state, along(sliding.direction_W, line.value, parabola.value),
-                   along(sliding.turn_axis_W, line.value, parabola.value),
-                   along(sliding.direction_W, line.slope, parabola.slope),
-                   along(sliding.turn_axis_W, line.slope, parabola.slope)};
 }
 
 geometry::Pose pose_at(const std::vector<TimedPose>& frames, double time) {
@@ -179,32 +134,24 @@ core::Result<Eigen::MatrixXd> MotionJudge::simulated(const MotionHypothesis& hyp
 
 core::Status MotionJudge::add_starts(std::size_t i, const MotionHypothesis& hypothesis,
                                      std::vector<belief::WorldState>* starts) const {
-  PRESCENE_TRY(const Beginning beginning,
-               fit_beginning(cases_[i].beginning, cases_[i].slides, hypothesis.center_of_mass(), scene_.gravity_W));
-  const double shift = hypothesis.start_noise * options_.position_noise;
-  const double turn = hypothesis.start_noise * options_.rotation_noise;
-  belief::WorldState start = belief::mean_start(scene_);
+  PRESCENE_TRY(const MotionStart beginning,
+               fit_motion_start(cases_[i].beginning, cases_[i].slides, hypothesis.center_of_mass(), scene_.gravity_W));
+  const ThrowScatter scatter{hypothesis.start_noise * options_.position_noise,
+                             hypothesis.start_noise * options_.rotation_noise, hypothesis.friction_scatter};
+  const belief::WorldState mean = belief::mean_start(scene_);
+  belief::PhysicalParameters physical = mean.objects[0].physical;
+  physical.center_of_mass = hypothesis.center_of_mass();
+  physical.friction = hypothesis[MotionParameter::kFriction];
+  physical.impact_friction = hypothesis[MotionParameter::kImpactFriction];
+  physical.restitution = hypothesis[MotionParameter::kRestitution];
   core::RandomStream own = stream_.at(i);
   const core::SobolNet net(kStartDimensions, own.next_u64());
   std::array<double, kStartDimensions> uniform{};
   for (std::size_t k = 0; k < samples(); ++k) {
     net.point(k, uniform);
-    Eigen::Matrix<double, kStartDimensions, 1> z;
-    for (int d = 0; d < kStartDimensions; ++d) z[d] = core::inverse_normal_cdf(uniform[static_cast<std::size_t>(d)]);
-    belief::ObjectState& object = start.objects[0];
-    object.mode = belief::MotionMode::kMoving;
-    object.X_WO = beginning.state.X_WO;
-    object.X_WO.translation += shift * beginning.place * z.head<3>();
-    object.X_WO.rotation = geometry::exp_rotation(turn * beginning.turn * z.segment<3>(3)) * object.X_WO.rotation;
-    object.V_WO = beginning.state.V_WO;
-    object.V_WO.linear += shift * beginning.velocity * z.segment<3>(6);
-    object.V_WO.angular += turn * beginning.spin * z.segment<3>(9);
-    const double scatter = std::exp(hypothesis.friction_scatter * z[12]);
-    object.physical.center_of_mass = hypothesis.center_of_mass();
-    object.physical.friction = scatter * hypothesis[MotionParameter::kFriction];
-    object.physical.impact_friction = scatter * hypothesis[MotionParameter::kImpactFriction];
-    object.physical.restitution = hypothesis[MotionParameter::kRestitution];
-    starts->push_back(start);
+    belief::WorldState start = mean;
+    start.objects[0] = drawn_start(beginning, scatter, physical, uniform);
+    starts->push_back(std::move(start));
   }
   return core::ok_status();
 }

@@ -110,6 +110,19 @@ MatrixXd PointResponse::slopes(const VectorXd& u) const {
   return result;
 }
 
+std::vector<MatrixXd> PointResponse::curvatures(const VectorXd& u) const {
+  std::vector<MatrixXd> all(static_cast<std::size_t>(observations_.count()), MatrixXd(parameters_, parameters_));
+  for (Index p = 0; p < parameters_; ++p) {
+    VectorXd up = u;
+    VectorXd down = u;
+    up[p] += kDifference;
+    down[p] -= kDifference;
+    const MatrixXd change = (slopes(up) - slopes(down)) / (2.0 * kDifference);
+    for (std::size_t i = 0; i < all.size(); ++i) all[i].col(p) = change.row(static_cast<Index>(i)).transpose();
+  }
+  return all;
+}
+
 MatrixXd PointResponse::curvature(const VectorXd& u) const {
   MatrixXd result(parameters_, parameters_);
   for (Index p = 0; p < parameters_; ++p) {

@@ -20,6 +20,8 @@ class PointResponse {
   Eigen::MatrixXd slopes(const Eigen::VectorXd& u) const;
   /// Of the mean score, by differences of its slope.
   Eigen::MatrixXd curvature(const Eigen::VectorXd& u) const;
+  /// Of each recording's score.
+  std::vector<Eigen::MatrixXd> curvatures(const Eigen::VectorXd& u) const;
 
  private:
   Eigen::MatrixXd slopes_of_points(Eigen::Index view, const Eigen::MatrixXd& points) const;

@@ -9,6 +9,7 @@
 #include "prescene/geometry/camera.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/calibration/toss_scores.h"
 
 namespace prescene::service::given_service_calibration {
 
@@ -23,5 +24,18 @@ extern const geometry::PinholeCamera camera;
 namespace object_calibration_h {
 extern const std::filesystem::path folder, path;
 }
+
+namespace toss_evaluation_h {
+extern const std::filesystem::path folder, path;
+}
+
+namespace toss_scores_h {
+extern const simulation::RecordedMotion motion;
+extern const simulation::RecordedRest rest;
+extern const simulation::MotionForecast forecast;
+extern const double gyration;
+extern const std::vector<ScoredToss> tosses;
+extern const core::RandomStream stream;
+}  // namespace toss_scores_h
 
 }  // namespace prescene::service::given_service_calibration

@@ -10,6 +10,7 @@
 #include "prescene/simulation/calibration/flight_calibration.h"
 #include "prescene/simulation/calibration/m_estimate.h"
 #include "prescene/simulation/calibration/motion_calibration.h"
+#include "prescene/simulation/calibration/motion_forecast.h"
 
 namespace prescene::simulation::given_simulation_calibration {
 
@@ -31,5 +32,14 @@ extern const belief::Scene scene;
 extern const SimulatorFactory make_simulator;
 extern core::ThreadPool pool;
 }  // namespace motion_calibration_h
+
+namespace motion_forecast_h {
+extern const std::vector<RecordedMotion> motions;
+extern const std::vector<std::size_t> numbers;
+extern const belief::Scene scene;
+extern const ThrowScatter scatter;
+extern const SimulatorFactory make_simulator;
+extern core::ThreadPool pool;
+}  // namespace motion_forecast_h
 
 }  // namespace prescene::simulation::given_simulation_calibration

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "made_tosses.h"
-#include "prescene/service/evaluate/forecast_scores.h"
+#include "prescene/service/calibration/forecast_scores.h"
 
 namespace prescene::service {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scores by hand and against closed forms.
-#include "prescene/service/evaluate/forecast_scores.h"
+#include "prescene/service/calibration/forecast_scores.h"
 
 #include <gtest/gtest.h>
 

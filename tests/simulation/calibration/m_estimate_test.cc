@@ -86,6 +86,48 @@ TEST(MEstimate, FindsALine) {
   EXPECT_NEAR(found.value[1], 2.0, 2e-3);
 }
 
+TEST(MEstimate, WithoutAFoldIsWhatTheOthersSay) {
+  Lines lines(3);
+  simulation::EstimateOptions options;
+  for (int i = 0; i < kRecordings; ++i) options.folds.push_back(i % 3);
+  const auto simulate = [&](std::span<const double> values) { return lines.simulated(values); };
+  const core::RandomStream stream(5, core::Purpose::kTest);
+  const auto all = m_estimate(three_parameters(), lines.observations, simulate, stream, options);
+  ASSERT_TRUE(all.ok());
+  ASSERT_EQ(all->without.size(), 3U);
+  // Asking for folds changes nothing else.
+  const Estimate plain = *m_estimate(three_parameters(), lines.observations, simulate, stream);
+  EXPECT_EQ(plain.value, all->value);
+  EXPECT_TRUE(plain.without.empty());
+  for (int fold = 0; fold < 3; ++fold) {
+    // The others alone.
+    Observations others;
+    others.samples = kSamples;
+    others.width = lines.observations.width;
+    std::vector<int> kept;
+    for (int i = 0; i < kRecordings; ++i)
+      if (i % 3 != fold) kept.push_back(i);
+    others.points.resize(2, std::ssize(kept));
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      others.points.col(static_cast<Eigen::Index>(i)) = lines.observations.points.col(kept[i]);
+      others.recordings.push_back(static_cast<int>(i));
+    }
+    const auto of_others = [&](std::span<const double> values) -> core::Result<Eigen::MatrixXd> {
+      const Eigen::MatrixXd points = *lines.simulated(values);
+      Eigen::MatrixXd chosen(2, std::ssize(kept) * kSamples);
+      for (std::size_t i = 0; i < kept.size(); ++i)
+        chosen.middleCols(static_cast<Eigen::Index>(i) * kSamples, kSamples) =
+            points.middleCols(kept[i] * kSamples, kSamples);
+      return chosen;
+    };
+    const auto again = m_estimate(three_parameters(), others, of_others, stream);
+    ASSERT_TRUE(again.ok());
+    // One Newton step against a fit of its own: much nearer to it than to the fit of all.
+    for (Eigen::Index p = 0; p < 2; ++p)
+      EXPECT_NEAR(all->without[static_cast<std::size_t>(fold)][p], again->value[p], 0.35 * again->standard_error(p));
+  }
+}
+
 TEST(MEstimate, IntervalsHoldWhatTheyPromise) {
   int held = 0;
   constexpr int kSets = 150;

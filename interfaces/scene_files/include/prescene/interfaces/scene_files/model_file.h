@@ -26,6 +26,20 @@ struct ModelFile {
   std::vector<std::string> remarks;  ///< Written as comments at the top.
 };
 
+/// How throws of an object differ from each other beyond what its model says: the key `throws` of a model file, which
+/// `prescene calibrate` writes and `prescene evaluate` reads.
+struct ModelThrows {
+  double position_noise = 0.0;    ///< m, of each coordinate of a frame that a start is read off, in [0, 1].
+  double rotation_noise = 0.0;    ///< rad, about each axis, in [0, 3].
+  double friction_scatter = 0.0;  ///< Standard deviation of the logarithm of both frictions, in [0, 3].
+
+  friend bool operator==(const ModelThrows&, const ModelThrows&) = default;
+};
+/// The lines of a model file for it.
+std::string throws_yaml(const ModelThrows& throws);
+/// What a model file says of throws; nothing where it says nothing. Fails as read_model does.
+core::Result<std::optional<ModelThrows>> read_throws(const std::filesystem::path& path, const YamlLimits& limits = {});
+
 /// The text of the file. What is read back from it equals what was written, to the bit (a symmetry's axis to the last).
 std::string model_yaml(const ModelFile& file);
 /// Writes it; fails as write_file does.

@@ -16,6 +16,7 @@
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/calibration/held_out_scatter.h"
 #include "prescene/service/calibration/motion_dataset.h"
 #include "prescene/simulation/calibration/flight_calibration.h"
 #include "prescene/simulation/calibration/motion_calibration.h"
@@ -24,8 +25,10 @@ namespace prescene::service {
 
 struct ObjectCalibrationOptions {
   std::uint64_t seed = 1;
-  int max_evaluations = 1500;     ///< Of the search, > 0.
-  int samples = 16;               ///< Simulated starts a recording, > 1.
+  int max_evaluations = 1500;  ///< Of the search, > 0.
+  /// Simulated starts a recording, > 1. 0: 16, of more than 125 recordings fewer, 8 at least: all of them together show
+  /// as much.
+  int samples = 0;
   std::vector<std::string> keep;  ///< Names of parameters that stay as the model has them.
 };
 
@@ -38,9 +41,13 @@ struct ObjectCalibration {
   simulation::MotionPrior prior;         ///< Before any recording.
   simulation::MotionCalibration motion;  ///< left_of_prior is of that prior, after flights and contacts.
   belief::ObjectModel model;             ///< With the values as means and the errors as deviations.
-  std::vector<std::string> remarks;      ///< Plain sentences: what the recordings do not tell, and what is odd.
+  simulation::ThrowScatter throws;       ///< By held-out recordings, or where too few come to rest by the fit.
+  std::optional<HeldOutScatter> held_out;
+  std::vector<std::string> remarks;  ///< Plain sentences: what the recordings do not tell, and what is odd.
 };
 
+/// Parameters by all recordings (but of twins one each), and how throws differ by recordings that parameters were not
+/// fitted to: five parts of the recordings, each foretold with the parameters that the others have.
 core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, Backends& backends,
                                                  const ObjectCalibrationOptions& options,
                                                  const core::ProgressSink& progress = {},
@@ -55,8 +62,8 @@ core::Result<std::string> calibrated_yaml(const MotionDataset& dataset, const Ob
 interfaces::LearnedFile with_calibrated(interfaces::LearnedFile earlier, const MotionDataset& dataset,
                                         const ObjectCalibration& found);
 
-/// {"recordings", "flights", "slides", "evaluations", "settled", "score", "start_noise", "friction_scatter", "flight",
-/// "parameters", "remarks"}
+/// {"recordings", "flights", "slides", "evaluations", "settled", "score", "start_noise", "friction_scatter", "throws",
+/// "held_out", "flight", "parameters", "remarks"}
 nlohmann::ordered_json to_json(const ObjectCalibration& found);
 
 }  // namespace prescene::service

@@ -55,6 +55,7 @@ struct EstimateOptions {
   double trials = 3.0;     ///< Of a round, for each coefficient of a straight line, > 1.
   double reach = 2.0;      ///< Of the trials, in standard errors of the estimate, > 0.
   double accuracy = 1.0;   ///< Settled is what moves by less in a round, in standard errors, rms over parameters.
+  std::vector<int> folds;  ///< Of each recording, 0, 1, ...: see Estimate::without; empty for none.
 };
 
 struct Estimate {
@@ -63,6 +64,9 @@ struct Estimate {
   double score = 0.0;  ///< Mean over recordings, near the value.
   int evaluations = 0;
   bool settled = false;  ///< Else it ended at its number of rounds.
+  /// For each fold the value without its recordings: one Newton step from the value, as a jackknife of an M-estimate
+  /// takes it [Shao & Tu 1995, 2.1].
+  std::vector<Eigen::VectorXd> without;
 
   double standard_error(Eigen::Index i) const { return std::sqrt(covariance(i, i)); }
 };

@@ -86,8 +86,10 @@ struct MotionCalibration {
   /// By how much starts are less certain than their fit says: stands for all that the simulator does not know.
   double start_noise = 1.0;
   double friction_scatter = 0.0;  ///< Relative, from recording to recording.
-  double start_cost = 0.0;        ///< Mean score of the prior's means.
-  double cost = 0.0;              ///< Of what was found.
+  /// For each fold of EstimateOptions::folds the parameters' values without its recordings, in their order.
+  std::vector<std::vector<double>> without;
+  double start_cost = 0.0;  ///< Mean score of the prior's means.
+  double cost = 0.0;        ///< Of what was found.
   int evaluations = 0;
   bool search_settled = false;    ///< Else it ended at its evaluations, and the values may be wrong.
   bool estimate_settled = false;  ///< Else the errors may be too small.
@@ -107,12 +109,15 @@ belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCali
 /// Least number of recordings for so many free parameters.
 constexpr std::size_t least_recordings(std::size_t free_parameters) { return free_parameters + 3; }
 
+/// Recordings that the search looks at, at most: it has to find the valley, and its cost grows with them.
+inline constexpr std::size_t kSearchRecordings = 40;
+
 /// Minimum of the mean kernel score of the poses at the checkpoints (see recording_scores()), in the metric
 /// sqrt(|dp|^2 + (rg turn)^2) with the radius of gyration rg: an evolution strategy finds the valley, m_estimate() its
 /// ground and the errors. Of 90 % intervals, value +- 1.645 errors, on simulated tosses see
-/// docs/reference/calibration.md. The scene has one object and no actions. The same bits for any number of threads.
-/// Fails with kInvalidInput where the recordings cannot be used (named) and as the factory does, with kCancelled when
-/// stopped.
+/// docs/reference/calibration.md. Of many recordings the search looks at every so many only (see kSearchRecordings);
+/// the estimate takes all. The scene has one object and no actions. The same bits for any number of threads. Fails with
+/// kInvalidInput where the recordings cannot be used (named) and as the factory does, with kCancelled when stopped.
 core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMotion>& motions,
                                                   const belief::Scene& scene, const MotionPrior& prior,
                                                   const SimulatorFactory& make_simulator,

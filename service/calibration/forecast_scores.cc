@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prescene/service/evaluate/forecast_scores.h"
+#include "prescene/service/calibration/forecast_scores.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
