@@ -332,16 +332,18 @@ class LayoutFinder {
     return true;
   }
 
-  /// Its name is kept, not its data.
+  /// Its name is kept, not its data. One that makes no sense is passed over: no message needs it, and whoever asks for
+  /// it is told that it is not there.
   Result<bool> add_attachment(const Frame& frame) {
     const std::uint64_t begin = position_ + records::kFrameBytes;
     PRESCENE_TRY(
         const std::span<const std::uint8_t> head,
         source_.peek(begin, static_cast<std::size_t>(std::min<std::uint64_t>(frame.length, kMaxAttachmentHead))));
+    position_ = begin + frame.length;
     McapStoredAttachment stored;
-    if (!records::parse(head, &stored.head)) return false;
+    if (!records::parse(head, &stored.head)) return true;
     const std::uint64_t beside_data = stored.head.bytes() + records::AttachmentHead::kChecksumBytes;
-    if (frame.length < beside_data || stored.head.data_size != frame.length - beside_data) return false;
+    if (frame.length < beside_data || stored.head.data_size != frame.length - beside_data) return true;
     metadata_bytes_ += stored.head.bytes() + sizeof stored;
     if (metadata_bytes_ > kMaxMetadataBytes) {
       return core::resource_exhausted(source_.name() +
@@ -351,7 +353,6 @@ class LayoutFinder {
     stored.offset = begin;
     stored.length = frame.length;
     out_.attachments.push_back(std::move(stored));
-    position_ = begin + frame.length;
     return true;
   }
 
