@@ -9,6 +9,7 @@
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
+#include "prescene/simulation/own_actions.h"
 #include "prescene/simulation/similarity.h"
 
 namespace prescene::service {
@@ -22,7 +23,7 @@ simulation::LockstepOptions lockstep_options(const simulation::BulletOptions& bu
 
 /// Runs in lockstep what that supports, and by Bullet's stepper what else it is given; single instances, which would
 /// leave the lanes empty, too.
-class EitherSimulator : public simulation::Simulator {
+class EitherSimulator : public simulation::Simulator, public simulation::OwnActionsRunner {
  public:
   /// `on_bullet` is told why, once for each run that Bullet's stepper has to take over.
   EitherSimulator(std::unique_ptr<simulation::Simulator> lockstep, std::unique_ptr<simulation::Simulator> bullet,
@@ -36,6 +37,22 @@ class EitherSimulator : public simulation::Simulator {
     if (!in_lockstep.ok()) on_bullet_(in_lockstep.message());
     const simulation::Simulator& simulator = in_lockstep.ok() ? *lockstep_ : *bullet_;
     simulator.run(starts, request, stream, numbers, pool, trajectories, cancellation);
+  }
+
+  void run_own(std::span<const belief::WorldState> starts, std::span<const std::vector<belief::Action>> actions,
+               const simulation::RunRequest& request, const core::RandomStream& stream,
+               simulation::InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+               const core::Cancellation* cancellation) const override {
+    core::Status in_lockstep = core::ok_status();
+    simulation::RunRequest asked = request;
+    for (const std::vector<belief::Action>& own : actions) {
+      asked.actions = own;
+      in_lockstep = lockstep_->supports(asked);
+      if (!in_lockstep.ok()) break;
+    }
+    if (!in_lockstep.ok()) on_bullet_(in_lockstep.message());
+    simulation::run_own_actions(in_lockstep.ok() ? *lockstep_ : *bullet_, starts, actions, request, stream, numbers,
+                                pool, trajectories, cancellation);
   }
 
   simulation::StepperUse stepper() const override { return lockstep_->stepper(); }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "prescene/simulation/own_actions.h"
 #include "prescene/simulation/similarity.h"
 
 namespace prescene::simulation {
@@ -43,7 +44,7 @@ class ScaledInstance : public Instance {
   Similarity to_true_;
 };
 
-class ScaledSimulator : public Simulator {
+class ScaledSimulator : public Simulator, public OwnActionsRunner {
  public:
   ScaledSimulator(std::unique_ptr<Simulator> simulator, const Similarity& to_true)
       : simulator_(std::move(simulator)), to_true_(to_true) {}
@@ -60,18 +61,21 @@ class ScaledSimulator : public Simulator {
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
            InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
            const core::Cancellation* cancellation) const override {
-    std::vector<belief::WorldState> inner;
-    inner.reserve(starts.size());
-    for (const belief::WorldState& start : starts) inner.push_back(scaled(start, to_true_.inverse()));
-    RunRequest inner_request = inside(request);
-    std::optional<ScaledEndRule> rule;
-    if (request.end_rule != nullptr) inner_request.end_rule = &rule.emplace(*request.end_rule, to_true_);
-    simulator_->run(inner, inner_request, stream, numbers, pool, trajectories, cancellation);
-    for (std::size_t i = 0; i < trajectories.size(); ++i) {
-      scale(to_true_, trajectories[i]);
-      for (belief::WorldState& state : trajectories[i].states) take_parameters(starts[i], state);
-      if (!trajectories[i].states.empty()) trajectories[i].states.front() = first_of(trajectories[i], starts[i]);
-    }
+    run_inside(starts, request, trajectories, [&](std::span<const belief::WorldState> inner, const RunRequest& mine) {
+      simulator_->run(inner, mine, stream, numbers, pool, trajectories, cancellation);
+    });
+  }
+
+  void run_own(std::span<const belief::WorldState> starts, std::span<const std::vector<belief::Action>> actions,
+               const RunRequest& request, const core::RandomStream& stream, InstanceNumbers numbers,
+               core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+               const core::Cancellation* cancellation) const override {
+    std::vector<std::vector<belief::Action>> own;
+    own.reserve(actions.size());
+    for (const std::vector<belief::Action>& each : actions) own.push_back(inside(each));
+    run_inside(starts, request, trajectories, [&](std::span<const belief::WorldState> inner, const RunRequest& mine) {
+      run_own_actions(*simulator_, inner, own, mine, stream, numbers, pool, trajectories, cancellation);
+    });
   }
 
   std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
@@ -80,6 +84,22 @@ class ScaledSimulator : public Simulator {
   }
 
  private:
+  template <typename Run>
+  void run_inside(std::span<const belief::WorldState> starts, const RunRequest& request,
+                  std::span<belief::Trajectory> trajectories, const Run& run) const {
+    std::vector<belief::WorldState> inner;
+    inner.reserve(starts.size());
+    for (const belief::WorldState& start : starts) inner.push_back(scaled(start, to_true_.inverse()));
+    RunRequest inner_request = inside(request);
+    std::optional<ScaledEndRule> rule;
+    if (request.end_rule != nullptr) inner_request.end_rule = &rule.emplace(*request.end_rule, to_true_);
+    run(inner, inner_request);
+    for (std::size_t i = 0; i < trajectories.size(); ++i) {
+      scale(to_true_, trajectories[i]);
+      for (belief::WorldState& state : trajectories[i].states) take_parameters(starts[i], state);
+      if (!trajectories[i].states.empty()) trajectories[i].states.front() = first_of(trajectories[i], starts[i]);
+    }
+  }
   /// The start without rounding, but with what the simulator set of it.
   static belief::WorldState first_of(const belief::Trajectory& trajectory, const belief::WorldState& start) {
     belief::WorldState first = start;

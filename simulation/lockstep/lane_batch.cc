@@ -136,8 +136,9 @@ void LaneBatch::test_balance() {
 }
 
 bool LaneBatch::take(LaneQueue& queue) {
-  const std::size_t index = queue.next.fetch_add(1, std::memory_order_relaxed);
-  if (index >= queue.starts.size()) return false;
+  const std::size_t place = queue.next.fetch_add(1, std::memory_order_relaxed);
+  if (place >= (queue.members.empty() ? queue.starts.size() : queue.members.size())) return false;
+  const std::size_t index = queue.members.empty() ? place : queue.members[place];
   const int at = live_++;
   start(*slots_[static_cast<std::size_t>(at)], at, index, queue);
   if (most_steps_ > 0) return true;
@@ -155,7 +156,8 @@ void LaneBatch::start(Slot& slot, int at, std::size_t index, LaneQueue& queue) {
   slot.until_asked = queue.request->end_rule_steps;
   slot.touches.clear();
   for (Open& open : slot.open) open.open = false;
-  slot.instance.start(engine_, at, queue.starts[index], queue.request->actions,
+  slot.instance.start(engine_, at, queue.starts[index],
+                      queue.actions.empty() ? queue.request->actions : queue.actions[index],
                       queue.stream->at(0, queue.numbers[index]));
   belief::Trajectory& trajectory = queue.trajectories[index];
   trajectory = belief::Trajectory{};

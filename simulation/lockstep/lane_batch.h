@@ -27,6 +27,9 @@ void touches_of(LaneEngine& engine, int slot, const LaneInstance& instance, std:
 struct LaneQueue {
   std::span<const belief::WorldState> starts;
   const RunRequest* request = nullptr;
+  std::span<const std::vector<belief::Action>> actions;  ///< Of each instance; empty = the request's.
+  /// Which instances; empty = all.
+  std::span<const std::size_t> members;
   std::span<belief::Trajectory> trajectories;
   const core::RandomStream* stream = nullptr;
   InstanceNumbers numbers = 0;

@@ -2,6 +2,7 @@
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 
 #include <algorithm>
+#include <map>
 #include <mutex>
 #include <type_traits>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "compile_scene.h"
 #include "lane_batch.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/own_actions.h"
 #include "prescene/simulation/rules/mechanics_hash.h"
 
 namespace prescene::simulation {
@@ -194,7 +196,7 @@ class LockstepInstance : public Instance {
   std::vector<std::uint8_t> one_ = {1};
 };
 
-class LockstepSimulator : public Simulator {
+class LockstepSimulator : public Simulator, public OwnActionsRunner {
  public:
   explicit LockstepSimulator(std::shared_ptr<const CompiledLockstep> scene) : scene_(std::move(scene)) {}
 
@@ -214,15 +216,31 @@ class LockstepSimulator : public Simulator {
     queue.stream = &stream;
     queue.numbers = numbers;
     queue.cancellation = cancellation;
-    const auto scene = scene_for(request.actions);
-    // Each thread gets its share of the instances at once, so that none waits for another's.
-    const auto threads = std::min(static_cast<std::size_t>(pool.threads()), starts.size());
-    const auto share = static_cast<int>((starts.size() + threads - 1) / threads);
-    pool.for_each_index(threads, [&](std::size_t) {
-      std::unique_ptr<LaneBatch> batch = take_batch(scene);
-      batch->run(queue, std::min(share, scene->options.live_instances));
-      give_back(std::move(batch));
-    });
+    run(queue, starts.size(), scene_for(request.actions), pool);
+  }
+
+  void run_own(std::span<const belief::WorldState> starts, std::span<const std::vector<belief::Action>> actions,
+               const RunRequest& request, const core::RandomStream& stream, InstanceNumbers numbers,
+               core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,
+               const core::Cancellation* cancellation) const override {
+    // Those with the same balls are of one scene.
+    std::map<std::vector<double>, std::vector<std::size_t>> groups;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      PRESCENE_CHECK(check_pushers(actions[i]).ok());
+      groups[pusher_radii(actions[i])].push_back(i);
+    }
+    for (const auto& [radii, members] : groups) {
+      LaneQueue queue;
+      queue.starts = starts;
+      queue.request = &request;
+      queue.actions = actions;
+      queue.members = members;
+      queue.trajectories = trajectories;
+      queue.stream = &stream;
+      queue.numbers = numbers;
+      queue.cancellation = cancellation;
+      run(queue, members.size(), scene_for(actions[members.front()]), pool);
+    }
   }
 
   double step_size() const override { return scene_->options.step; }
@@ -233,6 +251,18 @@ class LockstepSimulator : public Simulator {
   }
 
  private:
+  void run(LaneQueue& queue, std::size_t count, const std::shared_ptr<const CompiledLockstep>& scene,
+           core::ThreadPool& pool) const {
+    // Each thread gets its share of the instances at once, so that none waits for another's.
+    const auto threads = std::min(static_cast<std::size_t>(pool.threads()), count);
+    const auto share = static_cast<int>((count + threads - 1) / threads);
+    pool.for_each_index(threads, [&](std::size_t) {
+      std::unique_ptr<LaneBatch> batch = take_batch(scene);
+      batch->run(queue, std::min(share, scene->options.live_instances));
+      give_back(std::move(batch));
+    });
+  }
+
   /// The scene with the balls of these actions; the last one asked for is kept.
   std::shared_ptr<const CompiledLockstep> scene_for(const std::vector<belief::Action>& actions) const {
     const std::vector<double> radii = pusher_radii(actions);

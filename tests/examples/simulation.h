@@ -20,6 +20,13 @@ extern const belief::Scene scene;
 extern core::ThreadPool pool;
 extern const core::RandomStream stream;
 
+namespace own_actions_h {
+extern const std::unique_ptr<Simulator> simulator;
+extern const std::vector<belief::WorldState> starts;
+extern const RunRequest request;
+extern std::vector<belief::Trajectory> runs;
+}  // namespace own_actions_h
+
 namespace shape_store_h {
 extern const geometry::TriangleMesh mesh;
 extern const Decomposer decomposer;

@@ -9,6 +9,8 @@
 
 #include "lockstep_scenes.h"
 #include "prescene/geometry/sampling.h"
+#include "prescene/simulation/own_actions.h"
+#include "prescene/simulation/similarity.h"
 #include "tests/support/allocations.h"
 #include "tests/support/uncertain_scenes.h"
 
@@ -114,6 +116,38 @@ TEST_P(LockstepBits, AnyThreadCountOrderSplitAndReuseGivesTheSameBits) {
   EXPECT_TRUE(run_all(*lockstep_of(scene, few), starts, request) == reference);
   for (std::size_t i = 0; i < 10; ++i) {
     EXPECT_TRUE(run_all(*simulator, {starts[i]}, request, 1, static_cast<std::uint32_t>(i))[0] == reference[i]) << i;
+  }
+}
+
+TEST_P(LockstepBits, InstancesWithActionsOfTheirOwnHaveTheBitsOfRunsOfTheirOwn) {
+  const Scene scene = this->scene();
+  const std::vector<WorldState> starts = drawn_starts(scene, 24, 6);
+  std::vector<std::vector<belief::Action>> actions(starts.size(), scene.actions);
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    belief::Push push;
+    push.from = {-0.3 + 0.01 * static_cast<double>(i), 0.02, 0.03};
+    push.to = {0.1, 0.0, 0.03};
+    push.duration = 0.2 + 0.02 * static_cast<double>(i);
+    push.radius = i % 5 == 0 ? 0.01 : 0.015;
+    if (i % 7 != 0) actions[i].push_back({0.05, push});
+  }
+  simulation::RunRequest request = short_request(scene);
+  request.actions.clear();
+  const core::RandomStream stream(11, core::Purpose::kTest);
+  for (const simulation::Similarity similarity : {simulation::Similarity{1.0}, simulation::Similarity{0.5}}) {
+    auto simulator = lockstep_of(simulation::scaled(scene, similarity.inverse()));
+    if (similarity.length != 1.0) simulator = simulation::make_scaled_simulator(std::move(simulator), similarity);
+    std::vector<belief::Trajectory> together(starts.size()), reference(starts.size());
+    core::ThreadPool pool(2);
+    simulation::run_own_actions(*simulator, starts, actions, request, stream, 3, pool, together);
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      simulation::RunRequest mine = request;
+      mine.actions = actions[i];
+      simulator->run(std::span(starts).subspan(i, 1), mine, stream, static_cast<std::uint32_t>(3 + i), pool,
+                     std::span(reference).subspan(i, 1));
+    }
+    EXPECT_TRUE(together == reference) << similarity.length;
+    EXPECT_FALSE(reference[1].states.back() == reference[2].states.back());
   }
 }
 
