@@ -96,8 +96,15 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
   };
   const bool carried = hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn ||
                        hypothesis.kind == EventKind::kTakenAway;
-  const double when = carried ? 0.5 * (motion.before + motion.after) : motion.onset;
-  set_uniform(0, when / duration_, (0.02 + 0.4 * (motion.after - motion.before)) / duration_);
+  const bool was_there = is_present(hypothesis.object);
+  SeenTimes seen = {motion.before, motion.after, was_there ? motion.after : motion.before,
+                    was_there ? motion.back : motion.after};
+  if (seen_[hypothesis.object]) seen = *seen_[hypothesis.object];
+  const bool comes = hypothesis.kind == EventKind::kPutIn;
+  const double before = !carried ? motion.before : comes ? seen.came_after : seen.left_after;
+  const double after = !carried ? motion.after : comes ? seen.came_before : seen.left_before;
+  const double when = carried ? 0.5 * (before + after) : motion.onset;
+  set_uniform(0, when / duration_, (0.02 + 0.4 * (after - before)) / duration_);
   if ((hypothesis.kind == EventKind::kPushed || hypothesis.kind == EventKind::kBumped) && motion.moved) {
     set_uniform(1, 0.5, 0.06);
     const bool pushed = hypothesis.kind == EventKind::kPushed;
@@ -115,7 +122,9 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
         moved ? start_pose(hypothesis.object)->translation : put_in_at_[hypothesis.object].translation;
     const geometry::Vector3d shift = motion.last.translation - from;
     if (moved)
-      set(1, std::log(std::max(0.05, motion.back - when) / priors_.carry_duration) / priors_.carry_duration_spread,
+      set(1,
+          std::log(std::max(0.05, 0.5 * (seen.came_after + seen.came_before) - when) / priors_.carry_duration) /
+              priors_.carry_duration_spread,
           0.5);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double scale = axis < 2 ? priors_.carry_distance : priors_.carry_height;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "prescene/belief/body_names.h"
+#include "prescene/simulation/own_actions.h"
 
 namespace prescene::queries {
 namespace {
@@ -14,8 +15,9 @@ using belief::EventKind;
 using belief::Pose;
 using geometry::Vector3d;
 
-constexpr double kStillBody = 1e-3;  // m, rad; a robot's body that moves by less stands still
-constexpr int kRestFrames = 5;       // in which an object lay still, so that it is taken to go on so
+constexpr double kStillBody = 1e-3;                       // m, rad; a robot's body that moves by less stands still
+constexpr double kFoundShift = 0.004, kFoundTurn = 0.03;  // m and rad: spread of a pose that was found
+constexpr int kRestFrames = 5;  // in which an object lay still, so that it is taken to go on so
 
 double to_uniform(double z) { return std::clamp(core::normal_cdf(z), 1e-12, 1.0 - 1e-12); }
 
@@ -36,7 +38,9 @@ core::Result<std::unique_ptr<EventPaths>> EventPaths::create(const ExplainWindow
   std::unique_ptr<EventPaths> events(new EventPaths(window, context, priors, seed, prior_of(*window.start)));
   if (events->prior_.scene->objects.empty()) {
     events->follow_tracks();
-    if (events->objects_.empty())
+    const bool none = std::all_of(events->tracks_.begin(), events->tracks_.end(),
+                                  [](const SeenTrack& track) { return track.times.empty(); });
+    if (none)
       return core::not_found(
           "the belief holds no object at the window's begin, and none is found in it: begin the window later");
     return core::not_found(
@@ -48,6 +52,8 @@ core::Result<std::unique_ptr<EventPaths>> EventPaths::create(const ExplainWindow
   events->note_directions();
   if (!context.simulation.make_simulator) return core::unavailable("no simulator: this service was set up without one");
   PRESCENE_TRY(events->simulator_, context.simulation.make_simulator(*events->scene_, 1.0));
+  events->local_ = std::make_unique<LocalRuns>(*events->scene_, events->shapes_, events->prior_.likeliest,
+                                               *events->simulator_, context.simulation.make_simulator);
   return events;
 }
 
@@ -126,14 +132,9 @@ void EventPaths::set_scene() {
 }
 
 void EventPaths::follow_tracks() {
-  // What was not there at the begin may be put in, if it is found later.
+  // What was not there at the begin may be put in, if it is found later, by the tracker or by note_found().
   for (const belief::ObjectBelief& object : window_.start->objects) {
     if (queries::is_present(object)) continue;
-    const bool found = std::any_of(window_.frames.begin(), window_.frames.end(), [&](const WindowFrame& frame) {
-      const auto index = belief::find_object(*frame.belief, object.name);
-      return index && frame.belief->objects[static_cast<std::size_t>(*index)].state == belief::TrackState::kTracked;
-    });
-    if (!found) continue;
     belief::SceneObject absent;
     absent.name = object.name;
     absent.model = object.model;
@@ -141,6 +142,7 @@ void EventPaths::follow_tracks() {
     shapes_.push_back(belief::collision_mesh(prior_.scene->model_of(objects_.back())));
   }
   tracks_.assign(objects_.size(), {});
+  seen_.assign(objects_.size(), {});
   for (std::size_t i = 0; i < objects_.size(); ++i)
     for (const WindowFrame& frame : window_.frames) {
       const auto index = belief::find_object(*frame.belief, objects_[i].name);
@@ -150,6 +152,15 @@ void EventPaths::follow_tracks() {
       tracks_[i].times.push_back(core::seconds_of(frame.observation.stamp_ns - window_.start->stamp_ns));
       tracks_[i].estimates.push_back(belief::estimate(*frame.belief, object));
     }
+}
+
+void EventPaths::note_found(std::size_t object, const Pose& X_WO, std::vector<double> times) {
+  belief::ObjectEstimate estimate;
+  estimate.mean = estimate.mode = X_WO;
+  estimate.covariance.diagonal().head<3>().setConstant(kFoundTurn * kFoundTurn);
+  estimate.covariance.diagonal().tail<3>().setConstant(kFoundShift * kFoundShift);
+  tracks_[object].estimates.assign(times.size(), estimate);
+  tracks_[object].times = std::move(times);
 }
 
 void EventPaths::note_directions() {
@@ -164,6 +175,7 @@ void EventPaths::note_directions() {
       if (!object.particles.empty()) put_in_at_[i] = belief::estimate(*window_.start, object).mean;
       continue;
     }
+    put_in_at_[i] = *start_pose(i);
     const TrackedMotion motion = motion_of(i);
     const Vector3d d = motion.first_step - up * up.dot(motion.first_step);
     if (motion.moved && d.norm() > 1e-3) directions_[i] = std::atan2(up.cross(x).dot(d), x.dot(d));
@@ -174,13 +186,21 @@ bool EventPaths::is_held(std::size_t object) const {
   return is_present(object) && prior_.likeliest.objects[object].mode == belief::MotionMode::kHeld;
 }
 
+double EventPaths::may_be_absent(std::size_t object) const {
+  if (!is_present(object)) return 1.0;
+  if (is_held(object)) return 0.0;
+  const belief::ObjectBelief& believed = present_.objects[object];
+  return believed.state == belief::TrackState::kTracked ? 1.0 - believed.existence : 1.0;
+}
+
 std::optional<Pose> EventPaths::start_pose(std::size_t object) const {
   if (!is_present(object)) return std::nullopt;
   return prior_.likeliest.objects[object].X_WO;
 }
 
 std::vector<belief::Trajectory> EventPaths::run(std::span<const belief::WorldState> starts,
-                                                std::span<const std::vector<belief::Action>> actions) {
+                                                std::span<const std::vector<belief::Action>> actions,
+                                                std::optional<std::size_t> moved) {
   std::vector<belief::Trajectory> runs(starts.size());
   const WindowEnd end(duration_);
   simulation::RunRequest request;
@@ -189,18 +209,17 @@ std::vector<belief::Trajectory> EventPaths::run(std::span<const belief::WorldSta
   request.sample_interval = kEventInterval;
   request.end_rule = &end;
   core::ThreadPool& pool = *context_.simulation.pool;
-  const auto run_part = [&](std::size_t first, std::size_t count) {
-    simulation::RunRequest mine = request;
-    mine.actions = actions[first];
-    simulator_->run(starts.subspan(first, count), mine, stream_, static_cast<std::uint32_t>(first), pool,
-                    std::span(runs).subspan(first, count), context_.simulation.cancellation);
-  };
-  // What is done alike in all instances is simulated at once.
-  const bool alike = std::all_of(actions.begin(), actions.end(), [&](const auto& a) { return a == actions.front(); });
-  if (alike)
-    run_part(0, starts.size());
-  else
-    pool.for_each_index(starts.size(), [&](std::size_t i) { run_part(i, 1); });
+  if (moved && still_) {
+    const auto count =
+        local_->run(*moved, {starts, actions, &request, stream_, &pool, context_.simulation.cancellation}, runs);
+    if (!count && failure_.ok()) failure_ = count.status();
+    if (!count)
+      for (std::size_t i = 0; i < runs.size(); ++i) runs[i].states = {starts[i]};
+    simulated_ += count ? *count : 0;
+    return runs;
+  }
+  simulation::run_own_actions(*simulator_, starts, actions, request, stream_, 0, pool, runs,
+                              context_.simulation.cancellation);
   simulated_ += static_cast<int>(runs.size());
   return runs;
 }

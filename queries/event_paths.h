@@ -11,6 +11,7 @@
 
 #include "prescene/belief/event.h"
 #include "prescene/queries/explain.h"
+#include "prescene/queries/local_runs.h"
 #include "prescene/queries/tempered_smc.h"
 #include "prior.h"
 #include "seating.h"
@@ -49,6 +50,13 @@ struct SeenTrack {
   std::vector<belief::ObjectEstimate> estimates;  ///< In these.
 };
 
+/// What the frames say of when an object left where it was at the begin, and was where it was tracked last: a tracker
+/// notices either some frames late.
+struct SeenTimes {
+  double left_after = 0.0, left_before = 0.0;  ///< s
+  double came_after = 0.0, came_before = 0.0;  ///< s; both the duration = it did not come.
+};
+
 /// What a track says of when and how an object began to move.
 struct TrackedMotion {
   bool moved = false;   ///< It was tracked elsewhere than at the begin.
@@ -72,7 +80,7 @@ geometry::Vector3d horizontal_x(const geometry::Vector3d& up);
 class EventPaths {
  public:
   /// `window` must outlive it; times of `stamps` are those of the frames that weigh. Objects: those that are present at
-  /// the begin, then those that are not and are tracked at some later frame.
+  /// the begin, then those that are not.
   static core::Result<std::unique_ptr<EventPaths>> create(const ExplainWindow& window, const ExplainContext& context,
                                                           const belief::EventPriors& priors, std::uint64_t seed);
 
@@ -83,6 +91,8 @@ class EventPaths {
   double duration() const { return duration_; }
   const SeenTrack& track(std::size_t object) const { return tracks_[object]; }
   bool is_held(std::size_t object) const;
+  /// Probability that it is not there at the begin: one for what the tracker does not see there.
+  double may_be_absent(std::size_t object) const;
   /// Where it is at the begin, most probably; empty where it is not.
   std::optional<belief::Pose> start_pose(std::size_t object) const;
   /// Where what was not there is put in, but for its shift.
@@ -91,6 +101,10 @@ class EventPaths {
 
   /// Times of the frames that weigh, s from the begin; before anything below.
   void set_times(std::vector<double> times) { times_ = std::move(times); }
+  /// For guesses of kinds in which it is carried.
+  void note_seen(std::size_t object, const SeenTimes& times) { seen_[object] = times; }
+  /// What was not there at the begin was found in the last frame, and in those of `times` something is there, too.
+  void note_found(std::size_t object, const belief::Pose& X_WO, std::vector<double> times);
   /// Where objects are in those frames if nothing happens, from the most probable start.
   std::vector<ObjectPath> base();
 
@@ -107,6 +121,8 @@ class EventPaths {
 
   int simulated() const { return simulated_; }
   int failed() const { return failed_; }
+  /// The first error of a simulator that was to be made; what was simulated is worth nothing then.
+  const core::Status& failure() const { return failure_; }
   std::string stepper() const { return simulator_->stepper().name; }
   const std::vector<std::string>& remarks() const { return remarks_; }
 
@@ -119,8 +135,10 @@ class EventPaths {
   void note_directions();
   TrackedMotion motion_of(std::size_t object) const;
   belief::WorldState start_of(std::size_t object, const LatentPoint& z, std::size_t first) const;
+  /// `moved`: the only object that moves at first, if all else lies still.
   std::vector<belief::Trajectory> run(std::span<const belief::WorldState> starts,
-                                      std::span<const std::vector<belief::Action>> actions);
+                                      std::span<const std::vector<belief::Action>> actions,
+                                      std::optional<std::size_t> moved = {});
   std::vector<belief::Action> actions_from(double time) const;
   bool touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const;
   void begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
@@ -135,12 +153,14 @@ class EventPaths {
   std::shared_ptr<const belief::Scene> scene_;  // with the robot's timeline and all models
   std::unique_ptr<simulation::Simulator> simulator_;
   std::unique_ptr<Seating> seating_;
+  std::unique_ptr<LocalRuns> local_;
   belief::Belief present_;
   std::vector<std::unique_ptr<belief::Belief>> alone_;            // each with one object
   std::vector<std::unique_ptr<belief::BeliefSampler>> samplers_;  // of these
   std::vector<geometry::TriangleMesh> shapes_;                    // of the objects, in O
   std::vector<belief::SceneObject> objects_;
   std::vector<SeenTrack> tracks_;
+  std::vector<std::optional<SeenTimes>> seen_;  // by object
   std::vector<double> directions_;       // by object: in which it was tracked to move, rad; directions count from it
   std::vector<belief::Pose> put_in_at_;  // by object: where what was not there is put in, but for its shift
   std::vector<belief::Action> actions_;  // known ones, times from the begin
@@ -151,6 +171,7 @@ class EventPaths {
   core::RandomStream stream_;
   int simulated_ = 0;
   int failed_ = 0;
+  core::Status failure_;  // the first of a run
   std::vector<std::string> remarks_;
 };
 

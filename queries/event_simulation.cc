@@ -187,7 +187,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
         possible[i] = can_be ? 1 : 0;
       }
     });
-    after = run(states, actions);
+    after = run(states, actions, target);
   }
   const std::size_t count = times_.size();
   const auto make_path = [&](std::size_t i) {
@@ -214,7 +214,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
       const bool is_partner = hypothesis.partner && object == *hypothesis.partner;
       for (std::size_t k = 0; k < count; ++k) {
         const double t = times_[k];
-        poses[k] = quiet(object, t);
+        poses[k] = is_target && hypothesis.kind == EventKind::kPutIn ? std::nullopt : quiet(object, t);
         if (t < event.time || hypothesis.kind == EventKind::kNothing) continue;
         if (simulated) {
           poses[k] = pose_in(after[i], object, t);

@@ -4,13 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "event_hypotheses.h"
 #include "event_paths.h"
 #include "explain_answer.h"
+#include "missing_objects.h"
 #include "other_motion.h"
 #include "prescene/core/spelling.h"
 #include "prescene/queries/tempered_smc.h"
+#include "weigh_events.h"
 #include "window_likelihood.h"
 
 namespace prescene::queries {
@@ -23,7 +25,11 @@ constexpr std::size_t kMostCandidates = 4;
 constexpr double kElsewhere = 0.01,
                  kTurned = 0.15;   // m and rad: tracked further from its start, an object is looked at
 constexpr double kRefuted = -1.0;  // nats: what speaks so much against where it was is looked at
-constexpr int kPosteriorDraws = 2000;
+constexpr int kFirstRuns = 1;
+constexpr int kMostRounds = 4;      // times the query's runs: of what stays uncertain
+constexpr double kHopeless = 10.0;  // nats: what is so far behind the best is not searched further
+constexpr double kLikelierThanSeen =
+    3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
 class Explainer {
  public:
@@ -41,23 +47,15 @@ class Explainer {
       times_.push_back(core::seconds_of(likelihood_->stamp(k) - window_.start->stamp_ns));
     events_->set_times(times_);
     likelihood_->set_base(events_->base());
+    PRESCENE_RETURN_IF_ERROR(look_for_missing());
+    if (asked && !may_be_explained(*asked)) return lost_for_good();
     const std::vector<std::size_t> candidates = asked ? std::vector{*asked} : candidates_to_look_at();
-    const std::vector<Hypothesis> hypotheses = make_hypotheses(candidates);
-    std::uint64_t number = 0;
-    for (const std::size_t object : candidates) {
-      Judged nothing = judge({EventKind::kNothing, object, {}, 0.0}, number++);
-      const double evidence = nothing.posterior.mean_log_evidence;
-      nothings_.push_back(nothing);
-      for (const Hypothesis& hypothesis : hypotheses) {
-        if (hypothesis.object != object || hypothesis.kind == EventKind::kNothing) continue;
-        if (cancelled()) return core::cancelled("stopped on request before all events were weighed");
-        Judged judged = judge(hypothesis, number++);
-        judged.log_bayes -= evidence;
-        judged_.push_back(std::move(judged));
-      }
-    }
-    if (cancelled()) return core::cancelled("stopped on request before all events were weighed");
-    weigh(hypotheses);
+    for (const std::size_t object : candidates) note_when_seen(object);
+    const std::vector<Hypothesis> hypotheses = hypotheses_about(candidates, *events_, query_.weights, *tools_.meshes);
+    PRESCENE_RETURN_IF_ERROR(search_all(candidates, hypotheses));
+    PRESCENE_RETURN_IF_ERROR(search_rivals());
+    PRESCENE_RETURN_IF_ERROR(events_->failure());
+    remark_what_was_cut_short();
     Telling telling{window_, *events_, *likelihood_, times_, nothings_, judged_};
     ExplainAnswer answer = tell(telling);
     answer.evaluated += evaluated_;
@@ -70,16 +68,73 @@ class Explainer {
     return context_.simulation.cancellation != nullptr && context_.simulation.cancellation->requested();
   }
 
+  bool may_be_explained(std::size_t object) const {
+    return events_->is_present(object) || !events_->track(object).times.empty();
+  }
+  core::Status lost_for_good() const {
+    return core::not_found("'" + query_.object +
+                           "' is lost in the whole window: there is nothing to explain; choose a window in which it is "
+                           "tracked at the begin or found later");
+  }
+
+  /// What was not there at the begin, and the tracker did not find.
+  core::Status look_for_missing() {
+    std::vector<std::size_t> missing;
+    for (std::size_t i = 0; i < events_->objects().size(); ++i)
+      if (!may_be_explained(i) && (query_.object.empty() || query_.object == events_->objects()[i].name))
+        missing.push_back(i);
+    if (missing.empty()) return core::ok_status();
+    PRESCENE_TRY(const auto found, find_missing(frames_.back(), context_, tools_, query_.seed));
+    for (const std::size_t i : missing) {
+      const auto index = belief::find_object(*frames_.back().belief, events_->objects()[i].name);
+      if (!index || !found[static_cast<std::size_t>(*index)]) continue;
+      const Pose& X_WO = *found[static_cast<std::size_t>(*index)];
+      std::vector<double> absent(times_.size());
+      const ScenePath gone{{i}, {ObjectPath(times_.size())}, false};
+      likelihood_->evaluate(std::span(&gone, 1), absent);
+      // From when on it is seen there.
+      std::vector<double> seen;
+      for (std::size_t k = times_.size(); k-- > 0;) {
+        double there = 0.0;
+        likelihood_->evaluate(k, i, std::span(&X_WO, 1), std::span(&there, 1));
+        if (there <= absent[k]) break;
+        seen.insert(seen.begin(), times_[k]);
+      }
+      if (!seen.empty()) events_->note_found(i, X_WO, std::move(seen));
+    }
+    return core::ok_status();
+  }
+
+  /// From which frames on it is not where it was, and where it was tracked last.
+  void note_when_seen(std::size_t object) {
+    const SeenTrack& track = events_->track(object);
+    const std::size_t n = times_.size();
+    std::vector<double> absent(n), here(n, -1e300), there(n, -1e300);
+    const ScenePath gone{{object}, {ObjectPath(n)}, false};
+    likelihood_->evaluate(std::span(&gone, 1), absent);
+    for (std::size_t k = 0; k < n; ++k) {
+      if (const auto& base = likelihood_->base()[object][k])
+        likelihood_->evaluate(k, object, std::span(&*base, 1), std::span(&here[k], 1));
+      if (!track.estimates.empty())
+        likelihood_->evaluate(k, object, std::span(&track.estimates.back().mode, 1), std::span(&there[k], 1));
+    }
+    std::size_t left = n, came = n;
+    while (left > 0 && here[left - 1] < std::max(absent[left - 1], there[left - 1])) --left;
+    while (came > 0 && there[came - 1] > std::max(absent[came - 1], here[came - 1])) --came;
+    if (left == n && came == n) return;
+    const auto time = [&](std::size_t k) { return k < n ? times_[k] : events_->duration(); };
+    const auto before = [&](std::size_t k) { return k > 0 ? times_[k - 1] : 0.0; };
+    SeenTimes seen{before(left), time(left), before(came), time(came)};
+    if (came == n) seen.came_after = seen.came_before = events_->duration();
+    events_->note_seen(object, seen);
+  }
+
   core::Result<std::optional<std::size_t>> asked_object() const {
     if (query_.object.empty()) return std::optional<std::size_t>();
     for (std::size_t i = 0; i < events_->objects().size(); ++i)
       if (events_->objects()[i].name == query_.object) return std::optional(i);
     std::vector<std::string> names;
     for (const belief::ObjectBelief& object : window_.start->objects) names.push_back(object.name);
-    if (std::find(names.begin(), names.end(), query_.object) != names.end())
-      return core::not_found("'" + query_.object +
-                             "' is lost in the whole window: there is nothing to explain; choose a window in which it "
-                             "is tracked at the begin or found later");
     std::string known;
     for (const std::string& name : core::nearest_words(query_.object, names))
       known += (known.empty() ? "" : " or ") + ("'" + name + "'");
@@ -95,7 +150,7 @@ class Explainer {
     std::size_t doubtful = 0;
     for (std::size_t i = 0; i < events_->objects().size(); ++i) {
       if (!events_->is_present(i)) {
-        order.emplace_back(-1.0, i);
+        if (may_be_explained(i)) order.emplace_back(-1.0, i);
         continue;
       }
       double moved = 0.0;
@@ -140,54 +195,6 @@ class Explainer {
     return likelihood_->base()[object][k].value_or(Pose{});
   }
 
-  /// Of the candidates; priors are shared by all objects that a kind may happen to.
-  std::vector<Hypothesis> make_hypotheses(const std::vector<std::size_t>& candidates) const {
-    std::vector<Hypothesis> all;
-    const std::size_t n = events_->objects().size();
-    const auto looked_at = [&](std::size_t i) {
-      return std::find(candidates.begin(), candidates.end(), i) != candidates.end();
-    };
-    const auto add = [&](EventKind kind, const auto& may) {
-      std::vector<Hypothesis> of_kind;
-      for (std::size_t i = 0; i < n; ++i)
-        if (may(i)) of_kind.push_back({kind, i, {}, 0.0});
-      for (Hypothesis& h : of_kind) {
-        h.prior = query_.weights.of(kind) / static_cast<double>(of_kind.size());
-        all.push_back(h);
-      }
-    };
-    const auto free = [&](std::size_t i) { return events_->is_present(i) && !events_->is_held(i); };
-    const auto held = [&](std::size_t i) { return events_->is_held(i); };
-    const auto absent = [&](std::size_t i) { return !events_->is_present(i); };
-    all.push_back({EventKind::kNothing, candidates.front(), {}, query_.weights.of(EventKind::kNothing)});
-    for (const EventKind kind : {EventKind::kPushed, EventKind::kBumped, EventKind::kMoved, EventKind::kTakenAway})
-      add(kind, free);
-    add(EventKind::kSlipped, held);
-    add(EventKind::kPutIn, absent);
-    add(EventKind::kOther, [](std::size_t) { return true; });
-    std::vector<Hypothesis> pairs;
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = i + 1; j < n; ++j) {
-        if (!free(i) || !free(j)) continue;
-        const belief::ObjectModel &a = events_->model(i), &b = events_->model(j);
-        const bool same =
-            a.name == b.name || tools_.meshes->get(a.visual, a.collision, filter::MeshDetail::kLikelihood) ==
-                                    tools_.meshes->get(b.visual, b.collision, filter::MeshDetail::kLikelihood);
-        if (!same) continue;
-        const std::size_t first = looked_at(i) ? i : j;
-        pairs.push_back({EventKind::kExchanged, first, first == i ? j : i, 0.0});
-      }
-    for (Hypothesis& h : pairs) {
-      h.prior = query_.weights.of(EventKind::kExchanged) / static_cast<double>(pairs.size());
-      all.push_back(h);
-    }
-    double sum = 0.0;
-    for (const Hypothesis& h : all) sum += h.prior;
-    for (Hypothesis& h : all) h.prior /= sum > 0.0 ? sum : 1.0;
-    std::erase_if(all, [&](const Hypothesis& h) { return h.prior <= 0.0 || !looked_at(h.object); });
-    return all;
-  }
-
   void evaluate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
     std::vector<ScenePath> paths(points.size());
     events_->simulate(hypothesis, points, paths);
@@ -200,19 +207,20 @@ class Explainer {
     evaluated_ += static_cast<int>(points.size());
   }
 
-  Judged judge(const Hypothesis& hypothesis, std::uint64_t number) {
-    Judged judged;
-    judged.hypothesis = hypothesis;
-    judged.object = hypothesis.object;
-    const core::RandomStream stream(query_.seed + (number + 1) * 0x9e3779b97f4a7c15ULL, core::Purpose::kParameters);
+  /// `runs` more searches of it; of `other`, which needs none, the evidence.
+  void search(Judged& judged, int runs) {
+    const Hypothesis& hypothesis = judged.hypothesis;
+    const core::RandomStream stream(query_.seed + (judged.number + 1) * 0x9e3779b97f4a7c15ULL,
+                                    core::Purpose::kParameters);
     if (hypothesis.kind == EventKind::kOther) {
       const OtherMotion other = other_motion(*events_, *likelihood_, hypothesis.object, times_, query_.priors, stream);
       judged.log_bayes = other.log_evidence;
       judged.error = other.error;
       judged.other_path = other.path;
       judged.frame_means = other.frames;
+      most_likely_ = other.most_likely + kLikelierThanSeen;
       evaluated_ += other.evaluations;
-      return judged;
+      return;
     }
     TemperedTarget target;
     events_->guess(hypothesis, target);
@@ -220,75 +228,91 @@ class Explainer {
       evaluate(hypothesis, points, log_likelihoods);
     };
     TemperedOptions options;
-    options.runs = query_.runs;
+    options.runs = runs;
     options.points = query_.points;
-    judged.posterior = tempered_posterior(target, options, stream, context_.simulation.cancellation);
+    options.first_run = static_cast<int>(judged.posterior.log_evidence.size());
+    if (options.first_run == 0 && hypothesis.kind != EventKind::kNothing) {
+      options.most_likely = most_likely_;
+      options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);
+    }
+    TemperedResult found = tempered_posterior(target, options, stream, context_.simulation.cancellation);
+    judged.posterior = options.first_run == 0 ? std::move(found) : merge(judged.posterior, found);
     judged.log_bayes = judged.posterior.mean_log_evidence;
-    judged.error = judged.posterior.error;
-    if (judged.posterior.cut_short)
-      remarks_.push_back(std::string("The search for '") + belief::name_of(hypothesis.kind) + "' of " +
-                         events_->objects()[hypothesis.object].name +
-                         " was cut short: its probability is less certain than its interval says.");
-    return judged;
   }
 
-  /// Probabilities with intervals.
-  void weigh(const std::vector<Hypothesis>& hypotheses) {
-    const std::size_t n = judged_.size();
-    std::vector<double> prior(n);
-    for (std::size_t i = 0; i < n; ++i) prior[i] = std::log(judged_[i].hypothesis.prior);
-    double log_nothing = -1e300;
+  /// Each hypothesis once; those that can't compete end early.
+  core::Status search_all(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses) {
+    double prior_of_nothing = 0.0;
     for (const Hypothesis& h : hypotheses)
-      if (h.kind == EventKind::kNothing && h.prior > 0.0) log_nothing = std::log(h.prior);
-    const auto shares = [&](const std::vector<double>& log_bayes) {
-      double top = log_nothing;
-      for (std::size_t i = 0; i < n; ++i) top = std::max(top, prior[i] + log_bayes[i]);
-      std::vector<double> result(n + 1);
-      double sum = result[n] = std::exp(log_nothing - top);
-      for (std::size_t i = 0; i < n; ++i) sum += result[i] = std::exp(prior[i] + log_bayes[i] - top);
-      for (double& share : result) share /= sum;
-      return result;
-    };
-    std::vector<double> log_bayes(n);
-    for (std::size_t i = 0; i < n; ++i) log_bayes[i] = judged_[i].log_bayes;
-    const std::vector<double> best = shares(log_bayes);
-    std::vector<std::vector<double>> drawn(n + 1);
-    const core::RandomStream stream(query_.seed, core::Purpose::kResample);
-    for (int d = 0; d < kPosteriorDraws; ++d) {
-      core::RandomStream draws = stream.at(static_cast<std::uint64_t>(d));
-      // Student's t with runs - 1 degrees of freedom.
-      const auto student = [&](double error) {
-        const int freedom = std::max(1, query_.runs - 1);
-        double squares = 0.0;
-        for (int k = 0; k < freedom; ++k) {
-          const double x = draws.normal();
-          squares += x * x;
+      if (h.kind == EventKind::kNothing) prior_of_nothing = h.prior;
+    for (const std::size_t object : candidates) {
+      Judged& nothing = nothings_.emplace_back();
+      nothing.hypothesis = {EventKind::kNothing, object, {}, prior_of_nothing};
+      nothing.object = object;
+      nothing.number = number_++;
+      search(nothing, query_.runs);
+      best_ = std::max(best_, std::log(prior_of_nothing) + nothing.log_bayes);
+      // `other` first: it says how likely the frames can get at all.
+      for (const bool other : {true, false})
+        for (const Hypothesis& hypothesis : hypotheses) {
+          const bool is_other = hypothesis.kind == EventKind::kOther;
+          if (hypothesis.object != object || hypothesis.kind == EventKind::kNothing || is_other != other) continue;
+          if (cancelled()) return stopped();
+          Judged& judged = judged_.emplace_back();
+          judged.hypothesis = hypothesis;
+          judged.object = object;
+          judged.number = number_++;
+          search(judged, kFirstRuns);
+          best_ = std::max(best_, std::log(hypothesis.prior) + judged.log_bayes);
+          judged.log_bayes -= nothings_.back().log_bayes;
         }
-        return error * draws.normal() / std::sqrt(squares / freedom);
-      };
-      std::vector<double> of_nothing;
-      for (const Judged& nothing : nothings_) of_nothing.push_back(student(nothing.error));
-      std::vector<double> varied = log_bayes;
-      for (std::size_t i = 0; i < n; ++i) {
-        varied[i] += student(judged_[i].error);
-        for (std::size_t o = 0; o < nothings_.size(); ++o)
-          if (nothings_[o].object == judged_[i].object) varied[i] -= of_nothing[o];
-      }
-      const std::vector<double> sample = shares(varied);
-      for (std::size_t i = 0; i <= n; ++i) drawn[i].push_back(sample[i]);
     }
-    const auto put = [&](std::size_t i, Judged& judged) {
-      std::sort(drawn[i].begin(), drawn[i].end());
-      const double tail = 0.5 * (1.0 - query_.confidence);
-      const auto at = [&](double share) {
-        return drawn[i][static_cast<std::size_t>(std::lround(share * (kPosteriorDraws - 1)))];
-      };
-      judged.probability = best[i];
-      judged.low = std::min(best[i], at(tail));
-      judged.high = std::max(best[i], at(1.0 - tail));
+    return core::ok_status();
+  }
+
+  /// More runs of those that compete, until the intervals are narrow.
+  core::Status search_rivals() {
+    const auto evidence_of_nothing = [&](const Judged& judged) {
+      for (const Judged& nothing : nothings_)
+        if (nothing.object == judged.object) return nothing.log_bayes;
+      return 0.0;
     };
-    for (std::size_t i = 0; i < n; ++i) put(i, judged_[i]);
-    put(n, nothings_.front());
+    const auto more = [&](Judged& judged, int runs) {
+      search(judged, runs);
+      judged.log_bayes -= evidence_of_nothing(judged);
+    };
+    const auto runs_of = [](const Judged& judged) { return static_cast<int>(judged.posterior.log_evidence.size()); };
+    for (Judged& judged : judged_) {
+      const double log_posterior = std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged);
+      const bool competes = log_posterior > best_ - kHopeless;
+      if (judged.hypothesis.kind == EventKind::kOther || judged.posterior.gave_up || !competes) continue;
+      if (cancelled()) return stopped();
+      more(judged, std::max(1, query_.runs - runs_of(judged)));
+    }
+    for (;;) {
+      weigh_events(nothings_, judged_, query_.confidence, query_.seed);
+      if (cancelled()) return stopped();
+      // Whichever of the uncertain ones has the fewest runs.
+      Judged* least = nullptr;
+      for (Judged& judged : judged_) {
+        const bool wide = judged.high - judged.low > 2.0 * query_.half_width;
+        if (!wide || judged.hypothesis.kind == EventKind::kOther || judged.posterior.gave_up) continue;
+        if (runs_of(judged) < kMostRounds * query_.runs && (least == nullptr || runs_of(judged) < runs_of(*least)))
+          least = &judged;
+      }
+      if (least == nullptr) return core::ok_status();
+      more(*least, std::max(2, query_.runs / 2));
+    }
+  }
+
+  static core::Status stopped() { return core::cancelled("stopped on request before all events were weighed"); }
+
+  void remark_what_was_cut_short() {
+    for (const Judged& judged : judged_)
+      if (judged.posterior.cut_short)
+        remarks_.push_back(std::string("The search for '") + belief::name_of(judged.hypothesis.kind) + "' of " +
+                           events_->objects()[judged.object].name +
+                           " was cut short: its probability is less certain than its interval says.");
   }
 
   const ExplainWindow& window_;
@@ -301,6 +325,9 @@ class Explainer {
   std::vector<double> times_;
   std::vector<Judged> nothings_;  // by candidate
   std::vector<Judged> judged_;    // all others
+  double best_ = -1e300;          // greatest log prior + log evidence until now
+  double most_likely_ = 0.0;      // no path has a greater log likelihood
+  std::uint64_t number_ = 0;
   std::vector<std::string> remarks_;
   int evaluated_ = 0;
 };
@@ -318,6 +345,8 @@ core::Status validate(const ExplainQuery& query) {
   PRESCENE_RETURN_IF_ERROR(check("points", query.points, 8, 4096));
   if (!(query.confidence >= 0.5 && query.confidence <= 0.9999))
     return core::invalid_input("confidence: give 0.5 to 0.9999");
+  if (!(query.half_width >= 0.001 && query.half_width <= 0.5))
+    return core::invalid_input("half_width: give 0.001 to 0.5");
   double sum = 0.0;
   for (const double weight : query.weights.weight) {
     if (!(weight >= 0.0 && weight <= 1e6)) return core::invalid_input("events: give weights between 0 and 1e6");

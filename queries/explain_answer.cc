@@ -13,6 +13,7 @@ namespace {
 using belief::EventKind;
 using belief::Pose;
 
+constexpr std::size_t kToldPoints = 96;  // of a posterior: what is told of it is worked out from so many
 constexpr double kWorthTelling = 0.002;  // probability from which on the parameters of an event are worked out
 
 /// Quantiles of weighted values.
@@ -50,7 +51,8 @@ class Teller {
     std::vector<const Judged*> probable;
     for (const Judged* judged : all)
       if (judged->probability >= kWorthTelling) probable.push_back(judged);
-    for (std::size_t i = 0; i < events_->objects().size(); ++i) answer.objects.push_back(where(i, probable));
+    for (std::size_t i = 0; i < events_->objects().size(); ++i)
+      if (events_->is_present(i) || !events_->track(i).times.empty()) answer.objects.push_back(where(i, probable));
     const auto frame_means = [&](const Judged* judged, std::size_t k) {
       double nothing = 0.0;
       for (const Judged& n : nothings_)
@@ -77,9 +79,23 @@ class Teller {
   }
 
  private:
+  /// At most kToldPoints of equal weights, every so many of them by weight.
+  static void thin_out(std::vector<TemperedPoint>& points) {
+    if (points.size() <= kToldPoints) return;
+    std::vector<TemperedPoint> kept;
+    double reached = 0.0;
+    for (const TemperedPoint& point : points) {
+      reached += point.weight * static_cast<double>(kToldPoints);
+      while (kept.size() < kToldPoints && static_cast<double>(kept.size()) + 0.5 < reached) kept.push_back(point);
+    }
+    for (TemperedPoint& point : kept) point.weight = 1.0 / static_cast<double>(kept.size());
+    points = std::move(kept);
+  }
+
   /// What follows from the posterior of a hypothesis: its points, once more, with all that is told.
   void work_out(Judged& judged) {
     if (judged.hypothesis.kind == EventKind::kOther) return;
+    thin_out(judged.posterior.points);
     std::vector<LatentPoint> points;
     for (const TemperedPoint& point : judged.posterior.points) points.push_back(point.z);
     judged.paths.resize(points.size());

@@ -15,7 +15,8 @@ namespace prescene::queries {
 struct Judged {
   Hypothesis hypothesis;
   double log_bayes = 0.0;  // against nothing about the same object
-  double error = 0.0;      // of the hypothesis's own evidence
+  double error = 0.0;      // of the evidence of `other`
+  std::uint64_t number = 0;
   std::size_t object = 0;
   TemperedResult posterior;      // empty of `other`
   std::vector<ScenePath> paths;  // of its points, where it is probable enough

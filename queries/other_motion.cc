@@ -102,6 +102,7 @@ OtherMotion other_motion(const EventPaths& events, WindowLikelihood& likelihood,
       // As far as moving counts in this frame.
       if (log_moves > log_stays) variance += std::max(0.0, n * squares / (sum * sum) - 1.0) / n;
     }
+    result.most_likely += std::max({log_stays - std::log(kStaysInFrame), best_ratio, unseen[k]});
     const double log_unseen = std::log(kUnseen) + unseen[k];
     const double top = std::max({log_stays, log_moves, log_unseen});
     result.frames.push_back(

@@ -16,6 +16,7 @@ struct OtherMotion {
   double error = 0.0;                             ///< Standard error of that.
   std::vector<double> frames;                     ///< Its parts.
   std::vector<std::optional<belief::Pose>> path;  ///< The most probable one.
+  double most_likely = 0.0;                       ///< Greatest log likelihood that was met, all frames together.
   int evaluations = 0;
 };
 

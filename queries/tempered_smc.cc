@@ -14,6 +14,8 @@ constexpr double kImpossible = -1e5;  // log L of what can't be: finite, so that
 constexpr double kNuisanceStep =
     0.35;  // of a move in nuisances, which leaves their prior as it is [Cotter et al. 2013]
 constexpr double kLeastDeviation = 0.01;  // of a random walk
+// Correlations that few points show are shrunk by this share. Chosen.
+constexpr double kShrunk = 0.3;
 constexpr double kWantedAcceptance = 0.25;
 
 double log_normal(std::span<const double> z) {
@@ -43,10 +45,35 @@ struct Run {
   std::vector<double> log_l;
   double b = 0.0;
   double log_evidence = 0.0;
-  double scale = 1.0;  // of the random walk
-  std::vector<double> deviations;
-  bool moves = false;  // in this round
+  double scale = 1.0;          // of the random walk
+  std::vector<double> factor;  // of the spread: lower triangle, row by row
+  bool moves = false;          // in this round
+  int last_moves = 0;          // done at b = 1
+  bool gave_up = false;
 };
+
+/// Cholesky's factor of a symmetric positive definite matrix, in place.
+void factorise(std::vector<double>& a, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = a[i * n + j];
+      for (std::size_t k = 0; k < j; ++k) sum -= a[i * n + k] * a[j * n + k];
+      a[i * n + j] = i == j ? std::sqrt(std::max(1e-12, sum)) : sum / a[j * n + j];
+    }
+}
+
+/// Mean over the runs, its error, and the points by their runs' evidence; `points` hold shares of their runs.
+void summarise(TemperedResult& result, const std::vector<std::size_t>& run_of) {
+  const double top = *std::max_element(result.log_evidence.begin(), result.log_evidence.end());
+  double sum = 0.0, mean = 0.0, square = 0.0;
+  const auto runs = static_cast<double>(result.log_evidence.size());
+  for (const double e : result.log_evidence) sum += std::exp(e - top), mean += e / runs;
+  for (const double e : result.log_evidence) square += (e - mean) * (e - mean);
+  result.mean_log_evidence = top + std::log(sum / runs);
+  result.error = runs > 1.0 ? std::sqrt(square / (runs - 1.0) / runs) : 0.0;
+  for (std::size_t i = 0; i < run_of.size(); ++i)
+    result.points[i].weight *= std::exp(result.log_evidence[run_of[i]] - top) / sum;
+}
 
 class TemperedSampler {
  public:
@@ -55,31 +82,36 @@ class TemperedSampler {
 
   TemperedResult run(const core::Cancellation* cancellation) {
     begin();
-    int last = 0;
-    for (int step = 1; last < options_.last_moves; ++step) {
+    for (int step = 1;; ++step) {
       if (cancellation && cancellation->requested()) break;
       bool any = false;
+      // Each run goes its own way, so that it does not depend on those beside it.
       for (std::size_t r = 0; r < runs_.size(); ++r) {
         Run& run = runs_[r];
-        run.moves = run.b < 1.0;
-        if (run.moves)
+        run.moves = true;
+        if (run.b < 1.0 && !run.gave_up) {
           temper(run, step >= options_.most_steps,
-                 stream_.at(2 * static_cast<std::uint64_t>(step), static_cast<std::uint32_t>(r)));
+                 stream_.at(2 * static_cast<std::uint64_t>(step), static_cast<std::uint32_t>(number_of(r))));
+          run.moves = !run.gave_up;
+        } else if (!run.gave_up && run.last_moves < options_.last_moves) {
+          ++run.last_moves;
+          measure(run, std::vector<double>(run.z.size(), 1.0 / static_cast<double>(run.z.size())));
+        } else {
+          run.moves = false;
+        }
         any = any || run.moves;
       }
-      if (!any) {
-        ++last;
-        for (Run& run : runs_) {
-          run.moves = true;
-          measure(run, std::vector<double>(run.z.size(), 1.0 / static_cast<double>(run.z.size())));
-        }
-      }
+      if (!any) break;
       if (target_.dimensions > 0) move(static_cast<std::uint64_t>(step));
     }
     return result();
   }
 
  private:
+  std::size_t number_of(std::size_t run) const { return static_cast<std::size_t>(options_.first_run) + run; }
+  std::uint32_t number_of(std::size_t run, std::size_t point) const {
+    return static_cast<std::uint32_t>(number_of(run) * static_cast<std::size_t>(options_.points) + point);
+  }
   std::span<const double> moved(const LatentPoint& z) const { return std::span(z).first(moved_); }
 
   /// log of (N L / q) at a point: what a step of b adds to its weight.
@@ -99,7 +131,7 @@ class TemperedSampler {
     std::vector<LatentPoint> all;
     for (int r = 0; r < options_.runs; ++r) {
       for (std::size_t i = 0; i < count; ++i) {
-        core::RandomStream draws = stream_.at(0, static_cast<std::uint32_t>(static_cast<std::size_t>(r) * count + i));
+        core::RandomStream draws = stream_.at(0, number_of(static_cast<std::size_t>(r), i));
         LatentPoint z(static_cast<std::size_t>(target_.dimensions));
         // Stratified, so that no run is without points of either kind.
         const bool guessed =
@@ -151,6 +183,15 @@ class TemperedSampler {
     for (const double w : weight) sum += w;
     run.log_evidence += step * top + std::log(sum / static_cast<double>(n));
     run.b = run.b + step >= 1.0 - 1e-9 ? 1.0 : run.b + step;
+    // What is to come is at most (1 - b) of the greatest gain, as N / q <= 1 / (1 - kGuessShare).
+    const double reachable =
+        run.log_evidence +
+        (1.0 - run.b) * (options_.most_likely - std::log(1.0 - (target_.guess_mean.empty() ? 0.0 : kGuessShare)));
+    if (run.b < 1.0 && reachable < options_.give_up_below) {
+      run.log_evidence = reachable;
+      run.gave_up = true;
+      return;
+    }
     for (double& w : weight) w /= sum;
     measure(run, weight);
     // Systematic resampling.
@@ -168,34 +209,39 @@ class TemperedSampler {
     run.log_l = std::move(log_l);
   }
 
-  /// The spread of the moved coordinates, which random walks are scaled by.
+  /// The spread of the moved coordinates, along which random walks go.
   void measure(Run& run, const std::vector<double>& weight) const {
-    run.deviations.assign(moved_, 0.0);
-    for (std::size_t k = 0; k < moved_; ++k) {
-      double mean = 0.0, square = 0.0;
-      for (std::size_t i = 0; i < run.z.size(); ++i) mean += weight[i] * run.z[i][k];
-      for (std::size_t i = 0; i < run.z.size(); ++i) square += weight[i] * (run.z[i][k] - mean) * (run.z[i][k] - mean);
-      run.deviations[k] = std::max(kLeastDeviation, std::sqrt(square));
-    }
+    std::vector<double> mean(moved_, 0.0);
+    for (std::size_t i = 0; i < run.z.size(); ++i)
+      for (std::size_t k = 0; k < moved_; ++k) mean[k] += weight[i] * run.z[i][k];
+    run.factor.assign(moved_ * moved_, 0.0);
+    for (std::size_t i = 0; i < run.z.size(); ++i)
+      for (std::size_t k = 0; k < moved_; ++k)
+        for (std::size_t l = 0; l <= k; ++l)
+          run.factor[k * moved_ + l] +=
+              weight[i] * (run.z[i][k] - mean[k]) * (run.z[i][l] - mean[l]) * (k == l ? 1.0 : 1.0 - kShrunk);
+    for (std::size_t k = 0; k < moved_; ++k)
+      run.factor[k * moved_ + k] = std::max(kLeastDeviation * kLeastDeviation, run.factor[k * moved_ + k]);
+    factorise(run.factor, moved_);
   }
 
   void move(std::uint64_t step) {
     std::vector<LatentPoint> proposed;
     std::vector<std::pair<std::size_t, std::size_t>> of;
+    std::vector<double> log_uniform, step_of(moved_);
     for (std::size_t r = 0; r < runs_.size(); ++r) {
       Run& run = runs_[r];
       if (!run.moves) continue;
       const double walk = run.scale * 2.38 / std::sqrt(std::max(1.0, static_cast<double>(moved_)));
       for (std::size_t i = 0; i < run.z.size(); ++i) {
-        core::RandomStream draws = stream_.at(2 * step + 1, static_cast<std::uint32_t>(r * run.z.size() + i));
+        core::RandomStream draws = stream_.at(2 * step + 1, number_of(r, i));
         LatentPoint z = run.z[i];
-        for (std::size_t k = 0; k < z.size(); ++k) {
-          const double draw = draws.normal();
-          if (k < moved_)
-            z[k] += walk * run.deviations[k] * draw;
-          else
-            z[k] = std::sqrt(1.0 - kNuisanceStep * kNuisanceStep) * z[k] + kNuisanceStep * draw;
-        }
+        for (double& draw : step_of) draw = draws.normal();
+        for (std::size_t k = 0; k < moved_; ++k)
+          for (std::size_t l = 0; l <= k; ++l) z[k] += walk * run.factor[k * moved_ + l] * step_of[l];
+        for (std::size_t k = moved_; k < z.size(); ++k)
+          z[k] = std::sqrt(1.0 - kNuisanceStep * kNuisanceStep) * z[k] + kNuisanceStep * draws.normal();
+        log_uniform.push_back(std::log(draws.uniform()));
         proposed.push_back(std::move(z));
         of.emplace_back(r, i);
       }
@@ -209,10 +255,8 @@ class TemperedSampler {
       const auto log_density = [&](const LatentPoint& z, double l) {
         return (1.0 - run.b) * log_proposal(target_, moved(z)) + run.b * (log_normal(moved(z)) + l);
       };
-      core::RandomStream draws =
-          stream_.at(2 * step + 1, static_cast<std::uint32_t>((runs_.size() + r) * run.z.size() + i));
       const double ratio = log_density(proposed[j], log_l[j]) - log_density(run.z[i], run.log_l[i]);
-      if (!(std::log(draws.uniform()) < ratio)) continue;
+      if (!(log_uniform[j] < ratio)) continue;
       run.z[i] = std::move(proposed[j]);
       run.log_l[i] = log_l[j];
       ++accepted[r];
@@ -228,18 +272,17 @@ class TemperedSampler {
     TemperedResult result;
     result.evaluations = evaluations_;
     result.cut_short = cut_short_;
-    for (const Run& run : runs_) result.log_evidence.push_back(run.log_evidence);
-    const double top = *std::max_element(result.log_evidence.begin(), result.log_evidence.end());
-    double sum = 0.0, mean = 0.0, square = 0.0;
-    const auto runs = static_cast<double>(runs_.size());
-    for (const double e : result.log_evidence) sum += std::exp(e - top), mean += e / runs;
-    for (const double e : result.log_evidence) square += (e - mean) * (e - mean);
-    result.mean_log_evidence = top + std::log(sum / runs);
-    result.error = runs > 1.0 ? std::sqrt(square / (runs - 1.0) / runs) : 0.0;
-    for (const Run& run : runs_)
-      for (std::size_t i = 0; i < run.z.size(); ++i)
-        result.points.push_back(
-            {run.z[i], run.log_l[i], std::exp(run.log_evidence - top) / sum / static_cast<double>(run.z.size())});
+    std::vector<std::size_t> run_of;
+    for (std::size_t r = 0; r < runs_.size(); ++r) {
+      const Run& run = runs_[r];
+      result.log_evidence.push_back(run.log_evidence);
+      result.gave_up = result.gave_up || run.gave_up;
+      for (std::size_t i = 0; i < run.z.size(); ++i) {
+        result.points.push_back({run.z[i], run.log_l[i], 1.0 / static_cast<double>(run.z.size())});
+        run_of.push_back(r);
+      }
+    }
+    summarise(result, run_of);
     return result;
   }
 
@@ -253,6 +296,25 @@ class TemperedSampler {
 };
 
 }  // namespace
+
+TemperedResult merge(const TemperedResult& a, const TemperedResult& b) {
+  TemperedResult both;
+  both.evaluations = a.evaluations + b.evaluations;
+  both.cut_short = a.cut_short || b.cut_short;
+  both.gave_up = a.gave_up || b.gave_up;
+  std::vector<std::size_t> run_of;
+  for (const TemperedResult* one : {&a, &b}) {
+    const std::size_t points = one->points.size() / one->log_evidence.size(), first = both.log_evidence.size();
+    both.log_evidence.insert(both.log_evidence.end(), one->log_evidence.begin(), one->log_evidence.end());
+    for (std::size_t i = 0; i < one->points.size(); ++i) {
+      both.points.push_back(one->points[i]);
+      both.points.back().weight = 1.0 / static_cast<double>(points);
+      run_of.push_back(first + i / points);
+    }
+  }
+  summarise(both, run_of);
+  return both;
+}
 
 TemperedResult tempered_posterior(const TemperedTarget& target, const TemperedOptions& options,
                                   const core::RandomStream& stream, const core::Cancellation* cancellation) {

@@ -24,7 +24,7 @@ double sharpness_of(int k) { return k + 1 == kSharpnesses ? 0.0 : std::exp2(-k);
 constexpr double kLeastWidth = 0.02;
 
 /// Bounds the score of a twin whose draw is ruled out.
-constexpr double kLeastDensity = 1e-12;
+constexpr double kLeastPosteriorDensity = 1e-12;
 
 /// Mean squares by which each run is off what was seen, or off a twin.
 std::vector<double> misfits_from(const EpisodeRuns& runs, std::span<const double> seen) {
@@ -86,7 +86,7 @@ class Evidence {
     double sum = 0.0, squares = 0.0;
     for (std::size_t i = 0; i < draws_.size(); ++i)
       sum += weights.emplace_back(std::exp(draws_[i].log_weight) * likelihoods[i]);
-    if (!(sum > 0.0)) return static_cast<double>(draws_.front().uniforms.size()) * std::log(kLeastDensity);
+    if (!(sum > 0.0)) return static_cast<double>(draws_.front().uniforms.size()) * std::log(kLeastPosteriorDensity);
     for (double& weight : weights) {
       weight /= sum;
       squares += weight * weight;
@@ -107,7 +107,7 @@ class Evidence {
         const double off = (coordinates_[i * size + d] - coordinates_[truth * size + d]) / width;
         density += weights[i] * std::exp(-0.5 * off * off);
       }
-      score += std::log(std::max(density / width, kLeastDensity));
+      score += std::log(std::max(density / width, kLeastPosteriorDensity));
     }
     return score;
   }

@@ -109,11 +109,15 @@ Verb add_explain_verb(CLI::App& app) {
       ->check(CLI::Range(2, 64))
       ->capture_default_str();
   verb->add_option("--runs", options->explain.query.runs,
-                   "Independent searches of each event; their scatter is the interval")
+                   "Independent searches of each event that competes, and more where its interval is wide")
       ->check(CLI::Range(2, 64))
       ->capture_default_str();
   verb->add_option("--points", options->explain.query.points, "Instances of each search")
       ->check(CLI::Range(8, 4096))
+      ->capture_default_str();
+  verb->add_option("--half-width", options->explain.query.half_width,
+                   "Of the probabilities' intervals: good enough to stop searching")
+      ->check(number_between(0.001, 0.5))
       ->capture_default_str();
   verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
       ->check(positive_number())

@@ -106,6 +106,9 @@ core::Status explain_into(const EventEpisode& episode, std::uint64_t seed, const
   const queries::Explanation& first = explained->answer.explanations.front();
   result.first = label_of(first);
   result.probability = first.probability;
+  result.low = first.low;
+  result.high = first.high;
+  result.explaining = explained->cpu_seconds;
   result.right = is_true(first);
   const auto is_touch = [](EventKind kind) { return kind == EventKind::kPushed || kind == EventKind::kBumped; };
   const bool touched = is_touch(first.kind) && is_touch(episode.truth) && first.object == episode.object;
@@ -144,7 +147,7 @@ double quantile_of(std::vector<double> values, double at) {
 
 struct KindFigures {
   std::size_t n = 0, right = 0, nearly = 0, failed = 0, placed = 0, within = 0, hidden = 0, hidden_within = 0;
-  std::vector<double> time_errors, direction_errors, seconds;
+  std::vector<double> time_errors, direction_errors, half_widths, seconds, explaining;
 
   void add(const EpisodeResult& e) {
     ++n;
@@ -159,7 +162,9 @@ struct KindFigures {
       hidden += e.hidden ? 1 : 0;
       hidden_within += e.hidden && e.place_within ? 1 : 0;
     }
+    if (e.failure.empty()) half_widths.push_back(0.5 * (e.high - e.low));
     seconds.push_back(e.seconds);
+    explaining.push_back(e.explaining);
   }
 };
 
@@ -180,7 +185,10 @@ std::vector<std::string> figures_row(const std::string& kind, const KindFigures&
           number_of(kDegrees * quantile_of(f.direction_errors, 0.5), 1),
           number_of(kDegrees * quantile_of(f.direction_errors, 0.9), 1),
           percent_of(f.within, f.placed) + " of " + std::to_string(f.placed),
-          number_of(quantile_of(f.seconds, 0.5), 1)};
+          number_of(100.0 * quantile_of(f.half_widths, 0.5), 1),
+          number_of(100.0 * quantile_of(f.half_widths, 0.9), 1),
+          number_of(quantile_of(f.explaining, 0.5), 1),
+          number_of(quantile_of(f.explaining, 0.9), 1)};
 }
 
 ordered_json null_or(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(); }
@@ -201,7 +209,11 @@ ordered_json kind_json(const std::string& kind, const KindFigures& f) {
           {"within_90", f.within},
           {"hidden", f.hidden},
           {"hidden_within_90", f.hidden_within},
-          {"median_cpu_seconds", null_or(quantile_of(f.seconds, 0.5))}};
+          {"median_half_width", null_or(quantile_of(f.half_widths, 0.5))},
+          {"p90_half_width", null_or(quantile_of(f.half_widths, 0.9))},
+          {"median_cpu_seconds", null_or(quantile_of(f.explaining, 0.5))},
+          {"p90_cpu_seconds", null_or(quantile_of(f.explaining, 0.9))},
+          {"median_cpu_seconds_with_tracking", null_or(quantile_of(f.seconds, 0.5))}};
 }
 
 /// By kind, in the order of event_episode_kinds(), then all.
@@ -292,6 +304,7 @@ ordered_json to_json(const ExplainedEventsReport& report) {
     } else {
       json.update({{"first", e.first},
                    {"probability", e.probability},
+                   {"interval", {e.low, e.high}},
                    {"probability_of_truth", e.of_truth},
                    {"right", e.right},
                    {"right_push_and_blow_as_one", e.nearly_right},
@@ -299,7 +312,8 @@ ordered_json to_json(const ExplainedEventsReport& report) {
                    {"direction_error_rad", e.direction_error >= 0.0 ? ordered_json(e.direction_error) : ordered_json()},
                    {"place_error_m", e.place_error >= 0.0 ? ordered_json(e.place_error) : ordered_json()},
                    {"place_within_90", e.place_within},
-                   {"cpu_seconds", e.seconds}});
+                   {"cpu_seconds", e.explaining},
+                   {"cpu_seconds_with_tracking", e.seconds}});
     }
     episodes.push_back(std::move(json));
   }
@@ -311,7 +325,8 @@ ordered_json to_json(const ExplainedEventsReport& report) {
 std::vector<std::vector<std::string>> table_of(const ExplainedEventsReport& report) {
   std::vector<std::vector<std::string>> rows = {{"episodes", "n", "right first, %", "push = blow, %", "failed",
                                                  "time error median, s", "p90, s", "direction median, deg", "p90, deg",
-                                                 "place in 90 % radius, %", "CPU s"}};
+                                                 "place in 90 % radius, %", "half width median, %", "p90, %",
+                                                 "CPU s median", "p90, s"}};
   for (const auto& [kind, figures] : figures_of(report)) rows.push_back(figures_row(kind, figures));
   return rows;
 }

@@ -150,8 +150,10 @@ core::Result<Explained> explain_recording(const ReplayInput& input, const Explai
   context.likelihood = likelihood.get();
   context.settings = settings.filter;
   const core::Stopwatch watch;
+  const double cpu = core::process_cpu_seconds();
   PRESCENE_TRY(explained.answer, queries::explain(window, query, context));
   explained.seconds = watch.seconds();
+  explained.cpu_seconds = core::process_cpu_seconds() - cpu;
   return explained;
 }
 
@@ -182,7 +184,8 @@ ordered_json to_json(const Explained& explained) {
           {"weighed_instances", answer.evaluated},
           {"failed_instances", answer.failed},
           {"stepper", answer.stepper},
-          {"wall_seconds", explained.seconds}};
+          {"wall_seconds", explained.seconds},
+          {"cpu_seconds", explained.cpu_seconds}};
 }
 
 }  // namespace prescene::service

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "prescene/belief/event.h"
 #include "prescene/queries/explain.h"
@@ -62,6 +63,56 @@ TEST(TemperedPosterior, RepeatsItsBits) {
   const TemperedResult a = solve(gaussian, true, 3), b = solve(gaussian, true, 3), c = solve(gaussian, true, 4);
   EXPECT_EQ(a.log_evidence, b.log_evidence);
   EXPECT_NE(a.log_evidence, c.log_evidence);
+}
+
+TEST(TemperedPosterior, MergedRunsAreThoseOfOneCall) {
+  const GaussianCase gaussian{1.0, 0.2};
+  TemperedOptions options;
+  options.runs = 5;
+  const TemperedResult all = solve(gaussian, true, 3, options);
+  options.runs = 2;
+  const TemperedResult first = solve(gaussian, true, 3, options);
+  options.runs = 3;
+  options.first_run = 2;
+  const TemperedResult both = merge(first, solve(gaussian, true, 3, options));
+  EXPECT_EQ(both.log_evidence, all.log_evidence);
+  EXPECT_EQ(both.mean_log_evidence, all.mean_log_evidence);
+  EXPECT_EQ(both.error, all.error);
+  EXPECT_EQ(both.evaluations, all.evaluations);
+  ASSERT_EQ(both.points.size(), all.points.size());
+  for (std::size_t i = 0; i < all.points.size(); ++i) {
+    EXPECT_EQ(both.points[i].z, all.points[i].z);
+    EXPECT_NEAR(both.points[i].weight, all.points[i].weight, 1e-12);
+  }
+}
+
+// A log likelihood of at most -50 is far from the wanted evidence, so that no run needs all its steps.
+TEST(TemperedPosterior, GivesUpWhatCannotReachTheWantedEvidence) {
+  int calls = 0;
+  TemperedTarget target;
+  target.dimensions = target.moved = 1;
+  target.evaluate = [&](std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
+    ++calls;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      log_likelihoods[i] = -50.0 - 200.0 * (points[i][0] - 1.0) * (points[i][0] - 1.0);
+  };
+  TemperedOptions options;
+  const core::RandomStream stream(1, core::Purpose::kTest);
+  const TemperedResult searched = tempered_posterior(target, options, stream);
+  const int all_calls = std::exchange(calls, 0);
+  options.most_likely = 0.0;
+  options.give_up_below = -20.0;
+  const TemperedResult given_up = tempered_posterior(target, options, stream);
+  EXPECT_TRUE(given_up.gave_up);
+  EXPECT_LT(calls, all_calls);
+  // Its evidence is an upper bound that is low enough.
+  EXPECT_LT(given_up.mean_log_evidence, options.give_up_below);
+  EXPECT_GT(given_up.mean_log_evidence, searched.mean_log_evidence);
+  // What could still reach it is searched to the end, with the same bits.
+  options.give_up_below = -70.0;
+  const TemperedResult again = tempered_posterior(target, options, stream);
+  EXPECT_FALSE(again.gave_up);
+  EXPECT_EQ(again.log_evidence, searched.log_evidence);
 }
 
 TEST(TemperedPosterior, OfAnImpossibleLikelihoodIsFinite) {

@@ -40,11 +40,12 @@ struct ExplainWindow {
 };
 
 struct ExplainQuery {
-  std::string object;        ///< Events that happen to it; empty = to any object that the frames show to be elsewhere.
-  int frames = 10;           ///< That weigh; those between which most changes are taken. In [2, 64].
-  int runs = 4;              ///< Independent runs of a schema, whose scatter is its interval. In [2, 64].
-  int points = 24;           ///< Of each run. In [8, 4096].
+  std::string object;  ///< Events that happen to it; empty = to any object that the frames show to be elsewhere.
+  int frames = 10;     ///< That weigh; those between which most changes are taken. In [2, 64].
+  int runs = 4;        ///< Independent runs of each schema that competes, more where intervals are wide. In [2, 64].
+  int points = 24;     ///< Of each run. In [8, 4096].
   double confidence = 0.95;  ///< Of the intervals.
+  double half_width = 0.05;  ///< Of a probability's interval that is good enough. In [0.001, 0.5].
   std::uint64_t seed = 1;
   belief::EventWeights weights;  ///< How probable events are before anything was seen.
   belief::EventPriors priors;    ///< Of their parameters.

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,10 @@ struct TemperedOptions {
   double least_effective = 0.5;  ///< Share of the points that a step of b leaves as effective sample size.
   int most_steps = 24;           ///< Of b; the last goes to 1 whatever it costs.
   int last_moves = 2;            ///< Moves at b = 1; one at each b before.
+  int first_run = 0;             ///< Their numbers: results of other numbers are independent, and merge().
+  /// A run ends when its log evidence can't reach this any more, because no point is likelier than `most_likely`.
+  double give_up_below = -std::numeric_limits<double>::infinity();
+  double most_likely = std::numeric_limits<double>::infinity();  ///< Upper bound of log L.
 };
 
 struct TemperedPoint {
@@ -44,12 +49,16 @@ struct TemperedPoint {
 
 struct TemperedResult {
   std::vector<TemperedPoint> points;
-  std::vector<double> log_evidence;  ///< Of each run.
+  std::vector<double> log_evidence;  ///< Of each run; an upper bound where it gave up.
   double mean_log_evidence = 0.0;    ///< log of the mean of the runs' evidence.
   double error = 0.0;                ///< Standard error of that.
   int evaluations = 0;               ///< Of the likelihood.
   bool cut_short = false;            ///< The last step of b was larger than the effective sample size allows.
+  bool gave_up = false;              ///< A run did.
 };
+
+/// Of both results' runs, which must be of the same target and options but for `first_run`.
+TemperedResult merge(const TemperedResult& a, const TemperedResult& b);
 
 /// `stream` is used at (step of b, run and point).
 TemperedResult tempered_posterior(const TemperedTarget& target, const TemperedOptions& options,

@@ -32,6 +32,7 @@ struct EpisodeResult {
   std::string failure;            ///< Why there is no explanation; "" = there is one.
   std::string first;              ///< The most probable event with its object: "pushed thing_1".
   double probability = 0.0;       ///< Of that.
+  double low = 0.0, high = 0.0;   ///< Its stated interval.
   double of_truth = 0.0;          ///< Of the true event of the true object.
   bool right = false;             ///< The first is the true event of the true object; ...
   bool nearly_right = false;      ///< ... or it is a push for a blow, or the other way round.
@@ -40,7 +41,8 @@ struct EpisodeResult {
   double place_error = -1.0;      ///< m, of where the object is said to be in the end; negative = it is not there.
   bool place_within = false;      ///< That is within the 90 % radius.
   bool hidden = false;            ///< It is truly out of sight there.
-  double seconds = 0.0;           ///< CPU time of tracking and explanation.
+  double seconds = 0.0;           ///< CPU time of tracking and explanation ...
+  double explaining = 0.0;        ///< ... and of the explanation alone.
 };
 
 struct ExplainedEventsReport {

@@ -28,7 +28,8 @@ struct Explained {
   double from = 0.0;                 ///< s since the first frame: of the frame that the window begins after, and ...
   double to = 0.0;                   ///< ... of its last.
   std::vector<std::string> remarks;  ///< Of the replay.
-  double seconds = 0.0;              ///< Wall time of the explanation, without the replay.
+  double seconds = 0.0;              ///< Wall time of the explanation, without the replay; ...
+  double cpu_seconds = 0.0;          ///< ... CPU time of the process in it.
 };
 
 /// kInvalidInput where the window is empty or outside of the recording; errors of the replay and of queries::explain.
