@@ -29,7 +29,7 @@ constexpr std::size_t kDirections = 8;                                    // aro
 constexpr std::uint32_t kRoughStarts = 12;                                // for each direction
 constexpr std::uint32_t kStarts = 128, kStartsAtOnce = 32;  // in the weakest direction: 5 % is the sixth of them
 constexpr std::uint32_t kRemovalStarts = 256;
-constexpr double kAway = 100.0;  // m: beyond the world's end, where nothing is simulated
+constexpr double kRemovedBy = 100.0;  // m: beyond the world's end, where nothing is simulated
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// Simulates starts that are drawn one by one, each by its number, and then changed.
@@ -205,7 +205,7 @@ std::optional<belief::Removal> removal_of(Trials& trials, std::size_t object, co
     starts[i] = trials.start(numbers[i]);
     belief::ObjectState& taken = starts[i].objects[object];
     taken.mode = belief::MotionMode::kMoving;
-    taken.X_WO.translation += kAway * up;
+    taken.X_WO.translation += kRemovedBy * up;
     // What lay on it or leaned on it is not asleep.
     for (belief::ObjectState& other : starts[i].objects)
       if (other.mode == belief::MotionMode::kResting) other.mode = belief::MotionMode::kMoving;
