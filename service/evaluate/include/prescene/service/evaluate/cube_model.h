@@ -43,7 +43,7 @@ struct CubeModel {
 
 /// Read off the recordings, most of it without simulating: where the calibration starts.
 CubeModel measured_cube_model();
-/// What the calibration found on the tosses at even places of the list; see docs/studies/accuracy.md.
+/// What the general calibration found on the tosses at even places of the list; see docs/studies/accuracy.md.
 CubeModel shipped_cube_model();
 /// The data set's own description and plain contact settings, for comparison.
 CubeModel described_cube_model();
