@@ -126,6 +126,19 @@ std::string text_of(const ObjectCalibration& found) {
   std::string text = table(rows) + "\n" + std::to_string(found.flights) + " recordings begin in flight, " +
                      std::to_string(found.slides) + " on a support; " + std::to_string(found.motion.evaluations) +
                      " models tried\n";
+  text += "throws differ as if a tracker with a noise of " + fixed_text(1e3 * found.throws.position, 2) + " mm and " +
+          fixed_text(1e3 * found.throws.rotation, 1) + " mrad had seen their starts, and in friction by " +
+          fixed_text(100.0 * found.throws.friction, 1) + " %\n";
+  if (found.held_out) {
+    const TossScores& scores = found.held_out->scores;
+    text += "of " + std::to_string(scores.n) + " recordings that the parameters were not fitted to, " +
+            fixed_text(100.0 * scores.coverage[2].held.value, 1) + " +- " +
+            fixed_text(100.0 * scores.coverage[2].held.standard_error, 1) +
+            " % end in their 90 % region; Brier score of the side " + fixed_text(scores.brier.value, 3) + " +- " +
+            fixed_text(scores.brier.standard_error, 3) + ", median position error " +
+            fixed_text(1e3 * scores.median_error.value, 1) + " +- " +
+            fixed_text(1e3 * scores.median_error.standard_error, 1) + " mm\n";
+  }
   for (const std::string& remark : found.remarks) text += remark + "\n";
   return text;
 }
@@ -205,7 +218,8 @@ Verb add_calibrate_verb(CLI::App& app) {
           "Parameter that stays as the scene has it; may be repeated (inertia_size is the natural logarithm of "
           "a factor)")
       ->check(CLI::IsMember(names));
-  verb->add_option("--samples", options->samples, "Simulated starts a recording; 16, of cube_tosses 24")
+  verb->add_option("--samples", options->samples,
+                   "Simulated starts a recording; 16, of more than 125 recordings fewer, of cube_tosses 24")
       ->check(CLI::Range(2, 4096));
   verb->add_option("--max-evaluations", options->max_evaluations,
                    "Models that the search tries at most; 1500, of cube_tosses 150")

@@ -120,5 +120,37 @@ TEST_F(CalibrateTest, BadDataSetsEndWithTwo) {
   EXPECT_EQ(run_program({"calibrate", folder_.string(), "-o", "x.yaml", "--keep", "colour"}).exit_code, 2);
 }
 
+TEST_F(CalibrateTest, EvaluateScoresAFolder) {
+  core::ThreadPool pool(1);
+  service::Backends backends(pool);
+  const belief::Scene scene = box_scene({});
+  auto motions =
+      simulated_tosses(scene, **backends.make_simulator(scene), 6, core::RandomStream(3, core::Purpose::kTest), pool);
+  for (SimulatedMotion& motion : motions) {
+    for (int i = 0; i < 24; ++i) {
+      motion.times.push_back(motion.times.back() + 1.0 / 120.0);
+      motion.X_WO.push_back(geometry::Pose(motion.X_WO.back()));
+    }
+  }
+  write_file(folder_ / "tosses.csv", motion_table(motions));
+  const Finished finished = run_program({"evaluate", folder_.string(), "--json", "-q"});
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const auto document = nlohmann::json::parse(finished.out);
+  EXPECT_EQ(document["scores"]["n"], 6);
+  EXPECT_EQ(document["tosses"].size(), 6U);
+  EXPECT_THAT(document["remarks"].dump(), HasSubstr("the model says nothing of how throws differ"));
+  const Finished text = run_program({"evaluate", folder_.string(), "--each", "-q"});
+  EXPECT_THAT(text.out, HasSubstr("in 90 % region, %"));
+  EXPECT_THAT(text.out, HasSubstr("toss 5"));
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {"evaluate", folder_.string(), "--model", "x.yaml", "--folds", "2"},
+           {"evaluate", folder_.string(), "--model", (folder_ / "absent.yaml").string()},
+           {"evaluate", folder_.string(), "--folds", "7"},
+           {"evaluate", folder_.string(), "--data", "data"},
+           {"evaluate", (folder_ / "absent").string()},
+           {"evaluate", "credible_regions", "--folds", "2"}})
+    EXPECT_EQ(run_program(wrong).exit_code, 2) << wrong.back();
+}
+
 }  // namespace
 }  // namespace prescene::tests
