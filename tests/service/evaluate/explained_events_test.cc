@@ -54,8 +54,8 @@ TEST_P(ExplainedEpisodes, NameTheEventAndItsTime) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, ExplainedEpisodes,
-                         testing::Values("nothing", "pushed", "pushed_over", "bumped", "slipped", "moved",
-                                         "taken_away"),
+                         testing::Values("nothing", "pushed", "pushed_over", "bumped", "slipped", "moved", "taken_away",
+                                         "exchanged"),
                          [](const auto& tested) { return tested.param; });
 
 EpisodeResult said(const std::string& kind, double probability, bool right) {
