@@ -38,7 +38,7 @@ std::string carried_name(const std::filesystem::path& path, const std::filesyste
 }
 
 std::string carried_mesh_name(const interfaces::MeshRequest& request, const std::filesystem::path& scene) {
-  const std::string name = carried_name(request.path, scene);
+  std::string name = carried_name(request.path, scene);
   const auto format = interfaces::mesh_format(request.path);
   if (!format || is_whole(*format)) return name;
   return name + "@" + core::rounded_text(request.scale) + (request.y_up ? "y" : "") + ".ply";
