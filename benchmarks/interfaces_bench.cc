@@ -8,6 +8,7 @@
 // interface are processes of their own; the robot that writes is this one.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -178,7 +179,7 @@ class Robot {
 /// The value below which this share of them lies.
 std::optional<double> milliseconds(std::vector<double> seconds, double share) {
   if (seconds.empty()) return std::nullopt;
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(seconds.size() - 1) + 0.5);
+  const auto at = static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(seconds.size() - 1)));
   std::nth_element(seconds.begin(), seconds.begin() + at, seconds.end());
   return 1e3 * *(seconds.begin() + at);
 }

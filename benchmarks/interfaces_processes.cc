@@ -21,8 +21,8 @@
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
 
-// Compiled into interfaces/dds from its IDL.
-extern "C" const dds_topic_descriptor_t sensor_msgs_msg_dds__Image__desc;
+// Compiled into interfaces/dds from its IDL, which gives it its name.
+extern "C" const dds_topic_descriptor_t sensor_msgs_msg_dds__Image__desc;  // NOLINT(readability-identifier-naming)
 
 namespace prescene::benchmarks {
 namespace {
