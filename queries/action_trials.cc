@@ -6,6 +6,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
+#include "prescene/simulation/own_actions.h"
 
 namespace prescene::queries {
 namespace {
@@ -101,27 +102,11 @@ bool ActionTrials::simulate(std::span<const Trial> trials, std::vector<belief::T
   const core::Cancellation never;
   const core::Cancellation& outer = context_.cancellation ? *context_.cancellation : never;
   const core::Cancellation until(outer, context_.simulate_until.value_or(core::Cancellation::Clock::time_point::max()));
-  // A run has one list of actions: what is to be done alike is simulated together.
-  std::vector<std::size_t> order(trials.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  while (!order.empty()) {
-    const std::vector<belief::Action>& doing = actions[order.front()];
-    const auto others =
-        std::stable_partition(order.begin(), order.end(), [&](std::size_t i) { return actions[i] == doing; });
-    std::vector<belief::WorldState> group_starts;
-    std::vector<std::uint32_t> group_numbers;
-    for (auto i = order.begin(); i != others; ++i) {
-      group_starts.push_back(std::move(starts[*i]));
-      group_numbers.push_back(numbers[*i]);
-    }
-    std::vector<belief::Trajectory> group_runs(group_starts.size());
-    simulation::RunRequest request = request_;
-    request.actions = doing;
-    simulator_.run(group_starts, request, prior_.stream, std::span<const std::uint32_t>(group_numbers), *context_.pool,
-                   group_runs, context_.simulate_until ? &until : context_.cancellation);
-    for (std::size_t k = 0; k < group_runs.size(); ++k) runs[order[k]] = std::move(group_runs[k]);
-    order.erase(order.begin(), others);
-  }
+  simulation::RunRequest request = request_;
+  request.actions.clear();  // each has its own
+  simulation::run_own_actions(simulator_, starts, actions, request, prior_.stream,
+                              std::span<const std::uint32_t>(numbers), *context_.pool, runs,
+                              context_.simulate_until ? &until : context_.cancellation);
   return std::none_of(runs.begin(), runs.end(),
                       [](const belief::Trajectory& run) { return run.end == belief::TrajectoryEnd::kCancelled; });
 }

@@ -282,12 +282,19 @@ class Explainer {
       judged.log_bayes -= evidence_of_nothing(judged);
     };
     const auto runs_of = [](const Judged& judged) { return static_cast<int>(judged.posterior.log_evidence.size()); };
+    const auto log_posterior = [&](const Judged& judged) {
+      return std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged);
+    };
+    // That nothing explains what was seen may only mean that a search missed: then none is taken for hopeless.
+    const bool unexplained = std::any_of(judged_.begin(), judged_.end(), [&](const Judged& judged) {
+      return judged.hypothesis.kind == EventKind::kOther && log_posterior(judged) >= best_ - 1e-9;
+    });
     for (Judged& judged : judged_) {
-      const double log_posterior = std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged);
-      const bool competes = log_posterior > best_ - kHopeless;
-      if (judged.hypothesis.kind == EventKind::kOther || judged.posterior.gave_up || !competes) continue;
+      const bool hopeless = judged.posterior.gave_up || log_posterior(judged) <= best_ - kHopeless;
+      if (judged.hypothesis.kind == EventKind::kOther || (hopeless && !unexplained)) continue;
       if (cancelled()) return stopped();
       more(judged, std::max(1, query_.runs - runs_of(judged)));
+      if (unexplained) judged.posterior.gave_up = false;  // the run that did counts as one without evidence
     }
     for (;;) {
       weigh_events(nothings_, judged_, query_.confidence, query_.seed);
