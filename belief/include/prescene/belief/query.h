@@ -100,7 +100,7 @@ struct FallImpulse {
   friend bool operator==(const FallImpulse&, const FallImpulse&) = default;
 };
 /// How hard an object may be knocked, horizontally at the height of its centre of mass, before it falls: before it ends
-/// tilted by more than 30 degrees, more than 5 cm lower, or out of the world.
+/// tilted by more than 30 degrees, or more than 5 cm lower.
 struct StabilityMargin {
   struct Direction {
     Vector3d direction_W = Vector3d::UnitX();  ///< Unit vector across gravity.
