@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "foresee.h"
 #include "prescene/core/check.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "prescene/simulation/own_actions.h"
@@ -47,10 +48,6 @@ ActionTrials::ActionTrials(const Prior& prior, PlannedAction& plan, const Wanted
           std::min(core::SobolNet::kMaxDimensions, first_coordinate_ + 1 + start_dimensions_ + plan.noise_dimensions()),
           net_seed),
       fresh_(prior.stream.for_purpose(core::Purpose::kAction)) {
-  double sum = 0.0;
-  for (const simulation::StartComponent& component : prior.starts.components)
-    component_ends_.push_back(sum += component.weight);
-  for (double& end : component_ends_) end /= sum;
   request_.actions = scene_->actions;
   request_.stop.duration = duration;
   request_.stop.stop_at_rest = scene_->stop_at_rest;
@@ -82,9 +79,7 @@ void ActionTrials::draw(const Trial& trial, belief::WorldState& start, std::vect
       uniforms[i] = coordinate < coordinates.size() ? coordinates[coordinate] : random.uniform();
     }
   }
-  const auto chosen = static_cast<std::size_t>(
-      std::upper_bound(component_ends_.begin(), component_ends_.end() - 1, uniforms[0]) - component_ends_.begin());
-  const simulation::StartComponent& component = prior_.starts.components[chosen];
+  const simulation::StartComponent& component = prior_.starts.chosen_by(uniforms[0]);
   const std::span all(uniforms);
   start = component.draw(all.subspan(1, static_cast<std::size_t>(component.dimensions)));
   actions = plan_.begin(values_at(trial.point), all.subspan(static_cast<std::size_t>(1 + start_dimensions_)), start);
@@ -99,14 +94,11 @@ bool ActionTrials::simulate(std::span<const Trial> trials, std::vector<belief::T
     numbers[i] = trials[i].fresh ? kFreshNumbers | trials[i].scenario : trials[i].scenario;
   });
   runs.assign(trials.size(), {});
-  const core::Cancellation never;
-  const core::Cancellation& outer = context_.cancellation ? *context_.cancellation : never;
-  const core::Cancellation until(outer, context_.simulate_until.value_or(core::Cancellation::Clock::time_point::max()));
+  const core::Cancellation until = end_of_simulating(context_);
   simulation::RunRequest request = request_;
   request.actions.clear();  // each has its own
   simulation::run_own_actions(simulator_, starts, actions, request, prior_.stream,
-                              std::span<const std::uint32_t>(numbers), *context_.pool, runs,
-                              context_.simulate_until ? &until : context_.cancellation);
+                              std::span<const std::uint32_t>(numbers), *context_.pool, runs, &until);
   return std::none_of(runs.begin(), runs.end(),
                       [](const belief::Trajectory& run) { return run.end == belief::TrajectoryEnd::kCancelled; });
 }

@@ -48,7 +48,6 @@ class ActionTrials final : public TrialRunner {
   const belief::AchieveQuery& query_;
   const QueryContext& context_;
   simulation::RunRequest request_;
-  std::vector<double> component_ends_;  // cumulative weights
   int start_dimensions_ = 0, first_coordinate_ = 0;
   core::SobolNet net_;
   core::RandomStream fresh_;

@@ -33,6 +33,12 @@ bool needs_states_along_the_way(const belief::Scene& scene) {
 
 }  // namespace
 
+core::Cancellation end_of_simulating(const QueryContext& context) {
+  static const core::Cancellation kNever;
+  return {context.cancellation ? *context.cancellation : kNever,
+          context.simulate_until.value_or(core::Cancellation::Clock::time_point::max())};
+}
+
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
                                 const belief::Effort& effort, const QueryContext& context,
                                 const ForesightDetail& detail) {
@@ -66,10 +72,7 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
                                     " instances do not fit into the memory for a question: ask for at most " +
                                     std::to_string(most_instances));
 
-  const core::Cancellation never;
-  const core::Cancellation& outer = context.cancellation ? *context.cancellation : never;
-  const core::Cancellation until(outer, context.simulate_until.value_or(core::Cancellation::Clock::time_point::max()));
-  const core::Cancellation* cancellation = context.simulate_until ? &until : context.cancellation;
+  const core::Cancellation until = end_of_simulating(context);
 
   simulation::EstimatorOptions options;
   options.tolerance = effort.tolerance;
@@ -85,11 +88,11 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
         simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
                                    {.shapes = context.shapes,
                                     .edge_rounding = context.edge_rounding * foresight.simulator->length_scale(),
-                                    .cancellation = cancellation});
+                                    .cancellation = &until});
   options.certifier = foresight.certifier.get();
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,
-                                    prior.stream, options, *context.pool, cancellation, context.progress);
+                                    prior.stream, options, *context.pool, &until, context.progress);
   if (foresight.estimate.instances.empty() && !context.simulate_until && context.cancellation &&
       context.cancellation->requested())
     return core::cancelled("stopped on request before the first simulated instance was finished");

@@ -29,6 +29,9 @@ struct ForesightDetail {
   bool to_rest = true;  ///< Else instances end as soon as they are decided, where that can be told.
   bool keep_contacts = false;
 };
+/// Requested when the question is cancelled, and from QueryContext::simulate_until on.
+core::Cancellation end_of_simulating(const QueryContext& context);
+
 /// Fails when the duration is out of range, when the memory for a question does not hold it, when no simulator can be
 /// made, when the query was cancelled before an instance was finished, or when every instance failed in the simulator.
 /// The scene's outcomes are what is judged, its actions what is done.

@@ -9,13 +9,13 @@ namespace prescene::queries {
 namespace {
 
 using belief::Pose;
+using geometry::Box;
 using geometry::Vector3d;
 
 constexpr double kApart = 0.01;  // m between boxes about things that are simulated without each other
 
-template <typename Box>
 bool are_near(const Box& a, const Box& b) {
-  return (a.low.array() < b.high.array() + kApart).all() && (b.low.array() < a.high.array() + kApart).all();
+  return (a.min().array() < b.max().array() + kApart).all() && (b.min().array() < a.max().array() + kApart).all();
 }
 
 }  // namespace
@@ -30,13 +30,9 @@ LocalRuns::LocalRuns(const belief::Scene& scene, std::span<const geometry::Trian
       make_simulator_(make_simulator),
       parts_(scene.objects.size()) {}
 
-LocalRuns::Box LocalRuns::box_of(std::size_t object, const Pose& X_WO) const {
-  Box box{Vector3d::Constant(1e300), Vector3d::Constant(-1e300)};
-  for (const Vector3d& vertex : shapes_[object].vertices) {
-    const Vector3d p = X_WO * vertex;
-    box.low = box.low.cwiseMin(p);
-    box.high = box.high.cwiseMax(p);
-  }
+Box LocalRuns::box_of(std::size_t object, const Pose& X_WO) const {
+  Box box;
+  for (const Vector3d& vertex : shapes_[object].vertices) box.extend(X_WO * vertex);
   return box;
 }
 
@@ -95,7 +91,7 @@ bool LocalRuns::meets(const Part& part, const belief::WorldState& start, const s
       at = &X_WO;
       const Box now = box_of(part.kept[k], X_WO);
       // What it swept since the state before, straight.
-      if (near_any({before.low.cwiseMin(now.low), before.high.cwiseMax(now.high)})) return true;
+      if (near_any(before.merged(now))) return true;
       before = now;
     }
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "basis.h"
+#include "foresee.h"
 #include "prescene/belief/body_names.h"
 #include "prescene/geometry/angles.h"
 #include "prescene/queries/confidence_sequence.h"
@@ -40,17 +41,11 @@ class Trials {
       : prior_(prior), context_(context), simulator_(simulator) {
     request_.stop.duration = query.duration;
     request_.stop.stop_at_rest = true;
-    double sum = 0.0;
-    for (const simulation::StartComponent& component : prior.starts.components)
-      component_ends_.push_back(sum += component.weight);
   }
 
   WorldState start(std::uint32_t number) const {
     core::RandomStream random = prior_.stream.for_purpose(core::Purpose::kNearbyStart).at(4, number);
-    const double at = random.uniform() * component_ends_.back();
-    const auto chosen = static_cast<std::size_t>(
-        std::upper_bound(component_ends_.begin(), component_ends_.end() - 1, at) - component_ends_.begin());
-    const simulation::StartComponent& component = prior_.starts.components[chosen];
+    const simulation::StartComponent& component = prior_.starts.chosen_by(random.uniform());
     std::vector<double> uniforms(static_cast<std::size_t>(component.dimensions));
     for (double& uniform : uniforms) uniform = random.uniform();
     return component.draw(uniforms);
@@ -60,10 +55,7 @@ class Trials {
   std::optional<std::vector<belief::Trajectory>> run(const std::vector<WorldState>& starts,
                                                      const std::vector<std::uint32_t>& numbers) {
     std::vector<belief::Trajectory> runs(starts.size());
-    const core::Cancellation never;
-    const core::Cancellation& outer = context_.cancellation ? *context_.cancellation : never;
-    const core::Cancellation until(outer,
-                                   context_.simulate_until.value_or(core::Cancellation::Clock::time_point::max()));
+    const core::Cancellation until = end_of_simulating(context_);
     simulator_.run(starts, request_, prior_.stream, std::span<const std::uint32_t>(numbers), *context_.pool, runs,
                    &until);
     for (const belief::Trajectory& run : runs)
@@ -83,7 +75,6 @@ class Trials {
   const QueryContext& context_;
   const simulation::Simulator& simulator_;
   simulation::RunRequest request_;
-  std::vector<double> component_ends_;
   int instances_ = 0, failed_ = 0;
 };
 

@@ -166,12 +166,7 @@ core::Status hold_out(const UsableMotions& usable, const std::vector<int>& folds
     belief::ObjectModel& model = with.models[static_cast<std::size_t>(with.objects[0].model)];
     model = calibrated_model(model, without);
   }
-  std::vector<HeldOutMotion> motions;
-  for (std::size_t i = 0; i < usable.motions.size(); ++i) {
-    if (usable.rests[i])
-      motions.push_back({usable.motions[i], *usable.rests[i], usable.numbers[i], usable.groups[i],
-                         static_cast<std::size_t>(folds[i])});
-  }
+  const std::vector<HeldOutMotion> motions = usable.held_out(folds);
   PRESCENE_TRY(found->held_out,
                held_out_scatter(motions, scenes, found->throws, backends, stream, progress, cancellation));
   if (found->held_out) {

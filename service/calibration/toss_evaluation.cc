@@ -34,15 +34,6 @@ core::Result<UsableMotions> scorable_motions(const MotionDataset& dataset, Backe
   return usable;
 }
 
-std::vector<HeldOutMotion> resting_motions(const UsableMotions& usable) {
-  std::vector<HeldOutMotion> motions;
-  for (std::size_t i = 0; i < usable.motions.size(); ++i) {
-    if (usable.rests[i])
-      motions.push_back({usable.motions[i], *usable.rests[i], usable.numbers[i], usable.groups[i], 0});
-  }
-  return motions;
-}
-
 /// Scores, and what they do not say.
 core::Status finish(const MotionDataset& dataset, std::size_t motions, const core::RandomStream& stream,
                     TossEvaluation* found) {
@@ -108,7 +99,7 @@ core::Result<TossEvaluation> evaluate_model(const MotionDataset& dataset, const 
         " mrad, and regions may be too narrow");
   }
   const core::RandomStream stream(seed, core::Purpose::kEvaluation);
-  const std::vector<HeldOutMotion> motions = resting_motions(usable);
+  const std::vector<HeldOutMotion> motions = usable.held_out(std::vector<int>(usable.motions.size(), 0));
   PRESCENE_TRY(found.tosses, score_held_out(motions, {scene}, found.throws, backends, stream.at(0, kForecastDraws), {},
                                             progress, cancellation));
   PRESCENE_RETURN_IF_ERROR(finish(dataset, motions.size(), stream, &found));
@@ -130,8 +121,12 @@ core::Result<TossEvaluation> evaluate_folds(const MotionDataset& dataset, int fo
   std::vector<std::optional<ScoredToss>> scored(dataset.recordings.size());
   std::size_t resting = 0;
   for (int fold = 0; fold < folds; ++fold) {
-    std::vector<std::size_t> others, mine;
-    for (std::size_t i = 0; i < fold_of.size(); ++i) (fold_of[i] == fold ? mine : others).push_back(i);
+    std::vector<std::size_t> others;
+    std::vector<int> scene_of;  // the only one, of those of this part
+    for (std::size_t i = 0; i < fold_of.size(); ++i) {
+      if (fold_of[i] != fold) others.push_back(i);
+      scene_of.push_back(fold_of[i] == fold ? 0 : -1);
+    }
     const auto report = [&](const core::Progress& now) {
       if (progress)
         progress({(fold + now.fraction) / folds, std::nullopt,
@@ -144,12 +139,7 @@ core::Result<TossEvaluation> evaluate_folds(const MotionDataset& dataset, int fo
     belief::Scene scene = *dataset.scene;
     scene.models[static_cast<std::size_t>(scene.objects[0].model)] = calibration->model;
     if (calibration->flight) scene.gravity_W = calibration->flight->gravity_W;
-    std::vector<HeldOutMotion> motions = resting_motions(usable.subset(mine));
-    // Groups as in the whole set.
-    for (HeldOutMotion& motion : motions) {
-      const auto at = std::ranges::find(usable.numbers, motion.number) - usable.numbers.begin();
-      motion.group = usable.groups[static_cast<std::size_t>(at)];
-    }
+    const std::vector<HeldOutMotion> motions = usable.held_out(scene_of);
     resting += motions.size();
     PRESCENE_TRY(std::vector<ScoredToss> tosses, score_held_out(motions, {scene}, calibration->throws, backends,
                                                                 stream.at(0, kForecastDraws), {}, {}, cancellation));

@@ -148,6 +148,15 @@ UsableMotions UsableMotions::without_twins() const {
   return subset(first);
 }
 
+std::vector<HeldOutMotion> UsableMotions::held_out(const std::vector<int>& scene_of) const {
+  std::vector<HeldOutMotion> resting;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    if (rests[i] && scene_of[i] >= 0)
+      resting.push_back({motions[i], *rests[i], numbers[i], groups[i], static_cast<std::size_t>(scene_of[i])});
+  }
+  return resting;
+}
+
 std::vector<int> folds_of(const std::vector<std::size_t>& groups, int folds, core::RandomStream stream) {
   std::vector<std::size_t> firsts;
   for (std::size_t i = 0; i < groups.size(); ++i)

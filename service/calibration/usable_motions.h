@@ -30,6 +30,8 @@ struct UsableMotions {
   /// Those at `places` (ascending), without remarks.
   UsableMotions subset(const std::vector<std::size_t>& places) const;
   UsableMotions without_twins() const;
+  /// Those that come to rest, each with the scene that `scene_of` gives its motion; below 0: left out.
+  std::vector<HeldOutMotion> held_out(const std::vector<int>& scene_of) const;
 };
 /// What cannot be used is left out with a remark, unless more than a quarter is, or fewer than `least` remain that are
 /// no twins: then kInvalidInput names the first three reasons.

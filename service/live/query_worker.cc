@@ -56,7 +56,7 @@ void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& ob
   for (nlohmann::ordered_json& object : objects) {
     const core::TimeNs learned_ns = object.value("learned_ns", core::TimeNs{0});
     object["learned_s"] = object.value("lessons", 0) > 0
-                              ? nlohmann::ordered_json(1e-9 * static_cast<double>(learned_ns - first_frame_ns))
+                              ? nlohmann::ordered_json(core::seconds_of(learned_ns - first_frame_ns))
                               : nlohmann::ordered_json();
   }
 }

@@ -137,14 +137,9 @@ std::optional<RecordedRest> find_rest(std::span<const TimedPose> frames, double 
       rest.moved = rest.turned = 0.0;
     } else {
       // Not where noise first ends the still frames, but where it leaves.
-      const auto leaves = [&](std::size_t i, double factor) {
-        return (frames[i].X_WO.translation - frames[middle].X_WO.translation).norm() > factor * stillness.place() ||
-               geometry::angle_between(frames[i].X_WO.rotation, frames[middle].X_WO.rotation) >
-                   factor * stillness.angle();
-      };
       std::size_t gone = last + 1;
-      while (gone < end && !leaves(gone, kMovedAgain)) ++gone;
-      while (gone > last + 1 && leaves(gone - 1, 1.0)) --gone;
+      while (gone < end && stillness.near(middle, gone, kMovedAgain)) ++gone;
+      while (gone > last + 1 && !stillness.near(middle, gone - 1, 1.0)) --gone;
       rest.moves_again = gone;
     }
     return rest;

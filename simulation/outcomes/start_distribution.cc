@@ -5,6 +5,14 @@
 
 namespace prescene::simulation {
 
+const StartComponent& StartDistribution::chosen_by(double uniform) const {
+  double all = 0.0, reached = 0.0;
+  for (const StartComponent& component : components) all += component.weight;
+  for (const StartComponent& component : components)
+    if ((reached += component.weight) / all > uniform) return component;
+  return components.back();
+}
+
 StartSampler::StartSampler(const StartComponent& component, std::uint64_t seed)
     : component_(&component),
       net_(std::clamp(component.dimensions, 1, core::SobolNet::kMaxDimensions), seed),

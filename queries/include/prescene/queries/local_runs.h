@@ -41,11 +41,8 @@ class LocalRuns {
     std::vector<std::size_t> kept, left_out;
     std::unique_ptr<simulation::Simulator> simulator;  // null = nothing is left out
   };
-  struct Box {
-    geometry::Vector3d low, high;
-  };
   core::Result<const Part*> part_of(std::size_t object);
-  Box box_of(std::size_t object, const belief::Pose& X_WO) const;
+  geometry::Box box_of(std::size_t object, const belief::Pose& X_WO) const;
   /// Whether what moves in the run comes near what was left out.
   bool meets(const Part& part, const belief::WorldState& start, const std::vector<belief::Action>& actions,
              const belief::Trajectory& local) const;

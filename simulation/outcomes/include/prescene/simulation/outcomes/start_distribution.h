@@ -24,6 +24,9 @@ struct StartComponent {
 
 struct StartDistribution {
   std::vector<StartComponent> components;  ///< At least one.
+
+  /// The component that a uniform number in [0, 1) chooses: each by its share of all weight, in their order.
+  const StartComponent& chosen_by(double uniform) const;
 };
 
 /// The priors of a scene: one component.
