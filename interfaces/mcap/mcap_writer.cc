@@ -52,6 +52,8 @@ struct McapWriter::Impl {
   std::uint64_t chunk_messages = 0;
   std::map<std::uint16_t, records::MessageIndex> chunk_channels;
   std::set<std::uint16_t> chunk_schemas;
+  Compressor compressor{McapCompression::kNone};
+  std::vector<std::uint8_t> chunk_record;  ///< The memory of the last one, for the next.
 
   Status write_bytes(std::span<const std::uint8_t> bytes);
   Status add_message(const records::Channel& channel, const records::MessageHead& head,
@@ -151,7 +153,7 @@ Status McapWriter::Impl::add_message(const records::Channel& channel, const reco
 
 Status McapWriter::Impl::end_chunk() {
   if (chunk_messages == 0) return failure;
-  const std::optional<std::vector<std::uint8_t>> compressed = compress(options.compression, chunk);
+  const std::optional<std::span<const std::uint8_t>> compressed = compressor.compress(chunk);
   chunk_head.uncompressed_size = chunk.size();
   chunk_head.uncompressed_crc = crc32(chunk);
   chunk_head.compression = compressed ? compression_name(options.compression) : "";
@@ -164,8 +166,9 @@ Status McapWriter::Impl::end_chunk() {
   index.compressed_size = compressed ? compressed->size() : chunk.size();
   index.uncompressed_size = chunk.size();
 
-  std::vector<std::uint8_t> out;
-  records::append(chunk_head, compressed ? *compressed : chunk, &out);
+  std::vector<std::uint8_t>& out = chunk_record;
+  out.clear();
+  records::append(chunk_head, compressed ? *compressed : std::span<const std::uint8_t>(chunk), &out);
   index.chunk_length = out.size();
   for (const auto& [id, message_index] : chunk_channels) {
     index.message_index_offsets[id] = position + out.size();
@@ -231,6 +234,7 @@ Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::pa
                                                        const McapWriterOptions& options) {
   auto impl = std::make_unique<Impl>();
   impl->options = options;
+  impl->compressor = Compressor(options.compression);
   PRESCENE_TRY(impl->file, OutputFile::create(path));
   std::unique_ptr<McapWriter> writer(new McapWriter(std::move(impl)));
   std::vector<std::uint8_t> start(records::kMagic.begin(), records::kMagic.end());
