@@ -136,8 +136,8 @@ std::array<Compared, 3> scalar_to_vector(const std::vector<PackedPair>& pairs, i
       queries[1].emplace_back([&] { collision::overlap_volume(a, b, X_AB, scratch); });
       queries[2].emplace_back([&] { collision::scalar::overlap(a, b, X_AB, scratch); });
       queries[3].emplace_back([&] { collision::overlap(a, b, X_AB, scratch); });
-      queries[4].emplace_back([&] { collision::scalar::restitution(a, b, X_AB, {}, scratch); });
-      queries[5].emplace_back([&] { collision::restitution(a, b, X_AB, {}, scratch); });
+      queries[4].emplace_back([&] { collision::scalar::penalty_wrench(a, b, X_AB, {}, scratch); });
+      queries[5].emplace_back([&] { collision::penalty_wrench(a, b, X_AB, {}, scratch); });
     }
     for (std::size_t i = 0; i < 3; ++i) compared[i].measure(queries[2 * i], queries[2 * i + 1], rounds);
   }
@@ -168,7 +168,7 @@ std::array<Compared, 8> uncertain_to_certain(const std::vector<PackedPair>& pair
     const std::string where = i < 4 ? deviations : ", apart" + deviations;
     compared[i].slow_name =
         std::array{"uncertain state", "uncertain overlap", "uncertain overlap", "uncertain wrench"}[i % 4];
-    compared[i].fast_name = std::array{"boolean", "boolean", "overlap volume", "restitution"}[i % 4];
+    compared[i].fast_name = std::array{"boolean", "boolean", "overlap volume", "penalty wrench"}[i % 4];
     compared[i].work = compared[i].slow_name + " vs " + compared[i].fast_name + where;
   }
   SphereScratch scratch;
@@ -188,7 +188,7 @@ std::array<Compared, 8> uncertain_to_certain(const std::vector<PackedPair>& pair
         boolean.emplace_back([&] { collision::overlap(a, b, one.X_AB(), scratch); });
         volume.emplace_back([&] { collision::overlap_volume(a, b, one.X_AB(), scratch); });
         wrench.emplace_back([&] { collision::uncertain_wrench(a, b, one, {}, uncertain_scratch); });
-        force.emplace_back([&] { collision::restitution(a, b, one.X_AB(), {}, scratch); });
+        force.emplace_back([&] { collision::penalty_wrench(a, b, one.X_AB(), {}, scratch); });
       }
       const std::size_t first = apart ? 4 : 0;
       compared[first].measure(state, boolean, rounds);

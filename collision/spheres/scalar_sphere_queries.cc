@@ -134,9 +134,9 @@ void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
   for_overlapping(a, b, X_AB, scratch, found, static_cast<float>(range));
 }
 
-Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
-                        const RestitutionOptions& options, SphereScratch& scratch) {
-  Restitution sum;
+PenaltyWrench penalty_wrench(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
+                             const PenaltyOptions& options, SphereScratch& scratch) {
+  PenaltyWrench sum;
   for_overlapping(a, b, X_AB, scratch, [&](const PackedSphere& sphere_a, const PackedSphere& sphere_b, SpherePair) {
     const Vector3d centre = sphere_a.centre.cast<double>();
     const Vector3d apart = centre - sphere_b.centre.cast<double>();

@@ -140,7 +140,7 @@ class ShapeWrench {
 }  // namespace
 
 UncertainWrench uncertain_wrench(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
-                                 const RestitutionOptions& options, UncertainScratch& scratch) {
+                                 const PenaltyOptions& options, UncertainScratch& scratch) {
   const UncertainShape pair(a, b, between);
   ShapeWrench sums(between);
   pair.for_near(kReach, &scratch.memory().nodes, [&](const CriticalSphere& sphere) { sums.add(sphere); });

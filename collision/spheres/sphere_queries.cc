@@ -55,8 +55,8 @@ void overlap_volume_lanes(const SphereTree& a, const SphereTree& b, const Transf
   *result = sum.finish();
 }
 
-void restitution_lanes(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
-                       const RestitutionOptions& options, SphereScratch* scratch, Restitution* result) {
+void penalty_wrench_lanes(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
+                          const PenaltyOptions& options, SphereScratch* scratch, PenaltyWrench* result) {
   ForceSum sum(options.p_AP, &scratch->gathered);
   sum_pairs(a, b, X_AB, scratch, &sum);
   *result = sum.finish(options.stiffness);
@@ -118,7 +118,7 @@ namespace prescene::collision {
 
 HWY_EXPORT(overlap_lanes);
 HWY_EXPORT(overlap_volume_lanes);
-HWY_EXPORT(restitution_lanes);
+HWY_EXPORT(penalty_wrench_lanes);
 HWY_EXPORT(contacts_lanes);
 HWY_EXPORT(near_pairs_lanes);
 
@@ -134,11 +134,11 @@ SphereOverlap overlap_volume(const SphereTree& a, const SphereTree& b, const Tra
   return result;
 }
 
-Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
-                        const RestitutionOptions& options, SphereScratch& scratch) {
-  if (a.branching() != b.branching()) return scalar::restitution(a, b, X_AB, options, scratch);
-  Restitution result;
-  HWY_DYNAMIC_DISPATCH(restitution_lanes)(a, b, X_AB, options, &scratch, &result);
+PenaltyWrench penalty_wrench(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
+                             const PenaltyOptions& options, SphereScratch& scratch) {
+  if (a.branching() != b.branching()) return scalar::penalty_wrench(a, b, X_AB, options, scratch);
+  PenaltyWrench result;
+  HWY_DYNAMIC_DISPATCH(penalty_wrench_lanes)(a, b, X_AB, options, &scratch, &result);
   return result;
 }
 

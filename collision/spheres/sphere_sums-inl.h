@@ -142,9 +142,9 @@ class ForceSum {
   HWY_INLINE void make_room() {
     if (gathered_.size() > kGathered) sum_up(false);
   }
-  Restitution finish(double stiffness) {
+  PenaltyWrench finish(double stiffness) {
     sum_up(true);
-    Restitution result;
+    PenaltyWrench result;
     for (int i = 0; i < 3; ++i) {
       result.force[i] = stiffness * sums_[i].total();
       result.torque[i] = stiffness * sums_[3 + i].total();

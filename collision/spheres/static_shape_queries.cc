@@ -85,10 +85,10 @@ bool contacts(const SphereTree& a, const StaticShape& b, const Transform& X_AB, 
   return !for_overlapping(a, b, placement, scratch, found);
 }
 
-Restitution restitution(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
-                        const RestitutionOptions& options, SphereScratch& scratch) {
+PenaltyWrench penalty_wrench(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
+                             const PenaltyOptions& options, SphereScratch& scratch) {
   const ShapePlacement placement(a, X_AB);
-  Restitution sum;
+  PenaltyWrench sum;
   for_overlapping(a, b, placement, scratch,
                   [&](const PackedSphere& sphere, const StaticShape::Nearest& nearest, std::uint32_t) {
                     const double half = 0.5 * std::max(0.0, static_cast<double>(sphere.radius) - nearest.distance);

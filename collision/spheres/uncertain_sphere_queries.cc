@@ -130,7 +130,7 @@ UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, con
 }
 
 UncertainWrench uncertain_wrench(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
-                                 const RestitutionOptions& options, UncertainScratch& scratch) {
+                                 const PenaltyOptions& options, UncertainScratch& scratch) {
   if (!roots_may_meet(a, b, between, static_cast<double>(kWrenchReach))) return {};
   WrenchSums sums;
   sum_wrenches(a, b, Swelling(between, b), kWrenchReach, &scratch.memory().stack, &sums);

@@ -56,8 +56,8 @@ TEST(SphereQueriesLaw, SymmetricInTheBodies) {
     const double volume = overlap_volume(*a, *b, there, scratch).volume;
     RC_ASSERT(std::abs(volume - overlap_volume(*b, *a, back, scratch).volume) < 1e-3 * volume + 1e-10);
     // Each body gets the opposite of what the other gets.
-    const Restitution on_a = restitution(*a, *b, there, {}, scratch);
-    const Restitution on_b = restitution(*b, *a, back, {.p_AP = X_AB.inverse().translation}, scratch);
+    const PenaltyWrench on_a = penalty_wrench(*a, *b, there, {}, scratch);
+    const PenaltyWrench on_b = penalty_wrench(*b, *a, back, {.p_AP = X_AB.inverse().translation}, scratch);
     const Eigen::Matrix3d R_AB = X_AB.rotation.toRotationMatrix();
     const double scale = 1e-3 * std::sqrt(on_a.energy) + 1e-4;
     RC_ASSERT((on_a.force + R_AB * on_b.force).norm() < scale);
@@ -93,8 +93,8 @@ TEST(SphereQueriesLaw, FramesOfTheBodiesDoNotMatter) {
     const double volume = overlap_volume(*a, *b, here, scratch).volume;
     RC_ASSERT(std::abs(volume - overlap_volume(*other_a, *other_b, there, scratch).volume) < 1e-3 * volume + 1e-10);
     const Vector3d p_AP = *tests::vectors(0.05);
-    const Restitution push = restitution(*a, *b, here, {.p_AP = p_AP}, scratch);
-    const Restitution other = restitution(*other_a, *other_b, there, {.p_AP = X_MA * p_AP}, scratch);
+    const PenaltyWrench push = penalty_wrench(*a, *b, here, {.p_AP = p_AP}, scratch);
+    const PenaltyWrench other = penalty_wrench(*other_a, *other_b, there, {.p_AP = X_MA * p_AP}, scratch);
     const double scale = 1e-3 * std::sqrt(push.energy) + 1e-4;
     RC_ASSERT((X_MA.rotation * push.force - other.force).norm() < scale);
     RC_ASSERT((X_MA.rotation * push.torque - other.torque).norm() < scale);
@@ -153,10 +153,10 @@ TEST(SphereQueriesLaw, ForceAndTorqueAreTheGradientOfTheEnergy) {
     SphereScratch scratch;
     const Pose X_WB = near_pose();
     // A stands at the world's origin, and its frame's origin is the point of the torque.
-    const Restitution push = restitution(*a, *b, *to_transform(X_WB), {.stiffness = 1e6}, scratch);
+    const PenaltyWrench push = penalty_wrench(*a, *b, *to_transform(X_WB), {.stiffness = 1e6}, scratch);
     const double step = 2e-5;
     const auto energy = [&](const Pose& X_WA) {
-      return restitution(*a, *b, *relative_transform(X_WA, X_WB), {.stiffness = 1e6}, scratch).energy;
+      return penalty_wrench(*a, *b, *relative_transform(X_WA, X_WB), {.stiffness = 1e6}, scratch).energy;
     };
     const double scale = std::sqrt(1e6 * static_cast<double>(push.pairs) * push.energy) + 1.0;
     for (int axis = 0; axis < 3; ++axis) {

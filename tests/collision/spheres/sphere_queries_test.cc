@@ -125,7 +125,7 @@ std::set<SpherePair> pairs_of(const std::vector<SphereContact>& contacts) {
 
 void expect_agreement(const SphereTree& a, const SphereTree& b, const Transform& X_AB, SphereScratch& scratch) {
   const Vector3d p_AP(0.1, -0.2, 0.3);
-  const RestitutionOptions options{.stiffness = 10.0, .p_AP = p_AP};
+  const PenaltyOptions options{.stiffness = 10.0, .p_AP = p_AP};
   const BruteForce expected = brute_force(a.packing(), b.packing(), X_AB, p_AP);
   EXPECT_EQ(overlap(a, b, X_AB, scratch), !expected.pairs.empty());
   EXPECT_EQ(scalar::overlap(a, b, X_AB, scratch), !expected.pairs.empty());
@@ -134,8 +134,8 @@ void expect_agreement(const SphereTree& a, const SphereTree& b, const Transform&
         vectors ? overlap_volume(a, b, X_AB, scratch) : scalar::overlap_volume(a, b, X_AB, scratch);
     EXPECT_EQ(volume.pairs, expected.pairs.size());
     EXPECT_NEAR(volume.volume, expected.volume, 2e-5 * expected.volume + 1e-12);
-    const Restitution push =
-        vectors ? restitution(a, b, X_AB, options, scratch) : scalar::restitution(a, b, X_AB, options, scratch);
+    const PenaltyWrench push =
+        vectors ? penalty_wrench(a, b, X_AB, options, scratch) : scalar::penalty_wrench(a, b, X_AB, options, scratch);
     const double scale = 10.0 * std::sqrt(expected.energy * static_cast<double>(expected.pairs.size()));
     EXPECT_LE((push.force - 10.0 * expected.force).norm(), 1e-5 * scale);
     EXPECT_LE((push.torque - 10.0 * expected.torque).norm(), 2e-5 * scale);
@@ -192,7 +192,7 @@ TEST(SphereQueries, GiveTheSameBitsOnEveryTarget) {
     std::vector<std::array<double, 9>> answers;
     on_each_target([&] {
       const SphereOverlap volume = overlap_volume(*a, *b, X_AB, scratch);
-      const Restitution push = restitution(*a, *b, X_AB, {}, scratch);
+      const PenaltyWrench push = penalty_wrench(*a, *b, X_AB, {}, scratch);
       EXPECT_GT(volume.pairs, 100U);
       answers.push_back({volume.volume, push.force.x(), push.force.y(), push.force.z(), push.torque.x(),
                          push.torque.y(), push.torque.z(), push.energy, distance(*a, *b, X_AB, scratch)->distance});
@@ -227,13 +227,13 @@ TEST(SphereQueries, ContactOfTwoSpheresByHand) {
   EXPECT_EQ(found[0].position, Vector3f(1.75F, 0, 0));  // The overlap reaches from 1.5 to 2.
   EXPECT_EQ(found[0].normal, Vector3f(1, 0, 0));
   EXPECT_EQ(found[0].depth, 0.5F);
-  const Restitution push = restitution(*a, *b, X_AB, {.stiffness = 8.0, .p_AP = Vector3d(0, -1, 0)}, scratch);
+  const PenaltyWrench push = penalty_wrench(*a, *b, X_AB, {.stiffness = 8.0, .p_AP = Vector3d(0, -1, 0)}, scratch);
   EXPECT_TRUE(push.force.isApprox(Vector3d(-2.0, 0, 0)));
   EXPECT_TRUE(push.torque.isApprox(Vector3d(0, 0, 2.0)));
   EXPECT_NEAR(push.energy, 0.5, 1e-12);
   // Centres that fall together: no direction, hence no force; the contact points as A's anchor does.
   X_AB.translation = {0, 0, 0};
-  EXPECT_EQ(restitution(*a, *b, X_AB, {}, scratch).force, Vector3d::Zero());
+  EXPECT_EQ(penalty_wrench(*a, *b, X_AB, {}, scratch).force, Vector3d::Zero());
   found.clear();
   EXPECT_TRUE(contacts(*a, *b, X_AB, 5, &found, scratch));
   EXPECT_EQ(found[0].normal, Vector3f(0, 0, 1));
@@ -309,7 +309,7 @@ TEST(SphereQueries, DoNotAllocateOnceWarm) {
     for (const Transform& X_AB : transforms) {
       overlap(*a, *b, X_AB, scratch);
       overlap_volume(*a, *b, X_AB, scratch);
-      restitution(*a, *b, X_AB, {}, scratch);
+      penalty_wrench(*a, *b, X_AB, {}, scratch);
       distance(*a, *b, X_AB, scratch);
       found.clear();
       contacts(*a, *b, X_AB, 1'000'000, &found, scratch);

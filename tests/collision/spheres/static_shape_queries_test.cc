@@ -61,7 +61,7 @@ void expect_agreement(const SphereTree& tree, const StaticShape& shape, const Po
   RC_ASSERT(touched.size() == all.size());
   // Spheres that just touch may differ by the rounding of the transform.
   RC_ASSERT(std::max(touched.size(), expected.size()) - std::min(touched.size(), expected.size()) <= 2U);
-  const Restitution push = restitution(tree, shape, transform, {.stiffness = 100.0, .p_AP = p_AP}, scratch);
+  const PenaltyWrench push = penalty_wrench(tree, shape, transform, {.stiffness = 100.0, .p_AP = p_AP}, scratch);
   RC_ASSERT((push.force - force).norm() < 1e-4 * force.norm() + 1e-3);
   RC_ASSERT((push.torque - torque).norm() < 1e-4 * force.norm() + 1e-3);
   const SphereOverlap shared = overlap_volume(tree, shape, transform, scratch);
@@ -145,7 +145,7 @@ TEST(StaticShapeQueries, PackedBoxTipsAtItsAngle) {
       X_WA.rotation = geometry::Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitY()));
       const double nearest = distance(*tree, floor, *relative_transform(X_WA, Pose()), scratch)->distance;
       X_WA.translation.z() = -nearest - 1e-5;  // Just into the floor.
-      const Restitution push = restitution(*tree, floor, *relative_transform(X_WA, Pose()), {}, scratch);
+      const PenaltyWrench push = penalty_wrench(*tree, floor, *relative_transform(X_WA, Pose()), {}, scratch);
       EXPECT_GT(push.pairs, 0U);
       return push.torque.y() < 0.0;
     };
@@ -169,7 +169,7 @@ TEST(StaticShapeQueries, DoNotAllocateOnceWarm) {
       overlap(*tree, *shape, Transform(), scratch);
       overlap_volume(*tree, *shape, Transform(), scratch);
       distance(*tree, *shape, Transform(), scratch);
-      restitution(*tree, *shape, Transform(), {}, scratch);
+      penalty_wrench(*tree, *shape, Transform(), {}, scratch);
       found.clear();
       contacts(*tree, *shape, Transform(), 100000, &found, scratch);
     }

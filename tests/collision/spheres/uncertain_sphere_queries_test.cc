@@ -62,7 +62,7 @@ TEST(UncertainSphereQueries, PairsOfOneBodyAreNotIndependent) {
                                 diagonal(Vector3d::Zero(), Vector3d::Constant(5e-4))};
   const auto between = *RelativeUncertainty::make(fixed, placed);
   UncertainScratch scratch;
-  const RestitutionOptions options = {.stiffness = kStiffness};
+  const PenaltyOptions options = {.stiffness = kStiffness};
   const Matrix6d together = uncertain_wrench(*tree_of(below), *tree_of(above), between, options, scratch).covariance;
   Matrix6d apart = Matrix6d::Zero();
   for (const PackedSphere& a : below)

@@ -16,7 +16,7 @@ bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, s
               std::vector<SphereContact>* contacts, SphereScratch& scratch);
 void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB, double range,
                 std::vector<SpherePair>* pairs, SphereScratch& scratch);
-Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
-                        const RestitutionOptions& options, SphereScratch& scratch);
+PenaltyWrench penalty_wrench(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
+                             const PenaltyOptions& options, SphereScratch& scratch);
 
 }  // namespace prescene::collision::scalar

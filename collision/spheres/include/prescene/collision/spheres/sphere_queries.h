@@ -4,7 +4,7 @@
 //
 //   SphereScratch scratch;                                       // reused: queries then don't allocate
 //   if (overlap(cup, table, X_CT, scratch)) ...
-//   const Restitution push = restitution(cup, table, X_CT, {.stiffness = 1000.0}, scratch);
+//   const PenaltyWrench push = penalty_wrench(cup, table, X_CT, {.stiffness = 1000.0}, scratch);
 //
 // A query puts B's centres into A's frame by `X_AB * p_BC` (transform.h) and answers for the spheres that result, with
 // squared distances summed as (x^2 + y^2) + z^2 and compared with the rounded square of the rounded sum of the radii.
@@ -94,12 +94,12 @@ bool contacts(const SphereTree& a, const SphereTree& b, const Transform& X_AB, s
 void near_pairs(const SphereTree& a, const SphereTree& b, const Transform& X_AB, double range,
                 std::vector<SpherePair>* pairs, SphereScratch& scratch);
 
-struct RestitutionOptions {
+struct PenaltyOptions {
   double stiffness = 1.0;                          ///< N/m, finite and not negative.
   Eigen::Vector3d p_AP = Eigen::Vector3d::Zero();  ///< The torque is about this point, m; often the centre of mass.
 };
 /// What drives A out of B, in A's frame. B receives the opposite force, and the opposite torque about the same point.
-struct Restitution {
+struct PenaltyWrench {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< N.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< N m, about P.
   double energy = 0.0;                               ///< J; force and torque are its negative gradient in A's motion.
@@ -107,8 +107,8 @@ struct Restitution {
 };
 /// Each pair of spheres that overlap pushes with stiffness * (r1 + r2 - d) / 2 along the line of its centres: springs
 /// that share the overlap. A pair whose centres fall together has no direction and does not push.
-Restitution restitution(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
-                        const RestitutionOptions& options, SphereScratch& scratch);
+PenaltyWrench penalty_wrench(const SphereTree& a, const SphereTree& b, const Transform& X_AB,
+                             const PenaltyOptions& options, SphereScratch& scratch);
 
 /// Volume of the intersection of two spheres whose centres are d apart, m^3.
 double lens_volume(double radius_a, double radius_b, double d);

@@ -4,7 +4,7 @@
 //
 //   PRESCENE_TRY(const HalfSpace table, HalfSpace::make({0, 0, 1}, 0.72));
 //   PRESCENE_TRY(const TriangleSurface shelf, TriangleSurface::make(mesh, SurfaceSide::kBoth, pool));
-//   const Restitution push = restitution(cup, shelf, X_CS, {}, scratch);     // static_shape_queries.h
+//   const PenaltyWrench push = penalty_wrench(cup, shelf, X_CS, {}, scratch);     // static_shape_queries.h
 #pragma once
 
 #include <Eigen/Core>

@@ -4,7 +4,7 @@
 // radius. Spheres that touch overlap.
 //
 //   PRESCENE_TRY(const HalfSpace table, HalfSpace::make({0, 0, 1}, 0.72));
-//   const Restitution push = restitution(cup, table, X_CW, {.stiffness = 1000.0}, scratch);
+//   const PenaltyWrench push = penalty_wrench(cup, table, X_CW, {.stiffness = 1000.0}, scratch);
 #pragma once
 
 #include <cstddef>
@@ -52,7 +52,7 @@ bool contacts(const SphereTree& a, const StaticShape& b, const Transform& X_AB, 
 
 /// Each sphere that overlaps is pushed with stiffness * depth / 2 along its normal, as by the packing of a body of the
 /// same stiffness.
-Restitution restitution(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
-                        const RestitutionOptions& options, SphereScratch& scratch);
+PenaltyWrench penalty_wrench(const SphereTree& a, const StaticShape& b, const Transform& X_AB,
+                             const PenaltyOptions& options, SphereScratch& scratch);
 
 }  // namespace prescene::collision

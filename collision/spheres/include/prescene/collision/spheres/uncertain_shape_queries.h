@@ -33,10 +33,10 @@ namespace prescene::collision {
 UncertainOverlap uncertain_overlap(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch);
 
-/// Mean and covariance of restitution(): the force on A and its torque, in A's frame. Moments to
+/// Mean and covariance of penalty_wrench(): the force on A and its torque, in A's frame. Moments to
 /// second order in the error, with the kink where contact begins taken in full, of a shape that is flat at its place
 /// nearest to each sphere: good for half-spaces, and where the normal changes little over the error.
 UncertainWrench uncertain_wrench(const SphereTree& a, const StaticShape& b, const RelativeUncertainty& between,
-                                 const RestitutionOptions& options, UncertainScratch& scratch);
+                                 const PenaltyOptions& options, UncertainScratch& scratch);
 
 }  // namespace prescene::collision

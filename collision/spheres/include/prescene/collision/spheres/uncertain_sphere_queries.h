@@ -83,11 +83,11 @@ OverlapState overlap_state(const SphereTree& a, const SphereTree& b, const Relat
 UncertainOverlap uncertain_overlap(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
                                    UncertainScratch& scratch);
 
-/// Mean and covariance of restitution(): each pair that touches pushes with the stiffness times half its depth along
+/// Mean and covariance of penalty_wrench(): each pair that touches pushes with the stiffness times half its depth along
 /// the line of centres [Weller and Zachmann 2011]. Moments to second order in the error, with the kink where contact
 /// begins taken in full; pairs are correlated through the error that they share. Good while the error is small against
 /// the distances of centres (a tenth).
 UncertainWrench uncertain_wrench(const SphereTree& a, const SphereTree& b, const RelativeUncertainty& between,
-                                 const RestitutionOptions& options, UncertainScratch& scratch);
+                                 const PenaltyOptions& options, UncertainScratch& scratch);
 
 }  // namespace prescene::collision
