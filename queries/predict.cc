@@ -148,7 +148,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   PRESCENE_TRY(auto scene, with_question(own, query.actions.empty() && !prior.seen ? own.actions : query.actions,
                                          use_own_outcomes ? own.outcomes : query.outcomes,
                                          use_own_outcomes ? own.exclusive_outcomes : query.exclusive_outcomes));
-  if (scene->objects.empty()) return core::not_found("there is no object whose future could be told");
+  if (scene->objects.empty()) return core::not_found("there is no object to predict");
   ForesightDetail detail;
   detail.to_rest = wanted.final_poses || wanted.typical_runs || wanted.contacts || wanted.paths > 0;
   detail.keep_contacts = wanted.contacts;
@@ -218,7 +218,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   remark_on_actions(*foresight.scene, foresight.request.stop.duration, answer.remarks);
   remark_on_leaving(foresight.estimate, answer.remarks);
   if (!flight.ok())
-    answer.remarks.push_back("For how long nothing can touch anything is not told: " + flight.message() + ".");
+    answer.remarks.push_back("How long nothing can touch anything is not known: " + flight.message() + ".");
   remark_on_certainty(foresight.estimate, answer.remarks);
   return answer;
 }

@@ -191,7 +191,7 @@ core::Result<WantedOutcome> find_wanted(const belief::Scene& scene, const belief
   if (found.empty()) {
     if (std::find(left_out.begin(), left_out.end(), query.outcome) != left_out.end())
       return core::not_found("outcome '" + query.outcome +
-                             "' can't be told now, as an object that it names is lost or was not found");
+                             "' cannot be judged now, as an object that it names is lost or was not found");
     const std::vector<std::string> known = all_names(scene);
     const std::vector<std::string> nearest = core::nearest_words(query.outcome, known);
     std::string names;

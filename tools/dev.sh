@@ -99,7 +99,7 @@ verb_build() {
   [ $# = 0 ] || shift
   grep -q "\"name\": \"$preset\"" CMakePresets.json || fail "no preset '$preset'; there are dev, release, checked, asan, tsan, coverage"
   verb_setup run
-  # Configure afresh each time: links of headers follow the lists of the modules. It takes about two seconds.
+  # Configure each time, so that new files are seen. It takes about two seconds.
   timed "configure $preset" cmake --preset "$preset" --log-level=WARNING
   if [ $# -gt 0 ]; then set -- --target "$@"; fi
   timed "build $preset" cmake --build "build/$preset" -j "$jobs" "$@"

@@ -314,7 +314,7 @@ core::Result<DepthNoise> DepthNoiseEstimator::finish() const {
   find_steps(frames_, &noise);
   noise.remarks.emplace_back("pixels that never return anything (shadows of the projector, out of range): left out");
   noise.remarks.emplace_back(
-      "incidence_max_growth, support and background shares, materials other than those in view: not told");
+      "incidence_max_growth, support and background shares, materials other than those in view: not estimated");
   return noise;
 }
 

@@ -35,7 +35,7 @@ constexpr double kNoFriction = 0.02;
 constexpr double kLeastFrameRate = 100.0;  // Hz
 // m: twice the gap at which things still count as touching, and more.
 constexpr double kNoisySlide = 5e-4;
-// Parts of the recordings, each of which is foretold by what the others tell.
+// Parts of the recordings, each of which is forecast by what the others tell.
 constexpr int kFolds = 5;
 // Simulated starts: of a recording, and of all of them at most as long as each has the least.
 constexpr std::size_t kSamples = 16;

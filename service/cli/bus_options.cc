@@ -125,7 +125,7 @@ void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice)
                                                            {"graphics", rendering::Weigher::kGraphics}};
   verb.add_option_function<std::string>(
           "--likelihood", [&choice, names](const std::string& name) { choice.weigher = names.at(name); },
-          "Who scores poses, with the same bits: the processor; graphics (OpenGL 4.3, also in software); automatic: a "
+          "What scores poses, with the same bits: the processor; graphics (OpenGL 4.3, also in software); automatic: a "
           "graphics card where there is one")
       ->check(CLI::IsMember({"automatic", "processor", "graphics"}))
       ->default_str("automatic");

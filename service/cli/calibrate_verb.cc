@@ -199,8 +199,8 @@ core::Status run(const CalibrateOptions& options, VerbContext& context) {
 }  // namespace
 
 Verb add_calibrate_verb(CLI::App& app) {
-  auto* verb = app.add_subcommand("calibrate",
-                                  "Fits an object's model to recorded motion of it (docs/reference/calibration.md)");
+  auto* verb =
+      app.add_subcommand("calibrate", "Fit an object's model to recorded motion of it (docs/reference/calibration.md)");
   auto options = std::make_shared<CalibrateOptions>();
   verb->add_option("DATASET", options->name, "Folder with scene.yaml and tosses.csv; or cube_tosses, with --data")
       ->required();

@@ -191,10 +191,9 @@ core::Status run(const DemoOptions& options, VerbContext& context) {
 }  // namespace
 
 Verb add_demo_verb(CLI::App& app) {
-  auto* verb =
-      app.add_subcommand("demo",
-                         "Records a simulated robot that carries a carton over a bin, tracks it over DDS, asks "
-                         "what happens if it is let go");
+  auto* verb = app.add_subcommand("demo",
+                                  "Record a simulated robot that carries a carton over a bin, track it over DDS, ask "
+                                  "what happens if it is let go");
   auto options = std::make_shared<DemoOptions>();
   verb->add_option("-o,--output", options->folder, "Folder for recordings and report")
       ->check(file_name())

@@ -62,7 +62,7 @@ std::string folds_text(const std::vector<EvaluatedFold>& folds) {
 
 core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& context) {
   if (options.folds && !options.model.empty())
-    return core::invalid_input("--model and --folds exclude each other: each part is foretold by a model of its own");
+    return core::invalid_input("--model and --folds exclude each other: each part is forecast with a model of its own");
   if (options.max_evaluations && !options.folds)
     return core::invalid_input("--max-evaluations goes with --folds: nothing else is fitted");
   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(options.folder, context.log()));

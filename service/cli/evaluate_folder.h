@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `prescene evaluate FOLDER`: how well somebody's own recordings are foretold.
+// `prescene evaluate FOLDER`: how well somebody's own recordings are forecast.
 #pragma once
 
 #include <optional>

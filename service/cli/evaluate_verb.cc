@@ -237,15 +237,15 @@ Verb add_evaluate_verb(CLI::App& app) {
           "ycb_video (poses), cleargrasp (share of pixels of transparent things that "
           "the transparent material explains better than the opaque one), or, on simulated frames, which need "
           "no data: credible_regions (tempering), finding (objects without start poses, several supports), "
-          "tracking (sequences of eleven kinds, and with --data a real cube in a robot's hand), explain (events that "
-          "nobody told of)")
+          "tracking (sequences of eleven kinds, and with --data a real cube in a robot's hand), explain (unreported "
+          "events)")
       ->required()
       ->check(CLI::IsMember(known_names()) | CLI::ExistingDirectory);
   verb->add_option("--model", options->own.model,
-                   "Of a folder: model file to foretell with; else the scene's own model")
+                   "Of a folder: model file to forecast with; else the scene's own model")
       ->check(file_name());
   verb->add_option("--folds", options->own.folds,
-                   "Of a folder: foretell each of so many parts with a model that is fitted to the others")
+                   "Of a folder: forecast each of so many parts with a model that is fitted to the others")
       ->check(CLI::Range(2, 1000));
   verb->add_option("--max-evaluations", options->own.max_evaluations,
                    "Of a folder, with --folds: models that each fit's search tries at most; 1500")

@@ -90,7 +90,7 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
 
 Verb add_explain_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("explain",
-                                  "Explains what a recording shows in a window of time: which event, when, where from");
+                                  "Explain what a recording shows in a window of time: which event, when, where from");
   auto options = std::make_shared<ExplainVerbOptions>();
   verb->add_option("RECORDING", options->input, "MCAP or .db3 file, folder of rosbag2, or of images as for replay")
       ->required();

@@ -238,7 +238,7 @@ Verb add_predict_verb(CLI::App& app) {
       ->check(in_range(belief::kDurations));
   verb->add_option(
           "--stepper", options->stepper,
-          "Who simulates. lockstep: many instances at once, 3 to 7 times faster, but not every scene "
+          "Simulator. lockstep: many instances at once, 3 to 7 times faster, but not every scene "
           "(docs/reference/simulation.md says which; others are refused). bullet: every scene. automatic: lockstep "
           "where it can, else bullet, and the answer says why")
       ->check(CLI::IsMember({"automatic", "bullet", "lockstep"}))

@@ -108,12 +108,11 @@ Verb add_record_verb(CLI::App& app) {
       ->needs("--simulate")
       ->capture_default_str();
   verb->add_option("--remove", options->removals,
-                   "SECONDS:OBJECT: somebody takes the object away, and nobody is told; at 0: it is not there until it "
-                   "is put in")
+                   "SECONDS:OBJECT: somebody takes the object away, unreported; at 0: it is not there until it is put "
+                   "in")
       ->needs("--simulate");
   verb->add_option("--put", options->puts,
-                   "SECONDS:OBJECT:X,Y,Z[,YAW_DEG]: somebody puts the object there (m, its frame's origin), and nobody "
-                   "is told")
+                   "SECONDS:OBJECT:X,Y,Z[,YAW_DEG]: somebody puts the object there (m, its frame's origin), unreported")
       ->needs("--simulate");
   verb->add_flag("--unreported-robot", options->unreported_robot,
                  "The robot moves and acts, but neither its poses nor its actions are published")

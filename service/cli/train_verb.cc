@@ -61,7 +61,7 @@ core::Status run(const TrainOptions& options, VerbContext& context) {
 
 Verb add_train_verb(CLI::App& app) {
   auto* verb =
-      app.add_subcommand("train", "Learns to find a scene's models in single frames, by imagining scenes of them");
+      app.add_subcommand("train", "Learn to find a scene's models in single frames, by imagining scenes of them");
   auto options = std::make_shared<TrainOptions>();
   verb->add_option("SCENE", options->scene, "Scene file: its models are learned, on its supports and on others")
       ->required();

@@ -13,7 +13,7 @@
 namespace prescene::service {
 namespace {
 
-// Bounds of what waits: the newest frame wins, so more would never be used. 8 frames are 0.27 s at 30 Hz.
+// Bounds of what waits: only the newest frame is used, so more would be kept for nothing. 8 frames are 0.27 s at 30 Hz.
 constexpr std::size_t kMaxWaiting = 8;
 constexpr std::size_t kMaxColors = 8;
 // The same for large images, of all that wait: eight of 2048 x 2048, two of the largest. A depth takes 4 bytes.

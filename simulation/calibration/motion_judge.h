@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well simulations under a hypothesis foretell recorded motions.
+// How well simulations under a hypothesis forecast recorded motions.
 #pragma once
 
 #include <array>

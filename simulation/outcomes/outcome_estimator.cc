@@ -58,7 +58,7 @@ class Forecast {
     }
     const double wanted = count * std::pow(std::max(1.0, widest / options_.tolerance), 1.0 / rate);
     const double limit = options_.max_instances;
-    // Of an interval without end nothing can be foretold; `wanted` is no number then.
+    // Of an interval without end nothing can be forecast; `wanted` is no number then.
     expected_ =
         wanted < limit ? std::min(limit, static_cast<double>(next_net_size(static_cast<int>(wanted) - 1))) : limit;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tosses of a box with known properties, foretold by the truth and by models that were fitted to others of them.
+// Tosses of a box with known properties, forecast by the truth and by models that were fitted to others of them.
 #include "prescene/service/calibration/toss_evaluation.h"
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operator 5, filter: systematic resampling when the weights have become uneven, keeping the best particle as it is and
-// spreading the copies of the others so that the mixture's moments stay.
+// Operator 5, resample (the paper calls it belief filtering): systematic resampling when the weights have become
+// uneven, keeping the best particle as it is and spreading the copies of the others so that the mixture's moments stay.
 #pragma once
 
 #include <vector>

@@ -47,7 +47,7 @@ struct ObjectCalibration {
 };
 
 /// Parameters by all recordings (but of twins one each), and how throws differ by recordings that parameters were not
-/// fitted to: five parts of the recordings, each foretold with the parameters that the others have.
+/// fitted to: five parts of the recordings, each forecast with the parameters that the others have.
 core::Result<ObjectCalibration> calibrate_object(const MotionDataset& dataset, Backends& backends,
                                                  const ObjectCalibrationOptions& options,
                                                  const core::ProgressSink& progress = {},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well somebody's own recordings are foretold: by a given model, or each by a model that was fitted to the others.
+// How well somebody's own recordings are forecast: by a given model, or each by a model that was fitted to the others.
 //
 //   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(folder, log));
 //   PRESCENE_TRY(const TossEvaluation found, evaluate_model(dataset, path, backends, {}));
@@ -16,7 +16,7 @@
 
 namespace prescene::service {
 
-/// One part of the recordings, foretold by the model that the others have.
+/// One part of the recordings, forecast by the model that the others have.
 struct EvaluatedFold {
   int fitted = 0;  ///< Recordings that the model was fitted to.
   int scored = 0;
@@ -41,7 +41,7 @@ core::Result<TossEvaluation> evaluate_model(const MotionDataset& dataset, const 
                                             const core::ProgressSink& progress = {},
                                             const core::Cancellation* cancellation = nullptr);
 
-/// The recordings in `folds` parts (>= 2), twins together, each foretold by what calibrate_object() makes of the
+/// The recordings in `folds` parts (>= 2), twins together, each forecast by what calibrate_object() makes of the
 /// others, from the scene's model on.
 core::Result<TossEvaluation> evaluate_folds(const MotionDataset& dataset, int folds, Backends& backends,
                                             const ObjectCalibrationOptions& options,

@@ -25,7 +25,7 @@ inline constexpr std::array<const char*, 6> kSides = {"+x", "-x", "+y", "-y", "+
 /// Place in kSides.
 std::size_t side_up(const geometry::Quaterniond& R_WO);
 
-/// What was foretold of one recording, and what came.
+/// What was forecast of one recording, and what came.
 struct ScoredToss {
   std::string name;
   std::size_t group = 0;                       ///< Tosses of the same number are twins.
@@ -71,7 +71,7 @@ struct TossScores {
   ScoreValue log_score;
   ScoreValue median_error;                  ///< m
   ScoreValue p90_error;                     ///< m
-  std::array<ScoreValue, 2> mean_error{};   ///< m, true less foretold, along x and y of W.
+  std::array<ScoreValue, 2> mean_error{};   ///< m, true less forecast, along x and y of W.
   std::array<CoverageValue, 4> coverage{};  ///< 50, 80, 90 and 95 %.
   std::vector<ReliabilityRow> reliability;  ///< Rows that nothing falls into are left out.
 };

@@ -2,8 +2,9 @@
 // The live service: listens on the bus, steps the belief, publishes it, answers questions, and records what happened.
 //
 // One thread owns the belief and steps it; the bus has its own; questions are answered by two more from snapshots, so
-// that a slow question never delays a frame. The newest frame wins, and skipped ones are counted. Whatever is lost,
-// refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its rate.
+// that a slow question never delays a frame. Only the newest frame is used, and skipped ones are counted. Whatever is
+// lost, refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its
+// rate.
 #pragma once
 
 #include <filesystem>

@@ -2,8 +2,8 @@
 // Makes observations out of messages: pairs a depth image with its colour image and camera info, looks up where the
 // camera and the robot's bodies were, and skips, with a reason, what cannot be completed in time.
 //
-// The newest complete frame wins: a frame older than one already taken is skipped, never queued. The assembler reads no
-// clock; time is what its caller says, so a recording assembles to the same observations.
+// Only the newest complete frame is used: a frame older than one already taken is skipped, never queued. The assembler
+// reads no clock; time is what its caller says, so a recording assembles to the same observations.
 //
 // A frame whose stamp is more than a second before the last one taken, or far ahead of it, is skipped: one stamp may be
 // wrong. Three such in a row mean that the sender's clock was set, and count; where it went back, what was known of the

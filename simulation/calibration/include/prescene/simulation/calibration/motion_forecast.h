@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where recorded motions are foretold to end: each is simulated from what its first frames show until it rests.
+// Where recorded motions are forecast to end: each is simulated from what its first frames show until it rests.
 //
 //   PRESCENE_TRY(const std::vector<MotionForecast> forecasts,
 //                forecast_motions(motions, numbers, scene, scatter, make_simulator, stream, pool));
@@ -42,7 +42,7 @@ struct MotionForecast {
 };
 
 /// One forecast for each of `motions`, which are used up to the end of their beginning only. `numbers[i]` chooses the
-/// random numbers of motion i, so that these are the same whichever others are foretold with it. The model's uncertain
+/// random numbers of motion i, so that these are the same whichever others are forecast with it. The model's uncertain
 /// parameters are drawn from the scene. The same bits for any number of threads. Fails with kInvalidInput, naming the
 /// recording, where its beginning cannot be used, as the factory does, and with kCancelled when stopped.
 core::Result<std::vector<MotionForecast>> forecast_motions(
