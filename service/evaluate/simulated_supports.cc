@@ -13,6 +13,7 @@
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
+#include "suite_camera.h"
 
 namespace prescene::service {
 namespace {
@@ -360,14 +361,6 @@ class Layout {
   std::vector<Placed> things_;
 };
 
-Pose looking_from(const Vector3d& eye, const Vector3d& target) {
-  geometry::Matrix3d R;
-  R.col(2) = (target - eye).normalized();
-  R.col(0) = R.col(2).cross(Vector3d::UnitZ()).normalized();
-  R.col(1) = R.col(2).cross(R.col(0));
-  return {geometry::Quaterniond(R), eye};
-}
-
 /// Figures that are not the filter's: a better camera in the middle of a surface, a worse one at edges.
 rendering::SimulatedCamera other_camera() {
   rendering::SensorModelOptions sensor;
@@ -421,7 +414,7 @@ core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::R
   SupportsFrame frame;
   frame.observation.stamp_ns = 1'000'000'000;
   frame.observation.frame.camera = {640, 480, 570.0, 570.0, 319.5, 239.5};
-  frame.observation.X_WC = looking_from(p_WC, target);
+  frame.observation.X_WC = looking_at(p_WC, target);
   const geometry::PinholeCamera& camera = frame.observation.frame.camera;
   const Pose& X_WC = frame.observation.X_WC;
   Layout layout(room, camera, X_WC);

@@ -8,6 +8,7 @@
 
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
+#include "suite_camera.h"
 
 namespace prescene::service {
 namespace {
@@ -33,15 +34,6 @@ rendering::MeshHandle table_mesh() {
                    {-kTableHalf, kTableHalf, 0}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   return rendering::make_render_mesh(mesh);
-}
-
-/// The camera at `eye` that looks at `target`, its image upright in a world with z up.
-Pose looking_at(const Vector3d& eye, const Vector3d& target) {
-  geometry::Matrix3d R;
-  R.col(2) = (target - eye).normalized();
-  R.col(0) = R.col(2).cross(Vector3d::UnitZ()).normalized();
-  R.col(1) = R.col(2).cross(R.col(0));
-  return {geometry::Quaterniond(R), eye};
 }
 
 /// On the table, under the origin's z axis.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera of simulated evaluations.
+// The camera of simulated evaluations, and where it looks.
 #pragma once
 
 #include "prescene/service/recording/simulated_recording.h"
@@ -18,6 +18,16 @@ inline void set_suite_camera(SimulatedRecordingOptions& options) {
   options.camera.interior_outlier = 0.015;
   options.camera.quantisation_per_depth_squared = 0.0018;
   options.camera.color_noise = 4.0;
+}
+
+/// X_WC of a camera at `eye` that looks at `target`, its image upright in a world with z up. The line of sight must not
+/// be vertical.
+inline geometry::Pose looking_at(const geometry::Vector3d& eye, const geometry::Vector3d& target) {
+  geometry::Matrix3d R;
+  R.col(2) = (target - eye).normalized();
+  R.col(0) = R.col(2).cross(geometry::Vector3d::UnitZ()).normalized();
+  R.col(1) = R.col(2).cross(R.col(0));
+  return {geometry::Quaterniond(R), eye};
 }
 
 }  // namespace prescene::service

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "prescene/core/clock.h"
+#include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/backends.h"
@@ -96,13 +97,6 @@ double share(int part, int whole) {
   return whole > 0 ? static_cast<double>(part) / whole : std::numeric_limits<double>::quiet_NaN();
 }
 
-double quantile(std::vector<double> values, double at) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto place = values.begin() + std::lround(at * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 ordered_json or_null(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(); }
 
 ordered_json figures_json(const TrackingFigures& f) {
@@ -118,17 +112,17 @@ ordered_json figures_json(const TrackingFigures& f) {
           {"believed", f.believed},
           {"share_wrong", or_null(share(f.wrong, f.believed))},
           {"wrong", f.wrong},
-          {"median_position_error_m", or_null(quantile(f.position_errors, 0.5))},
-          {"p90_position_error_m", or_null(quantile(f.position_errors, 0.9))},
-          {"median_turn_error_rad", or_null(quantile(f.turn_errors, 0.5))},
-          {"p90_turn_error_rad", or_null(quantile(f.turn_errors, 0.9))},
+          {"median_position_error_m", or_null(core::quantile(f.position_errors, 0.5))},
+          {"p90_position_error_m", or_null(core::quantile(f.position_errors, 0.9))},
+          {"median_turn_error_rad", or_null(core::quantile(f.turn_errors, 0.5))},
+          {"p90_turn_error_rad", or_null(core::quantile(f.turn_errors, 0.9))},
           {"hidden", f.hidden},
           {"hidden_90_percent_region_holds", or_null(share(f.hidden_covered, f.hidden))},
           {"confidence_above_099", f.sure},
           {"confidence_above_099_right", or_null(share(f.sure_right, f.sure))},
           {"still", f.still_shifts.size()},
-          {"still_shift_p90_m", or_null(quantile(f.still_shifts, 0.9))},
-          {"still_turn_p90_rad", or_null(quantile(f.still_turns, 0.9))},
+          {"still_shift_p90_m", or_null(core::quantile(f.still_shifts, 0.9))},
+          {"still_turn_p90_rad", or_null(core::quantile(f.still_turns, 0.9))},
           {"cpu_ms_per_frame",
            or_null(f.frames > 0 ? 1e3 * f.cpu_seconds / f.frames : std::numeric_limits<double>::quiet_NaN())},
           {"calibration", calibration}};
@@ -146,12 +140,12 @@ std::vector<std::string> row_of(const std::string& kind, const TrackingFigures& 
           std::to_string(f.visible),
           percent(share(f.tracked, f.visible)),
           std::to_string(f.wrong) + " of " + std::to_string(f.believed),
-          scaled(quantile(f.position_errors, 0.5), 1e3, 1),
-          scaled(quantile(f.turn_errors, 0.5), kDegrees, 1),
+          scaled(core::quantile(f.position_errors, 0.5), 1e3, 1),
+          scaled(core::quantile(f.turn_errors, 0.5), kDegrees, 1),
           percent(share(f.hidden_covered, f.hidden)) + " of " + std::to_string(f.hidden),
           percent(share(f.sure_right, f.sure)) + " of " + std::to_string(f.sure),
-          scaled(quantile(f.still_shifts, 0.9), 1e3, 2),
-          scaled(quantile(f.still_turns, 0.9), kDegrees, 2),
+          scaled(core::quantile(f.still_shifts, 0.9), 1e3, 2),
+          scaled(core::quantile(f.still_turns, 0.9), kDegrees, 2),
           f.frames > 0 ? fixed_text(1e3 * f.cpu_seconds / f.frames, 0) : "-"};
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/service/live/bus_evidence.h"
@@ -40,13 +41,6 @@ class Checks {
  private:
   std::vector<DoctorCheck>& checks_;
 };
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::string counted_text(std::size_t number, const std::string& thing) {
   return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
@@ -372,7 +366,7 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
 void check_clock(const BusEvidence& evidence, Checks& checks) {
   const TopicEvidence& depth = evidence.topics().at(evidence.settings().topics.depth);
   if (depth.ages.empty()) return;
-  const double age = median(depth.ages);
+  const double age = core::upper_median(depth.ages);
   if (depth.stamps_not_later > 0) {
     checks.warn("stamps",
                 std::to_string(depth.stamps_not_later) + " of " + std::to_string(depth.messages) +

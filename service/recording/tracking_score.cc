@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "prescene/core/order_statistics.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::service {
@@ -13,12 +15,9 @@ namespace {
 constexpr double kVisibleShare = 0.5;
 constexpr double kWrong = 0.05;  // m
 
-/// The value below which the share lies; 0 for no values.
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  const auto place = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+/// 0 for no values.
+double quantile_or_zero(std::vector<double> values, double share) {
+  return values.empty() ? 0.0 : core::quantile(std::move(values), share);
 }
 
 }  // namespace
@@ -77,9 +76,9 @@ std::vector<ObjectTrackingScore> TrackingScore::rows() const {
       position_errors.push_back(error->position_error);
       turn_errors.push_back(error->turn_error);
     }
-    row.median_position_error = quantile(position_errors, 0.5);
-    row.p90_position_error = quantile(position_errors, 0.9);
-    row.median_turn_error = quantile(turn_errors, 0.5);
+    row.median_position_error = quantile_or_zero(position_errors, 0.5);
+    row.p90_position_error = quantile_or_zero(position_errors, 0.9);
+    row.median_turn_error = quantile_or_zero(turn_errors, 0.5);
     row.share_tracked = row.visible_frames > 0 ? static_cast<double>(tracked) / row.visible_frames : 0.0;
     row.share_confidently_wrong = row.frames > 0 ? static_cast<double>(wrong) / row.frames : 0.0;
     rows.push_back(row);

@@ -4,9 +4,11 @@
 // is strict: unknown keys and wrong types fail with the path of the place.
 #pragma once
 
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "prescene/belief/query.h"
 #include "prescene/core/status.h"

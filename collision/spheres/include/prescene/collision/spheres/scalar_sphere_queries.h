@@ -3,6 +3,10 @@
 // against, and what trees of different branching are met with.
 #pragma once
 
+#include <limits>
+#include <optional>
+#include <vector>
+
 #include "prescene/collision/spheres/sphere_queries.h"
 
 namespace prescene::collision::scalar {

@@ -8,7 +8,10 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
 
 #include "prescene/queries/explain.h"
 #include "prescene/service/recording/replay_input.h"

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "prescene/belief/trajectory.h"
 #include "prescene/geometry/lens.h"
