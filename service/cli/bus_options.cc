@@ -78,6 +78,17 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
   group->add_option("--tf-static-topic", topics.tf_static)->check(utf8_text())->capture_default_str();
 }
 
+void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, bool& salvage) {
+  verb.add_option("--depth-scale", depth_scale, "Of a folder: metres per unit of the depth images")
+      ->check(positive_number())
+      ->capture_default_str();
+  verb.add_option("--frame-rate", frame_rate, "Of a folder: frames a second")
+      ->check(positive_number())
+      ->capture_default_str();
+  verb.add_flag("--salvage", salvage,
+                "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
+}
+
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
   auto* group = verb.add_option_group("Camera", "Where the camera is");
   group->add_option("--world-frame", assembler.world_frame, "Frame of the scene in tf")

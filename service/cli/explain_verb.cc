@@ -119,13 +119,7 @@ Verb add_explain_verb(CLI::App& app) {
                    "Of the probabilities' intervals: good enough to stop searching")
       ->check(number_between(0.001, 0.5))
       ->capture_default_str();
-  verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
-      ->check(positive_number())
-      ->capture_default_str();
-  verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
-      ->check(positive_number())
-      ->capture_default_str();
-  verb->add_flag("--salvage", options->explain.read.salvage, "Read what is sound of a damaged recording");
+  add_input_options(*verb, options->depth_scale, options->frame_rate, options->explain.read.salvage);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;

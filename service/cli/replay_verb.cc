@@ -343,20 +343,13 @@ Verb add_replay_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable")
       ->needs("--over-dds");
-  verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
-      ->check(positive_number())
-      ->capture_default_str();
-  verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
-      ->check(positive_number())
-      ->capture_default_str();
+  add_input_options(*verb, options->depth_scale, options->frame_rate, options->read.salvage);
   verb->add_option("--from", options->read.from,
                    "Begin so many seconds after the recording's first message: the belief begins anew there")
       ->check(number_between(0.0, 1e9))
       ->capture_default_str();
   verb->add_option("--to", options->read.to, "End so many seconds after the recording's first message")
       ->check(number_between(0.0, 1e9));
-  verb->add_flag("--salvage", options->read.salvage,
-                 "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
       ->check(file_name());
   add_proposals_option(*verb, options->proposals);

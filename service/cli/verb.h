@@ -111,6 +111,8 @@ core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds);
 void add_topic_options(CLI::App& verb, TrackerSettings& tracker);
 /// Both.
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, TrackerSettings& tracker);
+/// Of a recording that is read: --depth-scale and --frame-rate of a folder of images, --salvage.
+void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, bool& salvage);
 /// --world-frame and --camera-pose.
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
 /// --view-address, --view-token and --view-origin, with `prefix` in place of "view-"; the port is the verb's own.

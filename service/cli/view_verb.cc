@@ -136,14 +136,7 @@ Verb add_view_verb(CLI::App& app) {
           "Scene file; default: the one that the recording holds; a folder without one is searched for its support; of "
           "what is on the bus, only what its markers show is drawn")
       ->check(file_name());
-  verb->add_option("--depth-scale", options->depth_scale, "Of a folder: metres per unit of the depth images")
-      ->check(positive_number())
-      ->capture_default_str();
-  verb->add_option("--frame-rate", options->frame_rate, "Of a folder: frames a second")
-      ->check(positive_number())
-      ->capture_default_str();
-  verb->add_flag("--salvage", options->read.salvage,
-                 "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
+  add_input_options(*verb, options->depth_scale, options->frame_rate, options->read.salvage);
   add_web_options(*verb, "", options->view);
   add_bus_options(*verb, options->dds, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
