@@ -19,6 +19,7 @@ namespace {
 
 // Chunks that are done sooner than this (s) are made larger: simulators may do many at once for less.
 constexpr double kShortChunk = 0.02;
+constexpr double kJudgedAfterCancelling = 0.1;  // s, at most, in which finished runs are still judged
 constexpr std::size_t kLargestChunk = 1024;
 
 /// Instances run between two looks at the clock, at first. Does not change results.
@@ -172,9 +173,12 @@ bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, s
   std::size_t finished = 0;
   while (finished < runs.size() && runs[finished].end != belief::TrajectoryEnd::kCancelled) ++finished;
   records.resize(first + finished);
-  std::vector<std::uint8_t> noted(finished, 0);  // judging many outcomes over many states takes its time too
+  // What was cancelled in its runs keeps those that were finished; but judging many outcomes over many states takes its
+  // time too, and whoever cancels does not wait for long.
+  std::vector<std::uint8_t> noted(finished, 0);
+  const core::Stopwatch judging;
   runner.pool.for_each_index(finished, [&](std::size_t i) {
-    if (runner.cancellation && runner.cancellation->requested()) return;
+    if (runner.cancellation && judging.seconds() > kJudgedAfterCancelling && runner.cancellation->requested()) return;
     InstanceRecord& record = records[first + i];
     record.component = planned[i].component;
     record.point = planned[i].point;

@@ -202,6 +202,31 @@ TEST(OutcomeEstimator, CancellationKeepsWhatIsDone) {
   expect_equal(estimate(tests::curved_boundary(), options, pool), stopped);
 }
 
+TEST(OutcomeEstimator, CancellationWithinAChunkKeepsTheRunsThatWereFinished) {
+  core::ThreadPool pool(1);
+  const ToyProblem problem = tests::curved_boundary();
+  const std::vector<Variable> variables = problem.variables();
+  for (const int finished : {1, 20, 32, 50}) {  // the first chunk has 32
+    core::Cancellation cancellation;
+    int runs = 0;
+    const tests::FakeSimulator simulator(
+        [&](const belief::WorldState& start, const RunRequest& request, core::RandomStream) {
+          if (++runs == finished) cancellation.request();
+          belief::WorldState end = start;
+          end.time += request.stop.duration;
+          return end;
+        });
+    EstimatorOptions options;
+    options.exact_instances = 1000;
+    const OutcomeEstimate cut =
+        estimate_outcomes(simulator, problem.starts(), variables, {}, test_stream(), options, pool, &cancellation);
+    EXPECT_EQ(cut.stop, EstimateStop::kCancelled);
+    EXPECT_EQ(cut.instances.size(), static_cast<std::size_t>(finished));
+    options.exact_instances = finished;
+    expect_equal(estimate_outcomes(simulator, problem.starts(), variables, {}, test_stream(), options, pool), cut);
+  }
+}
+
 TEST(OutcomeEstimator, CancelledBeforeItBeganItHasNoProbabilities) {
   core::ThreadPool pool(1);
   core::Cancellation cancellation;
