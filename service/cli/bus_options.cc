@@ -176,9 +176,11 @@ core::Status take_learned(const std::string& file, const std::vector<std::string
 
 TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const TrackerSettings& given) {
   const auto take = [&verb](const char* option, auto& to, const auto& from) {
-    if (verb.get_option(option)->count() > 0) to = from;
+    const CLI::Option* found = verb.get_option_no_throw(option);
+    if (found != nullptr && found->count() > 0) to = from;
   };
-  if (verb.get_option("--camera")->count() > 0) {
+  const CLI::Option* camera = verb.get_option_no_throw("--camera");
+  if (camera != nullptr && camera->count() > 0) {
     settings.topics.depth = given.topics.depth;
     settings.topics.color = given.topics.color;
     settings.topics.camera_info = given.topics.camera_info;

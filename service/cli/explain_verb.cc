@@ -120,6 +120,7 @@ Verb add_explain_verb(CLI::App& app) {
       ->check(number_between(0.001, 0.5))
       ->capture_default_str();
   add_input_options(*verb, options->depth_scale, options->frame_rate, options->explain.read.salvage);
+  add_topic_options(*verb, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);
   options->verb = verb;

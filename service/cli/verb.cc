@@ -21,6 +21,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/core/clock.h"
 #include "prescene/core/text.h"
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
@@ -134,11 +135,13 @@ core::ThreadPool& VerbContext::pool() {
 core::ProgressSink VerbContext::progress(const std::string& what) {
   if (options_.quiet) return {};
   const bool terminal = isatty(STDERR_FILENO) != 0;
-  return [this, what, terminal, last = -1](const core::Progress& progress) mutable {
+  return [this, what, terminal, last = -1, since = core::Stopwatch()](const core::Progress& progress) mutable {
     const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
     const int step = static_cast<int>(std::floor(fraction * (terminal ? 100.0 : 10.0)));
-    if (step == last) return;
+    // The share may stand still for long, where the work turns out to be more than was expected.
+    if (step == last && since.seconds() < (terminal ? 1.0 : 30.0)) return;
     last = step;
+    since = core::Stopwatch();
     std::string left = progress.seconds_left ? ", about " + duration_text(*progress.seconds_left) + " left" : "";
     if (!progress.text.empty()) left += ", " + progress.text;
     const std::string percent = fixed_text(100.0 * fraction, 0) + " %";

@@ -38,11 +38,9 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
   }
   auto found = edges_.find(child);
   const bool is_known = found != edges_.end() && found->second.parent == parent;
-  if (!is_known) PRESCENE_RETURN_IF_ERROR(check_acyclic(parent, child));
+  if (!is_known) PRESCENE_RETURN_IF_ERROR(check_acyclic(parent, child, stamp_ns));
   if (found != edges_.end() && !is_known) {
-    const bool expired =
-        !found->second.is_static && found->second.samples.back().first + core::ns_of(settings_.history_s) < stamp_ns;
-    if (!expired) {
+    if (!is_expired(found->second, stamp_ns)) {
       return core::invalid_input("frame '" + child + "' has the parent '" + found->second.parent + "' and now also '" +
                                  parent + "': stop one of the two publishers");
     }
@@ -85,12 +83,21 @@ core::Status TfBuffer::add(const std::string& raw_parent, const std::string& raw
   return core::ok_status();
 }
 
-core::Status TfBuffer::check_acyclic(const std::string& parent, const std::string& child) const {
+bool TfBuffer::is_expired(const Edge& edge, core::TimeNs stamp_ns) const {
+  return !edge.is_static && edge.samples.back().first + core::ns_of(settings_.history_s) < stamp_ns;
+}
+
+core::Status TfBuffer::check_acyclic(const std::string& parent, const std::string& child, core::TimeNs stamp_ns) {
+  auto expired = edges_.end();
   for (auto edge = edges_.find(parent); edge != edges_.end(); edge = edges_.find(edge->second.parent)) {
-    if (edge->second.parent == child) {
+    if (expired == edges_.end() && is_expired(edge->second, stamp_ns)) expired = edge;
+    if (edge->second.parent != child) continue;
+    if (expired == edges_.end()) {
       return core::invalid_input("transform " + parent + " -> " + child +
                                  " would close a cycle: stop the publisher of one of its transforms");
     }
+    erase(expired);
+    break;
   }
   return core::ok_status();
 }

@@ -114,6 +114,18 @@ TEST(TfBuffer, AFrameMayChangeItsParentOnceItsOldTransformsHaveExpired) {
   EXPECT_FALSE(tf.knows("table"));
 }
 
+TEST(TfBuffer, ACycleOpensOnceAWrongTransformHasExpired) {
+  TfBuffer tf;
+  const Pose here = Pose::identity();
+  ASSERT_TRUE(tf.add("hand", "base", 0, here, false).ok());  // parent and child exchanged
+  ASSERT_TRUE(tf.add("camera", "hand", 0, here, true).ok());
+  EXPECT_EQ(tf.add("base", "camera", 1 * kSecond, here, false).code(), StatusCode::kInvalidInput);
+  EXPECT_TRUE(tf.add("base", "camera", 60 * kSecond, here, false).ok());
+  EXPECT_TRUE(tf.lookup("base", "hand", 60 * kSecond).ok());
+  EXPECT_EQ(tf.add("hand", "base", 61 * kSecond, here, false).code(), StatusCode::kInvalidInput);
+  EXPECT_EQ(tf.add("hand", "camera", 600 * kSecond, here, false).code(), StatusCode::kInvalidInput);  // never expires
+}
+
 TEST(TfBuffer, OneStampFromTheFutureDoesNotBlockAFrameForEver) {
   TfBuffer tf;
   ASSERT_TRUE(tf.add("world", "camera", 1 * kSecond, turned_z(0.1, {1.0, 0.0, 0.0}), false).ok());

@@ -235,6 +235,10 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
   EXPECT_TRUE(json["followed_step_records"].get<bool>());
   EXPECT_GT(json["compared_steps"].get<int>(), 0);
   EXPECT_EQ(json["different_steps"], 0);
+  // The service's own settings are in the recording, and explain has fewer options than replay to replace them by.
+  const Finished explained = run_program(
+      {"explain", path("session.mcap"), "--from", "0.1", "--to", "0.6", "--points", "8", "--runs", "2", "--json"});
+  EXPECT_EQ(explained.exit_code, 0) << explained.err;
 }
 
 TEST_F(Session, AskingNobodySaysSo) {

@@ -62,8 +62,11 @@ class TfBuffer {
     std::deque<std::pair<core::TimeNs, geometry::Pose>> samples;  // ascending stamps; one entry if static
     int too_old_in_a_row = 0;
   };
-  /// Fails with kInvalidInput when an edge parent -> child would close a cycle.
-  core::Status check_acyclic(const std::string& parent, const std::string& child) const;
+  /// Older than the history, and not static.
+  bool is_expired(const Edge& edge, core::TimeNs stamp_ns) const;
+  /// Fails with kInvalidInput when an edge parent -> child would close a cycle. An expired edge on it gives way: that
+  /// publisher has stopped.
+  core::Status check_acyclic(const std::string& parent, const std::string& child, core::TimeNs stamp_ns);
   void erase(std::map<std::string, Edge>::iterator edge);
   void forget_beyond_limits(Edge& edge);
   core::Result<geometry::Pose> edge_pose(const std::string& child, const Edge& edge, core::TimeNs stamp_ns) const;
