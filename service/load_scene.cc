@@ -9,6 +9,7 @@
 #include "prescene/interfaces/scene_files/located_value.h"
 #include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
+#include "prescene/service/scene_report.h"
 
 namespace prescene::service {
 namespace {
@@ -122,6 +123,13 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
                                                                    const core::LogSink& log, FilesOfScene* files) {
   interfaces::FileReport report;
   return shared(interfaces::parse_scene(text, path.string(), options(log, path, files), &report), report, log);
+}
+
+core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std::string& text,
+                                                                       const std::filesystem::path& path,
+                                                                       const core::LogSink& log,
+                                                                       interfaces::FileReport& report) {
+  return shared(interfaces::parse_scene(text, path.string(), options(log, path), &report), report, log);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std::string& text,
