@@ -48,6 +48,18 @@ separate_arguments(_sanitizers UNIX_COMMAND "${PRESCENE_SANITIZERS}")
 add_compile_options(${_sanitizers})
 add_link_options(${_sanitizers})
 
+# A module that Python loads takes in only position-independent code, which Debian's g++ does not make by itself: what it
+# makes may go into programs alone. So the extension has a build folder of its own (the preset python), in which the
+# libraries that it links are compiled again. The second option lets g++ inline as in a program: nobody puts functions of
+# his own in the place of ours.
+option(PRESCENE_PYTHON "Make the Python package, and all code position-independent for it" OFF)
+if(PRESCENE_PYTHON)
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    add_compile_options(-fno-semantic-interposition)
+  endif()
+endif()
+
 option(PRESCENE_PARALLEL_STD_THREAD "Run parallel loops on std::thread instead of oneTBB, for the thread sanitizer" OFF)
 if(PRESCENE_PARALLEL_STD_THREAD)
   add_compile_definitions(PRESCENE_PARALLEL_STD_THREAD)

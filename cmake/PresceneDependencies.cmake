@@ -36,6 +36,7 @@ prescene_outside(OpenGL::OpenGL OpenGL COMPONENTS OpenGL EGL)
 prescene_outside(OpenGL::EGL OpenGL COMPONENTS OpenGL EGL)
 prescene_outside(CLI11::CLI11 CLI11)
 prescene_outside(spdlog::spdlog spdlog)
+prescene_outside(pybind11::module pybind11 CONFIG)
 # Of tests and benchmarks.
 prescene_outside(GTest::gmock GTest)
 prescene_outside(GTest::gtest_main GTest)

@@ -1,7 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
 # `cpack -G DEB` in the build folder makes three packages: prescene (the program, its man pages, a systemd unit, example
-# scenes), libprescene-dev (static libraries, headers, CMake package) and prescene-doc.
+# scenes), libprescene-dev (static libraries, headers, CMake package) and prescene-doc; in the build folder of the Python
+# package it makes python3-prescene.
+if(NOT TARGET prescene AND NOT TARGET prescene_python)
+  return()
+endif()
+
+set(PRESCENE_MAINTAINER "Prescene <prescene@localhost>" CACHE STRING "Maintainer that the Debian packages name")
+set(CPACK_PACKAGE_NAME prescene)
+set(CPACK_PACKAGE_CONTACT "${PRESCENE_MAINTAINER}")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PROJECT_CONFIG_FILE "${PROJECT_SOURCE_DIR}/cmake/packing.cmake")
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+# Looked for when poses are scored; without them it is done on the processor.
+set(_drivers "libegl-mesa0, libgl1-mesa-dri")
+
+if(TARGET prescene_python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-prescene)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "${_drivers}")
+  find_package(Python COMPONENTS Interpreter REQUIRED)
+  # An extension is for one version of Python, and for numpy's interface before its version 2.
+  math(EXPR _next "${Python_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), python3 (<< ${Python_VERSION_MAJOR}.${_next}), python3-numpy (>= 1:1.20), python3-numpy (<< 1:2)")
+endif()
 if(NOT TARGET prescene)
+  set(CPACK_COMPONENTS_ALL python)
+  include(CPack)
+  cpack_add_component_group(python DISPLAY_NAME "Python package")
+  cpack_add_component(python GROUP python)
   return()
 endif()
 
@@ -15,22 +49,9 @@ install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMP
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation)
 install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.bib")
 
-set(PRESCENE_MAINTAINER "Prescene <prescene@localhost>" CACHE STRING "Maintainer that the Debian packages name")
-set(CPACK_PACKAGE_NAME prescene)
-set(CPACK_PACKAGE_CONTACT "${PRESCENE_MAINTAINER}")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
-set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_STRIP_FILES ON)
-set(CPACK_PROJECT_CONFIG_FILE "${PROJECT_SOURCE_DIR}/cmake/packing.cmake")
-set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
-set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SECTION science)
-
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME prescene)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
-# Looked for when it runs; without them it scores poses on the processor.
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libegl-mesa0, libgl1-mesa-dri")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "${_drivers}")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libprescene-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DOC_PACKAGE_NAME prescene-doc)
@@ -48,7 +69,14 @@ list(JOIN _needed ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS)
 
 get_property(_installed GLOBAL PROPERTY PRESCENE_INSTALLED_MODULES)
 set(CPACK_COMPONENTS_ALL service_cli program_files documentation package ${_installed})
+if(TARGET prescene_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
 include(CPack)
+if(TARGET prescene_python)
+  cpack_add_component_group(python DISPLAY_NAME "Python package")
+  cpack_add_component(python GROUP python)
+endif()
 cpack_add_component_group(program DISPLAY_NAME Program)
 cpack_add_component_group(dev DISPLAY_NAME "Libraries and headers")
 cpack_add_component_group(doc DISPLAY_NAME Documentation)

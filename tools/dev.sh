@@ -7,11 +7,13 @@ usage() {
   cat << 'END'
 usage: ./dev VERB
 
-  setup [run|develop|MODULE]... install the missing Debian packages (default: run), or those that a module needs
+  setup [run|develop|docs|python|MODULE]...
+                               install the missing Debian packages (default: run), or those that a module needs
   build [PRESET] [TARGET]...   build (default preset: release)
   test [--preset P] [--all] [FILTER]...
                                build, then run the tests of tests/, with --all also those that take long, or those whose
                                name matches a FILTER (regular expressions); --long K/N: the K-th of N parts of the long ones
+  python [TEST]...             make the Python package in build/python/site and run its tests, or those whose names match
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE]...               format, layer and clang-tidy checks
@@ -97,7 +99,7 @@ verb_setup() {
 verb_build() {
   local preset=${1:-release}
   [ $# = 0 ] || shift
-  grep -q "\"name\": \"$preset\"" CMakePresets.json || fail "no preset '$preset'; there are dev, release, checked, asan, tsan, coverage"
+  grep -q "\"name\": \"$preset\"" CMakePresets.json || fail "no preset '$preset'; there are dev, release, checked, asan, tsan, coverage, python"
   verb_setup run
   # Configure each time, so that new files are seen. It takes about two seconds.
   timed "configure $preset" cmake --preset "$preset" --log-level=WARNING
@@ -142,6 +144,20 @@ run_tests() {
   # What tests have to say although they pass.
   grep -h '^compared: ' "build/$preset/Testing/Temporary/LastTest.log" || true
   return "$code"
+}
+
+# ---------------------------------------------------------------------------------------------------- Python
+
+# The extension has a build folder of its own, since it takes other objects than programs do (cmake/PresceneCompiler.cmake).
+# Its answers are compared with those of the program, which is built beside it.
+verb_python() {
+  local filter=(-L '^python$')
+  [ $# = 0 ] || filter+=(-R "$(IFS='|'; echo "$*")")
+  verb_setup run python
+  verb_build release prescene
+  verb_build python prescene_python
+  timed "tests of the Python package" run_tests python "${filter[@]}"
+  say "PYTHONPATH=$PWD/build/python/site /usr/bin/python3"
 }
 
 # ---------------------------------------------------------------------------------------------------- demo, bench
@@ -248,7 +264,7 @@ verb_bless() {
 verb=${1:-help}
 [ $# = 0 ] || shift
 case $verb in
-  setup | build | test | demo | bench | lint | format | fuzz | docs | bless) "verb_$verb" "$@" ;;
+  setup | build | test | python | demo | bench | lint | format | fuzz | docs | bless) "verb_$verb" "$@" ;;
   trace-diff) exec tools/trace-diff "$@" ;;
   help | -h | --help) usage ;;
   *) usage >&2; exit 2 ;;
