@@ -37,9 +37,12 @@ void note(const char* stage, StepResult& result) {
 std::optional<double> lowest_surface(const SampledDepth& sampled, const Pose& X_WC, const Vector3d& gravity_W) {
   if (!(gravity_W.norm() > 0.0)) return std::nullopt;
   const Vector3d up_W = -gravity_W.normalized();
+  const Vector3d up_C = X_WC.rotation.conjugate() * up_W;
+  const double height_of_camera = up_W.dot(X_WC.translation);
   std::vector<double> heights;
+  heights.reserve(sampled.points_C.size());
   for (std::size_t i = 0; i < sampled.points_C.size(); ++i)
-    if (sampled.depth.data()[i] > 0.0F) heights.push_back(up_W.dot(X_WC * sampled.points_C[i]));
+    if (sampled.depth.data()[i] > 0.0F) heights.push_back(up_C.dot(sampled.points_C[i]) + height_of_camera);
   if (heights.empty()) return std::nullopt;
   const auto at = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
   std::nth_element(heights.begin(), at, heights.end());

@@ -19,15 +19,16 @@ using belief::Particle;
 using geometry::Matrix3d;
 using geometry::Twist;
 
+constexpr double kStillTime = 20.0;  // s; what lies still begins to move once in so long, on average
+// Of what lies still and is seen, in a hand that stands still too: cameras and supports drift, so that the last hundred
+// frames or so count.
+constexpr MotionNoise kStillNoise = {.shift = 0.0001, .turn = 0.001, .speed = 0.0, .rate = 0.0};
 constexpr double kTwist95 = 12.59;  // 95 % quantile of chi-squared with 6 degrees of freedom
 constexpr double kLargestDeviations[] = {1.0, 0.15, 8.0, 1.0};  // rad, m, rad/s, m/s; spreads grow no further
 constexpr double kUnseenPhysicsShare = 1.0;   // of what is not tracked: nothing else says where it goes
 constexpr double kPhysicsAfterRelease = 1.0;  // in the step in which an object was released
-// By this share the covariance of a resting pose that is seen grows in a frame: errors of the camera that stay from
-// frame to frame (calibration, a pattern in the depth) do not average out.
-constexpr double kStillForgetting = 0.1;
-constexpr std::size_t kMostPushes = 16;  // that simulators take; the newest count
-constexpr double kStillBody = 1e-4;      // m, rad; a body of the robot that moves by less in a step stands still
+constexpr std::size_t kMostPushes = 16;       // that simulators take; the newest count
+constexpr double kStillBody = 1e-4;           // m, rad; a body of the robot that moves by less in a step stands still
 
 /// Adds the noise of dt, in the error coordinates (rotation, translation, angular, linear).
 void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covariance) {
@@ -121,6 +122,10 @@ void apply_grasps(const belief::Control& control, belief::Belief& belief) {
   }
 }
 
+bool stands_still(const Pose& X_WG_from, const Pose& X_WG_to) {
+  return geometry::box_minus(X_WG_to, X_WG_from).norm() < kStillBody;
+}
+
 /// A ball that something fills which moves in this step, at its begin and its end.
 struct Mover {
   Vector3d p_from_W;
@@ -159,7 +164,7 @@ std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose>
     movers.push_back({position_of(push, -action.time), position_of(push, dt - action.time), push.radius});
   }
   for (std::size_t i = 0; i < X_WG.size(); ++i) {
-    if (geometry::box_minus(X_WG[i], belief.robot[i]).norm() < kStillBody) continue;
+    if (stands_still(belief.robot[i], X_WG[i])) continue;
     geometry::Box box;
     for (const Vector3d& vertex : belief::collision_mesh(belief.scene->robot[i].collision).vertices) box.extend(vertex);
     if (!box.isEmpty())
@@ -177,9 +182,18 @@ bool may_touch(const std::vector<Mover>& movers, const Vector3d& p_W, double rad
   });
 }
 
-/// The modes of one object's particles for this step.
-void change_modes(const PredictOptions& options, bool tracked, bool in_hand, bool has_physics,
+/// The modes of one object's particles for this step of dt.
+void change_modes(const PredictOptions& options, bool seen, bool tracked, bool in_hand, bool has_physics, double dt,
                   core::RandomStream& stream, ObjectBelief& object) {
+  // Of those that rest, a few wake in each frame, evenly among them: what begins to move is followed at once. They
+  // weigh as much less as that is more than how often things begin to move.
+  const double wakes = options.wake_probability;
+  const double moves = std::min(wakes, dt / kStillTime);
+  const bool weighted = seen && wakes > 0.0 && wakes < 1.0;
+  const double log_woken = weighted ? std::log(moves / wakes) : 0.0;
+  const double log_resting = weighted ? std::log((1.0 - moves) / (1.0 - wakes)) : 0.0;
+  double to_wake = stream.uniform();
+  bool changed = false;
   for (Particle& particle : object.particles) {
     const double draw = stream.uniform();
     if (in_hand && particle.mode != MotionMode::kHeld) {
@@ -188,13 +202,24 @@ void change_modes(const PredictOptions& options, bool tracked, bool in_hand, boo
         particle.mode = MotionMode::kHeld;
         clear_twist(particle);
       }
-    } else if (particle.mode != MotionMode::kMoving) {
+    } else if (particle.mode == MotionMode::kHeld) {
       // What is hidden gives no reason to think that it moves.
       if (tracked && draw < options.wake_probability) wake(options, particle);
+    } else if (particle.mode == MotionMode::kResting) {
+      if (!seen) continue;
+      to_wake += wakes;
+      const bool woken = to_wake >= 1.0;
+      if (woken) {
+        to_wake -= 1.0;
+        wake(options, particle);
+      }
+      particle.log_weight += woken ? log_woken : log_resting;
+      changed = changed || weighted;
     } else if ((tracked || !has_physics) && draw < options.settle_probability && may_be_still(particle)) {
       settle(particle);  // What is not tracked does so where physics leaves it slow, not at the top of its flight.
     }
   }
+  if (changed) belief::normalize(object.particles);
 }
 
 }  // namespace
@@ -249,7 +274,8 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
     const std::optional<double> released = release_time(control, *belief.scene, object.name, dt);
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
-    change_modes(options, tracked, hand.has_value(), static_cast<bool>(simulators), draws, object);
+    const bool seen = tracked || object.state == belief::TrackState::kDoubtful;
+    change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, object);
     const Vector3d centre = centre_of(*belief.scene, object);
     // Nothing shows whether what is out of sight is touched: physics says it.
     const bool may_be_pushed = !tracked && simulators && is_present(object) && !movers.empty();
@@ -264,7 +290,9 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
         const Pose& X_to = X_WG[static_cast<std::size_t>(*hand)];
         const double held = released.value_or(dt);
         if (held > 0.0) carry(particle, X_from, geometry::interpolate(X_from, X_to, held / dt), held);
-        add_noise(options.held, dt, particle.covariance);
+        // What is held slips when the hand moves.
+        const bool still = tracked && !released && stands_still(X_from, X_to);
+        add_noise(still ? kStillNoise : options.held, dt, particle.covariance);
         if (!released) continue;
         wake(options, particle);
         left = dt - held;
@@ -273,8 +301,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
         wake(options, particle);  // nobody holds it
       }
       if (particle.mode == MotionMode::kResting) {
-        if (tracked) particle.covariance.topLeftCorner<6, 6>() *= 1.0 + kStillForgetting;
-        add_noise(options.resting, dt, particle.covariance);
+        add_noise(tracked ? kStillNoise : options.resting, dt, particle.covariance);
         if (may_be_pushed && may_touch(movers, particle.X_WO * centre, radius))
           falling.push_back({i, k, dt, particle.X_WO, particle.V_WO, true});
       } else if (left > 0.0) {

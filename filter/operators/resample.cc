@@ -13,6 +13,8 @@ using belief::Matrix12d;
 using belief::Particle;
 using Vector12d = Eigen::Matrix<double, 12, 1>;
 
+constexpr double kNegligible = 12.0;  // nats below the best; a particle so light says nothing any more
+
 /// Moves a copy within its Gaussian and narrows what is left, so that mean and covariance over many copies stay.
 void spread_copy(double share, core::RandomStream& stream, Particle& particle) {
   const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(particle.covariance);
@@ -23,6 +25,21 @@ void spread_copy(double share, core::RandomStream& stream, Particle& particle) {
   particle.V_WO.angular += d.segment<3>(6);
   particle.V_WO.linear += d.tail<3>();
   particle.covariance *= 1.0 - share;
+}
+
+/// What rests needs few particles, and those that woke for nothing would have to make up for it once it does move: the
+/// negligible ones become copies of the best, which share its weight.
+void replace_negligible(std::size_t best, std::vector<Particle>& particles) {
+  const Particle original = particles[best];
+  std::vector<std::size_t> replaced;
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    if (particles[i].log_weight < original.log_weight - kNegligible) replaced.push_back(i);
+  if (replaced.empty()) return;
+  for (const std::size_t i : replaced) particles[i] = original;
+  replaced.push_back(best);
+  const double each = original.log_weight - std::log(static_cast<double>(replaced.size()));
+  for (const std::size_t i : replaced) particles[i].log_weight = each;
+  belief::normalize(particles);
 }
 
 }  // namespace
@@ -46,11 +63,13 @@ std::vector<int> systematic_indices(const std::vector<Particle>& particles, doub
 bool resample(const ResampleOptions& options, core::RandomStream stream, std::vector<Particle>& particles) {
   if (particles.size() < 2) return false;
   const auto count = static_cast<double>(particles.size());
-  if (belief::effective_sample_size(particles) >= options.min_effective_share * count) return false;
   const auto best = static_cast<int>(
       std::max_element(particles.begin(), particles.end(),
                        [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }) -
       particles.begin());
+  if (particles[static_cast<std::size_t>(best)].mode == belief::MotionMode::kResting)
+    replace_negligible(static_cast<std::size_t>(best), particles);
+  if (belief::effective_sample_size(particles) >= options.min_effective_share * count) return false;
   std::vector<int> chosen = systematic_indices(particles, stream.uniform());
   // The best comes first, once; its place among the chosen is taken from its own copies.
   const auto place = std::find(chosen.begin(), chosen.end(), best);
@@ -63,7 +82,10 @@ bool resample(const ResampleOptions& options, core::RandomStream stream, std::ve
   int previous = best;
   for (const int i : chosen) {
     resampled.push_back(particles[static_cast<std::size_t>(i)]);
-    if (i == previous || i == best) spread_copy(options.spread, stream, resampled.back());
+    // Copies of what rests stay alike: nothing would part them again, and one comparison with a frame serves all.
+    const bool is_copy = i == previous || i == best;
+    if (is_copy && resampled.back().mode != belief::MotionMode::kResting)
+      spread_copy(options.spread, stream, resampled.back());
     previous = i;
   }
   for (Particle& particle : resampled) particle.log_weight = -std::log(count);

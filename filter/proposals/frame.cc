@@ -169,13 +169,27 @@ rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const
 
 double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step) {
   const int width = terms.camera.width, height = terms.camera.height;
-  const auto matches = [&](int x, int y) {
-    const double z = terms.depth(x, y), d = object_depth(x, y);
-    return d > 0.0 && z > 0.0 && std::abs(z - d) < std::max(kMatch, 3.0 * terms.model.hit_sigma(d, 1.0));
-  };
-  int ends = 0, goes_on = 0;
+  // What is further than two pixels from the object is no matter of its outline.
+  int left = width, right = -1, top = height, bottom = -1;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
+      if (!(object_depth(x, y) > 0.0F)) continue;
+      left = std::min(left, x), right = std::max(right, x);
+      top = std::min(top, y), bottom = std::max(bottom, y);
+    }
+  if (right < 0) return 1.0;
+  left = std::max(0, left - 2), right = std::min(width - 1, right + 2);
+  top = std::max(0, top - 2), bottom = std::min(height - 1, bottom + 2);
+  geometry::Image<std::uint8_t> matched(width, height, 0);
+  for (int y = top; y <= bottom; ++y)
+    for (int x = left; x <= right; ++x) {
+      const double z = terms.depth(x, y), d = object_depth(x, y);
+      matched(x, y) = d > 0.0 && z > 0.0 && std::abs(z - d) < std::max(kMatch, 3.0 * terms.model.hit_sigma(d, 1.0));
+    }
+  const auto matches = [&](int x, int y) { return matched(x, y) != 0; };
+  int ends = 0, goes_on = 0;
+  for (int y = top; y <= bottom; ++y)
+    for (int x = left; x <= right; ++x) {
       const double z = terms.depth(x, y);
       if (z == 0.0 || matches(x, y)) continue;
       // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side

@@ -39,7 +39,17 @@ geometry::PinholeCamera close_up(const geometry::PinholeCamera& camera, const Ve
 }
 
 /// What one pixel of a line shows.
-enum class Seen { kNothing, kObject, kBackground };
+enum class Seen : std::int8_t { kNothing, kObject, kBackground };
+
+/// exp(-n kLogOdds) for all n that a line can have.
+const std::array<double, 2 * static_cast<std::size_t>(kMostReach) + 2>& powers() {
+  static const auto kPowers = [] {
+    std::array<double, 2 * static_cast<std::size_t>(kMostReach) + 2> table{};
+    for (std::size_t n = 0; n < table.size(); ++n) table[n] = std::exp(-static_cast<double>(n) * kLogOdds);
+    return table;
+  }();
+  return kPowers;
+}
 
 }  // namespace
 
@@ -93,6 +103,7 @@ Outline::Outline(const SearchTarget& target, const Pose& X_CO, const geometry::P
 OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage& depth,
                                     const rendering::FrameTerms& terms) const {
   OutlineEquations equations;
+  const auto& power = powers();
   const geometry::Matrix3d R_CO = X_CO.rotation.toRotationMatrix();
   for (const Point& point : points_) {
     const Vector3d p = R_CO * point.p_O + X_CO.translation;
@@ -140,24 +151,21 @@ OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage
     }
     if (objects < kFewestSeen || backgrounds < kFewestSeen) continue;
 
-    // The posterior of where it ends: object on this side, background on that.
-    std::array<double, 2 * static_cast<std::size_t>(kMostReach) + 2> logs;
-    double score = 0.0;
-    for (int s = -reach; s <= reach; ++s)
-      if (line[static_cast<std::size_t>(s + reach)] == Seen::kBackground) score += kLogOdds;
-    double largest = score;
-    logs[0] = score;
+    // The posterior of where it ends: object on this side, background on that. Scores are in units of kLogOdds.
+    std::array<int, 2 * static_cast<std::size_t>(kMostReach) + 2> scores;
+    int score = backgrounds;
+    int largest = score;
+    scores[0] = score;
     const int ends = 2 * reach + 2;
     for (int i = 1; i < ends; ++i) {
       const Seen seen = line[static_cast<std::size_t>(i - 1)];
-      if (seen == Seen::kObject) score += kLogOdds;
-      if (seen == Seen::kBackground) score -= kLogOdds;
-      logs[static_cast<std::size_t>(i)] = score;
+      score += (seen == Seen::kObject ? 1 : 0) - (seen == Seen::kBackground ? 1 : 0);
+      scores[static_cast<std::size_t>(i)] = score;
       largest = std::max(largest, score);
     }
     double sum = 0.0, mean = 0.0, square = 0.0;
     for (int i = 0; i < ends; ++i) {
-      const double w = std::exp(logs[static_cast<std::size_t>(i)] - largest);
+      const double w = power[static_cast<std::size_t>(largest - scores[static_cast<std::size_t>(i)])];
       const double at = i - reach - 0.5;
       sum += w;
       mean += w * at;
@@ -173,6 +181,8 @@ OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage
     row << point.p_O.cross(R_CO.transpose() * a), a;
     equations.H += weight * row * row.transpose();
     equations.g += weight * mean * row;
+    // Whose derivative by the place is that of the equations.
+    equations.misfit += 0.5 * share_ / variance * mean * mean / (1.0 + scaled * scaled);
     ++equations.points;
   }
   without_facets(lever_, X_CO.rotation, p_OQ_, equations.H, equations.g);

@@ -43,6 +43,7 @@ Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Po
                          const SupportTrackingOptions& options) {
   Candidates found;
   const Pose X_FC = X_CF.inverse();
+  const geometry::Matrix3d R_FC = X_FC.rotation.toRotationMatrix();
   const Vector3d normal = X_CF.rotation * Vector3d::UnitZ();
   const double offset = normal.dot(X_CF.translation);
   for (int y = 0; y < sampled.camera.height; ++y)
@@ -53,7 +54,7 @@ Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Po
       if (z <= 0.0 || std::abs(along) < 1e-9) continue;
       const double expected = offset / along;
       if (expected <= 0.0) continue;
-      const Vector3d foot = X_FC * (expected * ray);
+      const Vector3d foot = R_FC * (expected * ray) + X_FC.translation;
       if (std::abs(foot.x()) > face.half_x || std::abs(foot.y()) > face.half_y) continue;
       const Vector3d p_C = sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)];
       const double above = normal.dot(p_C) - offset;

@@ -17,6 +17,7 @@
 #include "prescene/filter/operators/learn_colors.h"
 #include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/still_update.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/detection.h"
 #include "prescene/filter/proposals/frame.h"
@@ -86,6 +87,11 @@ extern const geometry::PinholeCamera camera;
 extern const Pose X_CO;
 extern const SearchTarget target;
 }  // namespace watched_renderer_h
+
+namespace still_update_h {
+extern const geometry::Matrix6d covariance, information;
+extern const geometry::Vector6d gradient;
+}  // namespace still_update_h
 
 namespace weight_h {
 extern const WeightOptions options;

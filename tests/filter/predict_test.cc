@@ -77,9 +77,48 @@ TEST_F(Predict, RestingStaysWhereItIsAndGrowsALittleUnsure) {
     const Particle& particle = belief.objects[0].particles[i];
     EXPECT_EQ(particle.X_WO, before.objects[0].particles[i].X_WO);
     EXPECT_EQ(particle.log_weight, before.objects[0].particles[i].log_weight);
-    EXPECT_NEAR(particle.covariance(3, 3), 1.1e-6 + 0.0006 * 0.0006 * 0.04, 1e-15);
+    EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.0001 * 0.0001 * 0.04, 1e-15);
     EXPECT_EQ(particle.covariance(9, 9), 1e-6);
   }
+}
+
+TEST_F(Predict, WhatWakesWeighsAsMuchAsThingsBeginToMove) {
+  belief::Belief belief = hand_and_object(MotionMode::kResting, false);
+  PredictOptions options;
+  const double dt = 0.05;
+  double moving_weight = 0.0, sum = 0.0;
+  int woken = 0;
+  constexpr int kSteps = 200;
+  for (int step = 0; step < kSteps; ++step) {
+    belief::Belief next = belief;
+    next.step = belief.step + static_cast<std::uint64_t>(step);
+    run(next, belief.robot[0], dt, options);
+    int mine = 0;
+    for (const Particle& particle : next.objects[0].particles) {
+      const bool moves = particle.mode == MotionMode::kMoving;
+      mine += moves;
+      moving_weight += moves ? std::exp(particle.log_weight) : 0.0;
+      sum += std::exp(particle.log_weight);
+    }
+    // Some of them in every frame, whatever the chance.
+    EXPECT_GE(mine, 1) << step;
+    EXPECT_LE(mine, 2) << step;
+    woken += mine;
+  }
+  EXPECT_NEAR(sum, kSteps, 1e-9);
+  EXPECT_NEAR(woken / (16.0 * kSteps), options.wake_probability, 0.01);
+  EXPECT_NEAR(moving_weight / kSteps, dt / 20.0, 0.05 * dt / 20.0);
+}
+
+TEST_F(Predict, InAHandThatStandsStillItIsStill) {
+  belief::Belief belief = hand_and_object(MotionMode::kHeld, true);
+  const Pose X_WG = belief.robot[0];
+  run(belief, X_WG, 0.04, without_mode_changes());
+  for (const Particle& particle : belief.objects[0].particles)
+    EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.0001 * 0.0001 * 0.04, 1e-15);
+  run(belief, X_WG * Pose::from_translation({0.001, 0.0, 0.0}), 0.04, without_mode_changes());
+  for (const Particle& particle : belief.objects[0].particles)
+    EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + (0.0001 * 0.0001 + 0.01 * 0.01) * 0.04, 1e-12);
 }
 
 TEST_F(Predict, HiddenRestingIsForgottenNoFasterThanItMayCreep) {

@@ -52,6 +52,32 @@ TEST(Resample, KeepsTheBestUnmovedAndMakesWeightsEqual) {
   for (const Particle& particle : particles) EXPECT_NEAR(particle.log_weight, std::log(0.25), 1e-12);
 }
 
+TEST(Resample, WhatRestsTakesTheNegligibleBack) {
+  auto particles = weighted({0.3, 0.35, 1e-9, 0.35, 1e-3});
+  belief::normalize(particles);
+  particles[1].mode = belief::MotionMode::kResting;
+  particles[1].log_weight += 1e-3;  // the best
+  belief::normalize(particles);
+  const auto before = particles;
+  EXPECT_FALSE(filter::resample({}, {1, core::Purpose::kResample}, particles));
+  EXPECT_EQ(particles[2].X_WO, before[1].X_WO);
+  EXPECT_EQ(particles[2].mode, belief::MotionMode::kResting);
+  // Nothing that may be right changes.
+  for (const std::size_t i : {0u, 3u, 4u}) {
+    EXPECT_EQ(particles[i].X_WO, before[i].X_WO);
+    EXPECT_NEAR(particles[i].log_weight, before[i].log_weight, 1e-6);
+  }
+  EXPECT_NEAR(std::exp(particles[1].log_weight) + std::exp(particles[2].log_weight), std::exp(before[1].log_weight),
+              1e-6);
+}
+
+TEST(Resample, CopiesOfWhatRestsStayAlike) {
+  auto particles = weighted({0.01, 0.90, 0.04, 0.05});
+  for (Particle& particle : particles) particle.mode = belief::MotionMode::kResting;
+  ASSERT_TRUE(filter::resample({}, {1, core::Purpose::kResample}, particles));
+  for (const Particle& particle : particles) EXPECT_EQ(particle.X_WO.translation.x(), 1.0);
+}
+
 // Mean and variance of many copies of one Gaussian, spread: within five standard errors.
 TEST(ResampleStatistics, SpreadCopiesKeepTheMoments) {
   std::vector<double> weights(2000, 1e-12);

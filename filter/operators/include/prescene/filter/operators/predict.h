@@ -32,7 +32,7 @@ struct MotionNoise {
 };
 
 struct PredictOptions {
-  /// What lies still. What is seen of it forgets a tenth a frame besides. Chosen.
+  /// What lies still and is not seen; what is seen moves hardly at all. Chosen.
   MotionNoise resting = {.shift = 0.0006, .turn = 0.006, .speed = 0.0, .rate = 0.0};
   /// About the hand. Chosen.
   MotionNoise held = {.shift = 0.010, .turn = 0.08, .speed = 0.0, .rate = 0.0};
