@@ -35,6 +35,7 @@ struct SolverContact {
   double rolling_arm = 0.0;  ///< m
   /// Normal velocity (A minus B) before this step's gravity, m/s; negative while closing.
   double speed_before = 0.0;
+  double turning = 0.0;  ///< m/s, in speed_before: what the turning of the bodies adds (ContactPoint::turning).
   /// In: the impulses of the step before (N s). Out: this step's.
   double impulse = 0.0;
   Vector3d friction_impulse = Vector3d::Zero();

@@ -34,7 +34,7 @@ void InstanceWorld::sweep(int index) {
   m.high = box.high;
   const double speed = std::max(m.velocity.norm(), m.velocity_before.norm());
   const double spin = std::max(m.spin.norm(), m.spin_after.norm());
-  m.travel = dt() * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));
+  m.travel = part_ * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));
   const Vector3d swell = Vector3d::Constant(m.travel + 0.5 * kContactMargin);
   m.low -= swell;
   m.high += swell;
@@ -68,11 +68,11 @@ void InstanceWorld::find_parts(const Part& part_a, const Moving& ma, const Part&
   const MovingFrame a{X_WA, {ma.p_WCm, ma.velocity, ma.spin}};
   const MovingFrame b{X_WB, {mb.p_WCm, mb.velocity, mb.spin}};
   if (part_a.spheres && part_b.spheres)
-    return sphere_finder_.spheres_spheres(*part_a.spheres, a, *part_b.spheres, b, range, dt(), points_);
+    return sphere_finder_.spheres_spheres(*part_a.spheres, a, *part_b.spheres, b, range, part_, points_);
   if (part_a.spheres && part_b.surface)
-    return sphere_finder_.spheres_surface(*part_a.spheres, a, *part_b.surface, b, range, dt(), points_);
-  if (part_a.spheres) return sphere_finder_.spheres_convex(*part_a.spheres, a, *part_b.core, b, range, dt(), points_);
-  sphere_finder_.spheres_convex(*part_b.spheres, b, *part_a.core, a, range, dt(), points_);
+    return sphere_finder_.spheres_surface(*part_a.spheres, a, *part_b.surface, b, range, part_, points_);
+  if (part_a.spheres) return sphere_finder_.spheres_convex(*part_a.spheres, a, *part_b.core, b, range, part_, points_);
+  sphere_finder_.spheres_convex(*part_b.spheres, b, *part_a.core, a, range, part_, points_);
   for (ContactPoint& point : points_) point.normal = -point.normal;
 }
 
@@ -141,6 +141,7 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
     c.impact_friction = pair.impact_friction;
     c.restitution = pair.restitution;
     c.rolling_arm = pair.rolling_arm;
+    c.turning = point.turning;
     c.speed_before = point.normal.dot(ma.velocity_before + ma.spin.cross(point.position - ma.p_WCm) -
                                       mb.velocity_before - mb.spin.cross(point.position - mb.p_WCm)) +
                      point.turning;
@@ -151,16 +152,28 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
       const double distance = (warm.position - p_B).squaredNorm();
       if (distance >= nearest) continue;
       nearest = distance;
-      c.impulse = warm.impulse;
-      c.friction_impulse = warm.friction_impulse;
+      // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
+      c.impulse = share() * warm.impulse;
+      c.friction_impulse = share() * warm.friction_impulse;
     }
     contacts_.push_back(c);
     contact_keys_.push_back(key);
   }
 }
 
+/// How fast the normal velocity of a contact grows while nothing presses, m/s^2.
+double InstanceWorld::free_acceleration(const SolverContact& c) const {
+  const auto falls = [&](int body) { return moving_[static_cast<std::size_t>(body)].dynamic ? 1.0 : 0.0; };
+  return (falls(c.body_a) - falls(c.body_b)) * c.normal.dot(scene_->scene.gravity_W);
+}
+
 bool InstanceWorld::solve(const core::Cancellation* cancellation) {
-  if (contacts_.empty()) {
+  // What stays open throughout, the solver would leave as it is.
+  const auto stays_open = [&](const SolverContact& c) {
+    const double speed = c.speed_before - c.turning + part_ * free_acceleration(c);
+    return c.gap > 0.0 && c.impulse == 0.0 && c.gap + part_ * speed > 0.0;
+  };
+  if (std::all_of(contacts_.begin(), contacts_.end(), stays_open)) {
     for (BodyResult& result : results_) result = BodyResult{};
     warm_.clear();
     return true;
@@ -184,8 +197,9 @@ bool InstanceWorld::solve(const core::Cancellation* cancellation) {
     body.setAngularVelocity(to_bullet(m.spin));
     body.updateInertiaTensor();
   }
+  settings_.overlap_recovery = share() * scene_->options.overlap_recovery;
   const bool many = contacts_.size() >= kManyContacts;
-  if (!solver_.solve_step(rigid_pointers_, contacts_, settings_, dt(), results_, many ? cancellation : nullptr))
+  if (!solver_.solve_step(rigid_pointers_, contacts_, settings_, part_, results_, many ? cancellation : nullptr))
     return false;
   warm_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
@@ -197,10 +211,14 @@ bool InstanceWorld::solve(const core::Cancellation* cancellation) {
   return true;
 }
 
+void InstanceWorld::note_overlap() {
+  overlap_ = 0.0;
+  if (steps_ > 0 && released_.empty()) return;
+  for (const SolverContact& c : contacts_) overlap_ = std::max(overlap_, -c.gap);
+}
+
 void InstanceWorld::note_touches() {
   touches_.clear();
-  overlap_ = 0.0;
-  const bool begins = steps_ == 1 || !released_.empty();
   const Vector3d up = belief::up_of(scene_->scene);
   Vector3d normal = Vector3d::Zero();
   const auto close = [&] {
@@ -210,7 +228,6 @@ void InstanceWorld::note_touches() {
   };
   // Contacts of a pair lie together, and pairs ascend.
   for (const SolverContact& c : contacts_) {
-    if (begins) overlap_ = std::max(overlap_, -c.gap);
     if (c.impulse <= 0.0 && c.gap > scene_->options.touching_distance) continue;
     if (touches_.empty() || touches_.back().first != c.body_a || touches_.back().second != c.body_b) {
       close();

@@ -24,9 +24,9 @@ InstanceWorld::Flight InstanceWorld::flight_of(const Object& object, const Compi
   // Without contact a step ends here.
   const Vector3d& gravity = scene_->scene.gravity_W;
   Flight flight;
-  flight.v_WCm = object.v_WCm + dt() * gravity;
-  flight.p_WCm = object.p_WCm + 0.5 * dt() * (object.v_WCm + flight.v_WCm);
-  const Spin spin = spun(object.R_WO, object.w_WO, body, dt());
+  flight.v_WCm = object.v_WCm + part_ * gravity;
+  flight.p_WCm = object.p_WCm + 0.5 * part_ * (object.v_WCm + flight.v_WCm);
+  const Spin spin = spun(object.R_WO, object.w_WO, body, part_);
   flight.R_WO = spin.R_WO;
   flight.w_WO = spin.w_WO;
   return flight;

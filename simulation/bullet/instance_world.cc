@@ -6,6 +6,7 @@
 
 #include "body_motion.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/rules/impact_split.h"
 
 namespace prescene::simulation {
 namespace {
@@ -23,13 +24,14 @@ std::unique_ptr<btRigidBody> make_rigid_body() {
 
 InstanceWorld::InstanceWorld(std::shared_ptr<const CompiledScene> scene)
     : scene_(std::move(scene)), player_(scene_->scene) {
+  set_part(kStepParts);
   const BulletOptions& options = scene_->options;
   settings_.iterations = options.solver_iterations;
   settings_.converged = options.solver_accuracy;
-  settings_.overlap_recovery = options.overlap_recovery;
   settings_.restitution_speed = options.restitution_speed;
   settings_.impact_speed = options.impact_speed;
   contacts_.reserve(kTypicalContacts);
+  pressed_.reserve(kTypicalContacts);
   contact_keys_.reserve(kTypicalContacts);
   warm_.reserve(kTypicalContacts);
   points_.reserve(kTypicalContacts);
@@ -111,8 +113,11 @@ bool InstanceWorld::step(const core::Cancellation* cancellation) {
   run_actions();
   place_kinematic();
   place_dynamic();
-  if (!find_contacts(cancellation) || !solve(cancellation)) return false;
-  integrate();
+  if (!find_contacts(cancellation)) return false;
+  note_overlap();
+  const bool done = take_parts(cancellation);
+  set_part(kStepParts);
+  if (!done) return false;
   ++steps_;
   note_touches();
   note_calm();
@@ -199,7 +204,7 @@ void InstanceWorld::integrate() {
       Impact& impact = impacts_[static_cast<std::size_t>(body)];
       impact.supported = impact.supported || !c.hit;
       impact.bounced = impact.bounced || c.bounced;
-      if (c.hit) impact.time = std::min(impact.time.value_or(dt()), c.hit_time);
+      if (c.hit) impact.time = std::min(impact.time.value_or(part_), c.hit_time);
     }
   }
   for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -218,23 +223,24 @@ void InstanceWorld::integrate() {
       // came out. Gravity counts within the step only while nothing holds the body up.
       const Impact& impact = impacts_[i];
       const double before = impact.time.value_or(0.0);
-      const double after = dt() - before;
+      const double after = part_ - before;
       const Vector3d& gravity = scene_->scene.gravity_W;
       const double falls_before = impact.supported ? 0.0 : 0.5 * before;
       const double falls_after = impact.supported || !impact.bounced ? 0.0 : -0.5 * after;
       const Vector3d flown = before * (object.v_WCm + falls_before * gravity);
       object.v_WCm = from_bullet(rigid_[i]->getLinearVelocity());
-      object.p_WCm += flown + after * (object.v_WCm + falls_after * gravity) + dt() * result.push;
+      object.p_WCm += flown + after * (object.v_WCm + falls_after * gravity) + part_ * result.push;
       const Vector3d w = from_bullet(rigid_[i]->getAngularVelocity());
       const CompiledBody& body = scene_->bodies[i];
-      const Spin spin = turned(spun(object.R_WO, w, body, dt()), before * (object.w_WO - w) + dt() * result.turn, body);
+      const Spin spin =
+          turned(spun(object.R_WO, w, body, part_), before * (object.w_WO - w) + part_ * result.turn, body);
       object.R_WO = spin.R_WO;
       object.w_WO = spin.w_WO;
     } else {
       object.v_WCm = flight.v_WCm;
-      object.p_WCm = flight.p_WCm + dt() * result.push;
+      object.p_WCm = flight.p_WCm + part_ * result.push;
       Spin spin{flight.R_WO, flight.w_WO};
-      if (!result.turn.isZero(0.0)) spin = turned(spin, dt() * result.turn, scene_->bodies[i]);
+      if (!result.turn.isZero(0.0)) spin = turned(spin, part_ * result.turn, scene_->bodies[i]);
       object.R_WO = spin.R_WO;
       object.w_WO = spin.w_WO;
     }

@@ -152,6 +152,7 @@ class InstanceWorld {
   void run_actions();
   void place_kinematic();
   void place_dynamic();
+  /// After what is taken of a step now.
   Flight flight_of(const Object& object, const CompiledBody& body) const;
   bool list_flyers();
   bool clear_for(int steps, double world_radius);
@@ -162,8 +163,20 @@ class InstanceWorld {
   void find_pair(int a, int b);
   void find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb, double range);
   void add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b);
+  double free_acceleration(const SolverContact& contact) const;
   bool solve(const core::Cancellation* cancellation);
   void integrate();
+  // Split steps: instance_impacts.cc.
+  bool take_parts(const core::Cancellation* cancellation);
+  /// What is taken of a step now: this many of kStepParts.
+  void set_part(int parts);
+  double share() const { return part_ / dt(); }
+  int splits_allowed() const;
+  int parts_to_impact(int left) const;
+  void shorten(int parts);
+  void keep_pressed();
+  void give_back_pressed();
+  void note_overlap();
   void note_touches();
   void note_calm();
   const CompiledBody& compiled(int body) const;
@@ -184,12 +197,14 @@ class InstanceWorld {
   SphereContactFinder sphere_finder_;
   ContactSolver solver_;
   SolverSettings settings_;
+  double part_ = 0.0;  // s, of a step: what is taken now
   std::vector<Moving> moving_;
   std::vector<Flight> flights_;
   std::vector<Flyer> flyers_;
   std::vector<Bounds> fixed_parts_;  // of the supports, with the margin at which contacts are made
   std::vector<ContactPoint> points_;
   std::vector<SolverContact> contacts_;
+  std::vector<SolverContact> pressed_;  // in the parts of this step that are over
   std::vector<std::uint64_t> contact_keys_;
   std::vector<std::unique_ptr<btRigidBody>> rigid_;
   std::vector<btCollisionObject*> rigid_pointers_;

@@ -174,7 +174,6 @@ core::Status validate(const LockstepOptions& options) {
   if (!(options.solver_accuracy >= 1e-7 && options.solver_accuracy <= 1.0)) {
     return core::invalid_input("solver_accuracy must be in [1e-7, 1] m/s");
   }
-  if (!(options.split_travel >= 0.0)) return core::invalid_input("split_travel must be >= 0");
   if (options.live_instances < 1 || options.live_instances > 1024) {
     return core::invalid_input("live_instances must be in [1, 1024]");
   }
@@ -233,7 +232,7 @@ core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const bel
                     options.impact_speed};
   lanes.origin = plain(belief::mean_start(scene).objects.front().X_WO.translation);
   core::Hasher hasher;
-  hasher.value(mechanics_hash(scene, options)).value(options.solver_accuracy).value(options.split_travel);
+  hasher.value(mechanics_hash(scene, options)).value(options.solver_accuracy);
   for (const double coordinate : lanes.origin) hasher.value(coordinate);
   compiled->hash = hasher.digest();
   Compiler compiler(*compiled, shapes);

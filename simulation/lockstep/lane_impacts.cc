@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps that are split at impacts. A body that turns by a third of a radian in a step hits with another corner, at
-// another time and about another arm than the one it has when the step begins; and where it hits with two corners, the
-// second one hits with the speed that the first one gave it. Errors of both kinds are as large as the step is long. So
-// the step goes on to the impact, without it; then follows a part that is hardly longer than the impact itself, for
-// which all contacts are found anew; then what is left, in the same way. Impacts become as exact as in steps of that
-// part's length, and flights, slides and rest keep theirs.
+// Steps that are split at impacts (prescene/simulation/rules/impact_split.h).
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "lane_engine.h"
+#include "prescene/simulation/rules/impact_split.h"
 
 namespace prescene::simulation {
 namespace {
-
-constexpr int kParts = 64;  ///< Of a step: an impact takes one.
-/// Of a step; then what is left is taken at once, so that none of them takes for ever.
-constexpr int kMostSplits = 16;
 
 Vector3d vector_of(const Real (&v)[3]) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
@@ -25,15 +16,8 @@ Vector3d row_at(const Rows<3>& rows, int at) {
   return {static_cast<double>(rows[0][at]), static_cast<double>(rows[1][at]), static_cast<double>(rows[2][at])};
 }
 
-/// When gap + speed t + acceleration t^2 / 2 becomes zero; speed < 0.
-double time_to_close(double gap, double speed, double acceleration) {
-  const double discriminant = speed * speed - 2.0 * acceleration * gap;
-  return discriminant > 0.0 ? 2.0 * gap / (std::sqrt(discriminant) - speed) : std::numeric_limits<double>::infinity();
-}
-
 }  // namespace
 
-/// Not where something is moved by other than contacts: those go from the begin of a step to its end.
 bool LaneEngine::may_split(int slot) const {
   for (int object = 0; object < objects(); ++object)
     if (motion(slot, object) == LaneMotion::kHeld) return false;
@@ -42,11 +26,9 @@ bool LaneEngine::may_split(int slot) const {
   return true;
 }
 
-/// Whole parts of the step that end before the first impact, of `left`, at least one; `left` if there is none.
+/// How many of the parts that are left come before the next impact.
 int LaneEngine::parts_to_impact(int slot, int left) {
   const StepSettings& settings = scene_->lanes.settings;
-  const double part = settings.dt / kParts;
-  const double time = part * left;
   const Vector3d gravity(settings.gravity[0], settings.gravity[1], settings.gravity[2]);
   double first = std::numeric_limits<double>::infinity();
   for (int object = 0; object < objects(); ++object) {
@@ -55,6 +37,7 @@ int LaneEngine::parts_to_impact(int slot, int left) {
     if (contacts.empty()) continue;
     const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
     const Vector3d v = row_at(state_.v, at), w = row_at(state_.w, at);
+    const double reach = scene_->lanes.bodies[static_cast<std::size_t>(object)].radius;
     for (const LaneContact& c : contacts) {
       const Vector3d normal = R * vector_of(c.normal);
       const Vector3d arm = R * vector_of(c.position);
@@ -67,23 +50,15 @@ int LaneEngine::parts_to_impact(int slot, int left) {
         speed -= normal.dot(row_at(state_.v, at_other) + row_at(state_.w, at_other).cross(other_arm));
         acceleration = 0.0;
       }
-      if (speed >= -settings.restitution_speed) continue;
-      if (-speed * settings.dt <
-          scene_->options.split_travel * scene_->lanes.bodies[static_cast<std::size_t>(object)].radius)
-        continue;
-      const auto gap = static_cast<double>(c.gap);
-      // What is jammed gets one impulse a step: many that are not settled would add energy.
-      if (gap < -scene_->options.touching_distance) continue;
-      first = std::min(first, gap > 0.0 ? time_to_close(gap, speed, acceleration) : 0.0);
+      first = std::min(first, split_time({static_cast<double>(c.gap), speed, acceleration, reach}, scene_->options));
     }
   }
-  if (first >= time) return left;
-  return std::max(1, static_cast<int>(first / part));
+  return parts_until(first, scene_->options.step, left);
 }
 
 void LaneEngine::set_share(int slot, int parts) {
   for (int object = 0; object < objects(); ++object)
-    state_.share[state_.at(object, slot)] = static_cast<Real>(parts) / static_cast<Real>(kParts);
+    state_.share[state_.at(object, slot)] = static_cast<Real>(parts) / static_cast<Real>(kStepParts);
 }
 
 /// How far each slot goes: to the next impact, or on through it, or to the end of the step.
@@ -134,10 +109,11 @@ void LaneEngine::give_back_pressed() {
 void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
   const auto count = static_cast<int>(wanted.size());
   going_.assign(wanted.begin(), wanted.end());
-  left_.assign(wanted.size(), kParts);
+  left_.assign(wanted.size(), kStepParts);
   taken_.resize(wanted.size());
+  const int most = most_splits(objects());
   for (int splits = 0;; ++splits) {
-    if (splits < kMostSplits) {
+    if (splits < most) {
       split(going_);
     } else {
       taken_ = left_;
@@ -150,7 +126,7 @@ void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
       left_[i] -= taken_[i];
       going_[i] = left_[i] > 0 ? 1 : 0;
       if (!going_[i]) {
-        set_share(slot, kParts);
+        set_share(slot, kStepParts);
         continue;
       }
       any = true;

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
 #include <set>
 #include <utility>
 
@@ -20,14 +19,6 @@ namespace {
 
 using geometry::BoxShape;
 
-/// The same method of a step: Bullet's stepper splits none.
-LockstepOptions whole_steps() {
-  LockstepOptions options;
-  options.split_travel = std::numeric_limits<double>::infinity();
-  return options;
-}
-std::unique_ptr<simulation::Simulator> whole_steps_of(const Scene& scene) { return lockstep_of(scene, whole_steps()); }
-
 /// How many starts fall in each class with both steppers, and in which they agree start by start.
 struct Shares {
   std::vector<int> bullet, lockstep;
@@ -40,7 +31,7 @@ Shares shares_of(const Scene& scene, int count) {
   request.stop.stop_at_rest = scene.stop_at_rest;
   request.actions = scene.actions;
   const auto bullet = run_all(*bullet_of(scene), starts, request);
-  const auto lockstep = run_all(*whole_steps_of(scene), starts, request);
+  const auto lockstep = run_all(*lockstep_of(scene), starts, request);
   const belief::ExclusiveOutcomes& classes = scene.exclusive_outcomes.front();
   Shares shares;
   shares.bullet.assign(classes.outcomes.size() + 1, 0);
@@ -62,6 +53,7 @@ void expect_same_distribution(const Scene& scene, int count, double least_same) 
   const int changed = count - shares.same;
   EXPECT_GE(shares.same, least_same * count) << scene.name;
   const double z = 3.8;  // six classes at most
+  testing::Test::RecordProperty(scene.name + "_same", std::to_string(shares.same));
   for (std::size_t k = 0; k < shares.bullet.size(); ++k) {
     testing::Test::RecordProperty(scene.name + "_" + std::to_string(k),
                                   std::to_string(shares.bullet[k]) + " / " + std::to_string(shares.lockstep[k]));
@@ -103,7 +95,7 @@ TEST(BulletAgreement, ReleasesOfTheSameSeedAreTheSame) {
   request.actions = scene.actions;
   request.stop.duration = 2.52;  // let go at 2.5 s
   const auto bullet = run_all(*bullet_of(scene), starts, request);
-  const auto lockstep = run_all(*whole_steps_of(scene), starts, request);
+  const auto lockstep = run_all(*lockstep_of(scene), starts, request);
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const belief::ObjectState& a = bullet[i].final().objects[0];
     const belief::ObjectState& b = lockstep[i].final().objects[0];
@@ -124,7 +116,7 @@ TEST(BulletAgreement, TrajectoriesTellTheSameStory) {
     request.stop.duration = scene.duration;
     request.sample_interval = 0.25;
     const auto bullet = run_all(*bullet_of(scene), starts, request);
-    const auto lockstep = run_all(*whole_steps_of(scene), starts, request);
+    const auto lockstep = run_all(*lockstep_of(scene), starts, request);
     int same_end = 0, same_pairs = 0, same_final = 0, near_in_time = 0;
     for (std::size_t i = 0; i < starts.size(); ++i) {
       const auto pairs_of = [](const belief::Trajectory& run) {
@@ -151,7 +143,7 @@ TEST(BulletAgreement, TrajectoriesTellTheSameStory) {
     EXPECT_GE(same_end, count - 1) << name;  // one in a thousand leans so that it rests here and not quite there
     EXPECT_GE(same_pairs, count * 9 / 10) << name;
     EXPECT_GE(same_final, count * 9 / 10) << name;
-    EXPECT_GE(near_in_time, count * 3 / 4) << name;
+    EXPECT_GE(near_in_time, count * 2 / 3) << name;  // how long something rocks is chaotic
   }
 }
 
@@ -188,7 +180,7 @@ StepErrors compare_steps(const belief::CollisionShape& shape, const belief::Coll
     add_object(scene, second, "second");
   }
   auto bullet = bullet_of(scene)->make_instance({}, core::RandomStream(1, core::Purpose::kTest));
-  auto lockstep = lockstep_instance_of(scene, whole_steps());
+  auto lockstep = lockstep_instance_of(scene);
   core::RandomStream stream(17, core::Purpose::kTest);
   StepErrors result;
   const auto velocity_of_mass = [](const belief::ObjectState& o) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Impacts of what turns and falls fast do not depend on where in a step they are.
+// Impacts of what turns and falls fast do not depend on where in a step they are. Of both steppers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,16 +34,36 @@ std::vector<WorldState> thrown(const Scene& scene, int count, double height, dou
   return starts;
 }
 
-std::vector<belief::Trajectory> runs_at(const Scene& scene, const std::vector<WorldState>& starts, double step,
-                                        double duration) {
-  LockstepOptions options;
-  options.step = step;
-  simulation::RunRequest request;
-  request.stop.duration = duration;
-  return run_all(*lockstep_of(scene, options), starts, request);
+std::unique_ptr<simulation::Simulator> of_lockstep(const Scene& scene, const simulation::MechanicsOptions& options) {
+  return lockstep_of(scene, LockstepOptions{options});
+}
+std::unique_ptr<simulation::Simulator> of_bullet(const Scene& scene, const simulation::MechanicsOptions& options) {
+  simulation::ShapeStore shapes(simulation::hacd_decomposer());
+  auto simulator = simulation::make_bullet_simulator(scene, shapes, simulation::BulletOptions{options});
+  PRESCENE_CHECK(simulator.ok());
+  return *std::move(simulator);
 }
 
-TEST(LockstepImpacts, OfATurningBodyAreThoseOfAFinerStep) {
+struct AnyStepper {
+  const char* name;
+  std::unique_ptr<simulation::Simulator> (*make)(const Scene& scene, const simulation::MechanicsOptions& options);
+  int throws;  ///< As many as take seconds.
+};
+void PrintTo(const AnyStepper& stepper, std::ostream* out) { *out << stepper.name; }
+
+class Impacts : public testing::TestWithParam<AnyStepper> {
+ protected:
+  static std::vector<belief::Trajectory> runs_at(const Scene& scene, const std::vector<WorldState>& starts, double step,
+                                                 double duration) {
+    simulation::MechanicsOptions options;
+    options.step = step;
+    simulation::RunRequest request;
+    request.stop.duration = duration;
+    return run_all(*GetParam().make(scene, options), starts, request, 2);
+  }
+};
+
+TEST_P(Impacts, OfATurningBodyAreThoseOfAFinerStep) {
   // From 0.3 m for 0.27 s: through the first impact, and often a second one.
   const Scene scene = die_of(0.5);
   const std::vector<WorldState> starts = thrown(scene, 300, 0.3, 15.0);
@@ -72,26 +92,30 @@ double share_of_square_faces(const std::vector<belief::Trajectory>& runs) {
   return square / static_cast<double>(runs.size());
 }
 
-TEST(LockstepImpacts, HalvingTheStepOfDiceShiftsNoShare) {
-  constexpr int kCount = 1000;
+TEST_P(Impacts, HalvingTheStepOfDiceShiftsNoShare) {
+  const int count = GetParam().throws;
   for (const double ratio : {0.5, 0.8, 1.4}) {
     const Scene scene = die_of(ratio);
-    const std::vector<WorldState> starts = thrown(scene, kCount, 0.8, 3.0);
+    const std::vector<WorldState> starts = thrown(scene, count, 0.8, 3.0);
     const double plain = share_of_square_faces(runs_at(scene, starts, 1.0 / 240.0, 8.0));
     const double half = share_of_square_faces(runs_at(scene, starts, 1.0 / 480.0, 8.0));
     // Chaotic: as of independent starts. False alarms: one in 1,000 of them.
-    EXPECT_NEAR(plain, half, 3.3 * std::sqrt(2.0 * half * (1.0 - half) / kCount)) << ratio;
+    EXPECT_NEAR(plain, half, 3.3 * std::sqrt(2.0 * half * (1.0 - half) / count)) << ratio;
   }
 }
 
-TEST(LockstepImpacts, SharesOfAFlatDieAreThoseOfAFinerStep) {
-  constexpr int kCount = 2500;
+TEST_P(Impacts, SharesOfAFlatDieAreThoseOfAFinerStep) {
+  const int count = 5 * GetParam().throws / 2;
   const Scene scene = die_of(0.5);
-  const std::vector<WorldState> starts = thrown(scene, kCount, 0.8, 3.0);
+  const std::vector<WorldState> starts = thrown(scene, count, 0.8, 3.0);
   const double plain = share_of_square_faces(runs_at(scene, starts, 1.0 / 240.0, 8.0));
   const double fine = share_of_square_faces(runs_at(scene, starts, 1.0 / 960.0, 8.0));
-  EXPECT_NEAR(plain, fine, 3.3 * std::sqrt(2.0 * fine * (1.0 - fine) / kCount));
+  EXPECT_NEAR(plain, fine, 3.3 * std::sqrt(2.0 * fine * (1.0 - fine) / count));
 }
+
+INSTANTIATE_TEST_SUITE_P(
+    Steppers, Impacts, testing::Values(AnyStepper{"lockstep", of_lockstep, 1000}, AnyStepper{"bullet", of_bullet, 200}),
+    [](const testing::TestParamInfo<AnyStepper>& stepper) { return std::string(stepper.param.name); });
 
 }  // namespace
 }  // namespace prescene::tests

@@ -23,10 +23,6 @@ namespace prescene::simulation {
 struct LockstepOptions : MechanicsOptions {
   /// As in BulletOptions, but >= 1e-7: impulses are single precision.
   double solver_accuracy = 2e-6;
-  /// A step in which something hits is split there, if the two close by at least this share of the object's farthest
-  /// point in a whole step; >= 0. With 0 all impacts are split, with infinity none. Slow ones matter for what rocks: a
-  /// bottle on its rim comes to stand too often where they are not split (docs/studies/uncertain_physics.md).
-  double split_travel = 0.0005;
   /// Instances that a thread has under way at once, in [1, 1024]. More fill the vectors better; memory grows by
   /// 4.5 KiB each with one object, 10 with two that are pushed.
   int live_instances = 256;

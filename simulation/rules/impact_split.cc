@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/simulation/rules/impact_split.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace prescene::simulation {
+namespace {
+
+constexpr int kMostSplits = 16;
+constexpr int kMostSplitObjects = 64;  ///< Objects times splits, of a step.
+
+}  // namespace
+
+double split_time(const Approach& approach, const MechanicsOptions& options) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  const double speed = approach.speed, gap = approach.gap;
+  if (speed >= -options.restitution_speed) return kNever;
+  if (-speed * options.step < kSplitTravel * approach.reach) return kNever;
+  if (gap < -options.touching_distance) return kNever;
+  if (gap <= 0.0) return 0.0;
+  // gap + speed t + acceleration t^2 / 2 = 0
+  const double discriminant = speed * speed - 2.0 * approach.acceleration * gap;
+  return discriminant > 0.0 ? 2.0 * gap / (std::sqrt(discriminant) - speed) : kNever;
+}
+
+int parts_until(double time, double step, int left) {
+  const double part = step / kStepParts;
+  if (time >= part * left) return left;
+  return std::clamp(static_cast<int>(time / part), 1, left);
+}
+
+int most_splits(int objects) { return std::min(kMostSplits, kMostSplitObjects / std::max(1, objects)); }
+
+}  // namespace prescene::simulation

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where every stepper splits a step: at impacts. A body that turns by a third of a radian in a step hits with another
+// corner, at another time and about another arm than the one it has when the step begins; and where it hits with two
+// corners, the second one hits with the speed that the first one gave it. Errors of both kinds are as large as the step
+// is long. So a step goes on to the first impact, without it; then follows a part that is hardly longer than the impact
+// itself, for which all contacts are found anew; then what is left, in the same way. Impacts become as exact as in
+// steps of that part's length, and flights, slides and rest keep theirs.
+//
+//   int left = kStepParts;
+//   for (int splits = 0; left > 0; ++splits) {
+//     double first = split_time({.gap = 1e-4, .speed = -0.5, .acceleration = -9.8, .reach = 0.06}, options);
+//     left -= splits < most_splits(1) ? parts_until(first, options.step, left) : left;
+//   }
+//
+// Nothing is split while something is moved by other than contacts: that goes from the begin of a step to its end.
+#pragma once
+
+#include "prescene/simulation/rules/mechanics_options.h"
+
+namespace prescene::simulation {
+
+/// Of a step: an impact takes one.
+inline constexpr int kStepParts = 64;
+/// Impacts split a step if the two close, in a whole step, by at least this share of the object's farthest point. Slow
+/// ones matter for what rocks: with 0.02, a bottle on its rim comes to stand too often
+/// (docs/studies/uncertain_physics.md).
+inline constexpr double kSplitTravel = 0.0005;
+
+/// A contact that may close within a step.
+struct Approach {
+  double gap = 0.0;           ///< m; negative where the two overlap.
+  double speed = 0.0;         ///< m/s along the normal, before the step's gravity; negative while it closes.
+  double acceleration = 0.0;  ///< m/s^2 along the normal: by what the two fall differently.
+  double reach = 0.0;         ///< m: of the object's farthest point from its frame.
+};
+
+/// When the contact closes, s from now on, if that splits the step; else infinity. Contacts that are slower than
+/// `restitution_speed` do not hit. What overlaps by more than `touching_distance` is jammed and gets one impulse a
+/// step: many that are not settled would add energy.
+double split_time(const Approach& approach, const MechanicsOptions& options);
+
+/// Whole parts of a step of `step` seconds that end before the first impact at `time`, at least one; `left`, those that
+/// are not yet taken, if it comes after them.
+int parts_until(double time, double step, int left);
+
+/// Most splits of a step in which so many objects move freely; then what is left is taken at once, so that none takes
+/// for ever. 16 for four objects or fewer. In a heap something hits in every step, and each split costs as much as a
+/// step of all of it: there are 64 / objects, and none beyond 64 objects.
+int most_splits(int objects);
+
+}  // namespace prescene::simulation

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where steps are split, by hand: steps of 1/64 s, so that a part is 1/4096 s.
+#include "prescene/simulation/rules/impact_split.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace prescene::simulation {
+namespace {
+
+constexpr double kStep = 1.0 / 64.0;
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+MechanicsOptions options_of_step() {
+  MechanicsOptions options;
+  options.step = kStep;
+  return options;
+}
+
+TEST(ImpactSplit, IsWhenTheGapCloses) {
+  const MechanicsOptions options = options_of_step();
+  EXPECT_DOUBLE_EQ(split_time({.gap = 0.01, .speed = -2.0, .acceleration = 0.0, .reach = 0.1}, options), 0.005);
+  // From rest it would take sqrt(2 h / g); thrown down at 3 m/s from 2 m: t = (sqrt(9 + 40) - 3) / 10.
+  EXPECT_DOUBLE_EQ(split_time({.gap = 2.0, .speed = -3.0, .acceleration = -10.0, .reach = 0.1}, options), 0.4);
+  EXPECT_EQ(split_time({.gap = 0.0, .speed = -2.0, .acceleration = 0.0, .reach = 0.1}, options), 0.0);
+  EXPECT_EQ(split_time({.gap = -1e-4, .speed = -2.0, .acceleration = 0.0, .reach = 0.1}, options), 0.0);
+  // It turns back before it arrives.
+  EXPECT_EQ(split_time({.gap = 0.1, .speed = -0.5, .acceleration = 10.0, .reach = 0.1}, options), kNever);
+}
+
+TEST(ImpactSplit, LeavesAloneWhatDoesNotHit) {
+  const MechanicsOptions options = options_of_step();
+  EXPECT_EQ(split_time({.gap = 1e-4, .speed = 1.0, .acceleration = -10.0, .reach = 0.1}, options), kNever);
+  EXPECT_EQ(split_time({.gap = 1e-4, .speed = -0.99 * options.restitution_speed, .reach = 1e-3}, options), kNever);
+  EXPECT_NE(split_time({.gap = 1e-4, .speed = -1.01 * options.restitution_speed, .reach = 1e-3}, options), kNever);
+  // Slow for its size.
+  const double slowest = kSplitTravel * 5.0 / kStep;
+  ASSERT_GT(slowest, options.restitution_speed);
+  EXPECT_EQ(split_time({.gap = 1e-4, .speed = -0.99 * slowest, .reach = 5.0}, options), kNever);
+  EXPECT_NE(split_time({.gap = 1e-4, .speed = -1.01 * slowest, .reach = 5.0}, options), kNever);
+  // Jammed.
+  EXPECT_EQ(split_time({.gap = -1.01 * options.touching_distance, .speed = -2.0, .reach = 0.1}, options), kNever);
+}
+
+TEST(ImpactSplit, PartsEndBeforeTheImpactAndGoOn) {
+  const double part = kStep / kStepParts;
+  EXPECT_EQ(parts_until(kNever, kStep, kStepParts), kStepParts);
+  EXPECT_EQ(parts_until(kStep, kStep, kStepParts), kStepParts);
+  EXPECT_EQ(parts_until(10.5 * part, kStep, kStepParts), 10);
+  EXPECT_EQ(parts_until(0.5 * part, kStep, kStepParts), 1);
+  EXPECT_EQ(parts_until(0.0, kStep, 7), 1);
+  EXPECT_EQ(parts_until(0.0, kStep, 1), 1);
+  EXPECT_EQ(parts_until(6.5 * part, kStep, 7), 6);
+  EXPECT_EQ(parts_until(7.5 * part, kStep, 7), 7);
+}
+
+TEST(ImpactSplit, BoundsTheWorkOfAStep) {
+  EXPECT_EQ(most_splits(0), 16);
+  EXPECT_EQ(most_splits(4), 16);
+  EXPECT_EQ(most_splits(64), 1);
+  EXPECT_EQ(most_splits(65), 0);
+  for (int objects = 1; objects < 200; ++objects) {
+    EXPECT_LE(objects * most_splits(objects), 64);
+    EXPECT_LE(most_splits(objects + 1), most_splits(objects));
+  }
+}
+
+}  // namespace
+}  // namespace prescene::simulation
