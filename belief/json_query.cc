@@ -8,6 +8,7 @@
 
 #include "json_achieve.h"
 #include "json_motion.h"
+#include "json_relations.h"
 #include "json_values.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
@@ -167,9 +168,11 @@ struct QueryJson {
     json["effort"] = effort_json(achieve.effort);
     return json;
   }
+  Json operator()(const RelationsQuery& relations) const { return relations_json(relations); }
+  Json operator()(const TimelineQuery& timeline) const { return timeline_question_json(timeline); }
 };
 
-const std::vector<std::string> kTasks{"where", "predict", "stability", "view", "achieve"};
+const std::vector<std::string> kTasks{"where", "predict", "stability", "view", "achieve", "relations", "timeline"};
 
 PredictQuery predict_from(JsonObject& fields) {
   PredictQuery predict;
@@ -286,6 +289,8 @@ struct AnswerJson {
             {"failed_instances", view.failed_instances}, {"remarks", view.remarks}};
   }
   Json operator()(const AchieveAnswer& achieve) const { return achieve_answer_json(achieve); }
+  Json operator()(const RelationsAnswer& relations) const { return relations_answer_json(relations); }
+  Json operator()(const TimelineAnswer& timeline) const { return timeline_answer_json(timeline); }
 };
 
 }  // namespace
@@ -314,6 +319,8 @@ core::Result<Query> query_from_json(std::string_view text) {
       if (what->first == "stability") query.what = stability_from(fields);
       if (what->first == "view") query.what = view_from(fields);
       if (what->first == "achieve") query.what = achieve_query_from(fields);
+      if (what->first == "relations") query.what = relations_from(fields);
+      if (what->first == "timeline") query.what = timeline_question_from(fields);
     }
   }
   if (!errors.ok()) return errors.status();

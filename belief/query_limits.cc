@@ -74,6 +74,28 @@ struct QueryCheck {
     return check_number(view.time, kViewTimes).at("time");
   }
   Status operator()(const AchieveQuery& achieve) const;
+  Status operator()(const RelationsQuery& relations) const {
+    if (relations.object) PRESCENE_RETURN_IF_ERROR(check_text(*relations.object, kLongestName, "object: the name"));
+    if (relations.draws < kFewestRelationDraws || relations.draws > kMostRelationDraws)
+      return core::invalid_input("draws: " + std::to_string(relations.draws) + " is out of range: give " +
+                                 std::to_string(kFewestRelationDraws) + " to " + std::to_string(kMostRelationDraws));
+    PRESCENE_RETURN_IF_ERROR(check_number(relations.confidence, kConfidences).at("confidence"));
+    PRESCENE_RETURN_IF_ERROR(check_number(relations.upright_within, kTurns).at("upright_within"));
+    if (!relations.reach) return {};
+    PRESCENE_RETURN_IF_ERROR(check_text(relations.reach->of, kLongestName, "reach.of: the name"));
+    if (!relations.reach->point_W.allFinite() || relations.reach->point_W.cwiseAbs().maxCoeff() > kLengthRange.high)
+      return core::invalid_input("reach.of: a point out of range: " + std::string(kLengthRange.remedy));
+    return check_number(relations.reach->radius, kReaches).at("reach.radius");
+  }
+  Status operator()(const TimelineQuery& timeline) const {
+    for (const auto& pattern : {timeline.first, timeline.second}) {
+      if (!pattern) continue;
+      PRESCENE_RETURN_IF_ERROR(check_text(pattern->subject, kLongestName, "a subject's name"));
+      PRESCENE_RETURN_IF_ERROR(check_text(pattern->other, kLongestName, "another thing's name"));
+    }
+    if (timeline.second && !timeline.first) return core::invalid_input("second: it needs a first");
+    return check_count(timeline.relations.size(), allen_words().size(), "relations between intervals");
+  }
 };
 
 /// Both ends of a range, or neither; not empty.

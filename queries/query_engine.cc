@@ -11,6 +11,8 @@
 #include "predict.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
+#include "prescene/queries/relation_history.h"
+#include "prescene/queries/relations.h"
 #include "stability.h"
 #include "view.h"
 #include "where.h"
@@ -46,10 +48,10 @@ auto within_time(const belief::Effort& effort, const QueryContext& context, cons
   return task(limited);
 }
 
-/// `make_prior` is called for what needs one; `known` is the belief or the scene.
-template <class Known, class MakePrior>
+/// `make_prior` is called for what needs one, `ask_relations` for relations; `known` is the belief or the scene.
+template <class Known, class MakePrior, class AskRelations>
 void dispatch(const Known& known, const belief::Query& query, const QueryContext& context, const MakePrior& make_prior,
-              belief::Answer& answer) {
+              const AskRelations& ask_relations, belief::Answer& answer) {
   PRESCENE_CHECK(context.pool != nullptr);
   answer.id = query.id;
   if (const core::Status asked = belief::validate(query); !asked.ok()) return put<belief::WhereAnswer>(asked, answer);
@@ -70,6 +72,10 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
           put(within_time(what.effort, context,
                           [&](const QueryContext& limited) { return achieve(make_prior(), what, limited); }),
               answer);
+        else if constexpr (std::is_same_v<Asked, belief::RelationsQuery>)
+          put(ask_relations(what), answer);
+        else if constexpr (std::is_same_v<Asked, belief::TimelineQuery>)
+          put(observed(known, what, context), answer);
         else
           put(view(make_prior(), what, context), answer);
       },
@@ -83,7 +89,8 @@ belief::Answer answer(const belief::Belief& snapshot, const belief::Query& query
   belief::Answer result;
   result.step = snapshot.step;
   dispatch(
-      snapshot, query, context, [&] { return prior_of(snapshot); }, result);
+      snapshot, query, context, [&] { return prior_of(snapshot); },
+      [&](const belief::RelationsQuery& asked) { return relations(snapshot, asked, context); }, result);
   return result;
 }
 
@@ -92,7 +99,8 @@ belief::Answer answer(std::shared_ptr<const belief::Scene> scene, std::uint64_t 
   PRESCENE_CHECK(scene != nullptr);
   belief::Answer result;
   dispatch(
-      *scene, query, context, [&] { return prior_of(scene, seed); }, result);
+      *scene, query, context, [&] { return prior_of(scene, seed); },
+      [&](const belief::RelationsQuery& asked) { return relations(scene, seed, asked, context); }, result);
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include "achieve_options.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
+#include "relations_options.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -89,6 +90,8 @@ std::string short_form(const nlohmann::ordered_json& answer) {
            stability_detail_text(*stability) + basis(*stability);
   }
   if (const auto achieve = answer.find("achieve"); achieve != answer.end()) return achieve_text(*achieve);
+  if (const auto relations = answer.find("relations"); relations != answer.end()) return relations_text(*relations);
+  if (const auto timeline = answer.find("timeline"); timeline != answer.end()) return timeline_text(*timeline);
   if (const auto predict = answer.find("predict"); predict != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"outcome", "group", "probability"}};
     for (const auto& outcome : predict->at("outcomes")) {

@@ -6,8 +6,11 @@
 #include "achieve_options.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/service/backends.h"
 #include "prescene/service/live/question_client.h"
+#include "prescene/service/load_scene.h"
 #include "prescene/service/outside_json.h"
+#include "relations_options.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -21,6 +24,10 @@ struct AskOptions {
   bool margin = false;
   bool removal = false;
   AchieveOptions achieve;
+  TimelineOptions timeline;
+  std::string asked_of;  // --object
+  std::string reach;
+  std::string scene;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
 };
@@ -38,6 +45,20 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     return core::invalid_input("--action, --free and what goes with them are of 'ask achieve': leave them out");
   if (options.kind != "stability" && (options.margin || options.removal))
     return core::invalid_input("--margin and --removal are of 'ask stability': leave them out");
+  if (options.kind != "timeline" && !(options.timeline == TimelineOptions{}))
+    return core::invalid_input("--first, --second and --relation are of 'ask timeline': leave them out");
+  if (options.kind != "relations" && !(options.reach.empty() && options.asked_of.empty()))
+    return core::invalid_input("--reach and --object are of 'ask relations': leave them out");
+  if (options.kind == "relations") {
+    if (!options.object.empty() && !options.asked_of.empty())
+      return core::invalid_input("'" + options.object + "' and --object are two objects: leave one of them out");
+    return relations_question(options.object.empty() ? options.asked_of : options.object, options.reach);
+  }
+  if (options.kind == "timeline") {
+    if (!options.object.empty())
+      return core::invalid_input("ask timeline takes no object: give --first '" + options.object + " ...'");
+    return timeline_question(options.timeline);
+  }
   const auto needs_object = [&]() -> core::Status {
     return options.object.empty() ? core::invalid_input("ask " + options.kind + " OBJECT: name the object")
                                   : core::ok_status();
@@ -64,11 +85,30 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     if (achieve.outcome.empty()) return core::invalid_input("ask achieve OUTCOME: name the outcome that is wanted");
     return achieve_question(achieve);
   }
-  return core::invalid_input("ask where | stability OBJECT | release OBJECT | achieve OUTCOME, or --question JSON");
+  return core::invalid_input(
+      "ask where | relations | timeline | stability OBJECT | release OBJECT | achieve OUTCOME, or --question JSON");
+}
+
+/// Of a scene file, of which nothing has been seen.
+core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& question, VerbContext& context) {
+  for (const char* name : {"--domain", "--ros-distro", "--timeout"})
+    if (options.verb->count(name) > 0)
+      return core::invalid_input(std::string(name) + " is for asking a `serve`: leave it out, or --scene");
+  PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));
+  PRESCENE_TRY(const belief::Query query, belief::query_from_json(belief::json_text(question)));
+  Backends backends(context.pool());
+  queries::QueryContext asked = backends.query_context(context.pool());
+  asked.cancellation = asked.abandoned = &context.cancellation();
+  const belief::Answer answer = queries::answer(scene, context.options().seed, query, asked);
+  PRESCENE_RETURN_IF_ERROR(answer.error);
+  const nlohmann::ordered_json document = belief::to_json(answer);
+  context.print(document, answer_text(document));
+  return core::ok_status();
 }
 
 core::Status run(AskOptions& options, VerbContext& context) {
   PRESCENE_TRY(const auto question, question_of(options));
+  if (!options.scene.empty()) return ask_scene(options, question, context);
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
   PRESCENE_TRY(const std::string text,
@@ -85,14 +125,17 @@ core::Status run(AskOptions& options, VerbContext& context) {
 
 Verb add_ask_verb(CLI::App& app) {
   auto* verb =
-      app.add_subcommand("ask", "Ask a running `serve`: where | stability OBJECT | release OBJECT | achieve OUTCOME");
+      app.add_subcommand("ask",
+                         "Ask a running `serve`, or a scene file: where | relations | timeline | stability OBJECT | "
+                         "release OBJECT | achieve OUTCOME");
   auto options = std::make_shared<AskOptions>();
   verb->add_option("KIND", options->kind,
-                   "where: poses and confidence; stability: does it stay; release: what if it is let go; "
-                   "achieve: how must it be done")
+                   "where: poses and confidence; relations: what is on, in, held by what; timeline: what was when; "
+                   "stability: does it stay; release: what if it is let go; achieve: how must it be done")
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
       ->check(utf8_text());
+  verb->add_option("--object", options->asked_of, "Of relations: the object, instead of OBJECT")->check(utf8_text());
   verb->add_option("--question", options->json, "Any question as JSON (docs/reference/queries.md) instead")
       ->check(utf8_text());
   verb->add_option(
@@ -103,9 +146,18 @@ Verb add_ask_verb(CLI::App& app) {
                  "Of stability: also how hard a knock makes it fall, and in which direction");
   verb->add_flag("--removal", options->removal, "Of stability: also whether the others stay where it is taken away");
   add_achieve_options(*verb, options->achieve);
+  verb->add_option("--reach", options->reach,
+                   "Of relations: also what is within reach of a point or robot body, as 0.4,0,0.9:0.8 or hand:0.8 (m)")
+      ->check(utf8_text());
+  add_timeline_options(*verb, options->timeline);
+  verb->add_option("--scene", options->scene, "Ask of this scene file instead of a running `serve`")
+      ->check(file_name());
   options->verb = verb;
   add_domain_option(*verb, options->dds);
-  verb->footer("Example: prescene ask stability carton");
+  verb->footer(
+      "Examples: prescene ask stability carton\n"
+      "          prescene ask relations mug\n"
+      "          prescene ask timeline --first 'touches carton mug' --relation before --second 'falls carton'");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 

@@ -11,6 +11,7 @@
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/scene_files/learned_file.h"
+#include "prescene/queries/relation_history.h"
 #include "prescene/service/live/bus_replay.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/outside_json.h"
@@ -20,6 +21,7 @@
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/training/proposals_file.h"
+#include "relations_options.h"
 #include "replay_text.h"
 #include "verb.h"
 
@@ -40,6 +42,8 @@ struct ReplayOptions {
   BusReplayOptions bus;
   RecordingReadOptions read;
   std::vector<std::string> questions;
+  std::string timeline_file;
+  TimelineOptions timeline;
   double depth_scale = 0.001;
   double frame_rate = 30.0;
   TrackerSettings tracker;
@@ -183,6 +187,52 @@ core::Status keep_learned(const ReplayOptions& options, const Tracker& tracker, 
   return core::ok_status();
 }
 
+/// The history of relations of what is replayed; everything of it, whatever its length.
+class ReplayTimeline {
+ public:
+  /// Does nothing unless the options ask for it.
+  ReplayTimeline(const ReplayOptions& options, Backends& backends)
+      : options_(options), is_asked_(!options.timeline_file.empty() || !(options.timeline == TimelineOptions{})) {
+    if (is_asked_) context_ = backends.query_context(backends.pool());
+  }
+  void add(const belief::Belief& belief) {
+    if (is_asked_) static_cast<void>(history_.add(belief, context_));  // the history counts what can't be judged
+    if (is_asked_) last_ = belief.scene;
+  }
+  /// Answers the question of the options, and writes the file.
+  core::Status finish(VerbContext& context) {
+    if (!is_asked_) return core::ok_status();
+    if (!last_) return core::not_found("--timeline: there was no frame");
+    PRESCENE_TRY(const ordered_json question, timeline_question(options_.timeline));
+    PRESCENE_TRY(const belief::Query query, belief::query_from_json(belief::json_text(question)));
+    context_.timeline = [this] { return history_.timeline(); };
+    PRESCENE_TRY(const belief::TimelineAnswer answer,
+                 queries::observed(*last_, std::get<belief::TimelineQuery>(query.what), context_));
+    belief::Answer told;
+    told.what = answer;
+    document_ = belief::to_json(told).at("timeline");
+    if (options_.timeline_file.empty()) return core::ok_status();
+    told.what = belief::match(*history_.timeline(), {});
+    const std::string text = belief::json_text(belief::to_json(told).at("timeline"), 2) + "\n";
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(options_.timeline_file, std::string_view(text)));
+    core::log(context.log(), core::LogLevel::kInfo, "timeline written to " + options_.timeline_file);
+    return core::ok_status();
+  }
+  const ordered_json& json() const { return document_; }
+  /// Of what was asked; the file alone says nothing here.
+  std::string text() const {
+    return document_.is_null() || options_.timeline == TimelineOptions{} ? "" : timeline_text(document_);
+  }
+
+ private:
+  const ReplayOptions& options_;
+  bool is_asked_;
+  queries::QueryContext context_;
+  std::shared_ptr<const belief::Scene> last_;
+  ordered_json document_;
+  queries::RelationHistory history_{{.seconds = 1e9, .most_intervals = 100'000}};
+};
+
 core::Status run_here(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
   PRESCENE_TRY(TrackerSettings settings, settings_of(options, input));
@@ -200,6 +250,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   TrackingScore score(input.scene());
   SupportScore supports;
   FinalStates states;
+  ReplayTimeline timeline(options, backends);
   SessionReport report(input.scene(), settings, backends);
   report.set_proposals(options.proposals);
   ordered_json steps = ordered_json::array();
@@ -209,6 +260,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     if (!first_ns) first_ns = summary.stamp_ns;
     score.add(summary);
     states.add(summary);
+    timeline.add(*at.belief());
     if (!options.report.empty()) {
       report.set_scene(at.belief()->scene);
       report.add(summary);
@@ -242,6 +294,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   context.end_progress();
   if (!summary) return summary.status();
   PRESCENE_RETURN_IF_ERROR(keep_learned(options, *tracker, context));
+  PRESCENE_RETURN_IF_ERROR(timeline.finish(context));
   add_errors(score, steps);
   report.set_supports(supports);
   const std::vector<ObjectTrackingScore> rows = score.rows();
@@ -276,6 +329,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"objects", states.json()},
        {"tracking", tracking_json(rows)},
        {"supports", support_rows},
+       {"timeline", timeline.json()},
        {"steps", steps}},
       std::to_string(summary->steps) + " steps from " + std::to_string(summary->messages) + " messages, " +
           std::to_string(summary->skipped) + " frames skipped\n" +
@@ -283,7 +337,8 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
           (summary->followed_step_records ? std::to_string(summary->compared - summary->different) + " of " +
                                                 std::to_string(summary->compared) + " steps have the recorded bits\n"
                                           : "") +
-          states.text() + tracking_text(rows) + supports_text(supports.rows()) + warnings_text(*summary));
+          states.text() + tracking_text(rows) + supports_text(supports.rows()) + timeline.text() +
+          warnings_text(*summary));
   if (summary->cancelled) return core::cancelled("stopped on request; what was done is printed");
   if (summary->different > 0) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
@@ -302,6 +357,10 @@ core::Status check_options(const ReplayOptions& options) {
       if (given(name))
         return core::invalid_input(std::string(name) + " is for --over-dds: leave it out, or give that too");
   } else {
+    for (const char* name : {"--timeline", "--first", "--second", "--relation"})
+      if (given(name))
+        return core::invalid_input(std::string(name) +
+                                   " goes without --over-dds: with it, ask the `serve` that tracks");
     for (const char* name : {"--learned", "--new-objects"})
       if (given(name))
         return core::invalid_input(std::string(name) + " goes without --over-dds: give it to the `serve` that tracks");
@@ -352,6 +411,10 @@ Verb add_replay_verb(CLI::App& app) {
       ->check(number_between(0.0, 1e9));
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
       ->check(file_name());
+  verb->add_option("--timeline", options->timeline_file,
+                   "Write when which relations held (on, in, touches, moves, falls, ...) as JSON")
+      ->check(file_name());
+  add_timeline_options(*verb, options->timeline);
   add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->bus.dds, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
@@ -367,7 +430,12 @@ Verb add_replay_verb(CLI::App& app) {
         PRESCENE_RETURN_IF_ERROR(check_options(*options));
         if (options->over_dds) PRESCENE_RETURN_IF_ERROR(take_domain(*options->verb, options->bus.dds));
         PRESCENE_RETURN_IF_ERROR(check_output("--report", options->report, {options->input, options->scene}));
+        PRESCENE_RETURN_IF_ERROR(check_output("--timeline", options->timeline_file, {options->input, options->scene}));
         PRESCENE_RETURN_IF_ERROR(check_apart("--learned", options->learned, "--report", options->report));
+        for (const auto& [name, file] :
+             {std::pair("--learned", options->learned), std::pair("--report", options->report)})
+          PRESCENE_RETURN_IF_ERROR(check_apart("--timeline", options->timeline_file, name, file));
+        PRESCENE_RETURN_IF_ERROR(timeline_question(options->timeline).status());
         PRESCENE_RETURN_IF_ERROR(take_learned(options->learned, {options->input, options->scene}, options->tracker));
         PRESCENE_RETURN_IF_ERROR(validate(options->tracker.topics));
         return options->over_dds ? run_over_dds(*options, context) : run_here(*options, context);

@@ -171,11 +171,13 @@ struct LiveService::Impl {
 
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
+  std::unique_ptr<HistoryKeeper> history;
   std::unique_ptr<QueryWorker> worker;
 
   ~Impl() {
     if (node) node->stop_receiving();  // no more questions for the worker,
     worker.reset();                    // no more answers for the bus
+    history.reset();
   }
 };
 
@@ -201,9 +203,11 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
     if (raw->settings.on_answer) raw->settings.on_answer(answer);
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
+  impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
+  impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
   impl->worker = std::make_unique<QueryWorker>(
-      backends, std::max(1, backends.pool().threads() - 1), settings.worker, [raw] { return raw->tracker->belief(); },
-      on_answer);
+      backends, std::max(1, backends.pool().threads() - 1), impl->settings.worker,
+      [raw] { return raw->tracker->belief(); }, on_answer);
   PRESCENE_RETURN_IF_ERROR(impl->join_bus());
   return std::unique_ptr<LiveService>(new LiveService(std::move(impl)));
 }
@@ -373,6 +377,7 @@ void LiveService::Impl::look_after_frames() {
       if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
       note_idle(step->idle_controls);
       publish();
+      history->note(tracker->belief());
       if (settings.on_step) settings.on_step(*step, tracker->belief());
     }
   } catch (const std::exception& error) {

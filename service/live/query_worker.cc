@@ -159,7 +159,9 @@ void QueryWorker::read(const std::string& question_json) {
                                                  " bytes: make it shorter"));
     auto read = belief::query_from_json(question_json);
     if (!read) return refuse(id_of(question_json), read.status());
-    if (std::holds_alternative<belief::WhereQuery>(read->what)) return answer(*read);
+    if (std::holds_alternative<belief::WhereQuery>(read->what) ||
+        std::holds_alternative<belief::TimelineQuery>(read->what))
+      return answer(*read);
     id = read->id;
     bound_effort(*read, settings_);
     const auto query = std::make_shared<const belief::Query>(*std::move(read));
@@ -230,6 +232,7 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query) {
   context.cancellation = context.abandoned = &end;
   context.simulate_until = deadline_after(settings_.most_seconds);
   context.most_bytes = settings_.most_bytes;
+  context.timeline = settings_.timeline;
   const std::shared_ptr<const belief::Belief> belief = snapshot_();
   // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
   const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)

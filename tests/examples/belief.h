@@ -5,6 +5,7 @@
 #include <span>
 
 #include "prescene/belief/belief.h"
+#include "prescene/belief/observed_timeline.h"
 #include "prescene/belief/query_limits.h"
 
 namespace prescene::belief::given_belief::physical_belief_h {
@@ -12,6 +13,11 @@ extern const ObjectModel model;
 extern const ObjectBelief object;
 extern const std::span<const double> uniforms;
 }  // namespace prescene::belief::given_belief::physical_belief_h
+
+namespace prescene::belief::given_belief::observed_timeline_h {
+extern const ObservedTimeline timeline;
+extern const TimelineQuery question;
+}  // namespace prescene::belief::given_belief::observed_timeline_h
 
 namespace prescene::belief::given_belief::query_limits_h {
 extern const double value;

@@ -12,6 +12,8 @@
 #include "prescene/queries/explain.h"
 #include "prescene/queries/parameter_search.h"
 #include "prescene/queries/query_engine.h"
+#include "prescene/queries/relation_history.h"
+#include "prescene/queries/relations.h"
 
 namespace prescene::queries::given_queries {
 
@@ -25,6 +27,15 @@ extern const ExplainContext context;
 }  // namespace explain_h
 
 }  // namespace prescene::queries::given_queries
+
+namespace prescene::queries::given_queries::relations_h {
+extern const QueryContext context;
+}
+
+namespace prescene::queries::given_queries::relation_history_h {
+extern const QueryContext context;
+extern const belief::TimelineQuery question;
+}  // namespace prescene::queries::given_queries::relation_history_h
 
 namespace prescene::queries::given_queries::confidence_sequence_h {
 extern const int successes, draws;

@@ -44,7 +44,7 @@ std::string json_text(const nlohmann::ordered_json& document, int indent = -1);
 /// value could be neither copied nor printed without running out of stack. So are objects of more than 1024 keys, each
 /// of which is compared with all before it. For texts from outside.
 core::Result<nlohmann::ordered_json> parse_json(std::string_view text, std::size_t max_bytes = 16u << 20);
-/// {"id": "...", "where": {...}} or "predict", "stability", "view", "achieve".
+/// {"id": "...", "where": {...}} or "predict", "stability", "view", "achieve", "relations", "timeline".
 core::Result<Query> query_from_json(std::string_view text);
 /// {"position": [x, y, z], "rotation": {"quaternion_wxyz": [w, x, y, z]}}, or another form of rotation of scene files.
 /// The rotation is normalised; zero or not finite is an error.

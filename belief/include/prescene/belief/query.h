@@ -10,7 +10,9 @@
 #include "prescene/belief/achieve.h"
 #include "prescene/belief/belief.h"
 #include "prescene/belief/effort.h"
+#include "prescene/belief/observed_timeline.h"
 #include "prescene/belief/prediction.h"
+#include "prescene/belief/relations.h"
 #include "prescene/core/status.h"
 #include "prescene/geometry/image.h"
 
@@ -68,7 +70,7 @@ struct ViewQuery {
 
 struct Query {
   std::string id;  ///< Given back in the answer.
-  std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery> what;
+  std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery, RelationsQuery, TimelineQuery> what;
   friend bool operator==(const Query&, const Query&) = default;
 };
 
@@ -150,7 +152,9 @@ struct Answer {
   std::string id;
   std::uint64_t step = 0;  ///< Of the belief that was asked.
   core::Status error;      ///< Not ok: could not be answered, and why.
-  std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer, AchieveAnswer> what;
+  std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer, AchieveAnswer, RelationsAnswer,
+               TimelineAnswer>
+      what;
 
   friend bool operator==(const Answer&, const Answer&) = default;
 };

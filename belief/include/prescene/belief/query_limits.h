@@ -27,6 +27,10 @@ inline constexpr ScalarRange kMoves{1e-6, 1e3, "give metres between 1e-06 and 10
 inline constexpr ScalarRange kTurns{1e-6, 3.2, "give radians between 1e-06 and 3.2"};
 /// The same in degrees, for JSON.
 inline constexpr ScalarRange kTurnsDeg{6e-5, 183.0, "give degrees between 6e-05 and 183"};
+/// m, of RelationsQuery.
+inline constexpr ScalarRange kReaches{1e-3, 1e3, "give metres between 0.001 and 1000"};
+/// Of RelationsQuery: with fewer no interval says much.
+inline constexpr int kFewestRelationDraws = 16, kMostRelationDraws = 4096;
 inline constexpr ScalarRange kWantedProbabilities{0.5, 0.999, "give a probability between 0.5 and 0.999, like 0.95"};
 inline constexpr int kMostPaths = 1000;
 inline constexpr std::size_t kMostFree = 16;

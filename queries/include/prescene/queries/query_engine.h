@@ -7,9 +7,9 @@
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
 //   if (!answer.error.ok()) ...
 //
-// Five questions: where is everything (actual belief); what happens if (state anticipation); does it stay (stability);
-// what will the camera see (observation anticipation); how must it be done, so that an outcome comes about (state
-// explanation). docs/reference/queries.md says what the answers mean.
+// Five questions: where is everything, and how are things related, now and in what was observed (actual belief); what
+// happens if (state anticipation); does it stay (stability); what will the camera see (observation anticipation); how
+// must it be done, so that an outcome comes about (state explanation). docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>
@@ -52,6 +52,8 @@ struct QueryContext {
   std::optional<core::Cancellation::Clock::time_point> simulate_until;
   /// Memory that instances and their states may take, bytes: no more are run, and what needs more is refused.
   std::size_t most_bytes = std::size_t{16} << 30;
+  /// What was observed until now, of TimelineQuery; may be empty, or give null, where nothing was kept.
+  std::function<std::shared_ptr<const belief::ObservedTimeline>()> timeline;
   /// Called from the calling thread; may be empty.
   core::ProgressSink progress;
 };

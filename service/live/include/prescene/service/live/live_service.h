@@ -15,6 +15,7 @@
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/service/live/history_keeper.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/tracker.h"
@@ -24,7 +25,8 @@ namespace prescene::service {
 struct LiveSettings {
   TrackerSettings tracker;
   interfaces::DdsOptions dds;
-  QueryWorkerSettings worker;
+  QueryWorkerSettings worker;  ///< Its timeline is the service's own.
+  HistorySettings history;
   double marker_rate = 5.0;  ///< Markers a second, at most.
   double diagnostics_rate = 1.0;
   /// For who looks on, all optional: what they do delays the service, so that they only hand over. Called on the

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Answers questions that come in as JSON, from snapshots of the belief, on two threads of its own: one reads questions,
-// answers `where` and refuses what it must; the other answers what has to be simulated, one question after the other.
-// So `where` never waits for a simulation.
+// answers `where` and `timeline` and refuses what it must; the other answers what has to be simulated, one question
+// after the other. So `where` never waits for a simulation.
 #pragma once
 
 #include <atomic>
@@ -32,6 +32,8 @@ struct QueryWorkerSettings {
   double most_seconds = 10.0;    ///< Time that any question may take, and at most 2 s more.
   /// Memory that the instances of a question may take; what needs more is refused, or ends with fewer instances.
   std::size_t most_bytes = std::size_t{512} << 20;
+  /// Of belief::TimelineQuery, see queries::QueryContext; called on both threads.
+  std::function<std::shared_ptr<const belief::ObservedTimeline>()> timeline = {};
 };
 
 /// What became of the questions since the start. Each that was asked and neither waits nor is worked on counts as
