@@ -6,9 +6,11 @@
 #include <set>
 #include <utility>
 
+#include "chunk_index_store.h"
 #include "mcap_compression.h"
 #include "mcap_records.h"
 #include "prescene/core/check.h"
+#include "prescene/interfaces/bytes/background_sync.h"
 #include "prescene/interfaces/bytes/crc32.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
@@ -31,8 +33,11 @@ void add_time(std::uint64_t time, std::uint64_t count_before, std::uint64_t* sta
 }  // namespace
 
 struct McapWriter::Impl {
+  explicit Impl(const std::filesystem::path& path) : chunk_indexes(path) {}
+
   McapWriterOptions options;
   OutputFile file;
+  std::unique_ptr<BackgroundSync> sync;  ///< Null: none is asked for.
   std::uint64_t position = 0;
   std::uint32_t data_crc = 0;
   Status failure;  ///< Stays once a write has failed.
@@ -41,7 +46,7 @@ struct McapWriter::Impl {
   std::vector<McapChannel> channels;
   std::vector<records::Channel> channel_records;
   std::vector<records::Schema> schemas;
-  std::vector<records::ChunkIndex> chunk_indexes;
+  ChunkIndexStore chunk_indexes;
   std::vector<records::MetadataIndex> metadata_indexes;
   std::vector<records::AttachmentIndex> attachment_indexes;
   records::Statistics statistics;
@@ -82,6 +87,10 @@ Status McapWriter::Impl::write_bytes(std::span<const std::uint8_t> bytes) {
   failure = file.write(bytes);
   position += bytes.size();
   data_crc = crc32(bytes, data_crc);
+  if (sync) {
+    sync->note_written();
+    if (failure.ok()) failure = sync->status();
+  }
   return failure;
 }
 
@@ -175,7 +184,7 @@ Status McapWriter::Impl::end_chunk() {
     records::append(message_index, &out);
   }
   index.message_index_length = out.size() - index.chunk_length;
-  chunk_indexes.push_back(std::move(index));
+  const Status kept = chunk_indexes.add(index);
   ++statistics.chunk_count;
 
   chunk.clear();
@@ -184,41 +193,54 @@ Status McapWriter::Impl::end_chunk() {
   chunk_channels.clear();
   chunk_schemas.clear();
   PRESCENE_RETURN_IF_ERROR(write_bytes(out));
-  if (options.sync) failure = file.sync();
+  failure = kept;
   return failure;
 }
 
 Status McapWriter::Impl::write_summary() {
   std::vector<std::uint8_t> out;
   records::append_data_end(data_crc, &out);
-  const std::size_t summary_begin = out.size();
+  PRESCENE_RETURN_IF_ERROR(write_bytes(out));
+
+  records::Footer footer;
+  footer.summary_start = position;
+  std::uint32_t crc = 0;
+  const auto write = [&](std::span<const std::uint8_t> bytes) {
+    crc = crc32(bytes, crc);
+    return write_bytes(bytes);
+  };
   std::vector<std::uint8_t> offsets;
+  const auto end_group = [&](records::Op op, std::uint64_t begin) {
+    if (position > begin) records::append_summary_offset(op, begin, position - begin, &offsets);
+  };
   const auto group = [&](records::Op op, const auto& group_records) {
-    const std::size_t begin = out.size();
+    const std::uint64_t begin = position;
+    out.clear();
     for (const auto& record : group_records) records::append(record, &out);
-    if (out.size() > begin) records::append_summary_offset(op, position + begin, out.size() - begin, &offsets);
+    Status written = write(out);
+    end_group(op, begin);
+    return written;
   };
   statistics.schema_count = static_cast<std::uint16_t>(schemas.size());
   statistics.channel_count = static_cast<std::uint32_t>(channels.size());
   statistics.attachment_count = static_cast<std::uint32_t>(attachment_indexes.size());
   statistics.metadata_count = static_cast<std::uint32_t>(metadata_indexes.size());
-  group(records::Op::kSchema, schemas);
-  group(records::Op::kChannel, channel_records);
-  group(records::Op::kStatistics, std::span(&statistics, 1));
-  group(records::Op::kChunkIndex, chunk_indexes);
-  group(records::Op::kAttachmentIndex, attachment_indexes);
-  group(records::Op::kMetadataIndex, metadata_indexes);
+  PRESCENE_RETURN_IF_ERROR(group(records::Op::kSchema, schemas));
+  PRESCENE_RETURN_IF_ERROR(group(records::Op::kChannel, channel_records));
+  PRESCENE_RETURN_IF_ERROR(group(records::Op::kStatistics, std::span(&statistics, 1)));
+  const std::uint64_t chunks_begin = position;
+  PRESCENE_RETURN_IF_ERROR(chunk_indexes.read(write));
+  end_group(records::Op::kChunkIndex, chunks_begin);
+  PRESCENE_RETURN_IF_ERROR(group(records::Op::kAttachmentIndex, attachment_indexes));
+  PRESCENE_RETURN_IF_ERROR(group(records::Op::kMetadataIndex, metadata_indexes));
 
-  records::Footer footer;
-  footer.summary_start = position + summary_begin;
-  footer.summary_offset_start = position + out.size();
-  out.insert(out.end(), offsets.begin(), offsets.end());
-  std::vector<std::uint8_t> footer_bytes;
-  records::append(footer, &footer_bytes);
+  footer.summary_offset_start = position;
+  PRESCENE_RETURN_IF_ERROR(write(offsets));
+  out.clear();
+  records::append(footer, &out);
   // The checksum covers the summary and the footer up to the checksum itself.
-  const std::span<const std::uint8_t> covered_footer(footer_bytes.data(),
-                                                     footer_bytes.size() - sizeof footer.summary_crc);
-  footer.summary_crc = crc32(covered_footer, crc32(std::span(out).subspan(summary_begin)));
+  footer.summary_crc = crc32(std::span(out).first(out.size() - sizeof footer.summary_crc), crc);
+  out.clear();
   records::append(footer, &out);
   out.insert(out.end(), records::kMagic.begin(), records::kMagic.end());
   return write_bytes(out);
@@ -232,10 +254,13 @@ McapWriter::~McapWriter() {
 
 Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::path& path,
                                                        const McapWriterOptions& options) {
-  auto impl = std::make_unique<Impl>();
+  auto impl = std::make_unique<Impl>(path);
   impl->options = options;
   impl->compressor = Compressor(options.compression);
   PRESCENE_TRY(impl->file, OutputFile::create(path));
+  if (options.sync_interval.count() > 0) {
+    PRESCENE_TRY(impl->sync, BackgroundSync::start(path, options.sync_interval));
+  }
   std::unique_ptr<McapWriter> writer(new McapWriter(std::move(impl)));
   std::vector<std::uint8_t> start(records::kMagic.begin(), records::kMagic.end());
   records::append(records::Header{options.profile, "prescene"}, &start);
@@ -328,13 +353,25 @@ Status McapWriter::flush() {
   return impl_->end_chunk();
 }
 
+Status McapWriter::flush_by(std::int64_t log_time_ns) {
+  Impl& impl = *impl_;
+  PRESCENE_CHECK(!impl.closed);
+  const std::int64_t begin_ns = log_time_ns - impl.options.chunk_ns;
+  const bool is_due = begin_ns >= 0 && static_cast<std::uint64_t>(begin_ns) >= impl.chunk_head.start_time;
+  if (impl.chunk_messages == 0 || !is_due) return impl.failure;
+  return impl.end_chunk();
+}
+
+double McapWriter::seconds_at_risk() const { return impl_->sync ? impl_->sync->seconds_at_risk() : 0.0; }
+
 Status McapWriter::close() {
   Impl& impl = *impl_;
   if (impl.closed) return impl.failure;
   impl.closed = true;
   static_cast<void>(impl.end_chunk());
   if (impl.failure.ok()) static_cast<void>(impl.write_summary());
-  if (impl.failure.ok() && impl.options.sync) impl.failure = impl.file.sync();
+  if (impl.failure.ok() && impl.sync) impl.failure = impl.file.sync();
+  impl.sync.reset();
   const Status closed = impl.file.close();
   if (impl.failure.ok()) impl.failure = closed;
   return impl.failure;

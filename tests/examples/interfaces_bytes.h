@@ -2,7 +2,9 @@
 // What the examples in the headers of interfaces/bytes take for granted.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "prescene/core/status.h"
 #include "prescene/interfaces/bytes/file.h"
@@ -10,5 +12,7 @@
 namespace prescene::interfaces::given_interfaces_bytes {
 
 extern const std::filesystem::path path;
+extern const std::vector<std::uint8_t> bytes;
+extern OutputFile file;
 
 }  // namespace prescene::interfaces::given_interfaces_bytes

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <new>
+#include <thread>
 
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
@@ -55,6 +57,56 @@ TEST(McapWriter, WhatWasFlushedIsReadableWithoutClosing) {
   EXPECT_EQ((*reader)->loss().lost_bytes, 0U);
   ASSERT_TRUE((*writer)->close().ok());
   EXPECT_EQ(tests::read_all(*read_file(path, 100000)).size(), 2U);
+}
+
+// What came last is kept back for no longer than a chunk's span, whether anything comes after it or not.
+TEST(McapWriter, AChunkThatIsOldEnoughIsWrittenThoughNothingComes) {
+  const tests::ScratchDir scratch;
+  const auto path = scratch.path() / "a.mcap";
+  auto writer = McapWriter::create(path, {.chunk_ns = 100, .sync_interval = std::chrono::milliseconds(1)});
+  ASSERT_TRUE(writer.ok());
+  const auto on_disk = [&] {
+    const auto reader = McapReader::open(path);
+    return reader ? tests::read_all(reader->get()).size() : 0;
+  };
+  const int channel = *(*writer)->add_channel(tests::channel_of("/1"));
+  ASSERT_TRUE((*writer)->flush_by(50).ok()) << "nothing is kept back";
+  ASSERT_TRUE((*writer)->write({channel, 0, 1000, 5, {1, 2, 3}}).ok());
+  ASSERT_TRUE((*writer)->write({channel, 0, 1050, 5, {4}}).ok());
+  ASSERT_TRUE((*writer)->flush_by(1099).ok());
+  EXPECT_EQ(on_disk(), 0U);
+  ASSERT_TRUE((*writer)->flush_by(1100).ok());
+  EXPECT_EQ(on_disk(), 2U);
+  while ((*writer)->seconds_at_risk() > 0.0) std::this_thread::yield();
+  ASSERT_TRUE((*writer)->write({channel, 0, 1100, 5, {5}}).ok());
+  ASSERT_TRUE((*writer)->flush_by(-1).ok()) << "a clock that went back";
+  EXPECT_EQ(on_disk(), 2U);
+  ASSERT_TRUE((*writer)->close().ok());
+  EXPECT_EQ(on_disk(), 3U);
+}
+
+// Of a long recording the index is not kept in memory; it reads as that of a short one does.
+TEST(McapWriter, AnIndexOfManyChunksIsWholeAndLeavesNoFileBehind) {
+  constexpr std::uint32_t kMessages = 6000;  // some 150 bytes each, which is more than is kept in memory
+  const tests::ScratchDir scratch;
+  const auto path = scratch.path() / "a.mcap";
+  auto writer = McapWriter::create(path, {.chunk_bytes = 1});
+  ASSERT_TRUE(writer.ok());
+  const int channel = *(*writer)->add_channel(tests::channel_of("/1"));
+  for (std::uint32_t i = 0; i < kMessages; ++i) ASSERT_TRUE((*writer)->write({channel, i, i, i, {1}}).ok());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
+  ASSERT_TRUE((*writer)->close().ok());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
+  const auto reader = McapReader::open(path);
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  EXPECT_EQ((*reader)->message_count(), kMessages);
+  const auto messages = tests::read_all(reader->get());
+  ASSERT_EQ(messages.size(), kMessages);
+  EXPECT_TRUE((*reader)->loss().nothing()) << (*reader)->loss().text();
+  // By the index: only the chunks of these times are read.
+  const auto some = McapReader::open(path, {.begin_ns = 5000, .end_ns = 5010});
+  ASSERT_TRUE(some.ok());
+  EXPECT_EQ(tests::read_all(some->get()).size(), 10U);
 }
 
 TEST(McapWriter, EndsChunksByTheirTimeSpan) {

@@ -7,6 +7,8 @@
 //   PRESCENE_RETURN_IF_ERROR(writer->close());
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 
@@ -22,13 +24,13 @@ struct McapWriterOptions {
   std::size_t chunk_bytes = std::size_t{1} << 20;
   /// It is also closed when its log times span more than this, nanoseconds.
   std::int64_t chunk_ns = 1'000'000'000;
-  /// Wait for the disk at the end of each chunk, so that closed chunks survive a power failure, too. Without it they
-  /// survive a crash of the program.
-  bool sync = false;
+  /// How often the disk is asked to keep what is in closed chunks, so that they survive a power failure (see
+  /// BackgroundSync); only close() waits for it. 0 = never: they survive a crash of the program.
+  std::chrono::milliseconds sync_interval{0};
 };
 
 /// Not thread-safe. Every write to the file is checked: a full disk is kUnavailable, naming the file, and what
-/// was in closed chunks stays readable.
+/// was in closed chunks stays readable. So is an error of the disk when it is to keep what was written.
 class McapWriter {
  public:
   static core::Result<std::unique_ptr<McapWriter>> create(const std::filesystem::path& path,
@@ -48,6 +50,12 @@ class McapWriter {
   core::Status write_attachment(const McapAttachment& attachment);
   /// Ends the current chunk and hands everything to the operating system.
   core::Status flush();
+  /// The same if the chunk's earliest message is chunk_ns or more before this log time. What came last is otherwise
+  /// kept back until the next message comes.
+  core::Status flush_by(std::int64_t log_time_ns);
+  /// How long ago the oldest of what was handed over and is not known to be on the disk was, s; 0 without
+  /// sync_interval.
+  double seconds_at_risk() const;
   /// Writes the index, statistics and footer. Nothing can be written afterwards.
   core::Status close();
 

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "disk.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+namespace prescene::interfaces {
+namespace {
+
+/// Of what has no disk behind it, or one that is not written to.
+bool has_no_disk(int error) { return error == EINVAL || error == EROFS; }
+
+}  // namespace
+
+core::Status disk_error(const std::filesystem::path& path, int error) {
+  return core::unavailable(path.string() + ": cannot be kept on the disk: " + std::generic_category().message(error) +
+                           "; free some space or choose another disk");
+}
+
+core::Status sync_content(int descriptor, const std::filesystem::path& path) {
+  return ::fdatasync(descriptor) == 0 || has_no_disk(errno) ? core::ok_status() : disk_error(path, errno);
+}
+
+core::Status sync_name(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return errno == EACCES ? core::ok_status() : disk_error(path, errno);
+  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
+  ::close(descriptor);
+  return error == 0 || has_no_disk(error) ? core::ok_status() : disk_error(path, error);
+}
+
+}  // namespace prescene::interfaces
