@@ -189,7 +189,12 @@ std::string achieve_text(const Json& answer) {
   const std::string wanted = "P >= " + core::rounded_text(answer.value("wanted", 0.0)) + " at " +
                              core::rounded_text(100.0 * answer.value("confidence", 0.0)) + " % confidence";
   if (!best.at("values").empty()) {
-    text += found ? "found, " + wanted + "\n" : "none found with " + wanted + "; best is\n";
+    // Not more than the search can know: it may have ended before it tested what it found.
+    const std::string stopped = answer.value("stopped", "");
+    text += found                    ? "found, " + wanted + "\n"
+            : stopped == "not_found" ? "none found with " + wanted + "; best is\n"
+                                     : "nothing certified with " + wanted + " before the search ended (" + stopped +
+                                           "); best so far, not tested for it, is\n";
     text += "  best: " + values_text(best.at("values")) + "\n        " + probability_text(best) + "\n";
   } else {
     text += "none found, and nothing could be tried\n";

@@ -235,7 +235,13 @@ bool RecordingReader::is_needed_later(const interfaces::McapChannel& channel, do
 core::Result<std::optional<RecordedEntry>> RecordingReader::next() {
   for (;;) {
     PRESCENE_TRY(std::optional<interfaces::McapMessage> message, reader_->next());
-    if (!message) return std::optional<RecordedEntry>();
+    if (!message) {
+      if (first_ns_ && options_.from > last_at_) {
+        return core::invalid_input("the recording ends at " + core::fixed_text(last_at_, 2) +
+                                   " s: begin before (--from)");
+      }
+      return std::optional<RecordedEntry>();
+    }
     const interfaces::McapChannel& channel = reader_->channels()[static_cast<std::size_t>(message->channel)];
     if (std::max(message->publish_time_ns, message->log_time_ns) > kLatestRecordedNs) {
       return core::data_loss("the recording has a message on " + channel.topic +
@@ -243,6 +249,7 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::next() {
     }
     if (!first_ns_) first_ns_ = message->log_time_ns;
     const double at = core::seconds_of(message->log_time_ns - *first_ns_);
+    last_at_ = std::max(last_at_, at);
     // Files without an index are read in their order, which may differ from that of time, though not by much.
     constexpr double kMostDisorder = 10.0;
     if (at > options_.to + kMostDisorder) return std::optional<RecordedEntry>();

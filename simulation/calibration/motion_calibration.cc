@@ -74,7 +74,8 @@ core::Status check(const std::vector<RecordedMotion>& motions, const belief::Sce
   if (free == 0) return core::invalid_input("no parameter of the calibration is free");
   if (motions.size() < least_recordings(free)) {
     return core::invalid_input("only " + std::to_string(motions.size()) + " recordings; " + std::to_string(free) +
-                               " parameters take at least " + std::to_string(least_recordings(free)));
+                               " parameters take at least " + std::to_string(least_recordings(free)) +
+                               ": record more, or keep parameters as they are (--keep)");
   }
   return core::ok_status();
 }

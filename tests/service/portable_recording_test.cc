@@ -211,6 +211,9 @@ TEST_F(PortableRecording, APartHasTheFramesOfItsWindow) {
             std::vector<std::string>(whole->hashes.begin(),
                                      whole->hashes.begin() + static_cast<std::ptrdiff_t>(first->hashes.size())));
   EXPECT_LT(first->hashes.size(), whole->hashes.size());
+  options.read = {};
+  options.read.from = 99.0;
+  EXPECT_THAT(replayed(options).status().message(), HasSubstr("the recording ends at 0.9"));
 }
 
 TEST_F(PortableRecording, TheOverviewSaysWhatIsThereAndWhatIsWrong) {

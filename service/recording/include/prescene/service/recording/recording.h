@@ -131,6 +131,7 @@ class RecordingReader {
   std::unique_ptr<interfaces::BagReader> reader_;
   RecordingReadOptions options_;
   std::optional<core::TimeNs> first_ns_;  // when the first message came
+  double last_at_ = 0.0;                  // s after it, of the latest message
   RecordingInfo info_;
   bool has_info_ = false;
   bool info_is_damaged_ = false;
