@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "event_paths.h"
+#include "prescene/belief/body_names.h"
 
 namespace prescene::queries {
 namespace {
@@ -14,6 +15,8 @@ using geometry::Vector3d;
 
 constexpr double kTrackedElsewhere = 0.006,
                  kTrackedTurned = 0.1;  // m and rad: tracked further from where it was, it has moved
+constexpr double kTippedOver = 0.85;    // cosine of a tilt
+constexpr double kSameHeight = 0.02;    // m; what ends within that of its height did not fall
 constexpr double kFirstStep = 0.35;     // s
 constexpr double kStopped = 0.03;       // m/s: it moves no more
 
@@ -79,6 +82,28 @@ TrackedMotion EventPaths::motion_of(std::size_t object) const {
   return motion;
 }
 
+EventPaths::Hit EventPaths::hit_of(std::size_t object, const TrackedMotion& motion) const {
+  Hit hit;
+  const auto start = start_pose(object);
+  if (!start) return hit;
+  const Vector3d up = belief::up_of(*scene_);
+  double lowest = 1e300, highest = -1e300;
+  for (const Vector3d& vertex : shapes_[object].vertices) {
+    lowest = std::min(lowest, up.dot(*start * vertex));
+    highest = std::max(highest, up.dot(*start * vertex));
+  }
+  const belief::PhysicalParameters& physical = prior_.likeliest.objects[object].physical;
+  const double middle = (up.dot(*start * physical.center_of_mass) - lowest) / std::max(1e-6, highest - lowest);
+  const double upright = (start->rotation.conjugate() * up).dot(motion.last.rotation.conjugate() * up);
+  // What stays upright was hit about as high as its centre, and slid until friction stopped it.
+  const bool tipped = upright < kTippedOver;
+  hit.height = tipped ? 0.5 * (middle + priors_.highest_touch) : middle;
+  const Vector3d way = *start * physical.center_of_mass - motion.last * physical.center_of_mass;
+  if (!tipped && std::abs(up.dot(way)) < kSameHeight)
+    hit.speed = std::sqrt(2.0 * physical.friction * scene_->gravity_W.norm() * (way - up * up.dot(way)).norm());
+  return hit;
+}
+
 void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) const {
   const auto dimensions = static_cast<std::size_t>(event_dimensions(hypothesis));
   target.dimensions = this->dimensions(hypothesis);
@@ -110,7 +135,14 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
     const bool pushed = hypothesis.kind == EventKind::kPushed;
     const double median = pushed ? priors_.push_speed : priors_.bump_speed;
     const double spread = pushed ? priors_.push_speed_spread : priors_.bump_speed_spread;
-    set(4, std::log(std::max(0.03, motion.speed) / median) / spread, 0.5);
+    double speed = std::max(0.03, motion.speed), speed_spread = 0.5;
+    if (!pushed) {
+      const Hit hit = hit_of(hypothesis.object, motion);
+      set_uniform(2, (hit.height - priors_.lowest_touch) / (priors_.highest_touch - priors_.lowest_touch), 0.15);
+      set_uniform(3, 0.5, 0.15);
+      if (hit.speed > speed) speed = hit.speed, speed_spread = 0.35;
+    }
+    set(4, std::log(speed / median) / spread, speed_spread);
     if (pushed)
       set(5,
           std::log(std::max(0.05, motion.until - motion.onset) / priors_.push_duration) / priors_.push_duration_spread,
@@ -118,6 +150,7 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
   }
   if ((hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn) && motion.moved) {
     const bool moved = hypothesis.kind == EventKind::kMoved;
+    const bool drawn = seen_in_the_end_[hypothesis.object] == 0;  // else the frames say where
     const geometry::Vector3d from =
         moved ? start_pose(hypothesis.object)->translation : put_in_at_[hypothesis.object].translation;
     const geometry::Vector3d shift = motion.last.translation - from;
@@ -126,12 +159,14 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
           std::log(std::max(0.05, 0.5 * (seen.came_after + seen.came_before) - when) / priors_.carry_duration) /
               priors_.carry_duration_spread,
           0.5);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t axis = 0; drawn && axis < 3; ++axis) {
       const double scale = axis < 2 ? priors_.carry_distance : priors_.carry_height;
       set(2 + axis, shift[static_cast<Eigen::Index>(axis)] / scale, 0.004 / scale);
     }
-    set_uniform(5, 0.5, 0.01);
-    set(6, 1.0, 0.7);
+    if (drawn) {
+      set_uniform(5, 0.5, 0.01);
+      set(6, 1.0, 0.7);
+    }
   }
   target.guess_mean = std::move(mean);
   target.guess_deviation = std::move(deviation);

@@ -143,6 +143,7 @@ void EventPaths::follow_tracks() {
   }
   tracks_.assign(objects_.size(), {});
   seen_.assign(objects_.size(), {});
+  seen_in_the_end_.assign(objects_.size(), 0);
   for (std::size_t i = 0; i < objects_.size(); ++i)
     for (const WindowFrame& frame : window_.frames) {
       const auto index = belief::find_object(*frame.belief, objects_[i].name);

@@ -103,6 +103,10 @@ class EventPaths {
   void set_times(std::vector<double> times) { times_ = std::move(times); }
   /// For guesses of kinds in which it is carried.
   void note_seen(std::size_t object, const SeenTimes& times) { seen_[object] = times; }
+  /// The last frame sees where the object is put down, if it is: nothing to guess.
+  void note_seen_in_the_end(std::size_t object) { seen_in_the_end_[object] = 1; }
+  /// Log density with which somebody puts it down there: of m^3, and rad of turns that change something.
+  double log_put_down(std::size_t object, const belief::Pose& X_WO) const;
   /// What was not there at the begin was found in the last frame, and in those of `times` something is there, too.
   void note_found(std::size_t object, const belief::Pose& X_WO, std::vector<double> times);
   /// Where objects are in those frames if nothing happens, from the most probable start.
@@ -134,6 +138,12 @@ class EventPaths {
   void follow_tracks();
   void note_directions();
   TrackedMotion motion_of(std::size_t object) const;
+  /// A guess of a blow that leads to a motion.
+  struct Hit {
+    double height = 0.5;  // share of the object's
+    double speed = 0.0;   // m/s; 0 = the motion does not say
+  };
+  Hit hit_of(std::size_t object, const TrackedMotion& motion) const;
   belief::WorldState start_of(std::size_t object, const LatentPoint& z, std::size_t first) const;
   /// `moved`: the only object that moves at first, if all else lies still.
   std::vector<belief::Trajectory> run(std::span<const belief::WorldState> starts,
@@ -161,6 +171,7 @@ class EventPaths {
   std::vector<belief::SceneObject> objects_;
   std::vector<SeenTrack> tracks_;
   std::vector<std::optional<SeenTimes>> seen_;  // by object
+  std::vector<std::uint8_t> seen_in_the_end_;   // by object
   std::vector<double> directions_;       // by object: in which it was tracked to move, rad; directions count from it
   std::vector<belief::Pose> put_in_at_;  // by object: where what was not there is put in, but for its shift
   std::vector<belief::Action> actions_;  // known ones, times from the begin

@@ -2,6 +2,7 @@
 // How events begin, and the instances that follow.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "event_paths.h"
 #include "prescene/belief/body_names.h"
@@ -14,9 +15,10 @@ using belief::EventKind;
 using belief::Pose;
 using geometry::Vector3d;
 
-constexpr double kMovedPlace = 0.003;  // m and ...
-constexpr double kMovedTurn = 0.015;   // ... rad: what is further from the base counts as moved
-constexpr double kPusherGap = 1e-3;    // m between what pushes and the object, at first
+constexpr double kMovedPlace = 0.003;   // m and ...
+constexpr double kMovedTurn = 0.015;    // ... rad: what is further from the base counts as moved
+constexpr double kStandingTilt = 0.03;  // rad; by which what is put down as it stood is tilted
+constexpr double kPusherGap = 1e-3;     // m between what pushes and the object, at first
 
 /// The state of a run at a time: the kept one before it.
 belief::WorldState state_in(const belief::Trajectory& run, double time) {
@@ -152,6 +154,34 @@ std::optional<Pose> EventPaths::put_down(const Hypothesis& hypothesis, const Eve
   return X;
 }
 
+double EventPaths::log_put_down(std::size_t object, const Pose& X_WO) const {
+  const Vector3d up = belief::up_of(*scene_);
+  const Pose& from = put_in_at_[object];
+  const geometry::SymmetryGroup& symmetry = model(object).symmetry;
+  const double log_root = 0.5 * std::log(2.0 * std::numbers::pi);
+  const auto log_normal = [&](double x, double deviation) {
+    return -0.5 * x * x / (deviation * deviation) - std::log(deviation) - log_root;
+  };
+  const Vector3d shift = X_WO.translation - from.translation;
+  const double lift = up.dot(shift), away = (shift - up * lift).norm();
+  const double log_density = log_normal(away, priors_.carry_distance) - std::log(priors_.carry_distance) - log_root +
+                             log_normal(lift, priors_.carry_height);
+  if (symmetry.ball) return log_density;
+  // Half of what is put down stands as before, turned about the vertical; the rest lies anyhow.
+  const double copies = static_cast<double>(symmetry.rotations.size() + 1);
+  const Pose X = geometry::closest_equivalent(X_WO, from, symmetry);
+  const double tilt =
+      std::acos(std::clamp((X.rotation.conjugate() * up).dot(from.rotation.conjugate() * up), -1.0, 1.0));
+  double log_upright = log_normal(tilt, kStandingTilt) - std::log(kStandingTilt) - log_root;
+  double log_anyhow = std::log(copies / (4.0 * std::numbers::pi));
+  if (!symmetry.axis) {
+    log_upright -= std::log(2.0 * std::numbers::pi);
+    log_anyhow -= std::log(2.0 * std::numbers::pi);
+  }
+  const double top = std::max(log_upright, log_anyhow);
+  return log_density + std::log(0.5) + top + std::log(std::exp(log_upright - top) + std::exp(log_anyhow - top));
+}
+
 void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
                           std::span<EventDraw> draws, std::span<belief::Trajectory> runs_out) {
   const std::size_t n = points.size(), target = hypothesis.object;
@@ -195,8 +225,15 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
     path = {};
     const EventDraw& event = events[i];
     const bool simulated = is_simulated(hypothesis.kind);
+    path.simulated = simulated || (hypothesis.kind == EventKind::kNothing && !still_);
     path.impossible = possible[i] == 0 || before[i].end == belief::TrajectoryEnd::kDiverged ||
                       (simulated && after[i].end == belief::TrajectoryEnd::kDiverged);
+    const bool carried = hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn;
+    if (carried || hypothesis.kind == EventKind::kExchanged) {
+      const auto down = std::lower_bound(times_.begin(), times_.end(), event.time + (carried ? event.duration : 0.0));
+      if (down != times_.end()) path.put_down_from = static_cast<std::size_t>(down - times_.begin());
+      path.put_anywhere = carried;
+    }
     const auto add = [&](std::size_t object, ObjectPath poses, bool always) {
       bool moves = always;
       for (std::size_t k = 0; k < count && !moves; ++k) moves = differs(poses[k], base_[object][k]);

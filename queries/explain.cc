@@ -8,6 +8,7 @@
 #include "event_hypotheses.h"
 #include "event_paths.h"
 #include "explain_answer.h"
+#include "frame_peaks.h"
 #include "missing_objects.h"
 #include "other_motion.h"
 #include "prescene/core/spelling.h"
@@ -27,7 +28,7 @@ constexpr double kElsewhere = 0.01,
 constexpr double kRefuted = -1.0;  // nats: what speaks so much against where it was is looked at
 constexpr int kFirstRuns = 1;
 constexpr int kMostRounds = 4;      // times the query's runs: of what stays uncertain
-constexpr double kHopeless = 10.0;  // nats: what is so far behind the best is not searched further
+constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
@@ -51,6 +52,7 @@ class Explainer {
     if (asked && !may_be_explained(*asked)) return lost_for_good();
     const std::vector<std::size_t> candidates = asked ? std::vector{*asked} : candidates_to_look_at();
     for (const std::size_t object : candidates) note_when_seen(object);
+    look_for_peaks(candidates);
     const std::vector<Hypothesis> hypotheses = hypotheses_about(candidates, *events_, query_.weights, *tools_.meshes);
     PRESCENE_RETURN_IF_ERROR(search_all(candidates, hypotheses));
     PRESCENE_RETURN_IF_ERROR(search_rivals());
@@ -93,7 +95,7 @@ class Explainer {
       if (!index || !found[static_cast<std::size_t>(*index)]) continue;
       const Pose& X_WO = *found[static_cast<std::size_t>(*index)];
       std::vector<double> absent(times_.size());
-      const ScenePath gone{{i}, {ObjectPath(times_.size())}, false};
+      const ScenePath gone = path_of(i, ObjectPath(times_.size()));
       likelihood_->evaluate(std::span(&gone, 1), absent);
       // From when on it is seen there.
       std::vector<double> seen;
@@ -113,7 +115,7 @@ class Explainer {
     const SeenTrack& track = events_->track(object);
     const std::size_t n = times_.size();
     std::vector<double> absent(n), here(n, -1e300), there(n, -1e300);
-    const ScenePath gone{{object}, {ObjectPath(n)}, false};
+    const ScenePath gone = path_of(object, ObjectPath(n));
     likelihood_->evaluate(std::span(&gone, 1), absent);
     for (std::size_t k = 0; k < n; ++k) {
       if (const auto& base = likelihood_->base()[object][k])
@@ -132,6 +134,19 @@ class Explainer {
     events_->note_seen(object, seen);
   }
 
+  /// Of the candidates, and of all else that was tracked elsewhere: what moves may move others.
+  void look_for_peaks(const std::vector<std::size_t>& candidates) {
+    const core::RandomStream stream(query_.seed, core::Purpose::kProposal);
+    for (std::size_t i = 0; i < events_->objects().size(); ++i) {
+      const bool is_candidate = std::find(candidates.begin(), candidates.end(), i) != candidates.end();
+      if (!is_candidate && !(events_->is_present(i) && tracked_elsewhere(i).elsewhere)) continue;
+      FoundPeaks found = find_peaks(*events_, *likelihood_, i, times_, stream);
+      if (found.peaks.back().seen) events_->note_seen_in_the_end(i);
+      likelihood_->set_peaks(i, std::move(found.peaks));
+      evaluated_ += found.evaluations;
+    }
+  }
+
   core::Result<std::optional<std::size_t>> asked_object() const {
     if (query_.object.empty()) return std::optional<std::size_t>();
     for (std::size_t i = 0; i < events_->objects().size(); ++i)
@@ -146,6 +161,23 @@ class Explainer {
     return core::not_found("there is no object '" + query_.object + "': " + known);
   }
 
+  struct Elsewhere {
+    double moved = 0.0;  // m, turns by a lever of 5 cm
+    bool elsewhere = false;
+  };
+  Elsewhere tracked_elsewhere(std::size_t object) const {
+    Elsewhere result;
+    const SeenTrack& track = events_->track(object);
+    for (std::size_t j = 0; j < track.times.size(); ++j) {
+      const Pose base = base_at(object, track.times[j]);
+      const double distance = (track.estimates[j].mean.translation - base.translation).norm();
+      const double angle = geometry::symmetric_angle(track.estimates[j].mean, base, events_->model(object).symmetry);
+      result.elsewhere = result.elsewhere || distance > kElsewhere || angle > kTurned;
+      result.moved = std::max(result.moved, distance + 0.05 * angle);
+    }
+    return result;
+  }
+
   /// Objects that the frames show to be elsewhere, those that moved furthest first; the least certain one if none did.
   std::vector<std::size_t> candidates_to_look_at() {
     std::vector<std::pair<double, std::size_t>> order;
@@ -156,23 +188,14 @@ class Explainer {
         if (may_be_explained(i)) order.emplace_back(-1.0, i);
         continue;
       }
-      double moved = 0.0;
-      bool elsewhere = false;
-      const SeenTrack& track = events_->track(i);
-      for (std::size_t j = 0; j < track.times.size(); ++j) {
-        const Pose base = base_at(i, track.times[j]);
-        const double distance = (track.estimates[j].mean.translation - base.translation).norm();
-        const double angle = geometry::symmetric_angle(track.estimates[j].mean, base, events_->model(i).symmetry);
-        elsewhere = elsewhere || distance > kElsewhere || angle > kTurned;
-        moved = std::max(moved, distance + 0.05 * angle);
-      }
+      const auto [moved, elsewhere] = tracked_elsewhere(i);
       double worst = 1e300;
       for (std::size_t k = 0; k < times_.size(); ++k) {
         if (!likelihood_->base()[i][k]) continue;
         double ratio = 0.0;
         likelihood_->evaluate(k, i, std::span(&*likelihood_->base()[i][k], 1), std::span(&ratio, 1));
         double absent = 0.0;
-        ScenePath gone{{i}, {ObjectPath(times_.size())}, false};
+        const ScenePath gone = path_of(i, ObjectPath(times_.size()));
         std::vector<double> ratios(times_.size());
         likelihood_->evaluate(std::span(&gone, 1), ratios);
         absent = ratios[k];
@@ -216,13 +239,12 @@ class Explainer {
     const core::RandomStream stream(query_.seed + (judged.number + 1) * 0x9e3779b97f4a7c15ULL,
                                     core::Purpose::kParameters);
     if (hypothesis.kind == EventKind::kOther) {
-      const OtherMotion other = other_motion(*events_, *likelihood_, hypothesis.object, times_, query_.priors, stream);
+      const OtherMotion other = other_motion(*events_, *likelihood_, hypothesis.object, query_.priors);
       judged.log_bayes = other.log_evidence;
       judged.error = other.error;
       judged.other_path = other.path;
       judged.frame_means = other.frames;
       most_likely_ = other.most_likely + kLikelierThanSeen;
-      evaluated_ += other.evaluations;
       return;
     }
     TemperedTarget target;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "explain_text.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::queries {
 namespace {
@@ -13,8 +14,9 @@ namespace {
 using belief::EventKind;
 using belief::Pose;
 
-constexpr std::size_t kToldPoints = 96;  // of a posterior: what is told of it is worked out from so many
-constexpr double kWorthTelling = 0.002;  // probability from which on the parameters of an event are worked out
+constexpr std::size_t kToldPoints = 96;    // of a posterior: what is told of it is worked out from so many
+constexpr std::uint64_t kPlaceDraws = 32;  // from each part of a place's distribution
+constexpr double kWorthTelling = 0.002;    // probability from which on the parameters of an event are worked out
 
 /// Quantiles of weighted values.
 double value_quantile(std::vector<std::pair<double, double>> values, double share) {
@@ -24,6 +26,30 @@ double value_quantile(std::vector<std::pair<double, double>> values, double shar
   for (const auto& [value, weight] : values)
     if ((sum += weight) >= share * all) return value;
   return values.empty() ? 0.0 : values.back().first;
+}
+
+/// A part of where an object may be.
+struct PossiblePlace {
+  geometry::Vector3d mean;
+  geometry::Matrix3d covariance;
+  double weight;
+};
+
+/// Within which it is with a probability of `share`, by draws from each part.
+double place_radius(const std::vector<PossiblePlace>& places, const geometry::Vector3d& mean, double share) {
+  const core::RandomStream stream(kPlaceDraws, core::Purpose::kNearbyStart);
+  std::vector<std::pair<double, double>> distances;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto eigen = geometry::symmetric_eigen_3(places[i].covariance);
+    core::RandomStream random = stream.at(i);
+    for (std::uint64_t d = 0; d < kPlaceDraws; ++d) {
+      geometry::Vector3d off;
+      for (double& x : off) x = random.normal();
+      off = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().cwiseProduct(off);
+      distances.emplace_back((places[i].mean + off - mean).norm(), places[i].weight);
+    }
+  }
+  return value_quantile(std::move(distances), share);
 }
 
 class Teller {
@@ -104,6 +130,7 @@ class Teller {
     events_->simulate(judged.hypothesis, points, judged.paths, judged.draws, judged.runs);
     std::vector<double> ratios(points.size() * times_.size());
     likelihood_->evaluate(judged.paths, ratios);
+    for (ScenePath& path : judged.paths) likelihood_->settle(path);
     judged.frame_means.assign(times_.size(), 0.0);
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t k = 0; k < times_.size(); ++k)
@@ -191,37 +218,46 @@ class Teller {
   WhereItIs where(std::size_t object, const std::vector<const Judged*>& all) const {
     WhereItIs result;
     result.object = events_->objects()[object].name;
-    std::vector<std::pair<geometry::Vector3d, double>> places;
+    std::vector<PossiblePlace> places;
     double gone = 0.0, sum = 0.0;
-    const auto note = [&](const std::optional<Pose>& X_WO, double weight) {
+    const auto note = [&](const std::optional<Pose>& X_WO, double weight, const std::vector<PathEnd>& ends) {
       sum += weight;
-      if (X_WO)
-        places.emplace_back(X_WO->translation, weight);
-      else
+      if (!X_WO)
         gone += weight;
+      else if (ends.empty())
+        places.push_back({X_WO->translation, geometry::Matrix3d::Zero(), weight});
+      for (const PathEnd& end : ends)
+        if (X_WO) places.push_back({X_WO->translation + end.shift, end.covariance, weight * end.weight});
     };
     for (const Judged* judged : all) {
       if (judged->hypothesis.kind == EventKind::kOther) {
-        note(object == judged->object ? judged->other_path.back() : likelihood_->base()[object].back(),
-             judged->probability);
+        if (object != judged->object) {
+          note(likelihood_->base()[object].back(), judged->probability, {});
+          continue;
+        }
+        const FramePeak& peak = likelihood_->peaks(object).back();
+        std::vector<PathEnd> ends;
+        if (peak.seen) ends.push_back({1.0, geometry::Vector3d::Zero(), peak.covariance.bottomRightCorner<3, 3>()});
+        note(judged->other_path.back(), judged->probability, ends);
         continue;
       }
       for (std::size_t i = 0; i < judged->paths.size(); ++i) {
         const ScenePath& path = judged->paths[i];
         if (path.impossible) continue;
         const auto at = std::find(path.moved.begin(), path.moved.end(), object);
-        note(at == path.moved.end() ? likelihood_->base()[object].back()
-                                    : path.paths[static_cast<std::size_t>(at - path.moved.begin())].back(),
-             judged->probability * judged->posterior.points[i].weight);
+        const double weight = judged->probability * judged->posterior.points[i].weight;
+        if (at == path.moved.end())
+          note(likelihood_->base()[object].back(), weight, {});
+        else
+          note(path.paths[static_cast<std::size_t>(at - path.moved.begin())].back(), weight,
+               likelihood_->ends(path, object));
       }
     }
     result.present = sum > 0.0 ? 1.0 - gone / sum : 0.0;
     double there = 0.0;
-    for (const auto& [p, weight] : places) result.mean += weight * p, there += weight;
+    for (const PossiblePlace& place : places) result.mean += place.weight * place.mean, there += place.weight;
     if (there > 0.0) result.mean /= there;
-    std::vector<std::pair<double, double>> distances;
-    for (const auto& [p, weight] : places) distances.emplace_back((p - result.mean).norm(), weight);
-    result.radius_90 = value_quantile(distances, 0.9);
+    result.radius_90 = place_radius(places, result.mean, 0.9);
     // Of an object that stays, hypotheses about others know only the most probable place: what the belief knows of it.
     if (const auto index = belief::find_object(*window_.start, result.object); index && events_->is_present(object)) {
       const auto estimate = belief::estimate(*window_.start, window_.start->objects[static_cast<std::size_t>(*index)]);
@@ -239,7 +275,7 @@ class Teller {
         if (best.posterior.points[i].log_likelihood > best.posterior.points[most].log_likelihood) most = i;
       path = &best.paths[most];
     } else if (best.hypothesis.kind == EventKind::kOther) {
-      tracked = {{best.object}, {best.other_path}, false};
+      tracked = path_of(best.object, best.other_path);
       path = &tracked;
     }
     result.out_of_sight = result.present > 0.5 && likelihood_->visible_share(*path, times_.size() - 1, object) < 0.05;

@@ -17,12 +17,10 @@ struct OtherMotion {
   std::vector<double> frames;                     ///< Its parts.
   std::vector<std::optional<belief::Pose>> path;  ///< The most probable one.
   double most_likely = 0.0;                       ///< Greatest log likelihood that was met, all frames together.
-  int evaluations = 0;
 };
 
-/// The integral over poses is by importance sampling about where the object was tracked in a frame.
+/// The integral over poses is that of the frames' peaks, which `likelihood` must have of the object.
 OtherMotion other_motion(const EventPaths& events, WindowLikelihood& likelihood, std::size_t object,
-                         const std::vector<double>& times, const belief::EventPriors& priors,
-                         const core::RandomStream& stream);
+                         const belief::EventPriors& priors);
 
 }  // namespace prescene::queries

@@ -127,11 +127,14 @@ class TemperedSampler {
   }
 
   void begin() {
-    const auto count = static_cast<std::size_t>(options_.points);
+    // Without coordinates, all points are one.
+    const auto count =
+        static_cast<std::size_t>(options_.points * (target_.dimensions > 0 ? std::max(1, options_.first_points) : 1));
     std::vector<LatentPoint> all;
     for (int r = 0; r < options_.runs; ++r) {
       for (std::size_t i = 0; i < count; ++i) {
-        core::RandomStream draws = stream_.at(0, number_of(static_cast<std::size_t>(r), i));
+        core::RandomStream draws =
+            stream_.at(0, static_cast<std::uint32_t>(number_of(static_cast<std::size_t>(r)) * count + i));
         LatentPoint z(static_cast<std::size_t>(target_.dimensions));
         // Stratified, so that no run is without points of either kind.
         const bool guessed =
@@ -190,18 +193,21 @@ class TemperedSampler {
     if (run.b < 1.0 && reachable < options_.give_up_below) {
       run.log_evidence = reachable;
       run.gave_up = true;
+      run.z.resize(static_cast<std::size_t>(options_.points));
+      run.log_l.resize(run.z.size());
       return;
     }
     for (double& w : weight) w /= sum;
     measure(run, weight);
     // Systematic resampling.
     const double first = stream.uniform();
-    std::vector<LatentPoint> z(n);
-    std::vector<double> log_l(n);
-    double reached = weight[0] * static_cast<double>(n);
-    for (std::size_t i = 0, from = 0; i < n; ++i) {
+    const auto kept = static_cast<std::size_t>(options_.points);
+    std::vector<LatentPoint> z(kept);
+    std::vector<double> log_l(kept);
+    double reached = weight[0] * static_cast<double>(kept);
+    for (std::size_t i = 0, from = 0; i < kept; ++i) {
       while (reached < static_cast<double>(i) + first && from + 1 < n)
-        reached += weight[++from] * static_cast<double>(n);
+        reached += weight[++from] * static_cast<double>(kept);
       z[i] = run.z[from];
       log_l[i] = run.log_l[from];
     }

@@ -90,7 +90,6 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
     for (double& share : result) share /= sum;
     return result;
   };
-  const std::vector<double> best = shares(log_posterior);
   std::vector<EvidenceError> errors;
   for (const Judged& one : judged) errors.push_back(error_of(one, scatter));
   const auto likeliest_nothing = std::max_element(
@@ -122,9 +121,12 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
     const auto at = [&](double share) {
       return drawn[i][static_cast<std::size_t>(std::lround(share * (kPosteriorDraws - 1)))];
     };
-    one.probability = best[i];
-    one.low = one.posterior.gave_up ? 0.0 : std::min(best[i], at(tail));
-    one.high = std::max(best[i], at(1.0 - tail));
+    // The mean over what the evidences may be, not what their estimates say: searches miss, too.
+    double mean_share = 0.0;
+    for (const double share : drawn[i]) mean_share += share / kPosteriorDraws;
+    one.probability = mean_share;
+    one.low = one.posterior.gave_up ? 0.0 : std::min(mean_share, at(tail));
+    one.high = std::max(mean_share, at(1.0 - tail));
   };
   for (std::size_t i = 0; i < n; ++i) put(i, judged[i]);
   put(n, nothings.front());

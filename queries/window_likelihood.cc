@@ -4,18 +4,26 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/belief/body_names.h"
 #include "prescene/filter/proposals/learned_colors.h"
+#include "prior.h"
 
 namespace prescene::queries {
 namespace {
 
 using belief::Pose;
 
-// What a simulated path is off a true one by: the spread of a hit is so many times the sensor's. Without it, a few
-// millimetres after a fall would decide between events. Chosen on generated episodes (docs/reference/explain.md).
-constexpr double kPathSpread = 2.5;
-// Frames share the errors of shapes, calibration and path: all of them count as so many.
-constexpr double kEffectiveFrames = 3.0;
+// Shapes, starts and what stands still are known to some millimetres: the spread of a hit is so many times the
+// sensor's. Chosen on generated episodes (docs/reference/explain.md).
+constexpr double kHitSpread = 2.5;
+// What is put where another stood stands there to 1 cm, 3 mm in height, 0.03 rad of tilt and 0.5 rad of turn.
+constexpr double kPutShift = 0.01, kPutLift = 0.003, kPutTilt = 0.03, kPutTurn = 0.5;
+// Share of the variance of a depth that is the same in all frames (docs/reference/sensor_model.md): frames average out
+// only the rest, so that of K frames each counts as 1 / (1 + share (K - 1)) of one.
+constexpr double kLastingError = 0.25;
+// A path is at a frame's peak up to this squared distance (95 % of chi-squared with six degrees of freedom): what the
+// image says of further ones is looked at.
+constexpr double kAtPeak = 12.6;
 constexpr float kBehindSupport = 0.02F;  // m; so far behind a support's surface an object is hidden by it
 constexpr int kSampled = 8;              // pixels between two that changes are looked for at
 constexpr float kChanged = 0.02F;        // m; a depth that changes by more has changed
@@ -76,13 +84,13 @@ std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int
 WindowLikelihood::WindowLikelihood(const belief::Belief& start, std::span<const belief::SceneObject> objects,
                                    std::span<const WindowFrame> frames, const ExplainContext& context,
                                    const filter::FilterTools& tools)
-    : start_(start), objects_(objects), window_(frames), context_(context), tools_(tools) {}
+    : start_(start), objects_(objects), window_(frames), context_(context), tools_(tools), peaks_(objects.size()) {}
 
 core::Status WindowLikelihood::prepare() {
   auto scene = std::make_shared<belief::Scene>(*start_.scene);
   const filter::FrameOptions& options = context_.settings.frame;
   scene->depth_noise.sigma_per_depth_squared =
-      kPathSpread * scene->depth_noise.sigma_per_depth_squared.value_or(options.sensor.sigma_per_depth_squared);
+      kHitSpread * scene->depth_noise.sigma_per_depth_squared.value_or(options.sensor.sigma_per_depth_squared);
   const filter::FrameColors colors{context_.settings.colors, filter::learned_models(start_, options.colors)};
   filter::FrameCache cache;
   for (const WindowFrame& seen : window_) {
@@ -98,6 +106,15 @@ core::Status WindowLikelihood::prepare() {
       targets.push_back(filter::target_of(named, *start_.scene, frame, tools_));
     }
   }
+  for (const belief::SceneObject& object : objects_) {
+    geometry::Matrix6d& error = start_errors_.emplace_back(geometry::Matrix6d::Zero());
+    const auto index = belief::find_object(start_, object.name);
+    if (!index || !is_present(start_.objects[static_cast<std::size_t>(*index)])) continue;
+    const auto estimate = belief::estimate(start_, start_.objects[static_cast<std::size_t>(*index)]);
+    geometry::Matrix6d along_W = geometry::Matrix6d::Identity();
+    along_W.topLeftCorner<3, 3>() = estimate.mean.rotation.toRotationMatrix();
+    error = along_W * estimate.covariance * along_W.transpose();
+  }
   return core::ok_status();
 }
 
@@ -110,9 +127,8 @@ void WindowLikelihood::set_base(std::vector<ObjectPath> base) {
     for (std::size_t i = 0; i < objects_.size(); ++i)
       if (base_[i][k])
         pixels = std::max(pixels, static_cast<double>(evidence(k, frames_[k].terms, i, *base_[i][k]).measured));
-  const double frames = static_cast<double>(frames_.size());
-  share_ = rendering::tempering(frames_.front().terms.tempering.weight, pixels, frames_.front().terms.step) *
-           std::min(1.0, kEffectiveFrames / frames);
+  share_ = rendering::tempering(frames_.front().terms.tempering.weight, pixels, frames_.front().terms.step) /
+           (1.0 + kLastingError * static_cast<double>(frames_.size() - 1));
 }
 
 geometry::DepthImage WindowLikelihood::depth_of(std::size_t frame, std::size_t object, const Pose& X_WO) const {
@@ -162,33 +178,118 @@ const WindowLikelihood::Background& WindowLikelihood::background(std::size_t fra
   return *backgrounds_.emplace(key, std::move(made)).first->second;
 }
 
-double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame) {
-  const Background& known = background(frame, path.moved);
-  double sum = known.log_ratio;
-  if (path.moved.size() == 1) {
-    const auto& X_WO = path.paths.front()[frame];
-    return X_WO ? sum + evidence(frame, known.terms, path.moved.front(), *X_WO).log_ratio : sum;
-  }
-  geometry::DepthImage depth = known.depth;
+double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame, std::size_t m, const Pose& X_WO,
+                                   const Background& known) const {
   bool first = true;
-  for (std::size_t m = 0; m < path.moved.size(); ++m) {
-    const auto& X_WO = path.paths[m][frame];
-    if (!X_WO) continue;
-    sum += first ? evidence(frame, known.terms, path.moved[m], *X_WO).log_ratio
-                 : evidence(frame, terms_with(frame, depth), path.moved[m], *X_WO).log_ratio;
+  geometry::DepthImage depth;
+  for (std::size_t before = 0; before < m; ++before) {
+    const auto& X_WB = path.paths[before][frame];
+    if (!X_WB) continue;
+    if (first) depth = known.depth;
     first = false;
-    if (m + 1 < path.moved.size()) filter::merge_nearest(depth_of(frame, path.moved[m], *X_WO), &depth);
+    filter::merge_nearest(depth_of(frame, path.moved[before], *X_WB), &depth);
   }
-  return sum;
+  return evidence(frame, first ? known.terms : terms_with(frame, depth), path.moved[m], X_WO).log_ratio;
+}
+
+void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of,
+                              std::vector<PathEnd>* ends) {
+  // By how much simulated paths are off is not known: a filter for each share, and the frames weigh them.
+  const std::size_t moved = path.moved.size(), shares = path.simulated ? kErrorShares.size() : 1;
+  const geometry::Vector3d up = belief::up_of(*start_.scene);
+  std::vector<PathError> errors;
+  for (std::size_t s = 0; s < shares; ++s)
+    for (const std::size_t object : path.moved) {
+      const belief::ObjectModel& model = start_.scene->model_of(objects_[object]);
+      errors.emplace_back(path.simulated ? kErrorShares[s] : 0.0, std::sqrt(0.5 * model.unit_inertia.trace()), up,
+                          model.symmetry);
+      errors.back().loosen(start_errors_[object]);
+    }
+  geometry::Matrix6d put_error = geometry::Matrix6d::Zero();
+  const geometry::Matrix3d along = up * up.transpose(), across = geometry::Matrix3d::Identity() - along;
+  put_error.topLeftCorner<3, 3>() = kPutTurn * kPutTurn * along + kPutTilt * kPutTilt * across;
+  put_error.bottomRightCorner<3, 3>() = kPutLift * kPutLift * along + kPutShift * kPutShift * across;
+  std::vector<std::uint8_t> put_at_peak(moved, 0);
+  std::vector<double> log_weight(shares, -std::log(static_cast<double>(shares))), in_frame(shares);
+  for (std::size_t k = 0; k < frames_.size(); ++k) {
+    const Background& known = background(k, path.moved);
+    std::fill(in_frame.begin(), in_frame.end(), share_ * known.log_ratio);
+    for (std::size_t m = 0; m < moved; ++m) {
+      if (!path.paths[m][k]) continue;
+      const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
+      const FramePeak* peak = !peaks.empty() && peaks[k].seen ? &peaks[k] : nullptr;
+      const bool put_down = path.put_down_from && k >= *path.put_down_from;
+      if (put_down && path.put_anywhere && peak != nullptr && put_at_peak[m] == 0) {
+        put_at_peak[m] = 1;
+        for (std::size_t s = 0; s < shares; ++s) {
+          errors[s * moved + m].put_at(*peak);
+          in_frame[s] += peak->log_mass + peak->log_put_down;
+        }
+        continue;
+      }
+      std::optional<double> direct;
+      for (std::size_t s = 0; s < shares; ++s) {
+        PathError& error = errors[s * moved + m];
+        if (put_at_peak[m] == 0) error.move_to(*path.paths[m][k]);
+        if (put_down && !path.put_anywhere && k == *path.put_down_from) error.loosen(put_error);
+        const PathFit fit = peak != nullptr ? error.fit(*peak) : PathFit{-1e300, 1e300};
+        bool at_peak = fit.mahalanobis < kAtPeak;
+        if (!at_peak) {
+          if (!direct) direct = share_ * log_ratio(path, k, m, error.path_pose(), known);
+          at_peak = fit.log_likelihood > *direct;
+        }
+        in_frame[s] += at_peak ? fit.log_likelihood : *direct;
+        if (at_peak) error.learn(*peak);
+      }
+    }
+    double top = -1e300, sum = 0.0;
+    for (std::size_t s = 0; s < shares; ++s) top = std::max(top, log_weight[s] += in_frame[s]);
+    for (const double w : log_weight) sum += std::exp(w - top);
+    log_ratios[k] = top + std::log(sum);
+    for (double& w : log_weight) w -= log_ratios[k];
+  }
+  const auto at = std::find(path.moved.begin(), path.moved.end(), of);
+  if (ends == nullptr || at == path.moved.end()) return;
+  for (std::size_t s = 0; s < shares; ++s) {
+    const PathError& error = errors[s * moved + static_cast<std::size_t>(at - path.moved.begin())];
+    const auto& last = path.paths[static_cast<std::size_t>(at - path.moved.begin())].back();
+    if (!last) return;
+    ends->push_back({std::exp(log_weight[s]),
+                     error.path_pose().translation - last->translation + error.mean().tail<3>(),
+                     error.covariance().bottomRightCorner<3, 3>()});
+  }
 }
 
 void WindowLikelihood::evaluate(std::span<const ScenePath> paths, std::span<double> log_ratios) {
   const std::size_t count = frames_.size();
   tools_.search->threads().for_blocks(paths.size(), 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      for (std::size_t k = 0; k < count; ++k)
-        log_ratios[i * count + k] = paths[i].impossible ? -1e6 : share_ * log_ratio(paths[i], k);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::span<double> of_path = log_ratios.subspan(i * count, count);
+      if (paths[i].impossible)
+        std::fill(of_path.begin(), of_path.end(), -1e6);
+      else
+        follow(paths[i], of_path);
+    }
   });
+}
+
+void WindowLikelihood::settle(ScenePath& path) const {
+  if (!path.put_down_from || !path.put_anywhere) return;
+  for (std::size_t m = 0; m < path.moved.size(); ++m) {
+    const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
+    std::optional<Pose> at;
+    for (std::size_t k = *path.put_down_from; k < frames_.size() && !peaks.empty(); ++k) {
+      if (!at && peaks[k].seen) at = peaks[k].X_WO;
+      if (at) path.paths[m][k] = at;
+    }
+  }
+}
+
+std::vector<PathEnd> WindowLikelihood::ends(const ScenePath& path, std::size_t object) {
+  std::vector<double> log_ratios(frames_.size());
+  std::vector<PathEnd> ends;
+  follow(path, log_ratios, object, &ends);
+  return ends;
 }
 
 void WindowLikelihood::evaluate(std::size_t frame, std::size_t object, std::span<const Pose> X_WO,

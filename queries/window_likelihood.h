@@ -16,6 +16,7 @@
 
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/queries/explain.h"
+#include "prescene/queries/path_error.h"
 
 namespace prescene::queries {
 
@@ -27,6 +28,26 @@ struct ScenePath {
   std::vector<std::size_t> moved;  ///< Objects that are not where the base has them, ascending.
   std::vector<ObjectPath> paths;   ///< Of these.
   bool impossible = false;
+  bool simulated = false;  ///< Then true paths may be off by a share of the motion (PathError).
+  /// From this frame on, what moves is where somebody put it: anywhere, which is then where frames see it, or, if not
+  /// `put_anywhere`, nearly where the path has it.
+  std::optional<std::size_t> put_down_from;
+  bool put_anywhere = false;
+};
+
+/// Of one object, which is at these poses.
+inline ScenePath path_of(std::size_t object, ObjectPath poses) {
+  ScenePath path;
+  path.moved = {object};
+  path.paths = {std::move(poses)};
+  return path;
+}
+
+/// Where an object may be in the last frame, given all frames, if a path is nearly the true one.
+struct PathEnd {
+  double weight = 1.0;                                    ///< All of a path sum to one.
+  geometry::Vector3d shift = geometry::Vector3d::Zero();  ///< From where the path ends, m.
+  geometry::Matrix3d covariance = geometry::Matrix3d::Zero();
 };
 
 /// The frames that differ most: places in `frames` at which equal parts of all change have passed, the last always,
@@ -49,11 +70,20 @@ class WindowLikelihood {
   void set_base(std::vector<ObjectPath> base);
   const std::vector<ObjectPath>& base() const { return base_; }
 
-  /// log_ratios[i * frames() + k]: tempered, of paths[i] in frame k.
+  /// Where frames say that an object is, by frame: paths near them are weighed by these, others by the image.
+  void set_peaks(std::size_t object, std::vector<FramePeak> peaks) { peaks_[object] = std::move(peaks); }
+  /// Empty = none were set.
+  const std::vector<FramePeak>& peaks(std::size_t object) const { return peaks_[object]; }
+
+  /// log_ratios[i * frames() + k]: tempered, of paths[i] in frame k, given the frames before.
   void evaluate(std::span<const ScenePath> paths, std::span<double> log_ratios);
   /// The same of one object at many poses in one frame, all others as the base has them.
   void evaluate(std::size_t frame, std::size_t object, std::span<const belief::Pose> X_WO,
                 std::span<double> log_ratios);
+  /// Sets the poses of what was put down anywhere to those that the frames see.
+  void settle(ScenePath& path) const;
+  /// Of an object that the path moves.
+  std::vector<PathEnd> ends(const ScenePath& path, std::size_t object);
   /// Share of the pixels of an object, as the path has it, that known things do not hide in the frame.
   double visible_share(const ScenePath& path, std::size_t frame, std::size_t object);
 
@@ -69,7 +99,13 @@ class WindowLikelihood {
   geometry::DepthImage depth_of(std::size_t frame, std::size_t object, const belief::Pose& X_WO) const;
   rendering::PoseEvidence evidence(std::size_t frame, const rendering::FrameTerms& terms, std::size_t object,
                                    const belief::Pose& X_WO) const;
-  double log_ratio(const ScenePath& path, std::size_t frame);
+  /// At a pose, of the m-th object that a path moves, given those before it; `known`: the background of the path's
+  /// frame.
+  double log_ratio(const ScenePath& path, std::size_t frame, std::size_t m, const belief::Pose& X_WO,
+                   const Background& known) const;
+  /// `ends`, where given, get those of the object `of`.
+  void follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of = 0,
+              std::vector<PathEnd>* ends = nullptr);
 
   const belief::Belief& start_;
   std::span<const belief::SceneObject> objects_;
@@ -80,7 +116,9 @@ class WindowLikelihood {
   std::vector<filter::FilterFrame> frames_;
   std::vector<std::vector<filter::SearchTarget>> targets_;  // by frame, by object
   std::vector<ObjectPath> base_;
-  double share_ = 1.0;  // of tempering
+  std::vector<std::vector<FramePeak>> peaks_;     // by object, by frame
+  std::vector<geometry::Matrix6d> start_errors_;  // by object, coordinates of PathError
+  double share_ = 1.0;                            // of tempering
   std::mutex mutex_;
   std::map<std::pair<std::size_t, std::vector<std::size_t>>, std::unique_ptr<const Background>> backgrounds_;
 };

@@ -26,6 +26,7 @@ using core::fixed_text;
 using nlohmann::ordered_json;
 
 constexpr double kTruthStep = 0.001;  // s, of Bullet's stepper
+constexpr double kProbable = 1e-4;    // from which on an explanation is listed
 constexpr double kBegun = 5e-4;       // m: the object has moved
 
 /// Where the object is at the end, and when it began to move.
@@ -113,8 +114,11 @@ core::Status explain_into(const EventEpisode& episode, std::uint64_t seed, const
   const auto is_touch = [](EventKind kind) { return kind == EventKind::kPushed || kind == EventKind::kBumped; };
   const bool touched = is_touch(first.kind) && is_touch(episode.truth) && first.object == episode.object;
   result.nearly_right = result.right || touched;
-  for (const queries::Explanation& e : explained->answer.explanations)
+  for (const queries::Explanation& e : explained->answer.explanations) {
     if (is_true(e)) result.of_truth += e.probability;
+    if (e.probability >= kProbable || is_true(e))
+      result.ranking.push_back({label_of(e), e.probability, e.log_bayes_factor});
+  }
   if (result.nearly_right && first.time) {
     const bool by_push = episode.truth == EventKind::kPushed;
     // Changes are taken to the nearest frame.
@@ -128,6 +132,7 @@ core::Status explain_into(const EventEpisode& episode, std::uint64_t seed, const
   for (const queries::WhereItIs& object : explained->answer.objects) {
     if (object.object != episode.object || !truth.end || object.present < 0.5) continue;
     result.place_error = (object.mean - truth.end->translation).norm();
+    result.place_radius = object.radius_90;
     result.place_within = result.place_error <= object.radius_90;
     result.hidden = object.out_of_sight;
   }
@@ -302,6 +307,10 @@ ordered_json to_json(const ExplainedEventsReport& report) {
     if (!e.failure.empty()) {
       json["failure"] = e.failure;
     } else {
+      ordered_json ranking = ordered_json::array();
+      for (const RankedEvent& one : e.ranking)
+        ranking.push_back(
+            {{"event", one.event}, {"probability", one.probability}, {"log_bayes_factor", one.log_bayes_factor}});
       json.update({{"first", e.first},
                    {"probability", e.probability},
                    {"interval", {e.low, e.high}},
@@ -311,7 +320,10 @@ ordered_json to_json(const ExplainedEventsReport& report) {
                    {"time_error", e.time_error >= 0.0 ? ordered_json(e.time_error) : ordered_json()},
                    {"direction_error_rad", e.direction_error >= 0.0 ? ordered_json(e.direction_error) : ordered_json()},
                    {"place_error_m", e.place_error >= 0.0 ? ordered_json(e.place_error) : ordered_json()},
+                   {"place_radius_90_m", e.place_error >= 0.0 ? ordered_json(e.place_radius) : ordered_json()},
                    {"place_within_90", e.place_within},
+                   {"hidden", e.hidden},
+                   {"ranking", std::move(ranking)},
                    {"cpu_seconds", e.explaining},
                    {"cpu_seconds_with_tracking", e.seconds}});
     }

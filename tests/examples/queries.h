@@ -11,6 +11,7 @@
 #include "prescene/queries/achieve_comparison.h"
 #include "prescene/queries/explain.h"
 #include "prescene/queries/parameter_search.h"
+#include "prescene/queries/path_error.h"
 #include "prescene/queries/query_engine.h"
 #include "prescene/queries/relation_history.h"
 #include "prescene/queries/relations.h"
@@ -51,3 +52,11 @@ extern const std::shared_ptr<const belief::Scene> scene;
 extern const belief::AchieveQuery question;
 extern const QueryContext context;
 }  // namespace prescene::queries::given_queries::achieve_comparison_h
+
+namespace prescene::queries::given_queries::path_error_h {
+extern const double radius;
+extern const geometry::Vector3d up;
+extern const geometry::SymmetryGroup symmetry;
+extern const geometry::Pose X_WO;
+extern const FramePeak peak;
+}  // namespace prescene::queries::given_queries::path_error_h

@@ -31,7 +31,8 @@ struct TemperedTarget {
 
 struct TemperedOptions {
   int runs = 4;                  ///< Independent ones: their scatter is the error of the evidence.
-  int points = 24;               ///< Of each.
+  int points = 24;               ///< Of each, ...
+  int first_points = 4;          ///< ... and so many times as many at first, so that few posteriors are missed.
   double least_effective = 0.5;  ///< Share of the points that a step of b leaves as effective sample size.
   int most_steps = 24;           ///< Of b; the last goes to 1 whatever it costs.
   int last_moves = 2;            ///< Moves at b = 1; one at each b before.

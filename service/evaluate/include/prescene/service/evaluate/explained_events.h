@@ -24,25 +24,33 @@ struct ExplainedEventsOptions {
   queries::ExplainQuery query;     ///< Its seed is that of the episode.
 };
 
+/// One of the explanations of an episode.
+struct RankedEvent {
+  std::string event;  ///< With its object: "pushed thing_1".
+  double probability = 0.0, log_bayes_factor = 0.0;
+};
+
 /// One episode and what was said of it.
 struct EpisodeResult {
   std::string kind;
   std::uint64_t seed = 0;
   belief::EventKind truth = belief::EventKind::kNothing;
-  std::string failure;            ///< Why there is no explanation; "" = there is one.
-  std::string first;              ///< The most probable event with its object: "pushed thing_1".
-  double probability = 0.0;       ///< Of that.
-  double low = 0.0, high = 0.0;   ///< Its stated interval.
-  double of_truth = 0.0;          ///< Of the true event of the true object.
-  bool right = false;             ///< The first is the true event of the true object; ...
-  bool nearly_right = false;      ///< ... or it is a push for a blow, or the other way round.
-  double time_error = -1.0;       ///< s; negative = none (not right, or no event).
-  double direction_error = -1.0;  ///< rad, of pushes and blows.
-  double place_error = -1.0;      ///< m, of where the object is said to be in the end; negative = it is not there.
-  bool place_within = false;      ///< That is within the 90 % radius.
-  bool hidden = false;            ///< It is truly out of sight there.
-  double seconds = 0.0;           ///< CPU time of tracking and explanation ...
-  double explaining = 0.0;        ///< ... and of the explanation alone.
+  std::string failure;               ///< Why there is no explanation; "" = there is one.
+  std::string first;                 ///< The most probable event with its object: "pushed thing_1".
+  double probability = 0.0;          ///< Of that.
+  double low = 0.0, high = 0.0;      ///< Its stated interval.
+  std::vector<RankedEvent> ranking;  ///< All explanations that are probable at all, the first one first.
+  double of_truth = 0.0;             ///< Of the true event of the true object.
+  bool right = false;                ///< The first is the true event of the true object; ...
+  bool nearly_right = false;         ///< ... or it is a push for a blow, or the other way round.
+  double time_error = -1.0;          ///< s; negative = none (not right, or no event).
+  double direction_error = -1.0;     ///< rad, of pushes and blows.
+  double place_error = -1.0;         ///< m, of where the object is said to be in the end; negative = it is not there.
+  double place_radius = 0.0;         ///< m, the stated 90 % radius.
+  bool place_within = false;         ///< The error is within that.
+  bool hidden = false;               ///< It is truly out of sight there.
+  double seconds = 0.0;              ///< CPU time of tracking and explanation ...
+  double explaining = 0.0;           ///< ... and of the explanation alone.
 };
 
 struct ExplainedEventsReport {

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/queries/path_error.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "prescene/core/random.h"
+
+namespace prescene::queries {
+namespace {
+
+using geometry::Pose;
+using geometry::Vector3d;
+
+const geometry::SymmetryGroup kNoSymmetry = geometry::SymmetryGroup::none();
+
+FramePeak peak_at(const Vector3d& p, double log_peak = 0.0) {
+  FramePeak peak;
+  peak.seen = true;
+  peak.X_WO = Pose::from_translation(p);
+  peak.covariance = 1e-4 * geometry::Matrix6d::Identity();
+  peak.log_peak = log_peak;
+  return peak;
+}
+
+TEST(PathError, WithoutErrorIsTheProductOfTheFrames) {
+  PathError error(0.0, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  double sum = 0.0;
+  for (int k = 0; k < 4; ++k) {
+    const Vector3d p(0.1 * k, 0.0, 0.0);
+    error.move_to(Pose::from_translation(p));
+    const FramePeak peak = peak_at(p + Vector3d(0.0, 0.01, 0.0), 3.0);
+    const PathFit fit = error.fit(peak);
+    EXPECT_NEAR(fit.mahalanobis, 1.0, 1e-9);
+    sum += fit.log_likelihood;
+    error.learn(peak);
+  }
+  EXPECT_NEAR(sum, 4.0 * (3.0 - 0.5), 1e-9);
+  EXPECT_EQ(error.covariance().norm(), 0.0);
+}
+
+// The second method: the frames' offsets along one axis are jointly normal, with the covariance of a random walk plus
+// that of the frames; the other axis of the plane and turns about the vertical only add their determinants.
+TEST(PathError, HasTheLikelihoodOfTheJointDistributionOfAllFrames) {
+  core::RandomStream random(5, core::Purpose::kTest);
+  const double share = 0.2, noise = 1e-4;
+  constexpr int kFrames = 6;
+  PathError error(share, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  Eigen::VectorXd off(kFrames), reached(kFrames);
+  double at = 0.0, variance = 0.0, sum = 0.0;
+  for (int k = 0; k < kFrames; ++k) {
+    const double step = k == 0 ? 0.0 : random.uniform(0.0, 0.1);
+    at += step;
+    variance += share * share * step * step;
+    reached[k] = variance;
+    off[k] = 0.01 * random.normal();
+    error.move_to(Pose::from_translation({at, 0.0, 0.0}));
+    const FramePeak peak = peak_at({at + off[k], 0.0, 0.0});
+    sum += error.fit(peak).log_likelihood;
+    error.learn(peak);
+  }
+  double expected = 0.0;
+  for (const double lever : {1.0, 1.0 / 0.05}) {  // translations, and turns
+    Eigen::MatrixXd joint(kFrames, kFrames);
+    for (int i = 0; i < kFrames; ++i)
+      for (int j = 0; j < kFrames; ++j) joint(i, j) = lever * lever * reached[std::min(i, j)] + (i == j ? noise : 0.0);
+    const double axes = lever == 1.0 ? 2.0 : 1.0;
+    expected += axes * 0.5 * (kFrames * std::log(noise) - std::log(joint.determinant()));
+    if (lever == 1.0) expected -= 0.5 * off.dot(joint.ldlt().solve(off));
+  }
+  EXPECT_NEAR(sum, expected, 1e-6 * std::abs(expected));
+}
+
+TEST(PathError, StaysAsLongAsNothingMovesAndIsLearntFromFrames) {
+  PathError error(0.5, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  error.move_to(Pose{});
+  const Pose X_WO = Pose::from_translation({0.2, 0.0, 0.0});
+  error.move_to(X_WO);
+  EXPECT_NEAR(std::sqrt(error.covariance()(3, 3)), 0.1, 1e-12);
+  for (int k = 0; k < 50; ++k) {
+    error.learn(peak_at({0.25, 0.0, 0.0}));
+    error.move_to(X_WO);
+  }
+  EXPECT_NEAR(error.mean()[3], 0.05, 1e-4);
+  EXPECT_NEAR(std::sqrt(error.covariance()(3, 3)), 0.01 / std::sqrt(50.0), 1e-5);
+}
+
+TEST(PathError, TurnsThatChangeNothingDoNotCount) {
+  const auto symmetry = geometry::SymmetryGroup::continuous(Vector3d::UnitZ(), true);
+  FramePeak peak = peak_at({0.0, 0.0, 0.0});
+  peak.covariance(2, 2) = 100.0;
+  PathError upright(0.1, 0.05, Vector3d::UnitZ(), symmetry), turned(0.1, 0.05, Vector3d::UnitZ(), symmetry);
+  upright.move_to(Pose{});
+  Pose X_WO;
+  X_WO.rotation = geometry::exp_rotation({std::numbers::pi, 0.0, 0.0}) * geometry::exp_rotation({0.0, 0.0, 1.0});
+  turned.move_to(X_WO);
+  EXPECT_NEAR(upright.fit(peak).log_likelihood, turned.fit(peak).log_likelihood, 1e-9);
+}
+
+}  // namespace
+}  // namespace prescene::queries
