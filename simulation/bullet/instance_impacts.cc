@@ -58,8 +58,9 @@ void InstanceWorld::give_back_pressed() {
   const auto pair_before = [](const SolverContact& a, const SolverContact& b) {
     return std::tie(a.body_a, a.body_b) < std::tie(b.body_a, b.body_b);
   };
-  for (const SolverContact& c : pressed_)
-    contacts_.insert(std::upper_bound(contacts_.begin(), contacts_.end(), c, pair_before), c);
+  // The last first, each before those of its pair: so the order is that of time.
+  for (auto c = pressed_.rbegin(); c != pressed_.rend(); ++c)
+    contacts_.insert(std::lower_bound(contacts_.begin(), contacts_.end(), *c, pair_before), *c);
 }
 
 /// From the contacts of a whole step to its end.
