@@ -194,16 +194,6 @@ std::string throws_yaml(const ModelThrows& throws) {
          key_line("friction_scatter", number_text(throws.friction_scatter));
 }
 
-core::Result<std::optional<ModelThrows>> read_throws(const std::filesystem::path& path, const YamlLimits& limits) {
-  PRESCENE_TRY(const LocatedValue document, read_yaml(path, limits));
-  const LocatedValue* at = document.find("throws");
-  if (!at) return std::optional<ModelThrows>();
-  Problems problems;
-  const ModelThrows throws = read_model_throws(*at, problems);
-  if (!problems.empty()) return problems.status();
-  return std::optional<ModelThrows>(throws);
-}
-
 core::Status write_model(const std::filesystem::path& path, const ModelFile& file) {
   return write_file(path, std::string_view(model_yaml(file)));
 }
@@ -211,8 +201,8 @@ core::Status write_model(const std::filesystem::path& path, const ModelFile& fil
 namespace {
 
 core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& document, const std::string& file,
-                                           const std::string& name, const SceneFileOptions& options,
-                                           FileReport* report) {
+                                           const std::string& name, const SceneFileOptions& options, FileReport* report,
+                                           std::optional<ModelThrows>* throws) {
   if (!document) {
     if (report) report->errors.push_back({file, 0, 0, "", document.status().message(), ""});
     return document.status();
@@ -225,7 +215,9 @@ core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& doc
     Binder binder(*document, problems);
     if (const LocatedValue* value = binder.require("model", "a model file holds one key 'model' with the model's keys"))
       model = read_object_model(*value, name, context);
-    if (const LocatedValue* throws = binder.find("throws")) read_model_throws(*throws, problems);
+    std::optional<ModelThrows> read;
+    if (const LocatedValue* value = binder.find("throws")) read = read_model_throws(*value, problems);
+    if (throws) *throws = read;
   }
   if (problems.empty())
     if (const core::Status status = belief::validate(model); !status.ok())
@@ -238,13 +230,15 @@ core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& doc
 }  // namespace
 
 core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
-                                             const SceneFileOptions& options, FileReport* report) {
-  return model_of(read_yaml(path, options.limits), path.string(), name, options, report);
+                                             const SceneFileOptions& options, FileReport* report,
+                                             std::optional<ModelThrows>* throws) {
+  return model_of(read_yaml(path, options.limits), path.string(), name, options, report, throws);
 }
 
 core::Result<belief::ObjectModel> parse_model(std::string_view text, const std::string& file, const std::string& name,
-                                              const SceneFileOptions& options, FileReport* report) {
-  return model_of(parse_yaml(text, file, options.limits), file, name, options, report);
+                                              const SceneFileOptions& options, FileReport* report,
+                                              std::optional<ModelThrows>* throws) {
+  return model_of(parse_yaml(text, file, options.limits), file, name, options, report, throws);
 }
 
 }  // namespace prescene::interfaces

@@ -67,8 +67,7 @@ core::Result<TossEvaluation> evaluate_model(const MotionDataset& dataset, const 
   if (!model.empty()) {
     belief::Scene scene = *dataset.scene;
     belief::ObjectModel& own = scene.models[static_cast<std::size_t>(scene.objects[0].model)];
-    PRESCENE_TRY(own, interfaces::read_model(model, own.name));
-    PRESCENE_TRY(throws, interfaces::read_throws(model));
+    PRESCENE_TRY(own, interfaces::read_model(model, own.name, {}, nullptr, &throws));
     with.scene = std::make_shared<const belief::Scene>(std::move(scene));
   }
   PRESCENE_TRY(const UsableMotions usable, scorable_motions(with, backends));

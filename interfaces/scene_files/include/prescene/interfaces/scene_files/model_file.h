@@ -37,8 +37,6 @@ struct ModelThrows {
 };
 /// The lines of a model file for it.
 std::string throws_yaml(const ModelThrows& throws);
-/// What a model file says of throws; nothing where it says nothing. Fails as read_model does.
-core::Result<std::optional<ModelThrows>> read_throws(const std::filesystem::path& path, const YamlLimits& limits = {});
 
 /// The text of the file. What is read back from it equals what was written, to the bit (a symmetry's axis to the last).
 std::string model_yaml(const ModelFile& file);
@@ -53,11 +51,14 @@ core::Result<std::string> fitted_model_yaml(const std::filesystem::path& scene, 
                                             const belief::ObjectModel& fitted, const std::filesystem::path& folder,
                                             const std::vector<std::string>& remarks = {},
                                             const YamlLimits& limits = {});
-/// Reads a model file on its own and gives the model a name.
+/// Reads a model file on its own and gives the model a name. What the file says of throws, if anything, goes to
+/// `throws`, which may be null.
 core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
-                                             const SceneFileOptions& options = {}, FileReport* report = nullptr);
+                                             const SceneFileOptions& options = {}, FileReport* report = nullptr,
+                                             std::optional<ModelThrows>* throws = nullptr);
 /// The same from text; `file` is its name in messages and where relative paths start.
 core::Result<belief::ObjectModel> parse_model(std::string_view text, const std::string& file, const std::string& name,
-                                              const SceneFileOptions& options = {}, FileReport* report = nullptr);
+                                              const SceneFileOptions& options = {}, FileReport* report = nullptr,
+                                              std::optional<ModelThrows>* throws = nullptr);
 
 }  // namespace prescene::interfaces
