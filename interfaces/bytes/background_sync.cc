@@ -18,11 +18,18 @@ Result<std::unique_ptr<BackgroundSync>> BackgroundSync::start(const std::filesys
                                                               std::chrono::milliseconds interval) {
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
   if (descriptor < 0) return disk_error(path, errno);
-  return std::unique_ptr<BackgroundSync>(new BackgroundSync(path, descriptor, interval));
+  // Now: later there may be no descriptor left.
+  const Result<int> folder = open_folder_of(path);
+  if (!folder) ::close(descriptor);
+  PRESCENE_RETURN_IF_ERROR(folder.status());
+  return std::unique_ptr<BackgroundSync>(new BackgroundSync(path, descriptor, *folder, interval));
 }
 
-BackgroundSync::BackgroundSync(std::filesystem::path path, int descriptor, std::chrono::milliseconds interval)
-    : path_(std::move(path)), descriptor_(descriptor), interval_(interval), thread_([this] { run(); }) {}
+BackgroundSync::BackgroundSync(std::filesystem::path path, int descriptor, int folder,
+                               std::chrono::milliseconds interval)
+    : path_(std::move(path)), descriptor_(descriptor), folder_(folder), interval_(interval), thread_([this] {
+        run();
+      }) {}
 
 BackgroundSync::~BackgroundSync() {
   {
@@ -32,6 +39,7 @@ BackgroundSync::~BackgroundSync() {
   changed_.notify_all();
   thread_.join();
   ::close(descriptor_);
+  if (folder_ >= 0) ::close(folder_);
 }
 
 void BackgroundSync::note_written() {
@@ -53,7 +61,6 @@ double BackgroundSync::seconds_at_risk() const {
 }
 
 void BackgroundSync::run() {
-  bool name_is_kept = false;
   std::unique_lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, [this] { return ended_ || waiting_since_; });
@@ -63,10 +70,7 @@ void BackgroundSync::run() {
     asked_since_ = std::exchange(waiting_since_, std::nullopt);
     lock.unlock();
     Status synced = sync_content(descriptor_, path_);
-    if (synced.ok() && !name_is_kept) {
-      synced = sync_name(path_);
-      name_is_kept = true;
-    }
+    if (synced.ok()) synced = sync_and_close_folder(std::exchange(folder_, -1), path_);
     lock.lock();
     if (status_.ok()) status_ = std::move(synced);
     asked_since_.reset();

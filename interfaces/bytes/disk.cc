@@ -25,13 +25,23 @@ core::Status sync_content(int descriptor, const std::filesystem::path& path) {
   return ::fdatasync(descriptor) == 0 || has_no_disk(errno) ? core::ok_status() : disk_error(path, errno);
 }
 
-core::Status sync_name(const std::filesystem::path& path) {
+core::Result<int> open_folder_of(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return errno == EACCES ? core::ok_status() : disk_error(path, errno);
-  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
-  ::close(descriptor);
+  if (descriptor < 0 && errno != EACCES) return disk_error(path, errno);
+  return descriptor;
+}
+
+core::Status sync_and_close_folder(int folder, const std::filesystem::path& path) {
+  if (folder < 0) return core::ok_status();
+  const int error = ::fsync(folder) == 0 ? 0 : errno;
+  ::close(folder);
   return error == 0 || has_no_disk(error) ? core::ok_status() : disk_error(path, error);
+}
+
+core::Status sync_name(const std::filesystem::path& path) {
+  PRESCENE_TRY(const int folder, open_folder_of(path));
+  return sync_and_close_folder(folder, path);
 }
 
 }  // namespace prescene::interfaces

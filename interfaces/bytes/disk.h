@@ -19,4 +19,9 @@ core::Status sync_content(int descriptor, const std::filesystem::path& path);
 /// otherwise. Does nothing where the folder may not be read.
 core::Status sync_name(const std::filesystem::path& path);
 
+/// The same in two parts, of which the second needs no descriptor: the folder's, or -1 where it may not be read; and
+/// waiting, which closes it.
+core::Result<int> open_folder_of(const std::filesystem::path& path);
+core::Status sync_and_close_folder(int folder, const std::filesystem::path& path);
+
 }  // namespace prescene::interfaces

@@ -42,11 +42,12 @@ class BackgroundSync {
 
  private:
   using Clock = std::chrono::steady_clock;
-  BackgroundSync(std::filesystem::path path, int descriptor, std::chrono::milliseconds interval);
+  BackgroundSync(std::filesystem::path path, int descriptor, int folder, std::chrono::milliseconds interval);
   void run();
 
   std::filesystem::path path_;
   int descriptor_;
+  int folder_;  // of the thread; -1: its name is kept
   std::chrono::milliseconds interval_;
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
