@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/interfaces/dds/dds_node.h"
 
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -49,6 +50,20 @@ std::string configuration(const DdsOptions& options) {
     xml += "<Tracing><Category>config</Category><OutputFile>/dev/null</OutputFile></Tracing>";
   if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
   return xml;
+}
+
+/// Cyclone takes some ten descriptors for a domain and, where it finds none, ends the program when it cleans up.
+core::Status check_descriptors() {
+  constexpr std::size_t kDescriptors = 16;
+  std::array<int, kDescriptors> spare{};
+  for (int& descriptor : spare) descriptor = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const bool enough = std::none_of(spare.begin(), spare.end(), [](int descriptor) { return descriptor < 0; });
+  for (const int descriptor : spare) {
+    if (descriptor >= 0) ::close(descriptor);
+  }
+  if (enough) return core::ok_status();
+  return core::unavailable("DDS needs " + std::to_string(kDescriptors) +
+                           " file descriptors, and there are not so many left: raise `ulimit -n`");
 }
 
 }  // namespace
@@ -264,6 +279,7 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
     return core::invalid_input("DDS domain " + std::to_string(options.domain) +
                                ": ROS_DOMAIN_ID is a number from 0 to 230");
   }
+  PRESCENE_RETURN_IF_ERROR(check_descriptors());
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   const auto domain_id = static_cast<dds_domainid_t>(options.domain);
