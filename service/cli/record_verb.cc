@@ -85,8 +85,10 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {}));
   const std::string output = live_recording_path(options.output, context);
   // With the names of the topics, so that a replay knows them.
-  PRESCENE_TRY(const auto recording, RecordingWriter::create(output, {"", "", context.options().seed,
-                                                                      belief::json_text(to_json(options.tracker))}));
+  PRESCENE_TRY(
+      const auto recording,
+      RecordingWriter::create(output, {"", "", context.options().seed, belief::json_text(to_json(options.tracker))},
+                              kLiveRecording));
   PRESCENE_TRY(const std::uint64_t messages,
                record_topics(options.dds, options.tracker.topics, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},

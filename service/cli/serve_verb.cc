@@ -60,7 +60,8 @@ core::Status run(ServeOptions& options, VerbContext& context) {
     PRESCENE_TRY(recording,
                  RecordingWriter::create(options.record,
                                          {options.scene, text, context.options().seed,
-                                          belief::json_text(to_json(options.settings.tracker)), std::move(files)}));
+                                          belief::json_text(to_json(options.settings.tracker)), std::move(files)},
+                                         kLiveRecording));
   }
   Backends backends(context.pool(), options.backends);
   PRESCENE_TRY(const auto view, open_view(options, scene, context));

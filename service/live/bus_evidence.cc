@@ -38,7 +38,8 @@ BusEvidence::BusEvidence(const TrackerSettings& settings, const belief::Scene* s
       tf_(settings.tf) {
   settings_.assembler = settled_assembler(settings);
   const InputTopics& topics = settings_.topics;
-  for (const std::string* topic : {&topics.depth, &topics.color, &topics.camera_info, &topics.tf, &topics.tf_static})
+  for (const std::string* topic :
+       {&topics.depth, &topics.color, &topics.camera_info, &topics.tf, &topics.tf_static, &topics.clock})
     if (!topic->empty()) topics_[*topic];
 }
 
@@ -48,7 +49,11 @@ void BusEvidence::note_header(TopicEvidence& topic, const interfaces::RosHeader&
   if (!stamp_ns) return;
   if (topic.messages > 1 && *stamp_ns <= topic.stamp_ns) ++topic.stamps_not_later;
   topic.stamp_ns = *stamp_ns;
-  if (topic.ages.size() < kMostAges) topic.ages.push_back(core::seconds_of(wall_ns - *stamp_ns));
+  if (topic.ages.size() >= kMostAges) return;
+  if (settings_.topics.clock.empty())
+    topic.ages.push_back(core::seconds_of(wall_ns - *stamp_ns));
+  else if (simulated_ns_)
+    topic.ages.push_back(core::seconds_of(*simulated_ns_ - *stamp_ns));
 }
 
 void BusEvidence::add(const ReceivedMessage& message, core::TimeNs wall_ns) {
@@ -67,6 +72,14 @@ void BusEvidence::add(const ReceivedMessage& message, core::TimeNs wall_ns) {
 core::Status BusEvidence::take_in(const ReceivedMessage& message, TopicEvidence& topic, core::TimeNs wall_ns) {
   const MessageIndex index = next_index_++;
   const InputTopics& topics = settings_.topics;
+  if (message.topic == topics.clock) {
+    PRESCENE_TRY(const auto clock,
+                 interfaces::decode_cdr<interfaces::RosClock>(message.cdr, interfaces::kSmallMessage));
+    PRESCENE_TRY(const core::TimeNs now_ns, interfaces::to_stamp_ns(clock.clock));
+    if (!simulated_ns_) first_simulated_ns_ = now_ns;
+    simulated_ns_ = now_ns;
+    return core::ok_status();
+  }
   if (message.topic == topics.camera_info) {
     PRESCENE_TRY(auto info, interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage));
     note_header(topic, info.header, wall_ns);

@@ -32,6 +32,7 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
   std::uint64_t messages = 0;
   core::TimeNs last_ns = 0;
   bool waits_for_depth = true;
+  bool was_late = false;
   const core::Stopwatch watch;
   while (!cancellation.requested()) {
     if (waits_for_depth && watch.seconds() > kNothingCameAfter) {
@@ -45,6 +46,12 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
       PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
       ++messages;
     }
+    PRESCENE_RETURN_IF_ERROR(recording.write_due(core::steady_now_ns()));
+    const bool is_late = recording.seconds_at_risk() > kTooLongAtRisk;
+    if (is_late && !was_late)
+      core::log(log, core::LogLevel::kWarning,
+                "the disk is slow: more than the last second is lost if the power fails");
+    was_late = is_late;
   }
   node->stop_receiving();
   if (inbox.dropped() + node->dropped_samples() > 0) {

@@ -363,6 +363,33 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
     checks.ok("robot", "tf gives the pose of " + counted_text(evidence.robot().size(), "robot part") + " of the scene");
 }
 
+void check_simulated_time(const BusEvidence& evidence, const BusSurroundings& around, Checks& checks) {
+  const std::string name = "simulated time";
+  const std::string type = "rosgraph_msgs/msg/Clock";
+  const std::string& topic = evidence.settings().topics.clock;
+  if (topic.empty()) {
+    if (writers_of(around, kClockTopic, type) > 0)
+      checks.warn(name, std::string("somebody tells it on ") + kClockTopic + ", but real time is used",
+                  "give --use-sim-time, here and to serve, if the camera is simulated");
+    return;
+  }
+  if (!evidence.simulated_ns()) {
+    const std::string& refusal = evidence.topics().at(topic).last_refusal;
+    checks.fail(name, refusal.empty() ? "nothing has come on " + topic : topic + ": " + refusal,
+                "start the simulator (or `ros2 bag play --clock`), or leave --use-sim-time out");
+    return;
+  }
+  const TopicEvidence& seen = evidence.topics().at(topic);
+  const double passed = core::seconds_of(*evidence.simulated_ns() - evidence.first_simulated_ns());
+  const std::string what = topic + ": " + fixed_text(core::seconds_of(*evidence.simulated_ns()), 2) + " s, " +
+                           rate_text(seen) + ", " + fixed_text(passed, 2) + " s passed in " +
+                           fixed_text(core::seconds_of(seen.last_ns - seen.first_ns), 2) + " s";
+  if (passed > 0.0)
+    checks.ok(name, what);
+  else
+    checks.warn(name, what, "let the simulation run: it is paused, or began anew just now");
+}
+
 void check_clock(const BusEvidence& evidence, Checks& checks) {
   const TopicEvidence& depth = evidence.topics().at(evidence.settings().topics.depth);
   if (depth.ages.empty()) return;
@@ -377,9 +404,10 @@ void check_clock(const BusEvidence& evidence, Checks& checks) {
   } else if (age > kOldStamp || age < -kAheadStamp) {
     checks.warn("stamps",
                 "depth images are stamped " + fixed_text(std::abs(age), 2) + " s " + (age > 0 ? "before" : "after") +
-                    " they came, by this machine's clock",
-                "that is as it should be in simulated time or for a recording; else synchronise the clocks (chrony, "
-                "PTP). Controls must have stamps of the camera's clock");
+                    " they came, by " +
+                    (evidence.settings().topics.clock.empty() ? "this machine's clock" : "simulated time"),
+                "that is as it should be for a recording; in simulated time give --use-sim-time; else synchronise the "
+                "clocks (chrony, PTP). Controls must have stamps of the camera's clock");
   } else {
     checks.ok("stamps", "depth images come " + fixed_text(1e3 * age, 0) + " ms (median) after their stamps");
   }
@@ -414,6 +442,7 @@ std::vector<DoctorCheck> checks_of(const BusEvidence& evidence, const BusSurroun
   const InputTopics& topics = evidence.settings().topics;
   check_domain(around, checks);
   check_services(around, checks);
+  check_simulated_time(evidence, around, checks);
   const bool has_depth =
       check_topic("depth image", topics.depth, depth_type(topics), true, "--depth-topic", evidence, around, checks);
   if (has_depth) check_image("depth image", topics.depth, depth_type(topics), evidence, around, checks);

@@ -11,7 +11,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
-#include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/bytes/kept_file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
@@ -47,7 +47,8 @@ std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
           {topics.color, image},
           {topics.camera_info, {.messages = 4, .bytes = kMiB}},
           {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
-          {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}}};
+          {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}},
+          {topics.clock, {.messages = 4, .bytes = kMiB}}};
 }
 
 /// True at most `rate` times a second.
@@ -83,6 +84,7 @@ struct LiveService::Impl {
         diagnostics_limit(settings.diagnostics_rate),
         learned_limit(1.0 / settings.learned_interval) {
     learned_limit.due();  // not before there is a frame
+    if (!settings.learned_file.empty()) learned_file = std::make_unique<interfaces::KeptFile>(settings.learned_file);
   }
 
   core::Status join_bus();
@@ -105,8 +107,8 @@ struct LiveService::Impl {
   void record_step(const StepRecord& step);
   /// The recording ends here, and is an error of the run.
   void give_up_recording(const core::Status& why);
-  /// Writes what was learned if it is not in the file yet.
-  core::Status keep_learned();
+  /// Has what was learned written if it was not yet, or could not be.
+  void keep_learned();
   /// The same from time to time; a failure is logged and published, and tried again.
   void look_after_learned();
   /// Steps the belief if a frame is complete, records what was answered, publishes.
@@ -152,7 +154,12 @@ struct LiveService::Impl {
   std::uint64_t idle_controls = 0;
   std::string last_idle_control;
   const Backends* backends = nullptr;
+  /// Since the last frame that was used, s; by simulated time where there is one.
+  std::optional<double> seconds_since_frame() const;
+
   std::optional<core::Stopwatch> since_frame;
+  core::TimeNs simulated_frame_ns = 0;        // when it was used
+  std::optional<core::Stopwatch> since_tick;  // since simulated time went on
   core::Stopwatch since_start;
   bool depth_has_come = false;
   bool told_nothing_came = false;
@@ -165,7 +172,8 @@ struct LiveService::Impl {
   std::string last_failure;
   core::TimeNs last_failure_ns = 0;
   std::shared_ptr<const belief::Scene> published_scene;  // whose models' meshes the markers have
-  std::string kept_learned;                              // the text that the learned file holds
+  std::unique_ptr<interfaces::KeptFile> learned_file;    // null where none is named
+  std::string kept_learned;                              // the text that it was given
   std::string learned_failure;
   ServiceHealth last_reported;
 
@@ -307,22 +315,20 @@ void LiveService::Impl::give_up_recording(const core::Status& why) {
   recording.reset();
 }
 
-core::Status LiveService::Impl::keep_learned() {
-  if (settings.learned_file.empty()) return core::ok_status();
-  const std::string text = interfaces::learned_yaml(tracker->learned());
-  if (text == kept_learned) return core::ok_status();
-  core::Status written = interfaces::write_file(settings.learned_file, std::string_view(text));
-  if (written.ok()) kept_learned = text;
-  learned_failure = written.message();
-  return written;
+void LiveService::Impl::keep_learned() {
+  std::string text = interfaces::learned_yaml(tracker->learned());
+  if (text == kept_learned && learned_file->status().ok()) return;
+  learned_file->put(text);
+  kept_learned = std::move(text);
 }
 
 void LiveService::Impl::look_after_learned() {
-  if (settings.learned_file.empty() || !learned_limit.due()) return;
-  const bool failed_before = !learned_failure.empty();
-  const core::Status kept = keep_learned();
-  if (!kept.ok() && !failed_before)
-    core::log(log, core::LogLevel::kError, "what was learned could not be kept: " + kept.message());
+  if (!learned_file) return;
+  const std::string failure = learned_file->status().message();
+  if (!failure.empty() && learned_failure.empty())
+    core::log(log, core::LogLevel::kError, "what was learned could not be kept: " + failure);
+  learned_failure = failure;
+  if (learned_limit.due()) keep_learned();
 }
 
 void LiveService::Impl::take_in(ReceivedMessage& message) {
@@ -338,7 +344,9 @@ void LiveService::Impl::take_in(ReceivedMessage& message) {
     }
   }
   depth_has_come = depth_has_come || message.topic == settings.tracker.topics.depth;
+  const core::TimeNs simulated_before_ns = tracker->simulated_now_ns();
   const core::Status taken = tracker->take_in(message, index);
+  if (tracker->simulated_now_ns() != simulated_before_ns) since_tick.emplace();
   if (!taken.ok()) refuse(taken);
 }
 
@@ -365,12 +373,17 @@ void LiveService::Impl::look_after_frames() {
   }
   const core::TimeNs now_ns = now();
   for (const std::string& answer : answers_given) record(kAnswerTopic, answer);
+  if (recording) {
+    const core::Status written = recording->write_due(now_ns);
+    if (!written.ok()) give_up_recording(written);
+  }
   try {
     if (const auto step = tracker->step(now_ns)) {
       record_step(step->record);  // first: whatever fails below, the step was made
       if (step->record.step == 1) worker->begin_session(step->record.stamp_ns);
       ++steps;
       since_frame.emplace();
+      simulated_frame_ns = tracker->simulated_now_ns();
       step_seconds = step->record.seconds;
       degraded = step->record.degraded;
       not_simulated += static_cast<std::uint64_t>(step->counters.not_simulated);
@@ -428,6 +441,12 @@ void LiveService::Impl::advertise_new(const std::string& object) {
     check_sent(publisher.status());
 }
 
+std::optional<double> LiveService::Impl::seconds_since_frame() const {
+  if (!since_frame) return std::nullopt;
+  if (!tracker->uses_simulated_time()) return since_frame->seconds();
+  return std::max(0.0, core::seconds_of(tracker->simulated_now_ns() - simulated_frame_ns));
+}
+
 ServiceHealth LiveService::Impl::health() const {
   ServiceHealth health;
   health.depth_topic = settings.tracker.topics.depth;
@@ -438,7 +457,7 @@ ServiceHealth LiveService::Impl::health() const {
   health.refused_messages = refused;
   health.dropped_in_inbox = inbox.dropped_by_topic();
   const InputTopics& topics = settings.tracker.topics;
-  health.image_topics = {topics.depth, topics.color, topics.camera_info};
+  health.image_topics = {topics.depth, topics.color, topics.camera_info, topics.clock};
   health.lost_on_bus = node->dropped_samples();
   health.unsent = unsent.load(std::memory_order_relaxed);
   health.unlogged = log_limiter.held_back();
@@ -450,6 +469,7 @@ ServiceHealth LiveService::Impl::health() const {
   health.last_idle_control = last_idle_control;
   health.other_services = node->other_writers(kBeliefTopic);
   health.is_recording = recording != nullptr;
+  if (recording) health.recording_at_risk_s = recording->seconds_at_risk();
   if (!recording_status.ok()) health.recording_failure = recording_status.message();
   health.keeps_learned = !settings.learned_file.empty();
   health.learned_failure = learned_failure;
@@ -458,7 +478,10 @@ ServiceHealth LiveService::Impl::health() const {
   health.failures = failures;
   health.last_failure = last_failure;
   health.last_failure_ns = last_failure_ns;
-  if (since_frame) health.seconds_since_frame = since_frame->seconds();
+  health.seconds_since_frame = seconds_since_frame();
+  health.clock_topic = topics.clock;
+  health.simulated_now_s = core::seconds_of(tracker->simulated_now_ns());
+  if (since_tick) health.seconds_since_tick = since_tick->seconds();
   health.last_step_seconds = step_seconds;
   health.lens = tracker->lens_text();
   health.degraded = degraded;
@@ -499,9 +522,10 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
 
 void LiveService::Impl::publish_diagnostics() {
   const ServiceHealth now = health();
+  const core::TimeNs stamp_ns = tracker->uses_simulated_time() ? tracker->simulated_now_ns() : core::wall_now_ns();
   tell_what_changed(now);
   check_sent(node->publish(
-      diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(core::wall_now_ns()), ""},
+      diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(stamp_ns), ""},
                                                   {to_diagnostic(now, last_reported, settings.dds.node_name)}}));
   if (settings.on_health) settings.on_health(health_text(now));
   last_reported = now;
@@ -531,7 +555,8 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
   }
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
   const core::Status recorded = impl.recording ? impl.recording->close() : impl.recording_status;
-  const core::Status kept = impl.keep_learned();
+  if (impl.learned_file) impl.keep_learned();
+  const core::Status kept = impl.learned_file ? impl.learned_file->wait() : core::ok_status();
   return recorded.ok() ? kept : recorded;
 }
 

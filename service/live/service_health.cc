@@ -2,8 +2,10 @@
 #include "prescene/service/live/service_health.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "prescene/core/text.h"
+#include "prescene/service/recording/recording.h"
 
 namespace prescene::service {
 namespace {
@@ -22,12 +24,21 @@ std::uint64_t losses_of(const ServiceHealth& health) {
   return sum;
 }
 
+bool is_recording_late(const ServiceHealth& health) { return health.recording_at_risk_s > kTooLongAtRisk; }
+
+/// Simulated time is paused, or nobody tells it.
+bool stands_still(const ServiceHealth& health) {
+  return !health.clock_topic.empty() && health.seconds_since_tick.value_or(HUGE_VAL) > kSilentAfter;
+}
+
 RosDiagnosticLevel level_of(const ServiceHealth& health, const ServiceHealth& before) {
   if (!health.recording_failure.empty() || !health.learned_failure.empty()) return RosDiagnosticLevel::kError;
   if (!health.seconds_since_frame) return RosDiagnosticLevel::kWarn;
   if (!is_tracking(health)) return RosDiagnosticLevel::kError;
   if (losses_of(health) > losses_of(before)) return RosDiagnosticLevel::kWarn;
-  return health.degraded.empty() && health.other_services == 0 ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
+  const bool is_well =
+      health.degraded.empty() && health.other_services == 0 && !is_recording_late(health) && !stands_still(health);
+  return is_well ? RosDiagnosticLevel::kOk : RosDiagnosticLevel::kWarn;
 }
 
 std::uint64_t sum_of(const std::map<std::string, std::uint64_t>& counts) {
@@ -45,12 +56,21 @@ std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
 
 std::string recording_text(const ServiceHealth& health) {
   if (!health.recording_failure.empty()) return "failed: " + health.recording_failure;
-  return health.is_recording ? "on" : "off";
+  if (!health.is_recording) return "off";
+  return is_recording_late(health)
+             ? "on, but the disk is slow: what came in the last " + core::fixed_text(health.recording_at_risk_s, 1) +
+                   " s is lost if the power fails"
+             : "on";
 }
 
 std::string learned_text(const ServiceHealth& health) {
   if (!health.learned_failure.empty()) return "failed: " + health.learned_failure;
   return health.keeps_learned ? "yes" : "no";
+}
+
+std::string clock_text(const ServiceHealth& health) {
+  if (health.clock_topic.empty()) return "";
+  return health.seconds_since_tick ? core::fixed_text(health.simulated_now_s, 3) : "has not come";
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -64,17 +84,21 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics,
                lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late,
                waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services, is_recording,
-               recording_failure, keeps_learned, learned_failure, seconds_since_frame, last_step_seconds, not_simulated,
-               physics_failure, steppers, lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] =
-      health;
+               recording_at_risk_s, recording_failure, keeps_learned, learned_failure, seconds_since_frame, clock_topic,
+               simulated_now_s, seconds_since_tick, last_step_seconds, not_simulated, physics_failure, steppers, lens,
+               degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
-  static_cast<void>(image_topics);       // says what of dropped_in_inbox is a loss
-  static_cast<void>(nothing_came);       // is in the text
-  static_cast<void>(is_recording);       // told, like its failure,
-  static_cast<void>(recording_failure);  // by recording_text()
-  static_cast<void>(keeps_learned);      // and by
-  static_cast<void>(learned_failure);    // learned_text()
+  static_cast<void>(image_topics);         // says what of dropped_in_inbox is a loss
+  static_cast<void>(nothing_came);         // is in the text
+  static_cast<void>(is_recording);         // told, like
+  static_cast<void>(recording_at_risk_s);  // both of these,
+  static_cast<void>(recording_failure);    // by recording_text()
+  static_cast<void>(keeps_learned);        // and by
+  static_cast<void>(learned_failure);      // learned_text(),
+  static_cast<void>(clock_topic);          // and
+  static_cast<void>(simulated_now_s);      // these by
+  static_cast<void>(seconds_since_tick);   // clock_text()
   const bool question_is_newer = last_failure.empty() || question_failure_ns > last_failure_ns;
   return {{"steps", std::to_string(steps)},
           {"depth topic", depth_topic},
@@ -96,6 +120,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"other services in the domain", std::to_string(other_services)},
           {"recording", recording_text(health)},
           {"keeps what it learns", learned_text(health)},
+          {"simulated time, s", clock_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},
           {"last step, s", core::rounded_text(last_step_seconds)},
           {"lens", lens},
@@ -131,6 +156,11 @@ std::string health_text(const ServiceHealth& health) {
   std::string end = health.recording_failure.empty() ? "" : "; the recording failed: " + health.recording_failure;
   if (!health.learned_failure.empty()) end += "; what was learned could not be kept: " + health.learned_failure;
   if (health.other_services > 0) end += "; " + others_text(health.other_services);
+  if (stands_still(health))
+    end += health.seconds_since_tick ? "; simulated time stands still: nothing new on " + health.clock_topic + " for " +
+                                           core::fixed_text(*health.seconds_since_tick, 0) + " s"
+                                     : "; no simulated time has come on " + health.clock_topic +
+                                           ": start the simulator, or leave --use-sim-time out";
   if (is_tracking(health)) {
     std::string text = "tracking";
     for (const std::string& word : health.degraded) text += "; " + word;

@@ -2,6 +2,8 @@
 #include "prescene/service/recording/recording.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "prescene/interfaces/bytes/crc32.h"
@@ -71,8 +73,12 @@ std::filesystem::path unused_recording_path(const std::filesystem::path& path) {
 }
 
 core::Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std::filesystem::path& path,
-                                                                       const RecordingInfo& info) {
-  PRESCENE_TRY(auto mcap, interfaces::McapWriter::create(path, {}));
+                                                                       const RecordingInfo& info,
+                                                                       const RecordingSafety& safety) {
+  interfaces::McapWriterOptions options;
+  options.chunk_ns = core::ns_of(safety.kept_back_s);
+  options.sync_interval = std::chrono::milliseconds(std::llround(1e3 * safety.unsynced_s));
+  PRESCENE_TRY(auto mcap, interfaces::McapWriter::create(path, options));
   interfaces::McapMetadata metadata{kMetadataName,
                                     {{"scene_file", info.scene_file},
                                      {"scene_text", info.scene_text},

@@ -238,7 +238,9 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
 std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
   for (std::size_t newest = waiting_.size(); newest > 0; --newest) {
     const Waiting& waiting = waiting_[newest - 1];
-    const bool out_of_time = now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
+    // A time before it came is that of a simulation that began anew.
+    const bool out_of_time =
+        now_ns < waiting.received_ns || now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
     Attempt attempt = assemble(waiting, out_of_time);
     if (attempt.frame) {
       const Waiting taken = waiting;

@@ -40,18 +40,16 @@ std::string color_type(const InputTopics& topics) {
 }
 
 core::Status validate(const InputTopics& topics) {
-  const std::pair<const char*, const std::string*> named[] = {{"depth", &topics.depth},
-                                                              {"color", &topics.color},
-                                                              {"camera info", &topics.camera_info},
-                                                              {"tf", &topics.tf},
-                                                              {"static tf", &topics.tf_static}};
+  const std::pair<const char*, const std::string*> named[] = {
+      {"depth", &topics.depth}, {"color", &topics.color},         {"camera info", &topics.camera_info},
+      {"tf", &topics.tf},       {"static tf", &topics.tf_static}, {"clock", &topics.clock}};
   std::map<std::string, const char*> seen;
   for (const auto& [what, topic] : named) {
     if (!core::is_utf8(*topic))
       return core::invalid_input(std::string("the ") + what +
                                  " topic's name is not UTF-8: give one of letters, digits, _ and /");
     if (topic->empty()) {
-      if (topic == &topics.color) continue;
+      if (topic == &topics.color || topic == &topics.clock) continue;
       return core::invalid_input(std::string("the ") + what + " topic has no name: only colour can be left out");
     }
     const auto [other, is_new] = seen.emplace(*topic, what);
@@ -83,6 +81,7 @@ std::vector<BusTopic> bus_topics(const InputTopics& topics) {
       {topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor, TopicQos::kReliable},
       {topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf, TopicQos::kTf},
       {topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, TopicQos::kLatched},
+      {topics.clock, "rosgraph_msgs/msg/Clock", TopicQos::kSensor, TopicQos::kReliable},
       {kControlTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kCommands},
       {kQueryTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kCommands},
       {kAnswerTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kReliable},

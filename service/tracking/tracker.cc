@@ -7,6 +7,7 @@
 
 #include "prescene/core/hash.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
 
 namespace prescene::service {
 namespace {
@@ -101,15 +102,22 @@ std::shared_ptr<const belief::Belief> Tracker::belief() const {
 core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, MessageIndex index) {
   last_index_ = index;
   const InputTopics& topics = settings_.topics;
+  const bool is_simulated = uses_simulated_time();
+  const core::TimeNs received_ns = is_simulated ? simulated_now_ns_ : message.received_ns;
   const auto take = [&]() -> core::Status {
+    if (is_simulated && message.topic == topics.clock) {
+      PRESCENE_TRY(const auto clock, decoded<interfaces::RosClock>(message, "rosgraph_msgs/msg/Clock"));
+      PRESCENE_TRY(simulated_now_ns_, interfaces::to_stamp_ns(clock.clock));
+      return core::ok_status();
+    }
     if (message.topic == topics.depth) {
       PRESCENE_TRY(DepthMessage depth, decode_depth(message, assembler_.image_rules()));
-      return assembler_.add_depth(std::move(depth), index, message.received_ns);
+      return assembler_.add_depth(std::move(depth), index, received_ns);
     }
     if (message.topic == topics.color) {
       if (!assembler_.uses_color()) return core::ok_status();
       PRESCENE_TRY(ColorMessage color, decode_color_message(message));
-      return assembler_.add_color(std::move(color), index, message.received_ns);
+      return assembler_.add_color(std::move(color), index, received_ns);
     }
     if (message.topic == topics.camera_info) {
       PRESCENE_TRY(const auto info, decoded<interfaces::RosCameraInfo>(message, "sensor_msgs/msg/CameraInfo"));
@@ -121,7 +129,9 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
     }
     if (message.topic == kControlTopic) {
       PRESCENE_RETURN_IF_ERROR(check_type(message, "std_msgs/msg/String"));
-      return controls_.take_in(message, belief_->step > 0 ? std::optional(belief_->stamp_ns) : std::nullopt);
+      const auto newest_ns = belief_->step > 0 ? std::optional(belief_->stamp_ns) : std::nullopt;
+      if (!is_simulated) return controls_.take_in(message, newest_ns);
+      return controls_.take_in({message.topic, message.type, message.cdr, received_ns, received_ns}, newest_ns);
     }
     return core::ok_status();
   };
@@ -129,7 +139,7 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
 }
 
 std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
-  std::optional<AssembledFrame> frame = assembler_.take(now_ns);
+  std::optional<AssembledFrame> frame = assembler_.take(uses_simulated_time() ? simulated_now_ns_ : now_ns);
   if (!frame) return std::nullopt;
   const core::Stopwatch watch;
   const core::TimeNs stamp_ns = frame->observation.stamp_ns;

@@ -101,6 +101,41 @@ TEST_F(DoctorTest, SaysThatNothingComes) {
   EXPECT_FALSE(diagnosis->frame.has_value());
 }
 
+TEST_F(DoctorTest, SaysHowSimulatedTimeGoesAndThatItIsTold) {
+  {
+    options_.seconds = 0.5;
+    options_.tracker.topics.clock = kClockTopic;
+    const auto diagnosis = examine();
+    ASSERT_TRUE(diagnosis.ok());
+    const DoctorCheck* check = find(*diagnosis, "simulated time");
+    ASSERT_NE(check, nullptr);
+    EXPECT_EQ(check->status, CheckStatus::kError);
+    EXPECT_EQ(check->what, "nothing has come on /clock");
+  }
+  tests::RobotOnBus robot(tests::kBoxScene, own_domain());
+  ASSERT_TRUE(robot.good());
+  robot.send_clock(0);
+  for (const std::string clock : {kClockTopic, ""}) {
+    options_.tracker.topics.clock = clock;
+    std::atomic<bool> done = false;
+    std::thread sender([&] {
+      for (core::TimeNs time_ns = 0; !done; time_ns += 10'000'000) {
+        robot.send_clock(time_ns);
+        robot.wait(std::chrono::milliseconds(10));
+      }
+    });
+    const auto is_found = [&](const core::Result<Diagnosis>& diagnosis) {
+      const DoctorCheck* check = diagnosis ? find(*diagnosis, "simulated time") : nullptr;
+      return check != nullptr && check->status == (clock.empty() ? CheckStatus::kWarning : CheckStatus::kOk);
+    };
+    bool found = false;
+    for (int i = 0; i < 20 && !found; ++i) found = is_found(examine());
+    EXPECT_TRUE(found) << clock;
+    done = true;
+    sender.join();
+  }
+}
+
 TEST_F(DoctorTest, StopsOnRequest) {
   options_.seconds = 600.0;
   core::Cancellation cancellation;

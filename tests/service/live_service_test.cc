@@ -60,12 +60,13 @@ class LiveServiceTest : public ::testing::Test {
     }
   }
 
-  void start(std::unique_ptr<RecordingWriter> recording = nullptr) {
+  void start(std::unique_ptr<RecordingWriter> recording = nullptr, const std::string& clock = "") {
     const auto scene = load_scene_text(tests::kBoxScene, "box.yaml", {});
     ASSERT_TRUE(scene.ok()) << scene.status().message();
     LiveSettings settings;
     settings.dds.domain = own_domain();
     settings.diagnostics_rate = 50.0;
+    settings.tracker.topics.clock = clock;
     const core::LogSink log = [this](core::LogLevel, const std::string& text) {
       const std::lock_guard lock(log_mutex_);
       log_.push_back(text);
@@ -149,6 +150,24 @@ TEST_F(LiveServiceTest, GoesOnTrackingWhenTheSendersClockIsSet) {
   EXPECT_TRUE(tracks_from(kNoon - 3600 * kSecond)) << robot_.diagnosis();
   EXPECT_TRUE(tracks_from(kNoon + 3600 * kSecond)) << robot_.diagnosis();
   EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, SaysHowSimulatedTimeGoes) {
+  start(nullptr, kClockTopic);
+  // Complete frames are used, but for all that the service knows no time passes.
+  ASSERT_TRUE(tracks_from(kNoon));
+  EXPECT_THAT(robot_.diagnosis(), HasSubstr("no simulated time has come on /clock"));
+  const auto says = [&](const std::string& text) {
+    return robot_.send_until([&] { return robot_.diagnosis().find(text) != std::string::npos; }, kNoon + kSecond);
+  };
+  robot_.send_clock(5 * kSecond);
+  EXPECT_TRUE(robot_.send_until(
+      [&] {
+        robot_.send_clock(7 * kSecond);
+        return robot_.diagnostics()["simulated time, s"] == "7.000";
+      },
+      kNoon + kSecond));
+  EXPECT_TRUE(says("simulated time stands still: nothing new on /clock for ")) << robot_.diagnosis();
 }
 
 TEST_F(LiveServiceTest, ARecordingThatFailsStandsInDiagnosticsAndInTheStatus) {

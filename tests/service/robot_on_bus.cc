@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -120,6 +121,11 @@ void RobotOnBus::send_tf(const interfaces::RosTfMessage& tf) {
   count(node_->publish(publisher(service::InputTopics().tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf), tf));
 }
 
+void RobotOnBus::send_clock(core::TimeNs time_ns) {
+  count(node_->publish(publisher(service::kClockTopic, "rosgraph_msgs/msg/Clock", TopicQos::kReliable),
+                       interfaces::RosClock{interfaces::to_ros_time(time_ns)}));
+}
+
 void RobotOnBus::ask(const std::string& question) {
   count(node_->publish(publisher(service::kQueryTopic, "std_msgs/msg/String", TopicQos::kReliable),
                        interfaces::RosString{question}));
@@ -169,6 +175,16 @@ std::vector<std::string> RobotOnBus::answers() const {
 std::vector<std::string> RobotOnBus::answers_since(std::size_t known) const {
   const std::lock_guard lock(mutex_);
   return {answers_.begin() + static_cast<std::ptrdiff_t>(std::min(known, answers_.size())), answers_.end()};
+}
+
+std::vector<std::string> RobotOnBus::take_beliefs() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(beliefs_, {});
+}
+
+std::vector<std::string> RobotOnBus::take_answers() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(answers_, {});
 }
 
 std::string RobotOnBus::diagnosis() const {

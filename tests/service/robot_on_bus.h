@@ -39,6 +39,7 @@ class RobotOnBus {
   void send_color(const interfaces::RosImage& image);
   void send_camera_info(const interfaces::RosCameraInfo& info);
   void send_tf(const interfaces::RosTfMessage& tf);
+  void send_clock(core::TimeNs time_ns);
   void ask(const std::string& question);
   void control(const std::string& json);
   /// Those of send_frame().
@@ -53,6 +54,9 @@ class RobotOnBus {
   std::vector<std::string> answers() const;
   /// Without the first `known` ones.
   std::vector<std::string> answers_since(std::size_t known) const;
+  /// Those that came since the last call, which are forgotten: for runs of hours.
+  std::vector<std::string> take_beliefs();
+  std::vector<std::string> take_answers();
   /// The newest diagnostic's text and values; empty before the first.
   std::string diagnosis() const;
   std::map<std::string, std::string> diagnostics() const;

@@ -160,6 +160,19 @@ TEST(ServiceHealth, ShowsTheNewestFailure) {
   EXPECT_EQ(shown(health), "of a question");
 }
 
+TEST(ServiceHealth, WarnsWhileTheDiskDoesNotKeepUpWithTheRecording) {
+  ServiceHealth health;
+  health.seconds_since_frame = 0.1;
+  health.is_recording = true;
+  health.recording_at_risk_s = 0.9;
+  EXPECT_EQ(level(health), RosDiagnosticLevel::kOk);
+  health.recording_at_risk_s = 2.34;
+  EXPECT_EQ(level(health), RosDiagnosticLevel::kWarn);
+  EXPECT_THAT(to_diagnostic(health, {}, "here").values,
+              ::testing::Contains(interfaces::RosKeyValue{
+                  "recording", "on, but the disk is slow: what came in the last 2.3 s is lost if the power fails"}));
+}
+
 TEST(ServiceHealth, AFailedRecordingIsAnErrorHoweverWellItTracks) {
   ServiceHealth health;
   health.seconds_since_frame = 0.1;

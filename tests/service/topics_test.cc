@@ -38,6 +38,10 @@ TEST(BusTopics, ColourIsLeftOutWhereItIsNotNamed) {
   const std::size_t all = bus_topics(topics).size();
   topics.color.clear();
   EXPECT_EQ(bus_topics(topics).size(), all - 1);
+  topics.clock = kClockTopic;
+  EXPECT_EQ(bus_topics(topics).size(), all) << "which is read where it is named";
+  topics.clock = topics.tf;
+  EXPECT_EQ(validate(topics).code(), core::StatusCode::kInvalidInput);
 }
 
 TEST(BusTopics, ImagesHaveTheTypeThatTheirNamesOrFormsSay) {

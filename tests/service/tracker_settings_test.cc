@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 
 TrackerSettings unusual() {
   TrackerSettings settings;
-  settings.topics = {"/d", "/c", "/i", "/t", "/ts", "points", "compressed"};
+  settings.topics = {"/d", "/c", "/i", "/t", "/ts", "points", "compressed", "/clock"};
   settings.assembler = {
       "base", "lens", geometry::normalized(geometry::Pose{{0.3, 0.1, -0.7, 0.2}, {0.1, 1.0 / 3.0, 2}}),
       0.07,   0.02,   false,

@@ -29,7 +29,7 @@ struct TopicEvidence {
   std::string frame_id;                ///< Of the last one.
   core::TimeNs stamp_ns = 0;           ///< The same.
   std::uint64_t stamps_not_later = 0;  ///< Messages whose stamp was not after the one before.
-  std::vector<double> ages;            ///< Wall time of arrival minus stamp, s; of the first few hundred.
+  std::vector<double> ages;  ///< Time of arrival, wall or simulated, minus stamp, s; of the first few hundred.
   // Of images, the last one's:
   int width = 0, height = 0;
   std::string encoding;
@@ -68,6 +68,9 @@ class BusEvidence {
   /// Of the last depth image that could be read.
   const interfaces::DepthImageReport& depth_report() const { return depth_report_; }
   const TfBuffer& tf() const { return tf_; }
+  /// What the clock of simulated time said last, and first; nothing: it is not asked for, or has not come.
+  std::optional<core::TimeNs> simulated_ns() const { return simulated_ns_; }
+  core::TimeNs first_simulated_ns() const { return first_simulated_ns_; }
   /// The robot bodies of the scene.
   const std::vector<std::string>& robot() const { return robot_; }
   /// The frame that the camera's pose is asked for: that of the settings or of the depth image.
@@ -83,6 +86,8 @@ class BusEvidence {
   TfBuffer tf_;
   std::map<std::string, TopicEvidence> topics_;
   MessageIndex next_index_ = 0;
+  std::optional<core::TimeNs> simulated_ns_;
+  core::TimeNs first_simulated_ns_ = 0;
   std::uint64_t frames_ = 0, frames_with_color_ = 0;
   std::map<std::string, std::uint64_t> skipped_;
   std::optional<AssembledFrame> newest_;

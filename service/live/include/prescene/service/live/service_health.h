@@ -42,10 +42,15 @@ struct ServiceHealth {
   std::string last_idle_control;       ///< What the last of them was, and why.
   int other_services = 0;              ///< Which publish beliefs in the same DDS domain.
   bool is_recording = false;
-  std::string recording_failure;  ///< Why the recording ended early; "" = it did not, or none was asked for.
+  double recording_at_risk_s = 0.0;  ///< As RecordingWriter::seconds_at_risk().
+  std::string recording_failure;     ///< Why the recording ended early; "" = it did not, or none was asked for.
   bool keeps_learned = false;
   std::string learned_failure;  ///< Why what was learned could not be written the last time; "" = it could.
-  std::optional<double> seconds_since_frame;  ///< Since the last frame that was used; empty = none yet.
+  /// Since the last frame that was used, by simulated time where there is one; empty = none yet.
+  std::optional<double> seconds_since_frame;
+  std::string clock_topic;                   ///< Of simulated time; "" = time is not simulated.
+  double simulated_now_s = 0.0;              ///< What it says.
+  std::optional<double> seconds_since_tick;  ///< Since it said another time, by a real clock; empty = never.
   double last_step_seconds = 0.0;
   std::uint64_t not_simulated = 0;  ///< Particles that physics could not move and constant velocity did.
   std::string physics_failure;      ///< Why, the last time; "" = it never failed.
@@ -58,7 +63,7 @@ struct ServiceHealth {
   core::TimeNs last_failure_ns = 0;   ///< core::steady_now_ns().
 };
 
-/// True while frames come and are used.
+/// True while frames come and are used, and while simulated time stands still after it.
 bool is_tracking(const ServiceHealth& health);
 
 /// What `other_services` (at least one) in the same DDS domain mean.
@@ -67,9 +72,10 @@ std::string others_text(int other_services);
 /// What it does and, while it does not track, why not: "no frame is used: tf does not connect ...".
 std::string health_text(const ServiceHealth& health);
 
-/// kWarn before the first frame, for degraded steps, beside other services, and when something failed, was lost or had
-/// no effect since `before`, the health of the last report (or none); kError when frames stopped, or the recording or
-/// keeping what was learned failed. The values are those since the start.
+/// kWarn before the first frame, for degraded steps, beside other services, while simulated time stands still, while
+/// the disk does not keep up with the recording, and when something failed, was lost or had no effect since `before`,
+/// the health of the last report (or none); kError when frames stopped, or the recording or keeping what was learned
+/// failed. The values are those since the start.
 interfaces::RosDiagnosticStatus to_diagnostic(const ServiceHealth& health, const ServiceHealth& before,
                                               const std::string& hardware_id);
 

@@ -44,11 +44,23 @@ bool holds_own_json(const interfaces::McapChannel& channel);
 /// Whether it holds what we made for other programs (RecordingWriter::write_output).
 bool is_own_output(const interfaces::McapChannel& channel);
 
+/// What of a recording may be lost: of what came, the last `kept_back_s` where the program is killed, and that,
+/// `unsynced_s` and the time of two requests to the disk where the power fails.
+struct RecordingSafety {
+  double kept_back_s = 1.0;  ///< > 0
+  double unsynced_s = 0.0;   ///< 0 = the power does not fail
+};
+/// Of what can't be made again: at most 0.2 s and, with a disk that takes up to a quarter of a second, 1 s are lost.
+inline constexpr RecordingSafety kLiveRecording{0.2, 0.3};
+/// After so long, s, it is told that the disk does not keep up.
+inline constexpr double kTooLongAtRisk = 1.0;
+
 /// Writes one recording. Not thread-safe: owned by the thread that steps the belief.
 class RecordingWriter {
  public:
   static core::Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& path,
-                                                               const RecordingInfo& info);
+                                                               const RecordingInfo& info,
+                                                               const RecordingSafety& safety = {});
 
   /// Messages of the robot; numbered 0, 1, ... in the order of these calls. Their times are clamped to 1970 and
   /// kLatestRecordedNs: a sender's clock may say anything. What ends in an exception is not in the recording, and has
@@ -61,6 +73,11 @@ class RecordingWriter {
   core::Status write_output(const std::string& topic, const std::string& type, std::vector<std::uint8_t> cdr,
                             core::TimeNs stamp_ns, core::TimeNs time_ns);
   core::Status flush() { return writer_->flush(); }
+  /// To be called now and then with the time, by which messages are received: writes what was kept back for long
+  /// enough.
+  core::Status write_due(core::TimeNs now_ns) { return writer_->flush_by(now_ns); }
+  /// How long ago the oldest of what was written and a power failure could take was written, s.
+  double seconds_at_risk() const { return writer_->seconds_at_risk(); }
   core::Status close() { return writer_->close(); }
 
  private:

@@ -21,8 +21,12 @@ struct InputTopics {
   /// What the depth topic carries: "image", "compressed", "points", or "" = as its name says.
   std::string depth_form;
   std::string color_form;  ///< The same of the colour topic: "image", "compressed" or "".
+  std::string clock;  ///< rosgraph_msgs/Clock, where time is simulated; "" = it is not (kClockTopic is ROS's name).
   friend bool operator==(const InputTopics&, const InputTopics&) = default;
 };
+
+/// As ROS's nodes name it, whose parameter use_sim_time is true.
+inline constexpr const char* kClockTopic = "/clock";
 
 /// The message types of the images: sensor_msgs/msg/Image; CompressedImage where the form says so, or without one the
 /// name's last part is "compressed" or "compressedDepth", as image_transport names them; for depth also PointCloud2,
@@ -37,7 +41,7 @@ bool is_image_type(const std::string& type);
 /// image_rect, image_rect_color, image_rect_raw and the like, also if they are compressed.
 bool names_rectified_images(const std::string& topic);
 
-/// kInvalidInput where a topic but colour is empty, two are one, or a form is none of the above.
+/// kInvalidInput where a topic but colour and clock is empty, two are one, or a form is none of the above.
 core::Status validate(const InputTopics& topics);
 
 // Our own topics. JSON is carried by std_msgs/String, so that `ros2 topic pub` and `echo` can speak it.

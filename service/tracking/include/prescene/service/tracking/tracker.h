@@ -46,13 +46,21 @@ class Tracker {
   /// Takes in one message of the robot; topics that nobody listens to are ignored. Numbers ascend. A message that says
   /// something impossible is refused, and named with its topic; nothing else is lost by it.
   core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
-  /// One belief step with the newest frame that is complete at `now_ns`; empty if there is none. Where the sender's
+  /// One belief step with the newest frame that is complete at `now_ns`, or in simulated time now; empty if there is
+  /// none. Where the sender's
   /// clock went back (a recording is played again) the belief starts anew. Controls wait for the first step that they
   /// can act in, which is the second of a belief. Where it ends in an exception nothing is changed but that the frame
   /// is gone.
   std::optional<TrackerStep> step(core::TimeNs now_ns);
-  /// When step() should be tried again although nothing came in.
-  std::optional<core::TimeNs> next_deadline() const { return assembler_.next_deadline(); }
+  /// When step() should be tried again although nothing came in. Simulated time goes on by messages only.
+  std::optional<core::TimeNs> next_deadline() const {
+    return uses_simulated_time() ? std::nullopt : assembler_.next_deadline();
+  }
+  /// Whether the settings name a clock topic. What frames wait for each other, and the time of controls without a
+  /// stamp, is counted by it then; it stands still until it comes, as in ROS.
+  bool uses_simulated_time() const { return !settings_.topics.clock.empty(); }
+  /// What the newest message on it said; 0 = none has come.
+  core::TimeNs simulated_now_ns() const { return simulated_now_ns_; }
 
   /// Frames that were not used, since the start, and why the newest since the last step was not ("" = none was).
   std::uint64_t skipped_count() const { return assembler_.skipped_count(); }
@@ -85,6 +93,7 @@ class Tracker {
   std::unique_ptr<rendering::LikelihoodBatch> likelihood_;
   filter::ParticleFilter filter_;
   FrameAssembler assembler_;
+  core::TimeNs simulated_now_ns_ = 0;
   MessageIndex last_index_ = 0;
   WaitingControls controls_;
   std::shared_ptr<const belief::Scene> scene_;  // as given, with the values of learned models
