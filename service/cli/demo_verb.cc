@@ -110,12 +110,17 @@ class Demo {
   core::Status run(const belief::Action& release) {
     const std::string scene = path("milk_on_bin.yaml"), milk = path("milk.mcap");
     PRESCENE_RETURN_IF_ERROR(step("what may happen, before anything was seen", {"predict", scene, "--seed", "1"}));
-    PRESCENE_RETURN_IF_ERROR(step("where must the hand let go, so that the carton lands in the bin?",
-                                  {"achieve", scene, "--outcome", "in_bin", "--free",
-                                   "position,pitch=-120:0,height=0:0.3", "--first", "--seed", "1"}));
+    PRESCENE_RETURN_IF_ERROR(
+        step("where must the hand let go, so that the carton lands in the bin?",
+             {"achieve", scene, "--outcome", "in_bin", "--free", "position,pitch=-120:0,height=0:0.3", "--first",
+              "--seed", "1", "--report", path("achieve.html")}));
     PRESCENE_RETURN_IF_ERROR(step("record a simulated robot with an RGB-D camera",
                                   {"record", "--simulate", scene, "-o", milk, "--seed", "3"}));
     PRESCENE_RETURN_IF_ERROR(live(scene, milk, release));
+    PRESCENE_RETURN_IF_ERROR(
+        step("did anything happen about the release that the robot did not report?",
+             {"explain", path("session.mcap"), "--from", fixed_text(release.time - 0.2, 2), "--to",
+              fixed_text(release.time + 1.0, 2), "--seed", "1", "--report", path("explain.html")}));
     return step("replay the session that the service recorded: the same bits", {"replay", path("session.mcap")});
   }
 
@@ -183,8 +188,11 @@ core::Status run(const DemoOptions& options, VerbContext& context) {
                  {"scene", demo.path("milk_on_bin.yaml")},
                  {"recording", demo.path("milk.mcap")},
                  {"session", demo.path("session.mcap")},
-                 {"report", report}},
-                "\nreport: " + report + "\n");
+                 {"report", report},
+                 {"achieve_report", demo.path("achieve.html")},
+                 {"explain_report", demo.path("explain.html")}},
+                "\nreport: " + report + "\nof achieve and explain: " + demo.path("achieve.html") + ", " +
+                    demo.path("explain.html") + "\n");
   return core::ok_status();
 }
 

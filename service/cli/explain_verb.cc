@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "prescene/core/text.h"
+#include "prescene/interfaces/reports/report.h"
 #include "prescene/service/recording/explained.h"
 #include "verb.h"
 
@@ -14,6 +16,7 @@ using core::fixed_text;
 struct ExplainVerbOptions {
   std::string input;
   std::string scene;
+  std::string report;
   ExplainOptions explain;
   TrackerSettings tracker;
   BackendSettings backends;
@@ -28,41 +31,104 @@ std::string interval_text(const std::optional<queries::EventValue>& value, int d
          fixed_text(value->high + shift, decimals) + ")";
 }
 
-/// Their times count from the recording's first frame, those of the answer from the window's begin.
-std::string explanation_text(const Explained& explained) {
+using Rows = std::vector<std::vector<std::string>>;
+
+/// What an explanation is printed as, each with a head. Times count from the recording's first frame, those of the
+/// answer from the window's start.
+struct ExplanationTables {
+  Rows events, places, frames;
+};
+
+ExplanationTables tables_of(const Explained& explained) {
   const queries::ExplainAnswer& answer = explained.answer;
-  std::vector<std::vector<std::string>> rows = {{"event", "object", "probability, %", "interval, %", "log Bayes factor",
-                                                 "time, s", "towards, deg", "speed, m/s", "tips, %", "falls, %"}};
+  ExplanationTables tables;
+  tables.events = {{"event", "object", "probability, %", "interval, %", "log Bayes factor", "time, s", "towards, deg",
+                    "speed, m/s", "tips, %", "falls, %"}};
   for (const queries::Explanation& e : answer.explanations) {
-    if (e.probability < 0.0005 && rows.size() > 3) continue;
+    if (e.probability < 0.0005 && tables.events.size() > 3) continue;
     const bool with_effects = e.time.has_value();
-    rows.push_back(
+    tables.events.push_back(
         {belief::name_of(e.kind), e.object + (e.partner.empty() ? "" : ", " + e.partner),
          fixed_text(100.0 * e.probability, 1), fixed_text(100.0 * e.low, 1) + " to " + fixed_text(100.0 * e.high, 1),
          fixed_text(e.log_bayes_factor, 1), interval_text(e.time, 2, explained.from), interval_text(e.towards, 0),
          interval_text(e.speed, 2), with_effects ? fixed_text(100.0 * e.tips, 0) : "",
          with_effects ? fixed_text(100.0 * e.falls, 0) : ""});
   }
-  std::string text = answer.text + "\n\n" + table(rows);
-  std::vector<std::vector<std::string>> places = {{"object", "there, %", "at the end, m", "90 % within, cm", ""}};
+  tables.places = {{"object", "there, %", "at the end, m", "90 % within, cm", ""}};
   for (const queries::WhereItIs& object : answer.objects)
-    places.push_back(
+    tables.places.push_back(
         {object.object, fixed_text(100.0 * object.present, 0),
          fixed_text(object.mean.x(), 3) + ", " + fixed_text(object.mean.y(), 3) + ", " + fixed_text(object.mean.z(), 3),
          fixed_text(100.0 * object.radius_90, 1), object.out_of_sight ? "out of sight" : ""});
-  text += "\n" + table(places);
-  std::vector<std::vector<std::string>> frames = {{"frame, s", "against nothing, nats", "against the second, nats"}};
+  tables.frames = {{"frame, s", "against nothing, nats", "against the second, nats"}};
   for (const queries::DecidingFrame& frame : answer.frames)
-    frames.push_back({fixed_text(frame.time + explained.from, 2), fixed_text(frame.against_nothing, 1),
-                      fixed_text(frame.against_second, 1)});
-  text += "\n" + table(frames);
-  for (const std::string& remark : answer.remarks) text += remark + "\n";
-  for (const std::string& remark : explained.remarks) text += remark + "\n";
-  return text + std::to_string(answer.evaluated) + " instances weighed, " + std::to_string(answer.simulated) +
-         " simulated, in " + fixed_text(explained.seconds, 1) + " s\n";
+    tables.frames.push_back({fixed_text(frame.time + explained.from, 2), fixed_text(frame.against_nothing, 1),
+                             fixed_text(frame.against_second, 1)});
+  return tables;
+}
+
+std::vector<std::string> remarks_of(const Explained& explained) {
+  std::vector<std::string> remarks = explained.answer.remarks;
+  remarks.insert(remarks.end(), explained.remarks.begin(), explained.remarks.end());
+  return remarks;
+}
+
+std::string work_text(const Explained& explained) {
+  return std::to_string(explained.answer.evaluated) + " instances weighed, " +
+         std::to_string(explained.answer.simulated) + " simulated, in " + fixed_text(explained.seconds, 1) + " s";
+}
+
+std::string explanation_text(const Explained& explained) {
+  const ExplanationTables tables = tables_of(explained);
+  std::string text = explained.answer.text + "\n";
+  for (const Rows* rows : {&tables.events, &tables.places, &tables.frames}) text += "\n" + table(*rows);
+  for (const std::string& remark : remarks_of(explained)) text += remark + "\n";
+  return text + work_text(explained) + "\n";
+}
+
+interfaces::TableBlock table_block(const std::string& caption, Rows rows) {
+  std::vector<std::string> columns = std::move(rows.front());
+  rows.erase(rows.begin());
+  return {caption, std::move(columns), std::move(rows)};
+}
+
+core::Status write_explanation_report(const std::string& path, const std::string& recording,
+                                      const Explained& explained) {
+  ExplanationTables tables = tables_of(explained);
+  interfaces::ReportContents contents;
+  contents.title = "What happened";
+  contents.subtitle = explained.answer.text;
+  contents.facts = {{"recording", recording},
+                    {"window", fixed_text(explained.from, 2) + " to " + fixed_text(explained.to, 2) + " s"},
+                    {"work", work_text(explained)}};
+  interfaces::ReportSection& events = contents.sections.emplace_back();
+  events.title = "Events";
+  interfaces::OutcomeBlock bars{"probabilities with their intervals", {}};
+  for (const queries::Explanation& e : explained.answer.explanations) {
+    if (e.probability < 0.0005 && bars.outcomes.size() > 2) continue;
+    const std::string name = belief::name_of(e.kind) + (e.object.empty() ? "" : " (" + e.object + ")");
+    bars.outcomes.push_back({name, "", e.probability, e.low, e.high});
+  }
+  events.blocks.emplace_back(std::move(bars));
+  events.blocks.emplace_back(
+      table_block("when, from where, how hard; means with 90 % intervals", std::move(tables.events)));
+  if (!explained.answer.explanations.empty() && !explained.answer.explanations.front().timeline.empty())
+    events.blocks.emplace_back(interfaces::TimelineBlock{"the most probable instance, s from the window's start",
+                                                         explained.answer.explanations.front().timeline, 0.0,
+                                                         explained.answer.duration});
+  interfaces::ReportSection& end = contents.sections.emplace_back();
+  end.title = "Where things are at the end, and what decides";
+  end.blocks.emplace_back(table_block("over all events", std::move(tables.places)));
+  end.blocks.emplace_back(table_block("how much each frame speaks for the first event (tempered log likelihoods)",
+                                      std::move(tables.frames)));
+  std::string remarks;
+  for (const std::string& remark : remarks_of(explained)) remarks += (remarks.empty() ? "" : "\n\n") + remark;
+  if (!remarks.empty()) end.blocks.emplace_back(interfaces::TextBlock{remarks});
+  return interfaces::write_report(path, contents);
 }
 
 core::Status run(ExplainVerbOptions& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.input, options.scene}));
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},
                                                           context.log()));
@@ -80,6 +146,10 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
                                            context.progress("tracking"));
   context.end_progress();
   if (!explained) return explained.status();
+  if (!options.report.empty()) {
+    PRESCENE_RETURN_IF_ERROR(write_explanation_report(options.report, options.input, *explained));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
   nlohmann::ordered_json document = {{"recording", options.input}, {"seed", options.explain.query.seed}};
   document.update(to_json(*explained));
   context.print(document, explanation_text(*explained));
@@ -94,7 +164,7 @@ Verb add_explain_verb(CLI::App& app) {
   auto options = std::make_shared<ExplainVerbOptions>();
   verb->add_option("RECORDING", options->input, "MCAP or .db3 file, folder of rosbag2, or of images as for replay")
       ->required();
-  verb->add_option("--from", options->explain.from, "Begin of the window, s since the first frame")
+  verb->add_option("--from", options->explain.from, "Start of the window, s since the first frame")
       ->check(number_between(0.0, 1e6))
       ->required();
   verb->add_option("--to", options->explain.to, "End of the window, s since the first frame")
@@ -104,6 +174,8 @@ Verb add_explain_verb(CLI::App& app) {
                    "Events of this object only; default: of every object that is not where it would be")
       ->check(utf8_text());
   verb->add_option("--scene", options->scene, "Scene file; default: the one that the recording holds")
+      ->check(file_name());
+  verb->add_option("--report", options->report, "Write an HTML page with probabilities, tables and a timeline")
       ->check(file_name());
   verb->add_option("--frames", options->explain.query.frames, "Frames of the window that weigh the events")
       ->check(CLI::Range(2, 64))
