@@ -19,7 +19,7 @@ using belief::Particle;
 using geometry::Matrix3d;
 using geometry::Twist;
 
-constexpr double kStillTime = 20.0;  // s; what lies still begins to move once in so long, on average
+constexpr double kStillTime = 5.0;  // s; what lies still begins to move once in so long, on average
 // Of what lies still and is seen, in a hand that stands still too: cameras and supports drift, so that the last hundred
 // frames or so count.
 constexpr MotionNoise kStillNoise = {.shift = 0.0001, .turn = 0.001, .speed = 0.0, .rate = 0.0};
@@ -27,8 +27,13 @@ constexpr double kTwist95 = 12.59;  // 95 % quantile of chi-squared with 6 degre
 constexpr double kLargestDeviations[] = {1.0, 0.15, 8.0, 1.0};  // rad, m, rad/s, m/s; spreads grow no further
 constexpr double kUnseenPhysicsShare = 1.0;   // of what is not tracked: nothing else says where it goes
 constexpr double kPhysicsAfterRelease = 1.0;  // in the step in which an object was released
-constexpr std::size_t kMostPushes = 16;       // that simulators take; the newest count
-constexpr double kStillBody = 1e-4;           // m, rad; a body of the robot that moves by less in a step stands still
+// What is slow mostly stays so, and what begins to move mostly begins slowly: this share of the particles, drawn anew
+// in each step, has so much less noise, and this share of those that wake so much less speed.
+constexpr double kSmoothShare = 0.5;
+constexpr double kSmoothNoise = 0.15;
+constexpr double kSlowWake = 0.2;
+constexpr std::size_t kMostPushes = 16;  // that simulators take; the newest count
+constexpr double kStillBody = 1e-4;      // m, rad; a body of the robot that moves by less in a step stands still
 
 /// Adds the noise of dt, in the error coordinates (rotation, translation, angular, linear).
 void add_noise(const MotionNoise& noise, double dt, belief::Matrix12d& covariance) {
@@ -57,11 +62,16 @@ bool may_be_still(const Particle& particle) {
   return cholesky.positive_definite() && twist.dot(cholesky.solve(twist)) < kTwist95;
 }
 
-/// Starts to move: at its velocity, with room for more.
-void wake(const PredictOptions& options, Particle& particle) {
+/// Starts to move: at its velocity, with room for more; for `share` of what the options say.
+void wake(const PredictOptions& options, Particle& particle, double share = 1.0) {
+  const double rate = share * options.wake_rate, speed = share * options.wake_speed;
   particle.mode = MotionMode::kMoving;
-  particle.covariance.diagonal().segment<3>(6).array() += options.wake_rate * options.wake_rate;
-  particle.covariance.diagonal().segment<3>(9).array() += options.wake_speed * options.wake_speed;
+  particle.covariance.diagonal().segment<3>(6).array() += rate * rate;
+  particle.covariance.diagonal().segment<3>(9).array() += speed * speed;
+}
+
+MotionNoise scaled(const MotionNoise& noise, double share) {
+  return {share * noise.shift, share * noise.turn, share * noise.speed, share * noise.rate};
 }
 
 /// The motion of a body between two poses as a twist.
@@ -182,9 +192,9 @@ bool may_touch(const std::vector<Mover>& movers, const Vector3d& p_W, double rad
   });
 }
 
-/// The modes of one object's particles for this step of dt.
+/// The modes of one object's particles for this step of dt. `smooth`: set for those that begin to move slowly.
 void change_modes(const PredictOptions& options, bool seen, bool tracked, bool in_hand, bool has_physics, double dt,
-                  core::RandomStream& stream, ObjectBelief& object) {
+                  core::RandomStream& stream, std::vector<bool>& smooth, ObjectBelief& object) {
   // Of those that rest, a few wake in each frame, evenly among them: what begins to move is followed at once. They
   // weigh as much less as that is more than how often things begin to move.
   const double wakes = options.wake_probability;
@@ -194,7 +204,8 @@ void change_modes(const PredictOptions& options, bool seen, bool tracked, bool i
   const double log_resting = weighted ? std::log((1.0 - moves) / (1.0 - wakes)) : 0.0;
   double to_wake = stream.uniform();
   bool changed = false;
-  for (Particle& particle : object.particles) {
+  for (std::size_t k = 0; k < object.particles.size(); ++k) {
+    Particle& particle = object.particles[k];
     const double draw = stream.uniform();
     if (in_hand && particle.mode != MotionMode::kHeld) {
       // It may have slipped, but a hand that has not let go carries it on.
@@ -211,7 +222,8 @@ void change_modes(const PredictOptions& options, bool seen, bool tracked, bool i
       const bool woken = to_wake >= 1.0;
       if (woken) {
         to_wake -= 1.0;
-        wake(options, particle);
+        smooth[k] = draw < kSmoothShare;
+        wake(options, particle, smooth[k] ? kSlowWake : 1.0);
       }
       particle.log_weight += woken ? log_woken : log_resting;
       changed = changed || weighted;
@@ -274,8 +286,9 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
     const std::optional<double> released = release_time(control, *belief.scene, object.name, dt);
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
+    std::vector<bool> smooth(object.particles.size(), false);
     const bool seen = tracked || object.state == belief::TrackState::kDoubtful;
-    change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, object);
+    change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, smooth, object);
     const Vector3d centre = centre_of(*belief.scene, object);
     // Nothing shows whether what is out of sight is touched: physics says it.
     const bool may_be_pushed = !tracked && simulators && is_present(object) && !movers.empty();
@@ -284,6 +297,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       Particle& particle = object.particles[k];
       double left = dt;
       const double physics_draw = draws.uniform();
+      const double smooth_draw = draws.uniform();
       double physics_share = tracked ? options.physics_share : kUnseenPhysicsShare;
       if (particle.mode == MotionMode::kHeld && hand) {
         const Pose& X_from = belief.robot[static_cast<std::size_t>(*hand)];
@@ -308,7 +322,9 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
         // What is seen and may be still goes nowhere in one step that its velocity does not say.
         const bool idle = tracked && !released && may_be_still(particle);
         const Particle before = particle;
-        drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep, options.moving);
+        const bool goes_on = tracked && !released && is_slow(particle) && (smooth[k] || smooth_draw < kSmoothShare);
+        drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep,
+              goes_on ? scaled(options.moving, kSmoothNoise) : options.moving);
         if (simulators && !idle && is_present(object) && physics_draw < physics_share) {
           falling.push_back({i, k, left, particle.X_WO, particle.V_WO});
           particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike

@@ -20,15 +20,15 @@ using geometry::Matrix3d;
 
 // Share of the variance of what a frame says of a pose: errors that stay from frame to frame (calibration, a pattern in
 // the depth), which do not average out over what lies still.
-constexpr double kCommonError = 0.5;
+constexpr double kCommonError = 0.75;
 constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
 constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
 constexpr double kLastGate = 0.012;          // m; ... in the last steps
 constexpr double kMostStartShift = 0.03;     // m; a start is never further off, however wide the prediction is, ...
 constexpr double kMostStartTurn = 0.35;      // rad; ... nor turned further
 constexpr double kFewestPixels = 12;         // the tempering's pixel count is at least this
-constexpr double kSharedShift = 0.01;        // m; an outline serves for poses so near to where it was taken ...
-constexpr double kSharedTurn = 0.1;          // rad
+constexpr double kSharedShift = 0.003;       // m; an outline serves for poses so near to where it was taken ...
+constexpr double kSharedTurn = 0.03;         // rad
 constexpr double kAlikeShift = 0.003;        // m; resting particles so near to each other are compared with a frame ...
 constexpr double kAlikeTurn = 0.03;          // rad; ... at one pose
 constexpr double kComparedShift = 0.008;     // m; poses so near to where the frame's equations were taken ...
@@ -64,14 +64,12 @@ struct Mode {
   Vector6d shift = Vector6d::Zero();  ///< From the prediction, box_plus coordinates.
   Matrix6d covariance;
   double log_determinant = 0.0;
-  double misfit = 0.0;  ///< nats, of the outline.
 };
 
 /// What the frame says about a pose, in W.
 struct FrameEquations {
   Matrix6d information;
   Vector6d gradient;
-  double misfit = 0.0;
   rendering::PoseEvidence evidence;
 };
 
@@ -131,7 +129,6 @@ class ParticleUpdate {
     for (int step = 0; step <= options_.steps; ++step) {
       const double t = options_.steps > 1 ? std::min(1.0, static_cast<double>(step) / (options_.steps - 1)) : 1.0;
       const FrameEquations equations = equations_at(mode.X_WO, gate_at(t), outline);
-      mode.misfit = equations.misfit;
       information = predicted.information + equations.information;
       if (step == options_.steps) break;  // the last pass is for the information at the mode
       const Vector6d gradient = equations.gradient - predicted.information * mode.shift;
@@ -165,7 +162,6 @@ class ParticleUpdate {
       const OutlineEquations edges = outline->linearise(X_CO, *context_.depth, terms_);
       H += edges.H;
       g += edges.g;
-      equations.misfit = edges.misfit;
     }
     equations.information = information_in_world(H, X_CW_.rotation);
     equations.gradient = g;
@@ -268,6 +264,8 @@ struct FrameLikelihood {
   bool covers(const Pose& other_X_WO) const {
     return is_near(geometry::box_minus(other_X_WO, X_WO), kComparedShift, kComparedTurn);
   }
+  /// nats, of what follows for a prediction.
+  double log_evidence(const StillUpdate& update) const { return log_peak + update.log_evidence; }
   /// For a prediction about `X_WO_before`.
   StillUpdate update(const Pose& X_WO_before, const Matrix6d& covariance, double common) const {
     const Vector6d since = geometry::box_minus(X_WO, X_WO_before);
@@ -280,14 +278,14 @@ struct FrameLikelihood {
 bool update_quietly(const FrameLikelihood& near, Particle& particle) {
   if (near.report.evidence.hit_share() < kQuietHits || !near.covers(particle.X_WO)) return false;
   const Gaussian predicted = gaussian(particle.covariance.topLeftCorner<6, 6>());
-  const StillUpdate update = near.update(particle.X_WO, predicted.covariance, 0.0);
+  const StillUpdate update = near.update(particle.X_WO, predicted.covariance, kCommonError);
   Mode mode;
   mode.shift = update.shift;
   mode.X_WO = geometry::box_plus(particle.X_WO, update.shift);
   mode.covariance = update.covariance;
   if (!is_near(geometry::box_minus(mode.X_WO, near.X_WO), kQuietShift, kQuietTurn)) return false;
   move_to(mode, predicted, particle);
-  particle.log_weight += near.log_peak + update.log_evidence;
+  particle.log_weight += near.log_evidence(update);
   return true;
 }
 
@@ -317,9 +315,9 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
   double log_moved = -std::numeric_limits<double>::infinity();
   if (within_reach(mode, predicted, dt, options)) {
     if (near != nullptr && near->covers(mode.X_WO) && near->covers(particle.X_WO))
-      log_moved = near->log_peak + near->update(particle.X_WO, predicted.covariance, 0.0).log_evidence;
+      log_moved = near->log_evidence(near->update(particle.X_WO, predicted.covariance, kCommonError));
     else
-      log_moved = frame.weight_share() * worth(moved.evidence.log_ratio, moved.outline, options) - mode.misfit -
+      log_moved = frame.weight_share() * worth(moved.evidence.log_ratio, moved.outline, options) -
                   0.5 * mode.shift.dot(predicted.information * mode.shift) +
                   0.5 * (mode.log_determinant - predicted.log_determinant);
     log_moved += log_appears;
@@ -376,8 +374,8 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
   report.evidence = frame.evidence(X_WO_after);
   report.outline = frame.outline(X_WO_after);
   likelihood.report = report;
-  likelihood.log_peak = frame.weight_share() * worth(report.evidence.log_ratio, report.outline, options) -
-                        equations.misfit + update.below_peak;
+  likelihood.log_peak =
+      frame.weight_share() * worth(report.evidence.log_ratio, report.outline, options) + update.below_peak;
   const FrameLikelihood& weighing =
       near != nullptr && near->covers(X_WO_after) && near->covers(first.X_WO) ? *near : likelihood;
   for (const std::size_t i : members) {
@@ -385,15 +383,14 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
     const bool alike = particle.X_WO == first.X_WO && particle.covariance == first.covariance;
     const Gaussian own = alike ? predicted : gaussian(particle.covariance.topLeftCorner<6, 6>());
     const StillUpdate mine = alike ? update : likelihood.update(particle.X_WO, own.covariance, kCommonError);
-    const double log_evidence = &weighing == &likelihood
-                                    ? mine.log_evidence
-                                    : weighing.update(particle.X_WO, own.covariance, kCommonError).log_evidence;
+    const double log_evidence = weighing.log_evidence(
+        &weighing == &likelihood ? mine : weighing.update(particle.X_WO, own.covariance, kCommonError));
     Mode moved;
     moved.shift = mine.shift;
     moved.X_WO = geometry::box_plus(particle.X_WO, mine.shift);
     moved.covariance = mine.covariance;
     move_to(moved, own, particle);
-    particle.log_weight += weighing.log_peak + log_evidence;
+    particle.log_weight += log_evidence;
     reports[i] = report;
   }
   return likelihood;

@@ -181,8 +181,6 @@ OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage
     row << point.p_O.cross(R_CO.transpose() * a), a;
     equations.H += weight * row * row.transpose();
     equations.g += weight * mean * row;
-    // Whose derivative by the place is that of the equations.
-    equations.misfit += 0.5 * share_ / variance * mean * mean / (1.0 + scaled * scaled);
     ++equations.points;
   }
   without_facets(lever_, X_CO.rotation, p_OQ_, equations.H, equations.g);

@@ -70,7 +70,7 @@ struct PredictReport {
 };
 
 /// Steps `belief` from its robot poses and stamp to `X_WG` and `dt` later (s, > 0). Actions of the control act at their
-/// times within the step. Weights do not change.
+/// times within the step. Weights change with modes.
 ///
 /// `simulators` is called once for each group of objects that may touch in this step, with a scene of these objects,
 /// and shapes should come from a cache; empty = none, then everything that moves does so at constant velocity. A

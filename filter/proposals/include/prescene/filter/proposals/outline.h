@@ -17,8 +17,7 @@ namespace prescene::filter {
 struct OutlineEquations {
   Matrix6d H = Matrix6d::Zero();
   Vector6d g = Vector6d::Zero();
-  int points = 0;       ///< That saw an edge.
-  double misfit = 0.0;  ///< nats; how much less probable the edges are than if each were where the pose has it.
+  int points = 0;  ///< That saw an edge.
 };
 
 /// The outline of one object, as points of its surface. Follows [Stoiber et al. 2022] in looking along lines across the
