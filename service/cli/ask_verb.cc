@@ -25,7 +25,6 @@ struct AskOptions {
   bool removal = false;
   AchieveOptions achieve;
   TimelineOptions timeline;
-  std::string asked_of;  // --object
   std::string reach;
   std::string scene;
   const CLI::App* verb = nullptr;
@@ -41,18 +40,21 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     if (!question->is_object()) return core::invalid_input("--question: not a JSON object (docs/reference/queries.md)");
     return question;
   }
-  if (options.kind != "achieve" && !(options.achieve == AchieveOptions{}))
+  AchieveOptions of_achieve = options.achieve;
+  if (options.kind == "relations") of_achieve.object.clear();
+  if (options.kind != "achieve" && !(of_achieve == AchieveOptions{}))
     return core::invalid_input("--action, --free and what goes with them are of 'ask achieve': leave them out");
   if (options.kind != "stability" && (options.margin || options.removal))
     return core::invalid_input("--margin and --removal are of 'ask stability': leave them out");
   if (options.kind != "timeline" && !(options.timeline == TimelineOptions{}))
     return core::invalid_input("--first, --second and --relation are of 'ask timeline': leave them out");
-  if (options.kind != "relations" && !(options.reach.empty() && options.asked_of.empty()))
-    return core::invalid_input("--reach and --object are of 'ask relations': leave them out");
+  if (options.kind != "relations" && !options.reach.empty())
+    return core::invalid_input("--reach is of 'ask relations': leave it out");
   if (options.kind == "relations") {
-    if (!options.object.empty() && !options.asked_of.empty())
+    const std::string& named = options.achieve.object;
+    if (!options.object.empty() && !named.empty())
       return core::invalid_input("'" + options.object + "' and --object are two objects: leave one of them out");
-    return relations_question(options.object.empty() ? options.asked_of : options.object, options.reach);
+    return relations_question(options.object.empty() ? named : options.object, options.reach);
   }
   if (options.kind == "timeline") {
     if (!options.object.empty())
@@ -135,7 +137,6 @@ Verb add_ask_verb(CLI::App& app) {
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
       ->check(utf8_text());
-  verb->add_option("--object", options->asked_of, "Of relations: the object, instead of OBJECT")->check(utf8_text());
   verb->add_option("--question", options->json, "Any question as JSON (docs/reference/queries.md) instead")
       ->check(utf8_text());
   verb->add_option(
