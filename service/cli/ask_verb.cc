@@ -47,7 +47,7 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
   if (options.kind != "stability" && (options.margin || options.removal))
     return core::invalid_input("--margin and --removal are of 'ask stability': leave them out");
   if (options.kind != "timeline" && !(options.timeline == TimelineOptions{}))
-    return core::invalid_input("--first, --second and --relation are of 'ask timeline': leave them out");
+    return core::invalid_input("--interval, --other and --relation are of 'ask timeline': leave them out");
   if (options.kind != "relations" && !options.reach.empty())
     return core::invalid_input("--reach is of 'ask relations': leave it out");
   if (options.kind == "relations") {
@@ -58,7 +58,7 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
   }
   if (options.kind == "timeline") {
     if (!options.object.empty())
-      return core::invalid_input("ask timeline takes no object: give --first '" + options.object + " ...'");
+      return core::invalid_input("ask timeline takes no object: give --interval '" + options.object + " ...'");
     return timeline_question(options.timeline);
   }
   const auto needs_object = [&]() -> core::Status {
@@ -158,7 +158,7 @@ Verb add_ask_verb(CLI::App& app) {
   verb->footer(
       "Examples: prescene ask stability carton\n"
       "          prescene ask relations mug\n"
-      "          prescene ask timeline --first 'touches carton mug' --relation before --second 'falls carton'");
+      "          prescene ask timeline --interval 'touches carton mug' --relation before --other 'falls carton'");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }
 

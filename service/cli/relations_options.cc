@@ -111,13 +111,12 @@ std::string interval_text(const Json& interval) {
 }  // namespace
 
 void add_timeline_options(CLI::App& verb, TimelineOptions& options) {
-  verb.add_option("--first", options.first,
+  verb.add_option("--interval", options.first,
                   "Of the timeline: intervals, as 'touches carton mug' or 'falls carton'; * is anything")
       ->check(utf8_text());
-  verb.add_option("--second", options.second, "Of the timeline: other intervals, to be compared with the first")
-      ->check(utf8_text());
+  verb.add_option("--other", options.second, "Of the timeline: intervals to compare these with")->check(utf8_text());
   verb.add_option("--relation", options.relations,
-                  "Of the timeline: how the first lies to the second (before, meets, overlaps, starts, during, "
+                  "Of the timeline: how --interval lies to --other (before, meets, overlaps, starts, during, "
                   "finishes, equals, and *_by, contains, after); repeatable; default: any")
       ->check(utf8_text());
 }
@@ -125,12 +124,14 @@ void add_timeline_options(CLI::App& verb, TimelineOptions& options) {
 core::Result<Json> timeline_question(const TimelineOptions& options) {
   Json timeline = Json::object();
   if (options.first.empty() && !(options.second.empty() && options.relations.empty()))
-    return core::invalid_input("--second and --relation need --first: give it, too");
-  for (const auto& [name, text] : {std::pair("first", options.first), std::pair("second", options.second)}) {
-    if (text.empty()) continue;
-    PRESCENE_RETURN_IF_ERROR(belief::pattern_from_text(text).status().at(std::string("--") + name));
-    timeline[name] = text;
-  }
+    return core::invalid_input("--other and --relation need --interval: give it, too");
+  const auto add = [&](const char* key, const char* option, const std::string& text) -> core::Status {
+    if (text.empty()) return {};
+    timeline[key] = text;
+    return belief::pattern_from_text(text).status().at(option);
+  };
+  PRESCENE_RETURN_IF_ERROR(add("first", "--interval", options.first));
+  PRESCENE_RETURN_IF_ERROR(add("second", "--other", options.second));
   if (!options.relations.empty()) timeline["relation"] = options.relations;
   return Json{{"timeline", std::move(timeline)}};
 }

@@ -19,7 +19,7 @@ struct TimelineOptions {
   std::vector<std::string> relations;
   friend bool operator==(const TimelineOptions&, const TimelineOptions&) = default;
 };
-/// --first, --second and --relation.
+/// --interval, --other and --relation.
 void add_timeline_options(CLI::App& verb, TimelineOptions& options);
 /// {"timeline": {...}}; the service, or belief::query_from_json, says what is wrong in it.
 core::Result<nlohmann::ordered_json> timeline_question(const TimelineOptions& options);

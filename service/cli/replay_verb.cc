@@ -357,7 +357,7 @@ core::Status check_options(const ReplayOptions& options) {
       if (given(name))
         return core::invalid_input(std::string(name) + " is for --over-dds: leave it out, or give that too");
   } else {
-    for (const char* name : {"--timeline", "--first", "--second", "--relation"})
+    for (const char* name : {"--timeline", "--interval", "--other", "--relation"})
       if (given(name))
         return core::invalid_input(std::string(name) +
                                    " goes without --over-dds: with it, ask the `serve` that tracks");
