@@ -18,6 +18,9 @@ usage: ./dev VERB
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE]...               format, layer and clang-tidy checks
   format [FILE]...             format the sources in place
+  faults [FAULT] [SECONDS]     do to a running service what may happen to it, and print what came of it: all, or one of kill, power,
+                               disk, rights, descriptors, memory, clock, publishers, second, reader, supervisor, flood, soak.
+                               SECONDS: how long soak and flood last (default 180 and 30)
   fuzz [TARGET] [SECONDS]      run libFuzzer on one target or all, 60 s each
   docs                         check the links and file names in README.md and docs/; make the API reference in build/docs
   bless REASON                 accept the current scenario results as the new pinned ones
@@ -212,6 +215,34 @@ verb_lint() {
   timed "clang-tidy" tools/run_tidy build/tidy "$jobs" "$@"
 }
 
+# ---------------------------------------------------------------------------------------------------- faults
+
+# Figures of docs/reference/reliability.md.
+verb_faults() {
+  local fault=${1:-all} seconds=${2:-} filter
+  case $fault in
+    all) filter='*' ;;
+    kill) filter='*.Killed*' ;;
+    power) filter='*.WhereThePowerFails*' ;;
+    disk) filter='*.AFullDisk*' ;;
+    rights) filter='*.AFolderWithoutRights*' ;;
+    descriptors) filter='*Descriptors*' ;;
+    memory) filter='*.WithoutMemory*:*.MemoryThatEnds*' ;;
+    clock) filter='*.AClock*' ;;
+    publishers) filter='*.Publishers*' ;;
+    second) filter='*.ASecondService*' ;;
+    reader) filter='*.AStoppedReader*' ;;
+    supervisor) filter='*.StartedAgain*' ;;
+    flood) filter='Flood.*' ;;
+    soak) filter='Soak.*' ;;
+    *) fail "no fault '$fault'; there are: all kill power disk rights descriptors memory clock publishers second reader supervisor flood soak" ;;
+  esac
+  [[ $seconds =~ ^[0-9]*$ ]] || fail "how many seconds? not '$seconds'"
+  verb_build release prescene system_flood_tests
+  timed "faults: $fault" env PRESCENE_FAULTS=full "PRESCENE_SOAK_SECONDS=${seconds:-180}" "PRESCENE_FLOOD_SECONDS=${seconds:-30}" \
+    build/release/tests/system_flood_tests "--gtest_filter=$filter" --gtest_brief=1
+}
+
 # ---------------------------------------------------------------------------------------------------- fuzz
 
 verb_fuzz() {
@@ -264,7 +295,7 @@ verb_bless() {
 verb=${1:-help}
 [ $# = 0 ] || shift
 case $verb in
-  setup | build | test | python | demo | bench | lint | format | fuzz | docs | bless) "verb_$verb" "$@" ;;
+  setup | build | test | python | demo | bench | lint | format | faults | fuzz | docs | bless) "verb_$verb" "$@" ;;
   trace-diff) exec tools/trace-diff "$@" ;;
   help | -h | --help) usage ;;
   *) usage >&2; exit 2 ;;

@@ -100,6 +100,12 @@ void BackgroundProgram::signal(int signal_number) const {
   if (pid_ > 0) kill(pid_, signal_number);
 }
 
+bool BackgroundProgram::has_ended() const {
+  siginfo_t info{};
+  return pid_ <= 0 ||
+         (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_signo == SIGCHLD);
+}
+
 int BackgroundProgram::stop(int signal_number) {
   if (pid_ <= 0) return -1;
   kill(pid_, signal_number);

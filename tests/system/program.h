@@ -39,7 +39,11 @@ class BackgroundProgram {
   BackgroundProgram(const BackgroundProgram&) = delete;
   BackgroundProgram& operator=(const BackgroundProgram&) = delete;
 
+  /// -1 once it was stopped.
+  pid_t pid() const { return pid_; }
   void signal(int signal_number) const;
+  /// Whether it has ended by itself. stop() then gives its exit code.
+  bool has_ended() const;
   /// Sends a signal and waits for the end; the exit code as above.
   int stop(int signal_number);
 
