@@ -68,8 +68,19 @@ QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSetti
       settings_(settings),
       snapshot_(std::move(snapshot)),
       on_answer_(std::move(on_answer)),
-      reader_([this] { read_questions(); }),
-      simulator_([this] { simulate_questions(); }) {}
+      reader_([this] { read_questions(); }) {
+  try {
+    simulator_ = std::thread([this] { simulate_questions(); });
+  } catch (...) {  // no memory for it: the other one must end before this object does
+    {
+      const std::lock_guard lock(mutex_);
+      stop_.request();
+    }
+    read_changed_.notify_all();
+    reader_.join();
+    throw;
+  }
+}
 
 QueryWorker::~QueryWorker() {
   {
