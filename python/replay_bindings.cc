@@ -96,8 +96,19 @@ BoundReplay open_replay(const ReplayRequest& request) {
 
 BoundFrame next_frame(BoundReplay& bound) {
   core::Cancellation cancellation;
-  auto frame = interruptibly(cancellation, [&] { return bound.stepper->next(cancellation); });
-  FramePtr next = value_or_raise(std::move(frame));
+  FramePtr next;
+  core::Status status;
+  try {
+    run_interruptibly(cancellation, [&] {
+      auto frame = bound.stepper->next(cancellation);
+      status = frame.status();
+      if (frame) next = *std::move(frame);
+    });
+  } catch (const py::error_already_set&) {  // a signal, just when the frame was done
+    if (next) bound.stepper->give_back(std::move(next));
+    throw;
+  }
+  raise_if_error(status);
   if (!next) throw py::stop_iteration();
   return {std::move(next), bound.engines};
 }

@@ -105,6 +105,11 @@ core::Result<std::shared_ptr<const ReplayFrame>> ReplayStepper::next(const core:
   return std::shared_ptr<const ReplayFrame>();
 }
 
+void ReplayStepper::give_back(std::shared_ptr<const ReplayFrame> frame) {
+  const std::lock_guard lock(mutex_);
+  if (!frame_ && !wanted_) frame_ = std::move(frame);
+}
+
 void ReplayStepper::close() {
   closed_.request();
   changed_.notify_all();

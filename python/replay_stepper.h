@@ -47,6 +47,8 @@ class ReplayStepper {
   /// The next step; null at the end. kCancelled where `cancellation` was requested before the step was done: it is
   /// then the next one. kInvalidInput where another thread is asking already, and, once, where no frame was of use.
   core::Result<std::shared_ptr<const ReplayFrame>> next(const core::Cancellation& cancellation);
+  /// The frame that next() gave, where nobody has asked since, is the next one again.
+  void give_back(std::shared_ptr<const ReplayFrame> frame);
   /// Ends it early, from any thread. Returns when its own thread has ended, which takes as long as a step at most.
   void close();
 

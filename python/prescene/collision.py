@@ -95,7 +95,8 @@ class Mesh:
 
     def collides(self, other: "Mesh", X_AB: ArrayLike) -> Union[bool, NDArray[np.bool_]]:
         """Whether a triangle of this mesh and one of `other` have a point in common. Exact."""
-        return self._inner.collides(_inner_of(other), X_AB)
+        found = self._inner.collides(_inner_of(other), X_AB)
+        return found if isinstance(found, np.ndarray) else bool(found)
 
     def closest_points(self, other: "Mesh", X_AB: ArrayLike, limit: float = math.inf) -> ClosestPoints:
         """How far apart the meshes are, and where. What is farther apart than `limit` (m) is not looked for."""
