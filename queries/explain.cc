@@ -27,7 +27,7 @@ constexpr double kElsewhere = 0.01,
                  kTurned = 0.15;   // m and rad: tracked further from its start, an object is looked at
 constexpr double kRefuted = -1.0;  // nats: what speaks so much against where it was is looked at
 constexpr int kFirstRuns = 1;
-constexpr int kMostRounds = 4;      // times the query's runs: of what stays uncertain
+constexpr int kMostRounds = 2;      // times the query's runs: of what stays uncertain
 constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
