@@ -31,10 +31,8 @@ constexpr int kHiddenDraws = 160;        // places that are tried for what may h
 constexpr double kHiddenFurthest = 0.3;  // m; their standard deviation grows no further
 constexpr double kHiddenTurn = 0.8;      // rad
 
-constexpr double kSameShift = 0.01;   // m; a find that is no further than this ...
-constexpr double kSameTurn = 0.2;     // rad; ... from where it is tracked is no other place
-constexpr double kSameDepth = 0.008;  // m; nor is one that looks alike: its surface no further away ...
-constexpr double kSameShare = 0.85;   // ... at this share of the pixels of either
+constexpr double kSameShift = 0.01;  // m; a find that is no further than this ...
+constexpr double kSameTurn = 0.2;    // rad; ... from where it is tracked is no other place
 
 bool lighter(const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }
 
@@ -87,21 +85,11 @@ void inject(const Pose& X_WO, const InitialiseOptions& spread, const core::Rando
   belief::normalize(object.particles);
 }
 
-/// Whether a pose is about the same place as another: near to it, or not to be told from it by its depth.
-bool is_same_place(const Pose& X_CO, const Pose& other_X_CO, const SearchTarget& target,
-                   const geometry::PinholeCamera& camera, rendering::Renderer& renderer) {
+/// Whether a pose is about the same as another.
+bool is_same_place(const Pose& X_CO, const Pose& other_X_CO, const SearchTarget& target) {
   const double shift = (X_CO * target.centre() - other_X_CO * target.centre()).norm();
   const double turn = geometry::log_rotation(X_CO.rotation.conjugate() * other_X_CO.rotation).norm();
-  if (shift < kSameShift && turn < kSameTurn) return true;
-  const geometry::DepthImage depth = depth_of(target, X_CO, camera, renderer);
-  const geometry::DepthImage other = depth_of(target, other_X_CO, camera, renderer);
-  int either = 0, same = 0;
-  for (std::size_t i = 0; i < depth.size(); ++i) {
-    const double a = depth.data()[i], b = other.data()[i];
-    either += a > 0.0 || b > 0.0;
-    same += a > 0.0 && b > 0.0 && std::abs(a - b) < kSameDepth;
-  }
-  return same >= kSameShare * either;
+  return shift < kSameShift && turn < kSameTurn;
 }
 
 }  // namespace
@@ -142,9 +130,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   if (e.log_ratio < options.accept_log_ratio || e.log_ratio < current.log_ratio + options.min_gain) return false;
   if (shown < kLeastShown || e.hit_share() < kLeastHits) return false;
   // Of a tracked object, the particles know that place better than a search of one frame.
-  if (object.state == belief::TrackState::kTracked &&
-      is_same_place(found.X_CO, X_CO, target, terms.camera, *tools.renderer))
-    return false;
+  if (object.state == belief::TrackState::kTracked && is_same_place(found.X_CO, X_CO, target)) return false;
   const Pose X_WO = frame.X_WC * found.X_CO;
   // A support that is a little higher than the scene says looks like the top of something inside it.
   if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;

@@ -32,6 +32,7 @@ constexpr double kPhysicsAfterRelease = 1.0;  // in the step in which an object 
 constexpr double kSmoothShare = 0.5;
 constexpr double kSmoothNoise = 0.15;
 constexpr double kSlowWake = 0.2;
+constexpr double kRestingWakes = 3.0;    // times the probability; they cost next to nothing while nothing moves
 constexpr std::size_t kMostPushes = 16;  // that simulators take; the newest count
 constexpr double kStillBody = 1e-4;      // m, rad; a body of the robot that moves by less in a step stands still
 
@@ -197,7 +198,7 @@ void change_modes(const PredictOptions& options, bool seen, bool tracked, bool i
                   core::RandomStream& stream, std::vector<bool>& smooth, ObjectBelief& object) {
   // Of those that rest, a few wake in each frame, evenly among them: what begins to move is followed at once. They
   // weigh as much less as that is more than how often things begin to move.
-  const double wakes = options.wake_probability;
+  const double wakes = std::min(1.0, kRestingWakes * options.wake_probability);
   const double moves = std::min(wakes, dt / kStillTime);
   const bool weighted = seen && wakes > 0.0 && wakes < 1.0;
   const double log_woken = weighted ? std::log(moves / wakes) : 0.0;
