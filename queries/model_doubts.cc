@@ -2,6 +2,7 @@
 // What else could have come out: from starts near by, with other steps, with other parameters; and the ways there.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "model_doubts.h"
 #include "prescene/core/text.h"
@@ -16,7 +17,11 @@ using Classes = std::vector<std::vector<int>>;
 constexpr double kDisplacement = 0.1;  // standard deviations
 constexpr double kChaotic = 0.1;       // share of pairs that end otherwise
 constexpr std::size_t kFewestComparedPairs = 32, kMostComparedPairs = 128;
-constexpr std::size_t kRepeated = 256;
+// Pairs with which the model's error begins, the most of a variant, and of all of them.
+constexpr std::size_t kFirstRepeated = 256, kMostRepeated = 12'288, kMostRuns = 131'072;
+constexpr int kMoreRounds = 3;                     // of more pairs, each as many as the one before shows are needed
+constexpr double kWantedShift = 0.03;              // that is to be found in nine cases of ten
+constexpr double kClear = 3.0;                     // times beyond what chance explains: need not be known better
 constexpr double kLowEnd = 0.05, kHighEnd = 0.95;  // of priors
 constexpr double kPathInterval = 1.0 / 30.0;
 constexpr std::size_t kPathsAtOnce = 48;          // bounds the memory; does not change results
@@ -62,12 +67,12 @@ struct Variant {
   std::string what;
   double step_factor = 1.0;
   std::shared_ptr<const belief::Scene> scene;
-  std::vector<belief::WorldState> starts;
+  std::function<void(belief::WorldState&)> change;  // of a start; may be empty
 };
 
-void add_object_ends(const belief::Scene& scene, const std::vector<belief::WorldState>& starts,
-                     const std::shared_ptr<const belief::Scene>& same, std::vector<Variant>& variants) {
-  for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+void add_object_ends(const std::shared_ptr<const belief::Scene>& scene, const std::vector<belief::WorldState>& starts,
+                     std::vector<Variant>& variants) {
+  for (std::size_t o = 0; o < scene->objects.size(); ++o) {
     for (const Parameter& parameter : kParameters) {
       std::vector<double> values;
       for (const belief::WorldState& start : starts) values.push_back(parameter.get(start.objects[o].physical));
@@ -76,18 +81,16 @@ void add_object_ends(const belief::Scene& scene, const std::vector<belief::World
       for (const double end : {kLowEnd, kHighEnd}) {
         const double value =
             values[static_cast<std::size_t>(std::lround(end * static_cast<double>(values.size() - 1)))];
-        Variant& variant = variants.emplace_back();
-        variant.what = scene.objects[o].name + ": " + parameter.name + " at " + core::rounded_text(value);
-        variant.scene = same;
-        variant.starts = starts;
-        for (belief::WorldState& start : variant.starts) parameter.set(start.objects[o].physical, value);
+        variants.push_back(
+            {Kind::kPrior, scene->objects[o].name + ": " + parameter.name + " at " + core::rounded_text(value), 1.0,
+             scene,
+             [o, set = parameter.set, value](belief::WorldState& start) { set(start.objects[o].physical, value); }});
       }
     }
   }
 }
 
-void add_support_ends(const std::shared_ptr<const belief::Scene>& scene, const std::vector<belief::WorldState>& starts,
-                      std::vector<Variant>& variants) {
+void add_support_ends(const std::shared_ptr<const belief::Scene>& scene, std::vector<Variant>& variants) {
   using Member = belief::ScalarDistribution belief::ContactProperties::*;
   const std::pair<const char*, Member> members[] = {{"friction", &belief::ContactProperties::friction},
                                                     {"restitution", &belief::ContactProperties::restitution}};
@@ -99,16 +102,26 @@ void add_support_ends(const std::shared_ptr<const belief::Scene>& scene, const s
         const double value = belief::draw(prior, std::span(&end, 1));
         auto changed = std::make_shared<belief::Scene>(*scene);
         changed->supports[s].contact.*member = belief::FixedScalar{value};
-        variants.push_back({Kind::kPrior, scene->supports[s].name + ": " + name + " at " + core::rounded_text(value),
-                            1.0, changed, starts});
+        variants.push_back({Kind::kPrior,
+                            scene->supports[s].name + ": " + name + " at " + core::rounded_text(value),
+                            1.0,
+                            changed,
+                            {}});
       }
     }
   }
 }
 
+/// Instances and what becomes of them in each variant.
+struct Pairs {
+  std::vector<double> weights;  // of instances
+  Classes before;
+  std::vector<Classes> after;  // by variant
+};
+
 /// By how much each probability differs, over the instances of which both are known.
-std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, const Classes& before,
-                                                 const Classes& after, double confidence) {
+std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, std::span<const double> weights,
+                                                 const Classes& before, const Classes& after, double confidence) {
   std::vector<belief::ModelError::Shift> shifts;
   const double reach = core::inverse_normal_cdf(0.5 + 0.5 * confidence);
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
@@ -117,7 +130,7 @@ std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, con
       double weight = 0.0, squares = 0.0, sum = 0.0, sum_squares = 0.0;
       for (std::size_t i = 0; i < before.size(); ++i) {
         if (before[i][v] < 0 || after[i][v] < 0) continue;
-        const double w = foresight.estimate.instances[i].weight;
+        const double w = weights[i];
         const int is = static_cast<int>(c);
         const double change = (after[i][v] == is ? 1.0 : 0.0) - (before[i][v] == is ? 1.0 : 0.0);
         weight += w;
@@ -141,6 +154,29 @@ std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, con
     }
   }
   return shifts;
+}
+
+belief::ModelError error_of(const Foresight& foresight, const std::vector<Variant>& variants, const Pairs& pairs,
+                            double confidence) {
+  belief::ModelError error;
+  error.instances = static_cast<int>(pairs.before.size());
+  for (std::size_t n = 0; n < variants.size(); ++n)
+    error.variants.push_back({variants[n].kind, variants[n].what,
+                              shifts_of(foresight, pairs.weights, pairs.before, pairs.after[n], confidence)});
+  return error;
+}
+
+/// How many pairs it takes until a shift of kWantedShift would be found, or those that there are stand out clearly.
+std::size_t pairs_needed(const belief::ModelError& error, double confidence) {
+  double more = 1.0;
+  for (const belief::ModelError::Variant& variant : error.variants) {
+    const double wider = widening(error, variant.kind, confidence);
+    for (const belief::ModelError::Shift& shift : variant.shifts) {
+      if (std::abs(shift.shift) > kClear * wider * 0.5 * (shift.high - shift.low)) continue;
+      more = std::max(more, findable(shift, wider, confidence) / kWantedShift);
+    }
+  }
+  return static_cast<std::size_t>(std::ceil(1.05 * more * more * error.instances));
 }
 
 }  // namespace
@@ -178,28 +214,85 @@ std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, cons
   return checks;
 }
 
+double widening(const belief::ModelError& error, belief::ModelError::Kind kind, double confidence) {
+  std::size_t comparisons = 0;
+  for (const belief::ModelError::Variant& variant : error.variants)
+    if (variant.kind == kind) comparisons += variant.shifts.size();
+  return core::inverse_normal_cdf(1.0 - 0.5 * (1.0 - confidence) /
+                                            static_cast<double>(std::max<std::size_t>(1, comparisons))) /
+         core::inverse_normal_cdf(0.5 + 0.5 * confidence);
+}
+
+double findable(const belief::ModelError::Shift& shift, double wider, double confidence) {
+  constexpr double kPower = 0.9;
+  const double half = 0.5 * (shift.high - shift.low);
+  const double deviation = half / core::inverse_normal_cdf(0.5 + 0.5 * confidence);
+  return wider * half + core::inverse_normal_cdf(kPower) * deviation;
+}
+
 core::Result<std::optional<belief::ModelError>> model_error(const Foresight& foresight, const Prior& prior,
                                                             double confidence, const QueryContext& context) {
-  const std::size_t count = std::min(kRepeated, foresight.estimate.instances.size());
-  const std::vector<belief::WorldState> starts =
-      simulation::starts_of(prior.starts, foresight.estimate, count, prior.stream, *context.pool);
-  std::vector<Variant> variants = {{Kind::kStep, "half the step", 0.5, foresight.scene, starts},
-                                   {Kind::kStep, "twice the step", 2.0, foresight.scene, starts}};
-  add_object_ends(*foresight.scene, starts, foresight.scene, variants);
-  add_support_ends(foresight.scene, starts, variants);
-
-  const Classes before = classes_so_far(foresight, count);
-  belief::ModelError error;
-  error.instances = static_cast<int>(count);
-  for (std::size_t n = 0; n < variants.size(); ++n) {
-    const Variant& variant = variants[n];
-    tell(context, static_cast<double>(n) / static_cast<double>(variants.size()), "the model's error: " + variant.what);
-    PRESCENE_TRY(const auto simulator, context.make_simulator(*variant.scene, variant.step_factor));
+  const std::size_t first = std::min(kFirstRepeated, foresight.estimate.instances.size());
+  const std::vector<belief::WorldState> own =
+      simulation::starts_of(prior.starts, foresight.estimate, first, prior.stream, *context.pool);
+  std::vector<Variant> variants = {{Kind::kStep, "half the step", 0.5, foresight.scene, {}},
+                                   {Kind::kStep, "twice the step", 2.0, foresight.scene, {}}};
+  add_object_ends(foresight.scene, own, variants);
+  add_support_ends(foresight.scene, variants);
+  std::vector<std::unique_ptr<simulation::Simulator>> simulators;
+  for (const Variant& variant : variants) {
+    PRESCENE_TRY(auto simulator, context.make_simulator(*variant.scene, variant.step_factor));
+    simulators.push_back(std::move(simulator));
+  }
+  const core::Cancellation until = end_of_simulating(context);
+  const core::Cancellation* cancellation = context.cancellation;
+  const auto classes = [&](const simulation::Simulator& simulator, std::span<const belief::WorldState> starts,
+                           std::uint32_t number) {
     // No certificates: they know the scene's friction, not a variant's.
-    const auto after = simulation::classes_from(*simulator, variant.starts, foresight.variables, foresight.request,
-                                                prior.stream, nullptr, *context.pool, context.cancellation);
-    if (!after) return std::optional<belief::ModelError>();
-    error.variants.push_back({variant.kind, variant.what, shifts_of(foresight, before, *after, confidence)});
+    return simulation::classes_from(simulator, starts, foresight.variables, foresight.request, prior.stream, nullptr,
+                                    *context.pool, cancellation, number);
+  };
+  double done = 0.0;
+  const auto add_after = [&](const std::vector<belief::WorldState>& starts, std::uint32_t number, double share,
+                             Pairs& pairs) {
+    pairs.after.resize(variants.size());
+    for (std::size_t n = 0; n < variants.size(); ++n) {
+      tell(context, done, "the model's error: " + variants[n].what);
+      std::vector<belief::WorldState> changed = starts;
+      if (variants[n].change)
+        for (belief::WorldState& start : changed) variants[n].change(start);
+      auto after = classes(*simulators[n], changed, number);
+      if (!after) return false;
+      pairs.after[n].insert(pairs.after[n].end(), after->begin(), after->end());
+      done += share / static_cast<double>(variants.size());
+    }
+    return true;
+  };
+
+  // The answer's own instances once more.
+  Pairs pairs;
+  pairs.before = classes_so_far(foresight, first);
+  for (std::size_t i = 0; i < first; ++i) pairs.weights.push_back(foresight.estimate.instances[i].weight);
+  if (!add_after(own, 0, 1.0 / (1 + kMoreRounds), pairs)) return std::optional<belief::ModelError>();
+  belief::ModelError error = error_of(foresight, variants, pairs, confidence);
+  if (foresight.estimate.instances.size() < 2) return std::optional(std::move(error));  // nothing is uncertain
+
+  // Others, until they tell enough; when time ends, those that are complete.
+  cancellation = &until;
+  Pairs fresh;
+  const std::size_t most = std::min(kMostRepeated, kMostRuns / variants.size());
+  for (int round = 0; round < kMoreRounds; ++round) {
+    const std::size_t have = fresh.before.size();
+    const std::size_t wanted = std::min(most, pairs_needed(error, confidence));
+    if (wanted <= static_cast<std::size_t>(error.instances)) break;
+    const auto number = static_cast<std::uint32_t>(have);
+    const std::vector<belief::WorldState> starts =
+        simulation::fresh_starts(prior.starts, number, wanted - have, prior.stream, *context.pool);
+    const auto before = classes(*foresight.simulator, starts, number);
+    if (!before || !add_after(starts, number, 1.0 / (1 + kMoreRounds), fresh)) break;
+    fresh.before.insert(fresh.before.end(), before->begin(), before->end());
+    fresh.weights.assign(wanted, 1.0);
+    error = error_of(foresight, variants, fresh, confidence);
   }
   return std::optional(std::move(error));
 }

@@ -14,10 +14,17 @@ namespace prescene::queries {
 std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, const Prior& prior, double confidence,
                                                 const QueryContext& context);
 
-/// Runs the first instances again at half and double step, and with each uncertain physical parameter of an object or
-/// support at the ends of its prior. Nothing when stopped.
+/// Runs the first 256 instances again at half and double step, and with each uncertain physical parameter of an object
+/// or support at the ends of its prior. Then other starts, each once as it is and once in each of these variants with
+/// the same random numbers, until every shift of 3 points would be found with a probability of 0.9, or is clear: at
+/// most 12,288, and 131,072 of all variants together. When stopped, those that are complete; nothing if there are none.
 core::Result<std::optional<belief::ModelError>> model_error(const Foresight& foresight, const Prior& prior,
                                                             double confidence, const QueryContext& context);
+
+/// How much wider the interval of a shift has to be to hold for all shifts of a kind at once [Bonferroni].
+double widening(const belief::ModelError& error, belief::ModelError::Kind kind, double confidence);
+/// The shift that would stand out from such an interval with a probability of 0.9.
+double findable(const belief::ModelError::Shift& shift, double wider, double confidence);
 
 /// Up to `count` instances' ways of the objects (by index). Not `complete` when stopped, or where the points of all of
 /// them would not fit into an answer.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "model_doubts.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "remarks.h"
@@ -15,19 +16,13 @@ using core::fixed_text;
 
 constexpr double kManyFailed = 0.01;
 constexpr std::size_t kMostNamed = 3;
+constexpr double kLargeShift = 0.03;  // of a probability: named whatever the interval
 
 std::string percent(double share, int decimals = 0) { return fixed_text(100.0 * share, decimals) + " %"; }
 std::string points(double shift) { return (shift >= 0.0 ? "+" : "") + fixed_text(100.0 * shift, 1); }
 
 std::string full_name(const std::string& group, const std::string& outcome) {
   return group.empty() ? outcome : group + " = " + outcome;
-}
-
-/// How much wider an interval has to be to hold for all of so many comparisons at once [Bonferroni].
-double widening(const belief::ModelError& error, std::size_t outcomes, double confidence) {
-  const double comparisons = static_cast<double>(std::max<std::size_t>(1, error.variants.size() * outcomes));
-  return core::inverse_normal_cdf(1.0 - 0.5 * (1.0 - confidence) / comparisons) /
-         core::inverse_normal_cdf(0.5 + 0.5 * confidence);
 }
 
 /// The variant of a kind that shifts an outcome most, of those that surely shift it.
@@ -51,9 +46,9 @@ Worst worst_for(const belief::ModelError& error, belief::ModelError::Kind kind,
   return worst;
 }
 
-/// "upright (interval +-1.2 points; half the step shifts it by ...); ...": those that shift beyond their interval, the
-/// farthest first; empty if none.
-std::string beyond_intervals(const belief::PredictAnswer& answer, belief::ModelError::Kind kind, double wider) {
+/// "upright (interval +-1.2 points; half the step shifts it by ...); ...": those that shift beyond their interval or
+/// by 3 points, the farthest first; empty if none.
+std::string large_shifts(const belief::PredictAnswer& answer, belief::ModelError::Kind kind, double wider) {
   struct Narrow {
     double excess;
     std::string text;
@@ -62,7 +57,7 @@ std::string beyond_intervals(const belief::PredictAnswer& answer, belief::ModelE
   for (const belief::OutcomeProbability& outcome : answer.outcomes) {
     const double half = 0.5 * (outcome.high - outcome.low);
     const Worst worst = worst_for(*answer.model_error, kind, outcome, wider);
-    if (!worst.shift || std::abs(worst.shift->shift) <= half) continue;
+    if (!worst.shift || std::abs(worst.shift->shift) <= std::min(half, kLargeShift)) continue;
     narrow.push_back({std::abs(worst.shift->shift) - half,
                       full_name(outcome.group, outcome.name) + " (interval +-" + fixed_text(100.0 * half, 1) +
                           " points; " + worst.what + " shifts it by " + points(worst.shift->shift) + ", " +
@@ -78,14 +73,13 @@ std::string beyond_intervals(const belief::PredictAnswer& answer, belief::ModelE
 void remark_on_model(const belief::PredictAnswer& answer, double confidence, std::vector<std::string>& remarks) {
   using ErrorKind = belief::ModelError::Kind;
   const belief::ModelError& error = *answer.model_error;
-  const double wider = widening(error, answer.outcomes.size(), confidence);
-  const std::string steps = beyond_intervals(answer, ErrorKind::kStep, wider);
+  const std::string steps = large_shifts(answer, ErrorKind::kStep, widening(error, ErrorKind::kStep, confidence));
   if (!steps.empty())
     remarks.push_back(
-        "The model's step: the intervals tell what more instances would change, and are narrower than what the "
-        "simulator itself is wrong by: " +
+        "The model's step: the intervals tell what more instances would change, not what the simulator itself is wrong "
+        "by: " +
         steps + ".");
-  const std::string priors = beyond_intervals(answer, ErrorKind::kPrior, wider);
+  const std::string priors = large_shifts(answer, ErrorKind::kPrior, widening(error, ErrorKind::kPrior, confidence));
   if (!priors.empty())
     remarks.push_back(
         "What the scene says is not known: the probabilities are taken over all of its values; with one of them known "
@@ -98,14 +92,18 @@ void remark_on_model(const belief::PredictAnswer& answer, double confidence, std
   if (any_prior && priors.empty())
     small += (small.empty() ? "no" : " and no") + std::string(" end of what the scene says is not known");
   if (small.empty()) return;
-  double resolved = 0.0;  // how small a shift these instances can show
-  for (const belief::ModelError::Variant& variant : error.variants)
+  double found = 0.0;
+  for (const belief::ModelError::Variant& variant : error.variants) {
+    if (!(variant.kind == ErrorKind::kStep ? steps : priors).empty()) continue;
+    const double wider = widening(error, variant.kind, confidence);
     for (const belief::ModelError::Shift& shift : variant.shifts)
-      resolved = std::max(resolved, wider * 0.5 * (shift.high - shift.low));
-  remarks.push_back("Model error: " + small +
-                    " was found to shift a probability by more than the half width of its interval; shifts below " +
-                    fixed_text(100.0 * resolved, 1) + " points are not seen with " + std::to_string(error.instances) +
-                    (error.instances == 1 ? " instance." : " instances."));
+      found = std::max(found, findable(shift, wider, confidence));
+  }
+  remarks.push_back(
+      "Model error: " + small +
+      " was found to shift a probability by 3 points or by more than the half width of its interval; with " +
+      std::to_string(error.instances) + (error.instances == 1 ? " instance" : " instances") + ", a shift of " +
+      fixed_text(100.0 * found, 1) + " points is found in nine cases of ten.");
 }
 
 void remark_on_instances(const belief::Basis& basis, std::vector<std::string>& remarks) {

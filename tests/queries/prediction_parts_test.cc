@@ -156,6 +156,63 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
   EXPECT_THAT(answer.remarks[1], AllOf(HasSubstr("carton: friction at"), Not(HasSubstr("the step"))));
 }
 
+/// Chaotic: each step ends in its own way, with probability `p`, at twice the step with `shifted`.
+QueryContext chaotic_context(double p, double shifted, core::ThreadPool& pool) {
+  QueryContext context = context_with(slide, pool);
+  context.make_simulator = [=](const belief::Scene&,
+                               double factor) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    return std::unique_ptr<simulation::Simulator>(std::make_unique<tests::FakeSimulator>(
+        [=](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+          belief::WorldState end = start;
+          const double digits = 1e6 * start.objects[0].physical.friction * (1.0 + factor);
+          if (digits - std::floor(digits) < (factor > 1.0 ? shifted : p)) end.objects[0].X_WO.translation.x() += 1.0;
+          return end;
+        }));
+  };
+  return context;
+}
+
+TEST(ModelError, RepeatsAsManyInstancesAsItTakesToFindAShiftOfThreePoints) {
+  core::ThreadPool pool(2);
+  const PredictAnswer answer =
+      predicted(queries::answer(sliding_scene(), 1, {"", asking([](auto& detail) { detail.model_error = true; })},
+                                chaotic_context(0.5, 0.46, pool)));
+  ASSERT_TRUE(answer.model_error);
+  // (2.24 + 1.28)^2 0.5 / 0.03^2: two comparisons at 95 %, and a power of 0.9.
+  EXPECT_GT(answer.model_error->instances, 6000);
+  EXPECT_LT(answer.model_error->instances, 9000);
+  const belief::ModelError::Shift half = answer.model_error->variants[0].shifts[0];
+  const belief::ModelError::Shift twice = answer.model_error->variants[1].shifts[0];
+  EXPECT_LT(std::abs(half.shift), 0.025);
+  EXPECT_NEAR(twice.shift, -0.04, 0.025);
+  EXPECT_LT(twice.high, 0.0);
+  ASSERT_FALSE(answer.remarks.empty());
+  EXPECT_THAT(answer.remarks[0], AllOf(StartsWith("The model's step"), HasSubstr("twice the step")));
+}
+
+TEST(ModelError, FindsNineOfTenShiftsOfThreePointsAndHardlyAnyOther) {
+  core::ThreadPool pool(2);
+  constexpr int kScenes = 40;
+  constexpr double kWider = 2.2414 / 1.9600;  // of two comparisons at 95 %
+  int found = 0, false_alarms = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    const double p = 0.1 + 0.8 * i / kScenes;
+    const PredictAnswer answer = predicted(queries::answer(
+        sliding_scene(), static_cast<std::uint64_t>(i), {"", asking([](auto& detail) { detail.model_error = true; })},
+        chaotic_context(p, p + 0.03, pool)));
+    ASSERT_TRUE(answer.model_error);
+    const auto sure = [&](std::size_t variant) {
+      const belief::ModelError::Shift& shift = answer.model_error->variants[variant].shifts[0];
+      return std::abs(shift.shift) > kWider * 0.5 * (shift.high - shift.low);
+    };
+    false_alarms += sure(0) ? 1 : 0;
+    found += sure(1) ? 1 : 0;
+  }
+  RecordProperty("found", found);
+  EXPECT_GE(found, 31);        // of 40 at 0.9: one in 200 runs has fewer
+  EXPECT_LE(false_alarms, 4);  // at 0.025: one in 300 has more
+}
+
 TEST(Chaos, IsToldApartFromABoundary) {
   core::ThreadPool pool(2);
   const auto ask = asking([](auto& detail) { detail.chaos = true; });

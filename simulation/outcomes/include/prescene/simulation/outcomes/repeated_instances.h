@@ -21,13 +21,16 @@ std::vector<belief::WorldState> starts_nearby(const StartDistribution& starts, c
                                               std::size_t count, double displacement, const core::RandomStream& stream,
                                               core::ThreadPool& pool);
 
-/// Per instance (numbered from 0) the class of every variable, -1 where the simulation failed; nothing when cancelled.
-/// `certifier` may be null.
-std::optional<std::vector<std::vector<int>>> classes_from(const Simulator& simulator,
-                                                          std::span<const belief::WorldState> starts,
-                                                          std::span<const Variable> variables,
-                                                          const RunRequest& request, const core::RandomStream& stream,
-                                                          const Certifier* certifier, core::ThreadPool& pool,
-                                                          const core::Cancellation* cancellation = nullptr);
+/// Other starts than those of an estimate, drawn independently: starts number `first` and on of a sequence that is the
+/// same for the same stream.
+std::vector<belief::WorldState> fresh_starts(const StartDistribution& starts, std::uint32_t first, std::size_t count,
+                                             const core::RandomStream& stream, core::ThreadPool& pool);
+
+/// Per instance (numbered from `first`) the class of every variable, -1 where the simulation failed; nothing when
+/// cancelled. `certifier` may be null.
+std::optional<std::vector<std::vector<int>>> classes_from(
+    const Simulator& simulator, std::span<const belief::WorldState> starts, std::span<const Variable> variables,
+    const RunRequest& request, const core::RandomStream& stream, const Certifier* certifier, core::ThreadPool& pool,
+    const core::Cancellation* cancellation = nullptr, std::uint32_t first = 0);
 
 }  // namespace prescene::simulation
