@@ -181,7 +181,7 @@ void hash_motion(core::Hasher& hasher, const MotionRecord& motion) {
   hasher.value(episode.kind).value(episode.closed).value(episode.probed);
   hash_twist(hasher, episode.V_start);
   for (const Pose& pose : episode.others) hash_pose(hasher, pose);
-  for (const double value : episode.log_likelihoods) hasher.value(value);
+  for (const double value : episode.run_errors) hasher.value(value);
   hash_samples(episode.samples);
 }
 

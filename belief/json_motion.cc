@@ -74,14 +74,14 @@ std::vector<MotionSample> samples_from(const JsonAt& at) {
 
 Json episode_json(const MotionEpisode& episode) {
   Json judged = Json::array();
-  for (const double value : episode.log_likelihoods) judged.push_back(number_json(value));
+  for (const double value : episode.run_errors) judged.push_back(number_json(value));
   return {{"kind", word_of(episode_words(), episode.kind)},
           {"samples", samples_json(episode.samples)},
           {"V_start", to_json(episode.V_start)},
           {"others", poses_json(episode.others)},
           {"closed", episode.closed},
           {"probed", episode.probed},
-          {"log_likelihoods", std::move(judged)}};
+          {"run_errors", std::move(judged)}};
 }
 
 MotionEpisode episode_from(const JsonAt& at) {
@@ -96,8 +96,8 @@ MotionEpisode episode_from(const JsonAt& at) {
   if (const auto others = fields.require("others")) episode.others = poses_from(*others);
   if (const auto closed = fields.require("closed")) episode.closed = closed->boolean();
   if (const auto probed = fields.require("probed")) episode.probed = probed->boolean();
-  if (const auto judged = fields.require("log_likelihoods"))
-    for (const JsonAt& item : judged->items()) episode.log_likelihoods.push_back(item.number_or_null(kNever));
+  if (const auto judged = fields.require("run_errors"))
+    for (const JsonAt& item : judged->items()) episode.run_errors.push_back(item.number_or_null(kNever));
   return episode;
 }
 

@@ -316,18 +316,18 @@ void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
   std::vector<belief::WorldState> starts;
   const bool probe = episode.kind == EpisodeKind::kRest && !episode.probed;
   const std::size_t wanted = draws.size() * static_cast<std::size_t>(judge.variants());
-  if (!judge.fits(episode.log_likelihoods)) {  // nothing to compare, or begun by another version
+  if (!judge.fits(episode.run_errors)) {  // nothing to compare, or begun by another version
     object.motion.episode.reset();
     return;
   }
   if (probe) {
     for (const std::size_t i : extreme_draws(draws)) starts.push_back(judge.start(draws[i], std::nullopt));
   } else {
-    const std::size_t first = episode.log_likelihoods.size() / judge.error_size();
+    const std::size_t first = episode.run_errors.size() / judge.error_size();
     for (std::size_t r = first; r < std::min(wanted, first + static_cast<std::size_t>(runs_left)); ++r)
       starts.push_back(judge.start(draws[r % draws.size()], r));
   }
-  std::vector<double> errors = probe ? std::vector<double>{} : std::move(episode.log_likelihoods);
+  std::vector<double> errors = probe ? std::vector<double>{} : std::move(episode.run_errors);
   const core::Status done = add_runs(judge, starts, belief, simulators, threads, errors);
   runs_left -= static_cast<int>(starts.size());
   report.runs += static_cast<int>(starts.size());
@@ -341,7 +341,7 @@ void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
     return;
   }
   if (errors.size() < wanted * judge.error_size()) {
-    episode.log_likelihoods = std::move(errors);
+    episode.run_errors = std::move(errors);
     return;
   }
   const core::TimeNs began_ns = episode.samples.front().stamp_ns;

@@ -243,7 +243,7 @@ MotionRecord random_motion(RandomStream& stream) {
   episode.others = {random_pose(stream)};
   episode.closed = random_below(stream, 2) == 1;
   episode.probed = random_below(stream, 2) == 1;
-  for (int i = random_below(stream, 3); i > 0; --i) episode.log_likelihoods.push_back(-stream.uniform());
+  for (int i = random_below(stream, 3); i > 0; --i) episode.run_errors.push_back(-stream.uniform());
   return motion;
 }
 

@@ -43,8 +43,8 @@ struct MotionEpisode {
   std::vector<Pose> others;  ///< Poses of the belief's objects at the start, by index.
   bool closed = false;       ///< Nothing is added any more; it is being judged.
   bool probed = false;       ///< The extreme draws were found to differ.
-  /// Of the draws judged so far.
-  std::vector<double> log_likelihoods;
+  /// Of the runs that were simulated so far, those of one after those of the other.
+  std::vector<double> run_errors;
   friend bool operator==(const MotionEpisode&, const MotionEpisode&) = default;
 };
 
