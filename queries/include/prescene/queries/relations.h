@@ -15,16 +15,15 @@
 //   within 60 degrees of the vertical and points up (belief::supports). `supports` is the same, told of the lower
 //   thing.
 // - `in`: at least half of a thing's surface is in the other's hollow. A point is in the hollow when at least 5/8 of
-// all
-//   directions from it meet the other's surface (in the plane of a rim half of them do) and it is not in its solid; or
-//   when it is in the box that the scene gives as the hollow. The surface is that of the collision shapes before any
+//   all directions from it meet the other's surface (in the plane of a rim half of them do) and it is not in its solid;
+//   or when it is in the box that the scene gives as the hollow. The surface is that of the collision shapes before any
 //   hull is taken.
 // - `holds`: the particle's mode, and the hand of the scene.
 // - `upright`: the normal of the face that a thing rests on as its model was made (that of its resting faces nearest to
 //   -z of its frame; z where it has none within 15 degrees) is within the angle asked for of the vertical, up to its
 //   symmetry. Not judged of balls.
 // - `visible`: nothing hides at least 5 % of the area that the camera would see of it; `share` is the mean of that
-// area.
+//   area.
 // - `within_reach`: a point of its surface is that near to the point asked for.
 #pragma once
 
