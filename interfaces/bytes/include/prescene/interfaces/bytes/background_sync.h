@@ -5,7 +5,7 @@
 //   PRESCENE_TRY(const auto sync, BackgroundSync::start(path, std::chrono::milliseconds(300)));
 //   PRESCENE_RETURN_IF_ERROR(file.write(bytes));
 //   sync->note_written();
-//   if (sync->seconds_at_risk() > 1.0) ... the disk does not keep up
+//   if (sync->seconds_at_risk() > 1.0) ...                 // the disk does not keep up
 #pragma once
 
 #include <chrono>
