@@ -94,6 +94,40 @@ std::vector<ReportSection> sections_of(const belief::AchieveAnswer& answer, cons
   return achieve_sections(answer);
 }
 
+std::vector<ReportSection> sections_of(const belief::RelationsAnswer& answer, const belief::Scene&) {
+  TableBlock table;
+  table.columns = {"relation", "of", "and", "probability", "low", "high"};
+  for (const belief::RelationProbability& one : answer.relations)
+    table.rows.push_back({belief::to_string(one.relation), one.subject, one.other, decimal(one.probability, 3),
+                          decimal(one.low, 3), decimal(one.high, 3)});
+  ReportSection section{"How things are related", {std::move(table)}};
+  for (const std::string& remark : answer.remarks) section.blocks.push_back(TextBlock{remark});
+  return {std::move(section)};
+}
+
+std::vector<ReportSection> sections_of(const belief::TimelineAnswer& answer, const belief::Scene&) {
+  const belief::ObservedTimeline& timeline = answer.timeline;
+  const auto since_first = [&](core::TimeNs stamp_ns) {
+    return decimal(core::seconds_of(stamp_ns - timeline.session_ns), 2);
+  };
+  TableBlock table;
+  table.columns = {"relation", "of", "and", "from (s)", "to (s)", "probability"};
+  for (const belief::ObservedInterval& one : timeline.intervals)
+    table.rows.push_back({belief::to_string(one.relation), one.subject, one.other, since_first(one.begin_ns),
+                          one.goes_on ? "goes on" : since_first(one.end_ns), decimal(one.probability, 3)});
+  ReportSection section{"What was observed", {std::move(table)}};
+  if (answer.of_pairs) {
+    TableBlock pairs;
+    pairs.caption = "pairs of these, by the numbers of their rows";
+    pairs.columns = {"first", "is", "second", "probability"};
+    for (const belief::TimelineAnswer::Pair& pair : answer.pairs)
+      pairs.rows.push_back({std::to_string(pair.first + 1), belief::to_string(pair.relation),
+                            std::to_string(pair.second + 1), decimal(pair.probability, 3)});
+    section.blocks.emplace_back(std::move(pairs));
+  }
+  return {std::move(section)};
+}
+
 std::vector<ReportSection> sections_of(const std::monostate&, const belief::Scene&) { return {}; }
 
 }  // namespace
