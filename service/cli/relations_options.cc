@@ -142,8 +142,8 @@ core::Result<Json> relations_question(const std::string& object, const std::stri
   if (reach.empty()) return Json{{"relations", std::move(relations)}};
   const std::size_t colon = reach.rfind(':');
   double radius = 0.0;
-  const core::Status form = core::invalid_input(
-      "--reach " + reach + ": give a point or a robot body and metres, as 0.4,0,0.9:0.8 or hand:0.8");
+  core::Status form = core::invalid_input("--reach " + reach +
+                                          ": give a point or a robot body and metres, as 0.4,0,0.9:0.8 or hand:0.8");
   if (colon == std::string::npos || colon == 0 || !interfaces::parse_number(reach.substr(colon + 1), &radius))
     return form;
   const std::string of = reach.substr(0, colon);
