@@ -20,7 +20,7 @@ using geometry::Matrix3d;
 
 // Share of the variance of what a frame says of a pose: errors that stay from frame to frame (calibration, a pattern in
 // the depth), which do not average out over what lies still.
-constexpr double kCommonError = 0.75;
+constexpr double kCommonError = 0.5;
 constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
 constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
 constexpr double kLastGate = 0.012;          // m; ... in the last steps

@@ -217,7 +217,7 @@ TEST(StillObject, ASmallDisplacementIsFoundWithinAFewFrames) {
     EXPECT_TRUE(box.always_tracked);
     const Vector3d before = box.published[23].translation - rest(0.0).translation;
     for (std::size_t i = 24 + 5; i < box.published.size(); ++i)
-      EXPECT_LT((box.published[i].translation - moved(1.0).translation - before).norm(), 0.0025) << i;
+      EXPECT_LT((box.published[i].translation - moved(1.0).translation - before).norm(), 0.0035) << i;
   }
 }
 
