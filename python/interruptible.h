@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Long work for Python: without the GIL, so that other threads of Python go on, and ended by Ctrl-C.
 //
-//   core::Cancellation cancellation;
-//   const auto answer = interruptibly(cancellation, [&] { return queries::answer(scene, seed, query, context); });
+// Used as interruptibly(cancellation, [&] { return queries::answer(scene, seed, query, context); }).
 #pragma once
 
 #include <cstddef>

@@ -134,7 +134,7 @@ TEST(Mechanics, ACoinThrownAlikeOnBothSidesShowsHeadsHalfTheTime) {
   settled.solver_accuracy = 1e-7;
   const PredictAnswer answer = predicted(scene, 0.04, settled);
   const double undecided = answer.outcomes[2].probability;
-  EXPECT_LT(undecided, 0.02);
+  EXPECT_LT(undecided, 0.05);  // they stand on their rim
   expect_covers(answer.outcomes[0], 0.5 * (1.0 - undecided), 0.0);
   expect_covers(answer.outcomes[1], 0.5 * (1.0 - undecided), 0.0);
   RecordProperty("heads", std::to_string(answer.outcomes[0].probability) + " of " + std::to_string(answer.instances));

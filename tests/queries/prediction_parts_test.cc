@@ -131,7 +131,8 @@ TEST(ModelError, TellsWhatTheEndsOfAPriorAndOtherStepsChange) {
   };
   const PredictAnswer answer = predicted(queries::answer(sliding_scene(), 1, {"", all}, context));
   ASSERT_TRUE(answer.model_error);
-  EXPECT_EQ(answer.model_error->instances, 256);
+  EXPECT_GE(answer.model_error->instances, 256);
+  EXPECT_LE(answer.model_error->instances, 12'288);
   EXPECT_EQ(factors, (std::vector<double>{1.0, 0.5, 2.0, 1.0, 1.0}));
   ASSERT_EQ(answer.model_error->variants.size(), 4u);
   const auto shift = [&](std::size_t variant) { return answer.model_error->variants[variant].shifts[0]; };
@@ -178,9 +179,9 @@ TEST(ModelError, RepeatsAsManyInstancesAsItTakesToFindAShiftOfThreePoints) {
       predicted(queries::answer(sliding_scene(), 1, {"", asking([](auto& detail) { detail.model_error = true; })},
                                 chaotic_context(0.5, 0.46, pool)));
   ASSERT_TRUE(answer.model_error);
-  // (2.24 + 1.28)^2 0.5 / 0.03^2: two comparisons at 95 %, and a power of 0.9.
-  EXPECT_GT(answer.model_error->instances, 6000);
-  EXPECT_LT(answer.model_error->instances, 9000);
+  // (2.64 + 1.28)^2 0.5 / 0.03^2 = 8500: six comparisons at 95 % (two steps, three outcomes), and a power of 0.9.
+  EXPECT_GT(answer.model_error->instances, 7500);
+  EXPECT_LT(answer.model_error->instances, 11'000);
   const belief::ModelError::Shift half = answer.model_error->variants[0].shifts[0];
   const belief::ModelError::Shift twice = answer.model_error->variants[1].shifts[0];
   EXPECT_LT(std::abs(half.shift), 0.025);

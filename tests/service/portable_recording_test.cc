@@ -213,7 +213,7 @@ TEST_F(PortableRecording, APartHasTheFramesOfItsWindow) {
   EXPECT_LT(first->hashes.size(), whole->hashes.size());
   options.read = {};
   options.read.from = 99.0;
-  EXPECT_THAT(replayed(options).status().message(), HasSubstr("the recording ends at 0.9"));
+  EXPECT_THAT(replayed(options).status().message(), HasSubstr("the recording ends at 1.0"));
 }
 
 TEST_F(PortableRecording, TheOverviewSaysWhatIsThereAndWhatIsWrong) {
