@@ -9,7 +9,8 @@
 //
 // Five questions: where is everything, and how are things related, now and in what was observed (actual belief); what
 // happens if (state anticipation); does it stay (stability); what will the camera see (observation anticipation); how
-// must it be done, so that an outcome comes about (state explanation). docs/reference/queries.md says what the answers mean.
+// must it be done, so that an outcome comes about (state explanation). docs/reference/queries.md says what the answers
+// mean.
 #pragma once
 
 #include <cstddef>
