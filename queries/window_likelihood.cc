@@ -217,8 +217,10 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
     for (std::size_t m = 0; m < moved; ++m) {
       if (!path.paths[m][k]) continue;
       const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
-      const FramePeak* peak = !peaks.empty() && peaks[k].seen ? &peaks[k] : nullptr;
       const bool put_down = path.put_down_from && k >= *path.put_down_from;
+      // A peak is measured with all else where it was. Of two that change places, one would hide the other.
+      const bool alone = !path.put_down_from || path.put_anywhere;
+      const FramePeak* peak = alone && !peaks.empty() && peaks[k].seen ? &peaks[k] : nullptr;
       if (put_down && path.put_anywhere && peak != nullptr && put_at_peak[m] == 0) {
         put_at_peak[m] = 1;
         for (std::size_t s = 0; s < shares; ++s) {
