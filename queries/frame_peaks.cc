@@ -168,9 +168,7 @@ FoundPeaks find_peaks(const EventPaths& events, WindowLikelihood& likelihood, st
     const geometry::Matrix6d hidden =
         geometry::Matrix6d::Identity() - geometry::Matrix6d(visible * visible.transpose());
     in_body += kHiddenTurn * kHiddenTurn * hidden;
-    geometry::Matrix6d along_W = geometry::Matrix6d::Identity();
-    along_W.topLeftCorner<3, 3>() = peak.X_WO.rotation.toRotationMatrix();
-    peak.covariance = along_W * in_body * along_W.transpose();
+    peak.covariance = turns_about_W(peak.X_WO, in_body);
   }
   return found;
 }

@@ -46,6 +46,12 @@ void PathError::move_to(const geometry::Pose& X_WO) {
   placed_ = true;
 }
 
+Matrix6d turns_about_W(const geometry::Pose& X_WO, const Matrix6d& covariance) {
+  Matrix6d along_W = Matrix6d::Identity();
+  along_W.topLeftCorner<3, 3>() = X_WO.rotation.toRotationMatrix();
+  return along_W * covariance * along_W.transpose();
+}
+
 Vector6d PathError::innovation(const FramePeak& peak) const {
   const geometry::Pose X = symmetry_->trivial() ? X_WO_ : geometry::closest_equivalent(X_WO_, peak.X_WO, *symmetry_);
   Vector6d seen;

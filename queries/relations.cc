@@ -59,11 +59,15 @@ std::string names_of(const std::vector<std::string>& names) {
   return text;
 }
 
-core::Status no_such_object(const std::string& name, const std::vector<std::string>& known) {
+/// "did you mean 'mug'? ", or nothing.
+std::string meant_by(const std::string& name, const std::vector<std::string>& known) {
   const std::vector<std::string> nearest = core::nearest_words(name, known);
+  return nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ";
+}
+
+core::Status no_such_object(const std::string& name, const std::vector<std::string>& known) {
   return core::not_found("there is no object '" + name + "' now (it may be lost or not there at all): " +
-                         (nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ") +
-                         "Those that are: " + names_of(known));
+                         meant_by(name, known) + "Those that are: " + names_of(known));
 }
 
 /// The names of the objects that take part.
@@ -88,10 +92,8 @@ core::Result<std::optional<int>> reach_body_of(const belief::Scene& scene, const
   if (body) return body;
   std::vector<std::string> known{"camera"};
   for (const belief::KinematicBody& robot : scene.robot) known.push_back(robot.name);
-  const std::vector<std::string> nearest = core::nearest_words(query.reach->of, known);
-  return core::not_found("reach.of: there is no robot body '" + query.reach->of +
-                         "': " + (nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ") + "Known are " +
-                         names_of(known) + ", and points [x, y, z]");
+  return core::not_found("reach.of: there is no robot body '" + query.reach->of + "': " +
+                         meant_by(query.reach->of, known) + "Known are " + names_of(known) + ", and points [x, y, z]");
 }
 
 /// The prior, with everything stopped and let go, and nothing done.

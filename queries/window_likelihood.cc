@@ -111,9 +111,7 @@ core::Status WindowLikelihood::prepare() {
     const auto index = belief::find_object(start_, object.name);
     if (!index || !is_present(start_.objects[static_cast<std::size_t>(*index)])) continue;
     const auto estimate = belief::estimate(start_, start_.objects[static_cast<std::size_t>(*index)]);
-    geometry::Matrix6d along_W = geometry::Matrix6d::Identity();
-    along_W.topLeftCorner<3, 3>() = estimate.mean.rotation.toRotationMatrix();
-    error = along_W * estimate.covariance * along_W.transpose();
+    error = turns_about_W(estimate.mean, estimate.covariance);
   }
   return core::ok_status();
 }
@@ -211,6 +209,8 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
   put_error.bottomRightCorner<3, 3>() = kPutLift * kPutLift * along + kPutShift * kPutShift * across;
   std::vector<std::uint8_t> put_at_peak(moved, 0);
   std::vector<double> log_weight(shares, -std::log(static_cast<double>(shares))), in_frame(shares);
+  // A peak is measured with all else where it was. Of two that change places, one would hide the other.
+  const bool alone = !path.put_down_from || path.put_anywhere;
   for (std::size_t k = 0; k < frames_.size(); ++k) {
     const Background& known = background(k, path.moved);
     std::fill(in_frame.begin(), in_frame.end(), share_ * known.log_ratio);
@@ -218,8 +218,6 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
       if (!path.paths[m][k]) continue;
       const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
       const bool put_down = path.put_down_from && k >= *path.put_down_from;
-      // A peak is measured with all else where it was. Of two that change places, one would hide the other.
-      const bool alone = !path.put_down_from || path.put_anywhere;
       const FramePeak* peak = alone && !peaks.empty() && peaks[k].seen ? &peaks[k] : nullptr;
       if (put_down && path.put_anywhere && peak != nullptr && put_at_peak[m] == 0) {
         put_at_peak[m] = 1;

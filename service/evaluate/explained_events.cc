@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "prescene/core/clock.h"
+#include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/recording/explained.h"
@@ -143,13 +144,6 @@ double share(std::size_t part, std::size_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : std::numeric_limits<double>::quiet_NaN();
 }
 
-double quantile_of(std::vector<double> values, double at) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto place = values.begin() + std::lround(at * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 struct KindFigures {
   std::size_t n = 0, right = 0, nearly = 0, failed = 0, placed = 0, within = 0, hidden = 0, hidden_within = 0;
   std::vector<double> time_errors, direction_errors, half_widths, seconds, explaining;
@@ -185,15 +179,15 @@ std::vector<std::string> figures_row(const std::string& kind, const KindFigures&
           percent_of(f.right, f.n),
           percent_of(f.nearly, f.n),
           std::to_string(f.failed),
-          number_of(quantile_of(f.time_errors, 0.5), 3),
-          number_of(quantile_of(f.time_errors, 0.9), 3),
-          number_of(kDegrees * quantile_of(f.direction_errors, 0.5), 1),
-          number_of(kDegrees * quantile_of(f.direction_errors, 0.9), 1),
+          number_of(core::quantile(f.time_errors, 0.5), 3),
+          number_of(core::quantile(f.time_errors, 0.9), 3),
+          number_of(kDegrees * core::quantile(f.direction_errors, 0.5), 1),
+          number_of(kDegrees * core::quantile(f.direction_errors, 0.9), 1),
           percent_of(f.within, f.placed) + " of " + std::to_string(f.placed),
-          number_of(100.0 * quantile_of(f.half_widths, 0.5), 1),
-          number_of(100.0 * quantile_of(f.half_widths, 0.9), 1),
-          number_of(quantile_of(f.explaining, 0.5), 1),
-          number_of(quantile_of(f.explaining, 0.9), 1)};
+          number_of(100.0 * core::quantile(f.half_widths, 0.5), 1),
+          number_of(100.0 * core::quantile(f.half_widths, 0.9), 1),
+          number_of(core::quantile(f.explaining, 0.5), 1),
+          number_of(core::quantile(f.explaining, 0.9), 1)};
 }
 
 ordered_json null_or(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(); }
@@ -204,21 +198,21 @@ ordered_json kind_json(const std::string& kind, const KindFigures& f) {
           {"right", f.right},
           {"right_push_and_blow_as_one", f.nearly},
           {"failed", f.failed},
-          {"median_time_error", null_or(quantile_of(f.time_errors, 0.5))},
-          {"p90_time_error", null_or(quantile_of(f.time_errors, 0.9))},
+          {"median_time_error", null_or(core::quantile(f.time_errors, 0.5))},
+          {"p90_time_error", null_or(core::quantile(f.time_errors, 0.9))},
           {"timed", f.time_errors.size()},
-          {"median_direction_error_rad", null_or(quantile_of(f.direction_errors, 0.5))},
-          {"p90_direction_error_rad", null_or(quantile_of(f.direction_errors, 0.9))},
+          {"median_direction_error_rad", null_or(core::quantile(f.direction_errors, 0.5))},
+          {"p90_direction_error_rad", null_or(core::quantile(f.direction_errors, 0.9))},
           {"directed", f.direction_errors.size()},
           {"placed", f.placed},
           {"within_90", f.within},
           {"hidden", f.hidden},
           {"hidden_within_90", f.hidden_within},
-          {"median_half_width", null_or(quantile_of(f.half_widths, 0.5))},
-          {"p90_half_width", null_or(quantile_of(f.half_widths, 0.9))},
-          {"median_cpu_seconds", null_or(quantile_of(f.explaining, 0.5))},
-          {"p90_cpu_seconds", null_or(quantile_of(f.explaining, 0.9))},
-          {"median_cpu_seconds_with_tracking", null_or(quantile_of(f.seconds, 0.5))}};
+          {"median_half_width", null_or(core::quantile(f.half_widths, 0.5))},
+          {"p90_half_width", null_or(core::quantile(f.half_widths, 0.9))},
+          {"median_cpu_seconds", null_or(core::quantile(f.explaining, 0.5))},
+          {"p90_cpu_seconds", null_or(core::quantile(f.explaining, 0.9))},
+          {"median_cpu_seconds_with_tracking", null_or(core::quantile(f.seconds, 0.5))}};
 }
 
 /// By kind, in the order of event_episode_kinds(), then all.

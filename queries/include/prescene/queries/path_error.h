@@ -35,6 +35,10 @@ struct FramePeak {
   double log_put_down = 0.0;  ///< Log density with which somebody puts the object down there (EventPriors).
 };
 
+/// The covariance of a pose in the coordinates of geometry::box_plus (turns along the axes of the object) in those of
+/// FramePeak.
+geometry::Matrix6d turns_about_W(const geometry::Pose& X_WO, const geometry::Matrix6d& covariance);
+
 struct PathFit {
   double log_likelihood = 0.0;
   double mahalanobis = 0.0;  ///< Squared distance of the path from the peak, by the spread of both.
