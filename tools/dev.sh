@@ -16,7 +16,8 @@ usage: ./dev VERB
   python [TEST]...             make the Python package in build/python/site and run its tests, or those whose names match
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
-  lint [FILE]...               format, layer and clang-tidy checks
+  lint [FILE | --recent K/N]   format, layer and clang-tidy checks; --recent: clang-tidy on what is new since origin/main (or
+                               a day) and on the K-th of N parts of the rest
   format [FILE]...             format the sources in place
   faults [FAULT] [SECONDS]     do to a running service what may happen to it, and print what came of it: all, or one of kill, power,
                                disk, rights, descriptors, memory, clock, publishers, second, reader, supervisor, flood, soak.
@@ -209,7 +210,7 @@ verb_format() {
 verb_lint() {
   verb_setup run develop
   timed "layer check" tools/check_layers
-  timed "format check" format_check "$@"
+  if [ "${1:-}" = --recent ]; then timed "format check" format_check; else timed "format check" format_check "$@"; fi
   timed "configure tidy" cmake --preset tidy --log-level=WARNING
   timed "generate headers" cmake --build build/tidy -j "$jobs" --target prescene_generated
   timed "clang-tidy" tools/run_tidy build/tidy "$jobs" "$@"
