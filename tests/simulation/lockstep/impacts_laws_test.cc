@@ -82,6 +82,75 @@ TEST_P(Impacts, OfATurningBodyAreThoseOfAFinerStep) {
   EXPECT_LT(errors[225], 0.1);
 }
 
+/// A planar impact by the laws that docs/reference/simulation.md states: the contact leaves with `restitution` times
+/// its speed (Newton), and friction holds it, or is `friction` times the normal impulse against the slip (Coulomb).
+struct PlanarImpact {
+  double tilt = 0.0;               ///< rad about y: which corner of the section is below, and how far to its side.
+  Vector3d velocity = {0, 0, -1};  ///< m/s along x and z, rad/s about y: (x, y's turn, z).
+  double friction = 0.0;
+  double restitution = 0.0;
+};
+
+/// Velocities (as in PlanarImpact) after a body of mass 1 kg and moment of inertia `inertia` hits at `arm` from its
+/// centre (x, z).
+Vector3d after(const PlanarImpact& impact, const Eigen::Vector2d& arm, double inertia) {
+  // Rows of the Jacobian for (v_x, w_y, v_z): the corner moves by v + w x r.
+  const Vector3d tangent(1.0, arm.y(), 0.0);
+  const Vector3d normal(0.0, -arm.x(), 1.0);
+  const Vector3d weights(1.0, 1.0 / inertia, 1.0);
+  const auto couple = [&](const Vector3d& a, const Vector3d& b) { return a.cwiseProduct(weights).dot(b); };
+  const double wanted = -(1.0 + impact.restitution) * normal.dot(impact.velocity);
+  Eigen::Matrix2d A;
+  A << couple(normal, normal), couple(normal, tangent), couple(tangent, normal), couple(tangent, tangent);
+  Eigen::Vector2d p = A.inverse() * Eigen::Vector2d(wanted, -tangent.dot(impact.velocity));
+  if (std::abs(p.y()) > impact.friction * p.x()) {
+    const double side = p.y() > 0.0 ? impact.friction : -impact.friction;
+    p.x() = wanted / (A(0, 0) + side * A(0, 1));
+    p.y() = side * p.x();
+  }
+  return impact.velocity + weights.cwiseProduct(p.x() * normal + p.y() * tangent);
+}
+
+TEST_P(Impacts, OfOneEdgeFollowNewtonsAndCoulombsLaws) {
+  // Corners are rounded a little, which moves where they hit: that is most of the tolerance.
+  for (const double tilt : {0.2, 0.5, 0.9, 1.3}) {
+    for (const double sideways : {-1.5, -0.2, 0.0, 0.6}) {
+      for (const double turn : {-8.0, 0.0, 5.0}) {
+        for (const double friction : {0.05, 0.3, 0.8}) {
+          const PlanarImpact impact{tilt, {sideways, turn, -1.5}, friction, 0.5};
+          ObjectModel model = primitive_model("bar", BoxShape{{0.08, 0.3, 0.04}}, 1.0);
+          model.contact.friction = belief::FixedScalar{friction};
+          model.contact.impact_friction = belief::FixedScalar{friction};
+          model.contact.restitution = belief::FixedScalar{impact.restitution};
+          Scene scene = floor_scene(model);
+          scene.gravity_W.setZero();
+          // The lowest corner of the section, from the centre.
+          Eigen::Vector2d arm(0.0, 0.0);
+          for (const double x : {-0.04, 0.04}) {
+            for (const double z : {-0.02, 0.02}) {
+              const Eigen::Vector2d corner(std::cos(tilt) * x + std::sin(tilt) * z,
+                                           -std::sin(tilt) * x + std::cos(tilt) * z);
+              if (corner.y() < arm.y()) arm = corner;
+            }
+          }
+          WorldState start = start_of(scene);
+          start.objects[0].X_WO = {about(Vector3d::UnitY(), tilt), {0.0, 0.0, 1e-4 - arm.y()}};
+          start.objects[0].V_WO.linear = {impact.velocity.x(), 0.0, impact.velocity.z()};
+          start.objects[0].V_WO.angular = {0.0, impact.velocity.y(), 0.0};
+          const double closing = impact.velocity.z() - arm.x() * impact.velocity.y();
+          if (closing > -0.3) continue;
+          const belief::ObjectState end = runs_at(scene, {start}, 1e-4, 3e-4)[0].final().objects[0];
+          const Vector3d expected = after(impact, arm, scene.models[0].unit_inertia(1, 1));
+          const Vector3d reached(end.V_WO.linear.x(), end.V_WO.angular.y(), end.V_WO.linear.z());
+          EXPECT_LT((reached - expected).cwiseProduct(Vector3d(1.0, 0.04, 1.0)).norm(), 0.025)
+              << "tilt " << tilt << " sideways " << sideways << " turn " << turn << " friction " << friction << ": "
+              << reached.transpose() << " for " << expected.transpose();
+        }
+      }
+    }
+  }
+}
+
 double share_of_square_faces(const std::vector<belief::Trajectory>& runs) {
   double square = 0.0;
   for (const belief::Trajectory& run : runs) {
