@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # One folder a module, one library a module. A module's public headers lie in <folder>/include/prescene/<folder> and are
 # included as "prescene/<folder>/<header>"; whoever does not name the module in USES, directly or through a module that
-# does, cannot include them. Those of tests and benchmarks are included by their path from the project's root.
+# does, cannot include them. What other modules of ours may include, but is not installed, lies in
+# <folder>/internal/prescene/<folder> and is included in the same way. Headers of tests and benchmarks are included by their
+# path from the project's root.
 
 # Sources that the build makes (message types): clang-tidy needs them, though nothing else of the build.
 add_custom_target(prescene_generated)
@@ -17,7 +19,7 @@ endfunction()
 
 # prescene_module(<name>
 #   HEADERS <h>...            public: <folder>/include/prescene/<folder>/<h>; of tests and benchmarks <folder>/<h>
-#   SHARED_HEADERS <h>...     as HEADERS, for our modules and tests only: not installed
+#   SHARED_HEADERS <h>...     for our modules and tests only: <folder>/internal/prescene/<folder>/<h>, not installed
 #   PRIVATE_HEADERS <h>...    for this module's own sources only, included as "<h>"
 #   SOURCES <cc>...           none: a module of headers only
 #   USES <module>...          our modules that public headers may include
@@ -67,14 +69,19 @@ function(prescene_module name)
 
   if(folder MATCHES "^(tests|benchmarks)(/|$)")
     set(below "${folder}")
+    set(shared_below "${folder}")
     target_include_directories(${target} ${scope} "${PROJECT_SOURCE_DIR}")
   else()
     set(below "${folder}/include/prescene/${folder}")
+    set(shared_below "${folder}/internal/prescene/${folder}")
     target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>")
+    if(M_SHARED_HEADERS)
+      target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/internal>")
+    endif()
   endif()
   set(shared ${M_SHARED_HEADERS})
   list(TRANSFORM M_HEADERS PREPEND "${below}/")
-  list(TRANSFORM shared PREPEND "${below}/")
+  list(TRANSFORM shared PREPEND "${shared_below}/")
   foreach(header IN LISTS M_HEADERS shared)
     if(NOT EXISTS "${PROJECT_SOURCE_DIR}/${header}")
       message(FATAL_ERROR "${CMAKE_CURRENT_LIST_FILE}: the header ${header} is listed but does not exist.")

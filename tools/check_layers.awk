@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The work of tools/check_layers. Input: a list of source files. Variable `rules`: the file of allowed arrows.
+# The work of tools/check_layers. Input: a list of source files. Variables: `rules`, the file of allowed arrows; `lists`, a
+# file that names the CMakeLists.txt of the modules.
 
 function complain(place, text) {
   printf "%s: error: %s\n", place, text
@@ -53,11 +54,15 @@ function check_outside(place, module, header,    i, j, n, folders, known) {
   else complain(place, "<" header "> belongs to no library named in tools/layers.txt; add an 'outside' line")
 }
 
-# "prescene/<module>/<header>" is <module>/include/prescene/<module>/<header>, also where nothing was configured yet; a
-# header of tests or benchmarks is included by its path.
-function check_ours(place, module, header,    other, target) {
+# "prescene/<module>/<header>" is <module>/include/prescene/<module>/<header>, or in <module>/internal if it is not installed,
+# also where nothing was configured yet; a header of tests or benchmarks is included by its path.
+function check_ours(place, path, module, header,    other, target) {
   other = module_of(name_of(header))
   target = header ~ /^prescene\// ? other "/include/" header : header
+  if (header ~ /^prescene\// && (other "/internal/" header) in is_source) {
+    target = other "/internal/" header
+    if (path ~ /\/include\/prescene\//) complain(place, "\"" header "\" is in " other "/internal and not installed, as this header is")
+  }
   if (other == "") complain(place, "\"" header "\" belongs to no module of tools/layers.txt")
   else if (!may_use(module, other)) complain(place, module " may not use " other " (\"" header "\")")
   else if (!(target in is_source)) complain(place, "there is no " target " (\"" header "\")")
@@ -161,6 +166,44 @@ function read_rules(    line, n, part, i, j, k, changed, pair, order, count) {
   } while (changed)
 }
 
+# Takes the headers that the CMakeLists.txt of a module lists: HEADERS belong into its include/, SHARED_HEADERS into its
+# internal/. A variable that the file itself sets stands for what it was set to.
+function read_list(list,    folder, line, n, token, i, j, command, keyword, of_variable, count, header) {
+  folder = list
+  sub(/\/?[^\/]*$/, "", folder)
+  command = keyword = ""
+  while ((getline line < list) > 0) {
+    sub(/#.*/, "", line)
+    gsub(/[()]/, " & ", line)
+    n = split(line, token, " ")
+    for (i = 1; i <= n; ++i) {
+      if (token[i] == "(") {
+        command = i > 1 ? token[i - 1] : command
+        keyword = ""
+      } else if (command == "set" && keyword == "") keyword = "$" token[i]
+      else if (token[i] ~ /^[A-Z_]+$/) keyword = token[i]
+      else if (token[i] ~ /\.h$/) of_variable[keyword] = of_variable[keyword] " " token[i]
+      else if (token[i] ~ /^\$\{.*\}$/) of_variable[keyword] = of_variable[keyword] of_variable["$" substr(token[i], 3, length(token[i]) - 3)]
+    }
+  }
+  close(list)
+  count = split(of_variable["HEADERS"], header, " ")
+  for (j = 1; j <= count; ++j) listed[folder "/include/prescene/" folder "/" header[j]] = list
+  count = split(of_variable["SHARED_HEADERS"], header, " ")
+  for (j = 1; j <= count; ++j) listed[folder "/internal/prescene/" folder "/" header[j]] = list
+}
+
+# Each header of an include/ or internal/ is listed as such, and each that is listed is there.
+function check_headers(    list, path) {
+  while ((getline list < lists) > 0) read_list(list)
+  for (path in is_source) {
+    if (path ~ /\/include\/prescene\// && !(path in listed))
+      complain(path, "not among the HEADERS of a CMakeLists.txt, so not installed; move it to internal/ (SHARED_HEADERS) or beside its sources")
+    if (path ~ /\/internal\/prescene\// && !(path in listed)) complain(path, "not among the SHARED_HEADERS of a CMakeLists.txt")
+  }
+  for (path in listed) if (!(path in is_source)) complain(listed[path], "there is no " path)
+}
+
 BEGIN { read_rules() }
 
 {
@@ -169,6 +212,7 @@ BEGIN { read_rules() }
 }
 
 END {
+  check_headers()
   for (s = 1; s <= source_count; ++s) {
     path = sources[s]
     module = module_of(path)
@@ -195,7 +239,7 @@ END {
       }
       header = substr(header, 2)
       sub(/[">].*/, "", header)
-      if (is_ours(header)) check_ours(place, module, header)
+      if (is_ours(header)) check_ours(place, path, module, header)
       else if (opening == "<") check_outside(place, module, header)
       else check_relative(place, path, module, header)
       if (path ~ /^tests\// && is_ours(header)) tested[name_of(header)] = 1

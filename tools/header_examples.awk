@@ -70,7 +70,7 @@ function without_dots(code,    place, rest, comment) {
   if (list) { print header; next }
   if (space == "") complain("an example, but no namespace prescene::" folder)
   included = header
-  sub(/^.*\/include\//, "", included)
+  sub(/^.*\/(include|internal)\/prescene\//, "prescene/", included)
   includes = includes "#include \"" included "\"\n"
   if (!(library in seen)) {
     seen[library] = 1

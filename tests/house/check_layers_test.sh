@@ -7,7 +7,7 @@ root=$1
 copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 (cd "$root" && find . \( -path ./build -o -path './.*' \) -prune -o -type f \
-  \( -name '*.h' -o -name '*.cc' -o -path './tools/*' -o -path './compile_flags.txt' \) -print | tar -cf - -T -) | tar -xf - -C "$copy"
+  \( -name '*.h' -o -name '*.cc' -o -name CMakeLists.txt -o -path './tools/*' -o -path './compile_flags.txt' \) -print | tar -cf - -T -) | tar -xf - -C "$copy"
 
 "$copy/tools/check_layers" "$copy" > "$copy/output" || { cat "$copy/output"; echo "the sources themselves fail"; exit 1; }
 
@@ -46,6 +46,11 @@ plant geometry/planted.cc '#include "ros_messages.h"' 'is not a file beside this
 plant collision/planted.cc '#define HWY_TARGET_INCLUDE "collide.cc"' 'HWY_TARGET_INCLUDE must be "planted.cc"'
 plant service/planted.cc 'const std::string text = json.dump();' 'is for belief/json_values.cc only'
 plant novelty/planted.cc '#include <vector>' 'lies in no folder'
+plant geometry/include/prescene/geometry/pose.h '#include "prescene/geometry/cancellable.h"' 'is in geometry/internal and not installed'
+plant geometry/include/prescene/geometry/planted.h '#pragma once' 'not among the HEADERS'
+plant geometry/internal/prescene/geometry/planted.h '#pragma once' 'not among the SHARED_HEADERS'
+plant geometry/CMakeLists.txt 'prescene_module(planted HEADERS planted.h)' 'there is no geometry/include/prescene/geometry/planted.h'
+plant geometry/CMakeLists.txt 'prescene_module(planted SHARED_HEADERS pose.h)' 'there is no geometry/internal/prescene/geometry/pose.h'
 
 grep -v '^-Igeometry/include$' "$root/compile_flags.txt" > "$copy/compile_flags.txt"
 if "$copy/tools/check_layers" "$copy" > "$copy/output" 2>&1; then echo "not seen: a missing folder in compile_flags.txt"; exit 1; fi
