@@ -18,6 +18,9 @@ using belief::Particle;
 using belief::TrackState;
 
 constexpr double kIslandGap = 0.005;  // m; objects nearer than this form an island
+// A support that was found in a frame is the average of what the first frames show of it, and follows later frames at
+// this rate. Chosen.
+constexpr double kLeastSupportGain = 0.1;
 
 const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
   return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
@@ -117,7 +120,7 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
       sample_depth(*observation.frame.depth, observation.frame.camera, settings_.initialise.detection.segmentation);
   const bool first = belief.step == 1;
   const bool searches = first && std::any_of(belief.scene->objects.begin(), belief.scene->objects.end(),
-                                             [&](const auto& o) { return has_wide_prior(o, settings_.initialise); });
+                                             [](const auto& o) { return has_wide_prior(o); });
   if (settings_.initialise.add_support && (belief.scene->supports.empty() || searches)) {
     const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
     const std::vector<belief::Support> found =
@@ -131,10 +134,10 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   if (const auto lowest = lowest_surface(sampled, observation.X_WC, belief.scene->gravity_W))
     belief.lowest_seen = std::min(*lowest, belief.lowest_seen.value_or(*lowest));
   for (std::size_t i = 0; i < belief.scene->supports.size(); ++i) {
-    auto measured = measure_support(sampled, observation.X_WC, belief.scene->supports[i], settings_.supports);
+    auto measured = measure_support(sampled, observation.X_WC, belief.scene->supports[i]);
     if (!measured) continue;
     if (is_found_support(measured->support)) {
-      const double gain = std::max(1.0 / static_cast<double>(belief.step), settings_.supports.least_gain);
+      const double gain = std::max(1.0 / static_cast<double>(belief.step), kLeastSupportGain);
       auto scene = std::make_shared<belief::Scene>(*belief.scene);
       correct_support(*measured, gain, scene->supports[i]);
       belief.scene = std::move(scene);
@@ -348,7 +351,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("weight", result);
   exchange_all(current);
   learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
-  result.counters.inferred_releases = infer_releases(belief, settings_.infer_release);
+  result.counters.inferred_releases = infer_releases(belief);
   LearnReport learned = learn_physics(belief, settings_.learn_physics, simulators_, search_.threads());
   result.counters.physics_runs = learned.runs;
   result.counters.physics_lessons = learned.lessons;

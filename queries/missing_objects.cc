@@ -32,7 +32,7 @@ core::Result<std::vector<std::optional<belief::Pose>>> find_missing(const Window
       continue;
     }
     in_scene.held_by.reset();
-    if (filter::has_wide_prior(in_scene, settings.initialise)) continue;
+    if (filter::has_wide_prior(in_scene)) continue;
     geometry::Matrix6d wide = geometry::Matrix6d::Zero();
     wide.diagonal().head<3>().setConstant(kAnyTurn * kAnyTurn);
     wide.diagonal().tail<3>().setConstant(kAnywhere * kAnywhere);

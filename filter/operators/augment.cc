@@ -30,6 +30,9 @@ constexpr double kInjectedShare = 0.5;   // of the particles are put at the find
 constexpr int kHiddenDraws = 160;        // places that are tried for what may have gone where it cannot be seen
 constexpr double kHiddenFurthest = 0.3;  // m; their standard deviation grows no further
 constexpr double kHiddenTurn = 0.8;      // rad
+// The standard deviation of these places when the object was just lost from sight, and how fast it grows. Chosen.
+constexpr double kHiddenShift = 0.06;  // m
+constexpr double kHiddenSpeed = 0.3;   // m/s
 
 constexpr double kSameShift = 0.01;  // m; a find that is no further than this ...
 constexpr double kSameTurn = 0.2;    // rad; ... from where it is tracked is no other place
@@ -187,7 +190,7 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
   const Particle last = object.particles.back();
   if (last.mode == belief::MotionMode::kHeld) return 0;
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
-  const double shift = std::min(kHiddenFurthest, options.hidden_shift + options.hidden_speed * unseen);
+  const double shift = std::min(kHiddenFurthest, kHiddenShift + kHiddenSpeed * unseen);
   const double fall = std::min(kHiddenFurthest, 0.5 * gravity_W.norm() * unseen * unseen);
   const Vector3d down = fall * gravity_W.normalized();
   core::RandomStream draws = stream.for_purpose(core::Purpose::kProposal);

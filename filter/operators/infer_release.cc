@@ -15,16 +15,21 @@ constexpr double kLeastGripGain = 0.05;
 
 constexpr int kSettledFrames = 3;  // where an object is in its hand is known after so many tracked frames
 
-bool has_left(const Vector3d& shift, const Vector3d& turn, const geometry::Matrix6d& covariance,
-              const InferReleaseOptions& options) {
+// An object has left its place in the hand when it is further from it than this, or turned further, and in either case
+// by at least three of its standard deviations, in so many tracked frames in a row. Chosen.
+constexpr double kLeftShift = 0.03;  // m
+constexpr double kLeftTurn = 0.5;    // rad
+constexpr int kLeftFrames = 3;
+
+bool has_left(const Vector3d& shift, const Vector3d& turn, const geometry::Matrix6d& covariance) {
   const geometry::Vector6d deviation = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  return shift.norm() > std::max(options.least_shift, 3.0 * deviation.tail<3>().maxCoeff()) ||
-         turn.norm() > std::max(options.least_turn, 3.0 * deviation.head<3>().maxCoeff());
+  return shift.norm() > std::max(kLeftShift, 3.0 * deviation.tail<3>().maxCoeff()) ||
+         turn.norm() > std::max(kLeftTurn, 3.0 * deviation.head<3>().maxCoeff());
 }
 
 /// Whether the object left the hand in this frame for good.
 bool follow_grip(const belief::Belief& belief, const belief::ObjectBelief& object, const Pose& X_WG,
-                 const InferReleaseOptions& options, belief::GripRecord& grip) {
+                 belief::GripRecord& grip) {
   if (object.state != belief::TrackState::kTracked) return false;
   const belief::ObjectEstimate estimate = belief::estimate(belief, object);
   const geometry::SymmetryGroup& symmetry = belief::model_of(belief, object).symmetry;
@@ -34,7 +39,7 @@ bool follow_grip(const belief::Belief& belief, const belief::ObjectBelief& objec
   }
   const Pose X_GO = geometry::closest_equivalent(X_WG.inverse() * estimate.mean, grip.X_GO, symmetry);
   const geometry::Vector6d moved = geometry::box_minus(X_GO, grip.X_GO);
-  if (!has_left(moved.tail<3>(), moved.head<3>(), estimate.covariance, options)) {
+  if (!has_left(moved.tail<3>(), moved.head<3>(), estimate.covariance)) {
     grip.apart_frames = 0;
     const double gain = std::max(1.0 / ++grip.frames, kLeastGripGain);
     grip.X_GO = geometry::normalized(geometry::box_plus(grip.X_GO, gain * moved));
@@ -44,12 +49,12 @@ bool follow_grip(const belief::Belief& belief, const belief::ObjectBelief& objec
     grip = {X_GO, 1, 0};
     return false;
   }
-  return ++grip.apart_frames >= options.apart_frames;
+  return ++grip.apart_frames >= kLeftFrames;
 }
 
 }  // namespace
 
-int infer_releases(belief::Belief& belief, const InferReleaseOptions& options) {
+int infer_releases(belief::Belief& belief) {
   int released = 0;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     belief::ObjectBelief& object = belief.objects[i];
@@ -58,7 +63,7 @@ int infer_releases(belief::Belief& belief, const InferReleaseOptions& options) {
       object.grip = {};
       continue;
     }
-    if (!follow_grip(belief, object, belief.robot[static_cast<std::size_t>(*hand)], options, object.grip)) continue;
+    if (!follow_grip(belief, object, belief.robot[static_cast<std::size_t>(*hand)], object.grip)) continue;
     auto scene = std::make_shared<belief::Scene>(*belief.scene);
     scene->objects[i].held_by.reset();
     belief.scene = std::move(scene);

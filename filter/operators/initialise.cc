@@ -14,7 +14,10 @@ namespace {
 using belief::ObjectBelief;
 using belief::Particle;
 
-constexpr int kSpreadDraws = 64;            // enough to tell a wide prior from a narrow one
+constexpr int kSpreadDraws = 64;  // enough to tell a wide prior from a narrow one
+// An object whose start has a larger standard deviation is looked for in the first frame. Chosen.
+constexpr double kWideShift = 0.06;         // m
+constexpr double kWideTurn = 0.5;           // rad
 constexpr double kMissingExistence = 0.2;   // of an object that was looked for and not found
 constexpr double kBoxMargin = 0.05;         // m that a find may lie outside of where the scene says
 constexpr double kSupportThickness = 0.02;  // m, of a support that is made of a plane of the first frame
@@ -117,11 +120,11 @@ rendering::SupportRegion upper_face(const belief::Support& support, const Pose& 
 
 }  // namespace
 
-bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& options) {
+bool has_wide_prior(const belief::SceneObject& object) {
   if (object.held_by) return false;
   const Matrix6d covariance = prior_covariance(object);
-  return std::sqrt(covariance.diagonal().head<3>().maxCoeff()) > options.wide_turn ||
-         std::sqrt(covariance.diagonal().tail<3>().maxCoeff()) > options.wide_shift;
+  return std::sqrt(covariance.diagonal().head<3>().maxCoeff()) > kWideTurn ||
+         std::sqrt(covariance.diagonal().tail<3>().maxCoeff()) > kWideShift;
 }
 
 std::vector<Particle> particles_about(const Pose& X_WO, belief::MotionMode mode, int count,
@@ -229,7 +232,7 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
   geometry::DepthImage known = frame.robot;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const belief::ObjectModel& model = scene.model_of(scene.objects[i]);
-    if (has_wide_prior(scene.objects[i], options)) {
+    if (has_wide_prior(scene.objects[i])) {
       wide.push_back(i);
     } else {
       const SearchTarget target = target_of(model, frame, tools);

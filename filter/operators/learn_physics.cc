@@ -31,6 +31,20 @@ constexpr double kMostSquares = 49.0;           // a sample that is further off 
 /// Nats; draws whose likelihoods differ by less say nothing.
 constexpr double kLeastDifference = 0.5;
 
+// All of the following are chosen, none is measured.
+constexpr int kRunsPerDraw = 4;  // each from a start of its own that is drawn from the start's covariance
+// Errors of the simulator, by which the standard deviations of the tracked poses are enlarged: this share of the path
+// and of the turn since the start, and the two floors.
+constexpr double kModelShare = 0.025;
+constexpr double kShiftFloor = 0.0015;     // m
+constexpr double kTurnFloor = 0.015;       // rad
+constexpr double kCorrelationTime = 0.15;  // s; samples nearer to each other count as one
+// Standard deviations of the velocities of what is let go, about the tracked ones.
+constexpr double kReleaseSpeedError = 0.05;  // m/s
+constexpr double kReleaseTurnError = 0.3;    // rad/s
+constexpr double kLargestMisfit = 12.0;  // if the best run's mean squared standardised error is larger, none explains
+constexpr double kOtherCause = 0.01;     // probability that something else moved the object, whatever its parameters
+
 double seconds_of(const MotionEpisode& episode, const MotionSample& sample) {
   return 1e-9 * static_cast<double>(sample.stamp_ns - episode.samples.front().stamp_ns);
 }
@@ -38,8 +52,8 @@ double seconds_of(const MotionEpisode& episode, const MotionSample& sample) {
 /// One episode of one object, and how to simulate it.
 class Judge {
  public:
-  Judge(const belief::Belief& belief, std::size_t object, const LearnPhysicsOptions& options)
-      : belief_(belief), object_(object), options_(options), episode_(*belief.objects[object].motion.episode) {
+  Judge(const belief::Belief& belief, std::size_t object)
+      : belief_(belief), object_(object), episode_(*belief.objects[object].motion.episode) {
     const belief::ObjectModel& model = belief::model_of(belief, belief.objects[object]);
     symmetry_ = &model.symmetry;
     p_OQ_ = model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
@@ -75,8 +89,6 @@ class Judge {
     return scene;
   }
 
-  /// So many runs a draw.
-  int variants() const { return std::max(1, options_.variants); }
   int samples() const { return static_cast<int>(compared_.size()); }
   std::size_t error_size() const { return kErrorSize * compared_.size(); }
 
@@ -127,13 +139,13 @@ class Judge {
 
   /// How many of the samples count as independent.
   double independent_samples() const {
-    return std::min(1.0 + duration() / options_.correlation_time, static_cast<double>(compared_.size()));
+    return std::min(1.0 + duration() / kCorrelationTime, static_cast<double>(compared_.size()));
   }
 
   /// Errors of these runs beside each other.
   EpisodeRuns runs(std::span<const double> errors) const {
     const double step = duration() / static_cast<double>(compared_.size());
-    return {errors, samples(), independent_samples(), kMostSquares, std::exp(-step / options_.correlation_time)};
+    return {errors, samples(), independent_samples(), kMostSquares, std::exp(-step / kCorrelationTime)};
   }
 
  private:
@@ -200,13 +212,11 @@ class Judge {
       path += (sample.X_WO * p_OQ_ - before.X_WO * p_OQ_).norm();
       turned += geometry::symmetric_angle(sample.X_WO, before.X_WO, *symmetry_);
       const double time = seconds_of(episode_, sample);
-      if (time - last < 0.5 * options_.correlation_time && k + 1 < episode_.samples.size()) continue;
+      if (time - last < 0.5 * kCorrelationTime && k + 1 < episode_.samples.size()) continue;
       last = time;
-      compared_.push_back({k,
-                           deviation(sample.deviation.tail<3>().norm() / std::sqrt(3.0), options_.model_share * path,
-                                     options_.shift_floor),
-                           deviation(sample.deviation.head<3>().norm() / std::sqrt(3.0), options_.model_share * turned,
-                                     options_.turn_floor)});
+      compared_.push_back(
+          {k, deviation(sample.deviation.tail<3>().norm() / std::sqrt(3.0), kModelShare * path, kShiftFloor),
+           deviation(sample.deviation.head<3>().norm() / std::sqrt(3.0), kModelShare * turned, kTurnFloor)});
     }
   }
 
@@ -238,8 +248,8 @@ class Judge {
     } else {
       state.X_WO = geometry::normalized(geometry::box_plus(first.X_WO, d));
       if (episode_.kind == EpisodeKind::kRest) return state;
-      for (int k = 0; k < 3; ++k) state.V_WO.linear[k] += options_.release_speed_error * mine.normal();
-      for (int k = 0; k < 3; ++k) state.V_WO.angular[k] += options_.release_turn_error * mine.normal();
+      for (int k = 0; k < 3; ++k) state.V_WO.linear[k] += kReleaseSpeedError * mine.normal();
+      for (int k = 0; k < 3; ++k) state.V_WO.angular[k] += kReleaseTurnError * mine.normal();
     }
     return state;
   }
@@ -250,7 +260,6 @@ class Judge {
   };
   const belief::Belief& belief_;
   std::size_t object_;
-  const LearnPhysicsOptions& options_;
   MotionEpisode episode_;  // a copy: the belief's own ends while this judges
   const geometry::SymmetryGroup* symmetry_ = nullptr;
   geometry::Vector3d p_OQ_;
@@ -289,13 +298,12 @@ core::Status add_runs(const Judge& judge, std::span<const belief::WorldState> st
 }
 
 /// Of a rest that a few draws at the ends of each coordinate were simulated for: whether it says anything.
-void probe_rest(const Judge& judge, const LearnPhysicsOptions& options, std::span<const double> errors,
-                belief::MotionRecord& motion, LearnReport& report) {
+void probe_rest(const Judge& judge, std::span<const double> errors, belief::MotionRecord& motion, LearnReport& report) {
   const std::vector<double> misfits = misfits_of(judge.runs(errors));
   const auto [low, high] = std::minmax_element(misfits.begin(), misfits.end());
   if (0.5 * judge.independent_samples() * (*high - *low) < kLeastDifference) {  // it stays whatever they are
     motion.episode.reset();
-  } else if (*low > options.largest_misfit) {
+  } else if (*low > kLargestMisfit) {
     motion.episode.reset();
     ++motion.episodes_unexplained;
     ++report.unexplained;
@@ -305,17 +313,16 @@ void probe_rest(const Judge& judge, const LearnPhysicsOptions& options, std::spa
 }
 
 /// Simulates some more runs of an object's closed episode; ends it when there are all.
-void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
-                   const simulation::SimulatorFactory& simulators, core::ThreadPool& threads, int& runs_left,
-                   belief::Belief& belief, LearnReport& report) {
+void go_on_judging(std::size_t index, const simulation::SimulatorFactory& simulators, core::ThreadPool& threads,
+                   int& runs_left, belief::Belief& belief, LearnReport& report) {
   belief::ObjectBelief& object = belief.objects[index];
   MotionEpisode& episode = *object.motion.episode;
   const belief::ObjectModel& model = belief::model_of(belief, object);
   const std::vector<PhysicalDraw> draws = belief::draws_of(model, object.physics, belief.seed + index);
-  const Judge judge(belief, index, options);
+  const Judge judge(belief, index);
   std::vector<belief::WorldState> starts;
   const bool probe = episode.kind == EpisodeKind::kRest && !episode.probed;
-  const std::size_t wanted = draws.size() * static_cast<std::size_t>(judge.variants());
+  const std::size_t wanted = draws.size() * static_cast<std::size_t>(kRunsPerDraw);
   if (!judge.fits(episode.run_errors)) {  // nothing to compare, or begun by another version
     object.motion.episode.reset();
     return;
@@ -337,7 +344,7 @@ void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
     return;
   }
   if (probe) {
-    probe_rest(judge, options, errors, object.motion, report);
+    probe_rest(judge, errors, object.motion, report);
     return;
   }
   if (errors.size() < wanted * judge.error_size()) {
@@ -348,8 +355,8 @@ void go_on_judging(std::size_t index, const LearnPhysicsOptions& options,
   const core::TimeNs ended_ns = std::min(episode.samples.back().stamp_ns, belief.stamp_ns);
   object.motion.episode.reset();
   const core::RandomStream stream(belief.seed, core::Purpose::kLearning, static_cast<std::uint64_t>(began_ns) + 1);
-  const EpisodeEvidence evidence = evidence_of(judge.runs(errors), draws, options.other_cause, stream);
-  if (!(evidence.least_misfit <= options.largest_misfit)) {
+  const EpisodeEvidence evidence = evidence_of(judge.runs(errors), draws, kOtherCause, stream);
+  if (!(evidence.least_misfit <= kLargestMisfit)) {
     ++object.motion.episodes_unexplained;
     ++report.unexplained;
     return;
@@ -368,13 +375,12 @@ LearnReport learn_physics(belief::Belief& belief, const LearnPhysicsOptions& opt
   LearnReport report;
   int runs_left = options.runs_per_frame;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    follow_motion(belief, static_cast<int>(i), options, belief.objects[i].motion);
+    follow_motion(belief, static_cast<int>(i), belief.objects[i].motion);
     auto& episode = belief.objects[i].motion.episode;
     if (!options.enabled || !simulators ||
         belief::physical_dimensions(belief::model_of(belief, belief.objects[i])) == 0)
       episode.reset();
-    if (episode && episode->closed && runs_left > 0)
-      go_on_judging(i, options, simulators, threads, runs_left, belief, report);
+    if (episode && episode->closed && runs_left > 0) go_on_judging(i, simulators, threads, runs_left, belief, report);
   }
   return report;
 }

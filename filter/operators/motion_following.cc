@@ -19,11 +19,16 @@ using geometry::Vector6d;
 /// Share of a new frame in the mean pose of what lies still, at least: supports and cameras may drift.
 constexpr double kLeastGain = 0.02;
 
-constexpr double kBefore = 0.4;      // s; an episode begins so long before motion was noticed
-constexpr double kLongest = 2.0;     // s; what lasts longer is judged by its beginning
-constexpr double kLongestGap = 0.3;  // s; an episode in which the object is not tracked for longer is given up
-constexpr int kFewestSamples = 5;    // of an episode
-constexpr double kRestTime = 0.5;    // s; what lies still is simulated for so long
+constexpr int kRestFrames = 10;  // an object that is tracked for so many frames without moving lies still; chosen
+// It moves when it is further from where it lay than this, or turned further, and in either case by at least three of
+// its standard deviations. Chosen.
+constexpr double kStartShift = 0.008;  // m
+constexpr double kStartTurn = 0.09;    // rad
+constexpr double kBefore = 0.4;        // s; an episode begins so long before motion was noticed
+constexpr double kLongest = 2.0;       // s; what lasts longer is judged by its beginning
+constexpr double kLongestGap = 0.3;    // s; an episode in which the object is not tracked for longer is given up
+constexpr int kFewestSamples = 5;      // of an episode
+constexpr double kRestTime = 0.5;      // s; what lies still is simulated for so long
 
 double seconds_between(core::TimeNs from, core::TimeNs to) { return 1e-9 * static_cast<double>(to - from); }
 
@@ -122,7 +127,7 @@ std::vector<belief::KinematicBody::Waypoint> with_corners(const std::vector<beli
   return path;
 }
 
-void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsOptions& options, MotionRecord& record) {
+void follow_motion(const belief::Belief& belief, int object, MotionRecord& record) {
   const belief::ObjectBelief& mine = belief.objects[static_cast<std::size_t>(object)];
   const bool judging = record.episode && record.episode->closed;
   const bool held = holder_of(*belief.scene, object).has_value();
@@ -158,15 +163,15 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
   const belief::ObjectModel& model = belief::model_of(belief, mine);
   now.X_WO = geometry::closest_equivalent(now.X_WO, record.X_still, model.symmetry);
   const Vector6d moved = geometry::box_minus(now.X_WO, record.X_still);
-  const bool moves = moved.tail<3>().norm() > std::max(options.start_shift, 3.0 * now.deviation.tail<3>().maxCoeff()) ||
-                     moved.head<3>().norm() > std::max(options.start_turn, 3.0 * now.deviation.head<3>().maxCoeff());
+  const bool moves = moved.tail<3>().norm() > std::max(kStartShift, 3.0 * now.deviation.tail<3>().maxCoeff()) ||
+                     moved.head<3>().norm() > std::max(kStartTurn, 3.0 * now.deviation.head<3>().maxCoeff());
   record.moved_frames = moves ? record.moved_frames + 1 : 0;
-  const bool lay_still = record.still_frames >= options.rest_frames;
+  const bool lay_still = record.still_frames >= kRestFrames;
   const bool moved_for_good = moves && (!lay_still || record.moved_frames >= kMovedFrames);
   if (record.episode && !judging) {
     record.episode->samples.push_back(now);
     const bool long_enough = seconds_between(record.episode->samples.front().stamp_ns, now.stamp_ns) >= kLongest;
-    record.episode->closed = long_enough || (!moves && record.still_frames + 1 >= options.rest_frames);
+    record.episode->closed = long_enough || (!moves && record.still_frames + 1 >= kRestFrames);
     if (record.episode->closed && std::ssize(record.episode->samples) < kFewestSamples) record.episode.reset();
   } else if (!record.episode && moved_for_good && lay_still) {
     record.episode = motion_episode(belief, now, record);
@@ -175,7 +180,7 @@ void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsO
     begin_anew(now.X_WO, record);
   } else if (!moves) {
     average(now.X_WO, record);
-    if (!record.episode && !record.place_judged && record.still_frames >= options.rest_frames) {
+    if (!record.episode && !record.place_judged && record.still_frames >= kRestFrames) {
       record.place_judged = true;
       record.episode = rest_episode(belief, now, record);
     }

@@ -9,8 +9,7 @@
 namespace prescene::filter {
 
 /// Brings the motion record of one object up to the belief's last frame; a new or ended episode is in the record.
-void follow_motion(const belief::Belief& belief, int object, const LearnPhysicsOptions& options,
-                   belief::MotionRecord& record);
+void follow_motion(const belief::Belief& belief, int object, belief::MotionRecord& record);
 
 /// A body that is seen at each frame starts and stops between frames. Where its velocity changes, the interval gets the
 /// corner at which the straight motions before and after it meet: joining the frames by straight lines would let a

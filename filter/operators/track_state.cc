@@ -17,7 +17,9 @@ constexpr double kMostExistenceOdds = 7.0;
 /// nats per pixel; a pose of which so much or more is expected has to reach the limits in full. That of opaque things
 /// in front of what is far or not known is 5.5 to 6.5.
 constexpr double kFullEvidence = 6.0;
-constexpr double kLeastScale = 0.15;  // however little is expected, some of it has to be seen
+constexpr int kTrackedPixels = 5;            // at the likelihood's resolution; a pose with fewer is doubtful; chosen
+constexpr double kLeastVisibleShare = 0.08;  // of the covered pixels; with less in sight nothing can be said; chosen
+constexpr double kLeastScale = 0.15;         // however little is expected, some of it has to be seen
 
 void change_existence(double nats, ObjectBelief& object) {
   const double p = std::clamp(object.existence, 1e-6, 1.0 - 1e-6);
@@ -44,7 +46,7 @@ void mark_unseen(core::TimeNs stamp_ns, const TrackStateOptions& options, Object
 
 void update_track(const WeightReport& report, core::TimeNs stamp_ns, const TrackStateOptions& options,
                   ObjectBelief& object) {
-  if (report.hidden_weight > 0.5 || report.visible_share < options.min_visible_share) {
+  if (report.hidden_weight > 0.5 || report.visible_share < kLeastVisibleShare) {
     mark_unseen(stamp_ns, options, object);
     object.visible_share = report.visible_share;
     return;
@@ -55,8 +57,7 @@ void update_track(const WeightReport& report, core::TimeNs stamp_ns, const Track
   object.visible_share = report.visible_share;
   change_existence(report.evidence_per_pixel - lost_evidence, object);
   object.frames_refuted = report.evidence_per_pixel >= lost_evidence ? 0 : object.frames_refuted + 1;
-  if (report.evidence_per_pixel >= scale * options.tracked_evidence &&
-      report.visible_pixels >= options.tracked_pixels) {
+  if (report.evidence_per_pixel >= scale * options.tracked_evidence && report.visible_pixels >= kTrackedPixels) {
     object.state = TrackState::kTracked;
     object.frames_unseen = 0;
     object.last_seen_ns = stamp_ns;

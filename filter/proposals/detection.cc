@@ -31,6 +31,10 @@ constexpr double kOddsOfSize = 1.3;         // per factor e of the log ratio
 constexpr double kOddsOfLack = 13.8;        // per share of the expected evidence that is missing
 constexpr double kLeastSupportArea = 0.05;  // m^2; a smaller flat patch may be a face of an object
 constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much larger than the largest face of an object
+// Starts for each cluster and model where something was learned of it (FilterTools::learned), in place of
+// DetectionOptions::starts. Chosen.
+constexpr int kLearnedStarts = 36;  // poses that the learned places propose, ...
+constexpr int kOtherStarts = 24;    // ... and random ones beside them
 // Joint refinement of what is accepted.
 constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
 constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
@@ -86,9 +90,8 @@ std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled,
                             const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream) {
   if (target.learned == nullptr) return cluster_starts(cluster, target, up_C, kStandingStarts, options.starts, stream);
   std::vector<Pose> starts = learned_starts(*target.learned, sampled.depth, sampled.camera, cluster.points_C, up_C,
-                                            options.learned_starts, stream.for_purpose(core::Purpose::kSurface));
-  const std::vector<Pose> others =
-      cluster_starts(cluster, target, up_C, kStandingStarts, options.starts_beside_learned, stream);
+                                            kLearnedStarts, stream.for_purpose(core::Purpose::kSurface));
+  const std::vector<Pose> others = cluster_starts(cluster, target, up_C, kStandingStarts, kOtherStarts, stream);
   starts.insert(starts.end(), others.begin(), others.end());
   return starts;
 }
@@ -183,8 +186,7 @@ void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>
   weigh_standing();
   while (!proposals.empty()) {
     const auto best = std::max_element(proposals.begin(), proposals.end(), worse);
-    if (judge.decides() ? best->log_odds < options.least_log_odds
-                        : !acceptable(best->candidate.evidence, best->cost, options)) {
+    if (judge.decides() ? best->log_odds < kLeastLogOdds : !acceptable(best->candidate.evidence, best->cost, options)) {
       proposals.erase(best);
       continue;
     }

@@ -13,6 +13,9 @@ namespace prescene::filter {
 /// Share of a pose's outline at which the measured surface ends (outline_support).
 inline constexpr double kLeastOutline = 0.7;
 
+/// Nats; a candidate with lower log odds is not accepted where a learned judge decides. Chosen.
+inline constexpr double kLeastLogOdds = -0.8;
+
 struct Proposal {
   int model = 0;
   PoseCandidate candidate{};
@@ -46,7 +49,7 @@ class ProposalJudge {
   double log_odds(const Proposal& proposal) const;
   /// Whether a find is still worth what a candidate must be.
   bool believes(double log_odds_at_end) const {
-    return tools_.learned->fit.empty() || log_odds_at_end >= options_.least_log_odds;
+    return tools_.learned->fit.empty() || log_odds_at_end >= kLeastLogOdds;
   }
   /// That a find is right which had these log odds when it was accepted and has those at the end.
   double probability(double accepted, double at_end) const;

@@ -15,7 +15,8 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int kPlaneDraws = 400;           // triples of points tried
+constexpr int kPlaneDraws = 400;     // triples of points tried
+constexpr double kDepthStep = 0.02;  // m, the most between neighbours in one cluster; tuned: docs/studies/tracking.md
 constexpr double kLeastPlaneShare = 0.08;  // of the measured points; less is no support
 // 1/m^2: the tolerance of a plane is so many times the squared depth where that is more than 1.
 constexpr double kToleranceGrowth = 0.7;
@@ -249,7 +250,7 @@ std::vector<Cluster> find_clusters(const SampledDepth& sampled, const geometry::
     return measured(sampled.points_C[static_cast<std::size_t>(i)]) && (explained.empty() || explained.data()[i] == 0);
   };
   const auto joined = [&](int i, int j) {
-    return std::abs(sampled.depth.data()[i] - sampled.depth.data()[j]) < options.depth_step;
+    return std::abs(sampled.depth.data()[i] - sampled.depth.data()[j]) < kDepthStep;
   };
   std::vector<Cluster> clusters;
   for (std::vector<int>& pixels : connected_pixels(sampled.camera.width, sampled.camera.height, inside, joined)) {

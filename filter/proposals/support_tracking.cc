@@ -9,6 +9,7 @@
 namespace prescene::filter {
 namespace {
 
+constexpr double kFaceGate = 0.02;        // m from the believed plane; what is further off belongs to something else
 constexpr double kInlier = 0.008;         // m from the fitted plane
 constexpr double kGrowth = 1.2;           // 1/m^2; thresholds grow by this times the squared depth, as noise does
 constexpr int kFewestFacePixels = 60;     // at the sampled width; less is no measurement
@@ -39,8 +40,7 @@ struct Candidates {
 /// What a threshold for near points is at this depth.
 double at_depth(double threshold, double z) { return threshold * std::max(1.0, kGrowth * z * z); }
 
-Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Pose& X_CF,
-                         const SupportTrackingOptions& options) {
+Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Pose& X_CF) {
   Candidates found;
   const Pose X_FC = X_CF.inverse();
   const geometry::Matrix3d R_FC = X_FC.rotation.toRotationMatrix();
@@ -58,7 +58,7 @@ Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Po
       if (std::abs(foot.x()) > face.half_x || std::abs(foot.y()) > face.half_y) continue;
       const Vector3d p_C = sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)];
       const double above = normal.dot(p_C) - offset;
-      const double gate = at_depth(options.gate, z);
+      const double gate = at_depth(kFaceGate, z);
       if (above > gate) continue;  // something stands on it, or before it
       ++found.expected;
       if (above > -gate) found.points_C.push_back(p_C);
@@ -77,13 +77,12 @@ bool is_found_support(const std::string& name) {
 }
 
 std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, const Pose& X_WC,
-                                                  const belief::Support& support,
-                                                  const SupportTrackingOptions& options) {
+                                                  const belief::Support& support) {
   const std::optional<Face> face = upper_face(support);
   if (!face) return std::nullopt;
   const Pose X_CF = X_WC.inverse() * face->X_WF;
   if ((X_CF.inverse().translation).z() <= 0.0) return std::nullopt;  // seen from below
-  const Candidates seen = candidates_of(sampled, *face, X_CF, options);
+  const Candidates seen = candidates_of(sampled, *face, X_CF);
   if (static_cast<int>(seen.points_C.size()) < kFewestFacePixels) return std::nullopt;
 
   geometry::Plane plane_C = fit_plane(seen.points_C);

@@ -50,10 +50,6 @@ extern const WeightOptions weighting;
 extern const InitialiseOptions spread;
 }  // namespace augment_h
 
-namespace infer_release_h {
-extern const InferReleaseOptions options;
-}
-
 namespace initialise_h {
 extern const core::TimeNs stamp_ns;
 extern const InitialiseOptions options;

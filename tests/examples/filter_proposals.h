@@ -110,7 +110,6 @@ extern const SegmentationOptions options;
 
 namespace support_tracking_h {
 extern belief::Support support;
-extern const SupportTrackingOptions options;
 extern const double gain;
 }  // namespace support_tracking_h
 

@@ -36,9 +36,9 @@ TEST(HasWidePrior, TellsPlacedObjectsFromOpenOnes) {
   const auto placed = table_scene({box_model("box", {0.1, 0.1, 0.1})}, {Pose::identity()}, 0.02, 0.1);
   const auto turned = table_scene({box_model("box", {0.1, 0.1, 0.1})}, {Pose::identity()}, 0.02, 1.0);
   const auto open = open_scene({box_model("box", {0.1, 0.1, 0.1})});
-  EXPECT_FALSE(has_wide_prior(placed->objects[0], {}));
-  EXPECT_TRUE(has_wide_prior(turned->objects[0], {}));
-  EXPECT_TRUE(has_wide_prior(open->objects[0], {}));
+  EXPECT_FALSE(has_wide_prior(placed->objects[0]));
+  EXPECT_TRUE(has_wide_prior(turned->objects[0]));
+  EXPECT_TRUE(has_wide_prior(open->objects[0]));
 }
 
 class OpenTable : public ::testing::Test {

@@ -39,7 +39,7 @@ TEST(FoundSupports, AreKnownByTheirNamesAndNoOtherIs) {
 TEST_F(TableOnTheMove, IsMeasuredWhereItIs) {
   for (const double angle : {-0.4, 0.0, 0.7}) {
     const Pose X_WC = moved_camera(angle);
-    const auto measured = measure_support(see(X_WC), X_WC, table(), {});
+    const auto measured = measure_support(see(X_WC), X_WC, table());
     ASSERT_TRUE(measured.has_value());
     EXPECT_LT(measured->tilt, 0.6 * kDegree);
     EXPECT_NEAR(measured->height, 0.0, 0.003);
@@ -54,15 +54,15 @@ TEST_F(TableOnTheMove, ASupportBelievedElsewhereIsMeasuredThereAndMovedThere) {
   support.X_WS = Pose{geometry::exp_rotation({0.012, -0.01, 0.0}), {0.01, 0.0, -0.006}};
   const Pose X_WC = moved_camera(0.0);
   const SampledDepth sampled = see(X_WC);
-  const auto measured = measure_support(sampled, X_WC, support, {});
+  const auto measured = measure_support(sampled, X_WC, support);
   ASSERT_TRUE(measured.has_value());
   EXPECT_NEAR(measured->height, 0.006, 0.002);
   EXPECT_NEAR(measured->tilt, std::hypot(0.012, 0.01), 0.5 * kDegree);
   belief::Support half = support;
   correct_support(*measured, 0.5, half);
   correct_support(*measured, 1.0, support);
-  const auto after_half = measure_support(sampled, X_WC, half, {});
-  const auto after = measure_support(sampled, X_WC, support, {});
+  const auto after_half = measure_support(sampled, X_WC, half);
+  const auto after = measure_support(sampled, X_WC, support);
   ASSERT_TRUE(after_half.has_value() && after.has_value());
   EXPECT_NEAR(after_half->height, 0.5 * measured->height, 0.0005);
   EXPECT_NEAR(after_half->tilt, 0.5 * measured->tilt, 0.1 * kDegree);
@@ -75,13 +75,13 @@ TEST_F(TableOnTheMove, IsNotMeasuredFromBelowOutOfViewOrWhereItIsNot) {
   const SampledDepth sampled = see(X_WC);
   Pose away = X_WC;
   away.rotation = away.rotation * geometry::exp_rotation({0.0, 3.14159, 0.0});
-  EXPECT_FALSE(measure_support(sampled, away, table(), {}).has_value());
+  EXPECT_FALSE(measure_support(sampled, away, table()).has_value());
   belief::Support above = table();
   above.X_WS.translation.z() = 0.1;
-  EXPECT_FALSE(measure_support(sampled, X_WC, above, {}).has_value());
+  EXPECT_FALSE(measure_support(sampled, X_WC, above).has_value());
   belief::Support upside_down = table();
   upside_down.X_WS = Pose{geometry::exp_rotation({3.14159265, 0.0, 0.0}), {0.0, 0.0, -0.04}};
-  EXPECT_FALSE(measure_support(sampled, X_WC, upside_down, {}).has_value());
+  EXPECT_FALSE(measure_support(sampled, X_WC, upside_down).has_value());
 }
 
 TEST_F(TableOnTheMove, IsFoundAndFollowedByTheFilter) {

@@ -74,12 +74,12 @@ TEST(TrackState, AFewPixelsAreNotEnoughToBeSure) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
   WeightReport corner = seen(9.0);
-  corner.visible_pixels = options.tracked_pixels - 1;
+  corner.visible_pixels = 4;
   filter::update_track(corner, kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   for (int i = 2; i < 20; ++i) filter::update_track(corner, i * kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
-  corner.visible_pixels = options.tracked_pixels;
+  corner.visible_pixels = 5;
   filter::update_track(corner, 20 * kFrameNs, options, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
 }

@@ -43,18 +43,17 @@ struct FilterSettings {
   PredictOptions predict;
   AugmentOptions augment;
   WeightOptions weight;
-  InferReleaseOptions infer_release;
   LearnPhysicsOptions learn_physics;
   ResampleOptions resample;
   TrackStateOptions track;
-  SupportTrackingOptions supports;
   /// What training learned of the scene's models (service/training); null = nothing. Finding uses it.
   LearnedModels learned;
   /// By model name. What an object's colours were learned to be (frame.colors) takes precedence.
   ColorModels colors;
-  /// switch. Look for objects that are not tracked. Range true or false. Measured: docs/studies/tracking.md.
+  /// switch. Objects that are not tracked are looked for in the frame. Range true or false. Measured:
+  /// docs/studies/tracking.md.
   bool recover = true;
-  /// s. A longer pause between frames is predicted as one of this length. Range 0.1 to 10. Chosen.
+  /// s. A longer pause between two frames is predicted as if it had lasted this long. Range 0.1 to 10. Chosen.
   double max_gap = 1.0;
 };
 

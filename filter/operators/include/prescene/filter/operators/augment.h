@@ -19,56 +19,55 @@
 namespace prescene::filter {
 
 struct AugmentOptions {
-  /// frames. An object not supported for so many frames is looked for ... Range 1 to 100. Chosen.
+  /// frames. An object that the frames have not supported for this many frames is looked for. Range 1 to 100. Chosen.
   int recover_after_frames = 4;
-  /// frames. ... every so many. Range 1 to 100. Chosen.
+  /// frames. While it is not found, the search is repeated after this many frames. Range 1 to 100. Chosen.
   int recover_every = 3;
-  /// share. An object that is tracked by less than this share of its pixels may be a wrong pose that the true one
-  /// sticks out of: it is looked for too ... Range 0 to 1. Chosen.
+  /// share. If less than this share of a tracked object's pixels supports it, its pose may be wrong, and the object is
+  /// looked for, too. Range 0 to 1. Chosen.
   double suspicious_share = 0.75;
-  /// frames. ... every so many. Range 1 to 100. Chosen.
+  /// frames. The search for such an object is repeated after this many frames. Range 1 to 100. Chosen.
   int suspicious_every = 10;
-  /// count. Poses that a search starts from. Range 8 to 1000. Chosen.
+  /// count. A search starts from this many poses. Range 8 to 1000. Chosen.
   int recover_starts = 48;
-  /// nats per pixel. A find needs so much for each visible pixel, outline considered. Range 0 to 10. Measured:
-  /// docs/studies/tracking.md.
+  /// nats per pixel. A find is accepted only if the frame says at least this much for each visible pixel, with the
+  /// outline taken into account. Range 0 to 10. Measured: docs/studies/tracking.md.
   double accept_evidence = 3.0;
-  /// nats. A find needs so much, untempered. Range 0 to 1000. Chosen.
+  /// nats. A find is accepted only if its log ratio (untempered) is at least this. Range 0 to 1000. Chosen.
   double accept_log_ratio = 40.0;
-  /// nats. So much more than where it was thought to be. Range 0 to 1000. Chosen.
+  /// nats. A find is accepted only if its log ratio exceeds that of the believed pose by at least this. Range 0 to
+  /// 1000. Chosen.
   double min_gain = 10.0;
-  /// m/s. Where motion could not have carried it since it was seen last (at this speed, and not less than 10 cm), ...
-  /// Range 0 to 10. Chosen.
+  /// m/s. A place is out of reach if the object would have had to move there faster than this since it was last seen,
+  /// and is more than 10 cm away. Range 0 to 10. Chosen.
   double reach_speed = 0.7;
-  /// nats per pixel. ... a find needs so much more evidence. Range 0 to 10. Chosen.
+  /// nats per pixel. A find that is out of reach needs this much more evidence. Range 0 to 10. Chosen.
   double far_evidence = 1.0;
-  /// share. An object that the evidence speaks against may have gone where it cannot be seen: places about where it
-  /// was and below it that are hidden and free get this share of the particles. Range 0 to 1. Chosen.
+  /// share. When the evidence speaks against an object, this share of its particles is moved to hidden, free places
+  /// near its last one and below it. Range 0 to 1. Chosen.
   double hidden_share = 0.25;
-  /// m. Standard deviation of these places, ... Range 0 to 1. Chosen.
-  double hidden_shift = 0.06;
-  /// m/s. ... growing so fast while it was not seen, to 0.3 m. Range 0 to 10. Chosen.
-  double hidden_speed = 0.3;
-  /// nats. Two objects of one shape change places where the colours of both together say so by this much (tempered),
-  /// ... Range 0 to 1000. Chosen.
+  /// nats. Two objects of one shape change places if the colours of both together favour the exchange by this log ratio
+  /// (tempered). Range 0 to 1000. Chosen.
   double exchange_gain = 10.0;
-  /// nats per pixel. ... and by so much for each visible pixel. Range 0 to 10. Chosen.
+  /// nats per pixel. The exchange must also be favoured by this much for each visible pixel. Range 0 to 10. Chosen.
   double exchange_evidence = 1.0;
-  /// switch. Look for more objects than the scene names: of its models, and things that no model describes. A scene
-  /// file's `new_objects` and --new-objects set it. Range true or false. Chosen.
+  /// switch. Objects beyond those that the scene names are looked for: more of its models, and things that no model
+  /// describes. A scene file's `new_objects` and --new-objects set it. Range true or false. Chosen.
   bool new_objects = false;
-  /// frames. Between two such searches. Range 1 to 1000. Chosen.
+  /// frames. New objects are looked for once in this many frames. Range 1 to 1000. Chosen.
   int new_every = 15;
-  /// nats. Smaller finds of new objects are remnants more often than objects. Range 0 to 10000. Measured:
-  /// docs/studies/tracking.md.
+  /// nats. A new object is accepted only if its log ratio is at least this; smaller finds are more often remnants than
+  /// objects. Range 0 to 10000. Measured: docs/studies/tracking.md.
   double new_log_ratio = 250.0;
-  /// nats. The same of things that no model describes, which get a shape about their points. Range 0 to 10000. Chosen.
+  /// nats. The same limit for things that no model describes, which get a shape fitted around their points. Range 0 to
+  /// 10000. Chosen.
   double unknown_log_ratio = 100.0;
-  /// m. What is larger in any direction is no such thing, ... Range 0.05 to 5. Chosen.
+  /// m. A cluster that is larger than this in any direction is not taken for such a thing. Range 0.05 to 5. Chosen.
   double unknown_largest = 0.4;
-  /// m. ... and neither is what rises less above its support. Range 0.005 to 0.5. Chosen.
+  /// m. A cluster that rises less than this above its support is not taken for such a thing. Range 0.005 to 0.5.
+  /// Chosen.
   double unknown_lowest = 0.015;
-  /// Of new objects.
+  /// Used to look for new objects.
   DetectionOptions detection;
 };
 

@@ -21,22 +21,19 @@ namespace prescene::filter {
 inline constexpr double kFoundExistence = 0.9;
 
 struct InitialiseOptions {
-  /// count. Of each object. Range 1 to 1000. Measured: docs/studies/tracking.md.
+  /// count. Each object has this many particles. Range 1 to 1000. Measured: docs/studies/tracking.md.
   int particles = 16;
-  /// m. An object whose start is known worse than this ... Range 0 to 1. Chosen.
-  double wide_shift = 0.06;
-  /// rad. ... or this (standard deviations) is looked for in the frame. Range 0 to 3.2. Chosen.
-  double wide_turn = 0.5;
-  /// m. Standard deviation of a particle about its mean after a find. Range 0.0001 to 0.1. Chosen.
+  /// m. After a find, the particles' positions are drawn with this standard deviation. Range 0.0001 to 0.1. Chosen.
   double first_shift = 0.006;
-  /// rad. The same of the rotation. Range 0.001 to 1. Chosen.
+  /// rad. After a find, the particles' rotations are drawn with this standard deviation. Range 0.001 to 1. Chosen.
   double first_turn = 0.06;
-  /// probability. That an object is there which the scene names and places. Range 0 to 1. Chosen.
+  /// probability. An object that the scene names and places is there with this probability before the first frame.
+  /// Range 0 to 1. Chosen.
   double prior_existence = 0.95;
-  /// switch. Supports that the scene does not name and the frame shows become its own: where it names none, or where
-  /// objects are looked for. Range true or false. Chosen.
+  /// switch. Supports that the frame shows and the scene does not name are added to the belief's scene, if the scene
+  /// names none or objects are looked for. Range true or false. Chosen.
   bool add_support = true;
-  /// Of objects that are looked for in the first frame; its segmentation serves supports, too.
+  /// Used to look for objects in the first frame; its segmentation is used for supports, too.
   DetectionOptions detection;
 };
 
@@ -44,8 +41,10 @@ struct InitialiseOptions {
 belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed, core::TimeNs stamp_ns,
                                   const InitialiseOptions& options);
 
-/// Whether the scene leaves the object's place or rotation too open to start from.
-bool has_wide_prior(const belief::SceneObject& object, const InitialiseOptions& options);
+/// Whether the scene leaves the object's place or rotation too open to start from: a standard deviation along or about
+/// some axis is more than 6 cm or 0.5 rad. Such an object is looked for in the first frame. Never of an object that is
+/// held.
+bool has_wide_prior(const belief::SceneObject& object);
 
 /// The supports that the frame shows and the scene does not know, each as a box of its plane's extent, the one that
 /// most pixels show first. Gravity says what is up; what is no larger than a face of the scene's models is not taken

@@ -21,43 +21,44 @@ using geometry::Vector3d;
 
 /// Standard deviations that are added within one second, as random walks: rates in m, rad per square root of a second.
 struct MotionNoise {
-  /// m per sqrt(s). Of the position. Range 0 to 0.5. Chosen.
+  /// m per sqrt(s). Noise of the position. Range 0 to 0.5. Chosen.
   double shift;
-  /// rad per sqrt(s). Of the rotation. Range 0 to 5. Chosen.
+  /// rad per sqrt(s). Noise of the rotation. Range 0 to 5. Chosen.
   double turn;
-  /// m/s per sqrt(s). Of the velocity. Range 0 to 10. Chosen.
+  /// m/s per sqrt(s). Noise of the velocity. Range 0 to 10. Chosen.
   double speed;
-  /// rad/s per sqrt(s). Of the angular velocity. Range 0 to 100. Chosen.
+  /// rad/s per sqrt(s). Noise of the angular velocity. Range 0 to 100. Chosen.
   double rate;
 };
 
 struct PredictOptions {
-  /// What lies still and is not seen; what is seen moves hardly at all. Chosen.
+  /// Noise of objects that rest and are not seen. For those that are seen it is much smaller. Chosen.
   MotionNoise resting = {.shift = 0.0006, .turn = 0.006, .speed = 0.0, .rate = 0.0};
-  /// About the hand. Chosen.
+  /// Noise of held objects, relative to the hand. Chosen.
   MotionNoise held = {.shift = 0.010, .turn = 0.08, .speed = 0.0, .rate = 0.0};
-  /// For each frame at 30 Hz: 3 mm, 0.03 rad, 0.10 m/s, 0.8 rad/s. What moves faster is often lost. Chosen.
+  /// Noise of moving objects. At 30 Hz this is 3 mm, 0.03 rad, 0.10 m/s and 0.8 rad/s in each frame. Objects whose
+  /// velocity changes faster are often lost. Chosen.
   MotionNoise moving = {.shift = 0.0164, .turn = 0.164, .speed = 0.55, .rate = 4.4};
-  /// share. Of a seen object's velocity that is left after one second. Range 0 to 1. Chosen.
+  /// share. A tracked object keeps this share of its velocity over one second. Range 0 to 1. Chosen.
   double velocity_keep = 0.55;
-  /// share. The same of an object that is not tracked: it would drift away. Range 0 to 1. Measured:
-  /// docs/studies/tracking.md.
+  /// share. An object that is not tracked keeps this share of its velocity over one second; with more it would drift
+  /// away. Range 0 to 1. Measured: docs/studies/tracking.md.
   double unseen_velocity_keep = 2e-4;
-  /// probability. For each frame and particle of a tracked object: resting or held becomes moving. Range 0 to 1.
-  /// Chosen.
+  /// probability. In each frame, a resting or held particle of a tracked object starts to move with this probability.
+  /// Range 0 to 1. Chosen.
   double wake_probability = 0.12;
-  /// probability. For each frame and particle: what the scene says is held moves with the hand again. Range 0 to 1.
-  /// Chosen.
+  /// probability. In each frame, a moving particle of an object that the scene says is held moves with the hand again
+  /// with this probability. Range 0 to 1. Chosen.
   double regrasp_probability = 0.5;
-  /// probability. For each frame and particle: moving with a velocity that agrees with none becomes resting. Range 0
-  /// to 1. Chosen.
+  /// probability. In each frame, a moving particle whose velocity is consistent with zero comes to rest with this
+  /// probability. Range 0 to 1. Chosen.
   double settle_probability = 0.15;
-  /// m/s. Standard deviation of the velocity of what starts to move. Range 0 to 5. Chosen.
+  /// m/s. The velocity of a particle that starts to move is drawn with this standard deviation. Range 0 to 5. Chosen.
   double wake_speed = 0.15;
-  /// rad/s. The same of the rotation. Range 0 to 50. Chosen.
+  /// rad/s. Its angular velocity is drawn with this standard deviation. Range 0 to 50. Chosen.
   double wake_rate = 1.0;
-  /// share. Of the moving particles of a tracked object, simulated in place of constant velocity. Range 0 to 1.
-  /// Chosen.
+  /// share. This share of a tracked object's moving particles is simulated; the others go on at constant velocity.
+  /// Range 0 to 1. Chosen.
   double physics_share = 0.5;
 };
 

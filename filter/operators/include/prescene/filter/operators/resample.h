@@ -11,10 +11,11 @@
 namespace prescene::filter {
 
 struct ResampleOptions {
-  /// share. Resample when the effective sample size is below this share of the particles. Range 0 to 1. Chosen.
+  /// share. The particles are resampled when their effective sample size is below this share of their number. Range 0
+  /// to 1. Chosen.
   double min_effective_share = 0.5;
-  /// share. Copies are drawn from their particle's Gaussian times this, and keep the rest as their covariance: between
-  /// 0 (copies are equal) and 1 (copies are points). Range 0 to 1. Chosen.
+  /// share. Copies are drawn with this share of their particle's Gaussian and keep the rest as their covariance: with 0
+  /// they are equal, with 1 they are points. Range 0 to 1. Chosen.
   double spread = 0.4;
 };
 

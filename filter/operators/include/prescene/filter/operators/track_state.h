@@ -9,18 +9,16 @@
 namespace prescene::filter {
 
 struct TrackStateOptions {
-  /// nats per pixel. Of a visible pixel, from which a pose counts as tracked ... Range 0 to 10. Measured:
-  /// docs/studies/tracking.md.
+  /// nats per pixel. A pose counts as tracked if the frame says at least this much for each of its visible pixels.
+  /// Range 0 to 10. Measured: docs/studies/tracking.md.
   double tracked_evidence = 3.0;
-  /// pixels. ... if so many show it, at the likelihood's resolution; else it is doubtful. Range 1 to 100. Chosen.
-  int tracked_pixels = 5;
-  /// nats per pixel. Below this it is refuted; between, it is doubtful. Range 0 to 10. Chosen.
+  /// nats per pixel. A pose for which the frame says less than this is refuted; between the two limits it is doubtful.
+  /// Range 0 to 10. Chosen.
   double lost_evidence = 1.0;
-  /// frames. Refuted in so many without a better one or hiding in between, it is lost. Range 1 to 100. Chosen.
+  /// frames. An object is lost when it was refuted in this many frames and was neither hidden nor better in any frame
+  /// between them. Range 1 to 100. Chosen.
   int lost_after_frames = 4;
-  /// share. Of the covered pixels: with less in sight, nothing can be said. Range 0 to 1. Chosen.
-  double min_visible_share = 0.08;
-  /// s. An object that is unseen for longer is lost. Range 1 to 100000. Chosen.
+  /// s. An object that is unseen for longer than this is lost. Range 1 to 100000. Chosen.
   double unseen_lost_after = 60.0;
 };
 

@@ -17,25 +17,28 @@
 namespace prescene::filter {
 
 struct WeightOptions {
-  /// count. Gauss-Newton steps of a particle, at most. Range 1 to 20. Chosen.
+  /// count. A particle takes at most this many Gauss-Newton steps. Range 1 to 20. Chosen.
   int steps = 5;
-  /// share. Standard deviation of the random starts, of the predicted one. Range 0 to 1. Chosen.
+  /// share. Random starts are drawn with this share of the predicted standard deviation. Range 0 to 1. Chosen.
   double start_spread = 0.8;
-  /// share. A pose is hidden when less than this share of the pixels that it should show is not behind something else;
+  /// share. A pose is hidden if less than this share of the pixels that it should show is not behind something else;
   /// then staying hidden competes with moving to where something is seen. Range 0 to 1. Chosen.
   double hidden_share = 0.35;
-  /// nats. Log prior odds of becoming hidden, and of coming into sight again. Range -20 to 0. Chosen.
+  /// nats. The log prior odds of becoming hidden, and of coming into sight again. Range -20 to 0. Chosen.
   double log_hidden = -4.0;
-  /// m. Hidden poses that overlap a support by more than this (contacts are not known better) are improbable. Range 0
+  /// m. Hidden poses that reach further than this into a support are improbable; contacts are not known better. Range 0
   /// to 0.1. Chosen.
   double support_tolerance = 0.015;
-  /// m/s. A mode further from the prediction than this and its spread allow is refused. Range 0.1 to 20. Chosen.
+  /// m/s. A mode is refused if the object would have had to move there faster than this, beyond its predicted spread.
+  /// Range 0.1 to 20. Chosen.
   double max_jump_speed = 2.0;
-  /// m. Where the measured surface goes on past the outline within this, there is no edge. Range 0.001 to 0.1. Chosen.
+  /// m. If the measured surface goes on past the outline with a step smaller than this, there is no edge. Range 0.001
+  /// to 0.1. Chosen.
   double outline_step = 0.02;
-  /// share. Of the outline with an edge, below which a match is no evidence at all ... Range 0 to 1. Chosen.
+  /// share. A match is no evidence if less than this share of the outline has an edge. Range 0 to 1. Chosen.
   double min_outline = 0.50;
-  /// share. ... and from which it is full evidence. Range 0 to 1. Chosen.
+  /// share. A match is full evidence if at least this share of the outline has an edge; between the two it counts in
+  /// part. Range 0 to 1. Chosen.
   double full_outline = 0.80;
 };
 

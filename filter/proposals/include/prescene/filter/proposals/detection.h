@@ -18,23 +18,18 @@ namespace prescene::filter {
 
 struct DetectionOptions {
   SegmentationOptions segmentation;
-  /// count. Random poses tried for each cluster and model. Range 8 to 1000. Measured: docs/studies/tracking.md.
+  /// count. This many random poses are tried for each cluster and model of which nothing was learned. Range 8 to 1000.
+  /// Measured: docs/studies/tracking.md.
   int starts = 192;
-  /// count. The same beside what was learned (FilterTools::learned), ... Range 0 to 1000. Chosen.
-  int starts_beside_learned = 24;
-  /// count. ... and poses that the learned places propose. Range 0 to 1000. Chosen.
-  int learned_starts = 36;
   SearchOptions search;
-  /// count. The largest clusters only. Range 1 to 100. Chosen.
+  /// count. Only this many clusters are looked at, the largest first. Range 1 to 100. Chosen.
   int max_clusters = 14;
-  /// share. Of the visible pixels that must match. Range 0 to 1. Tuned: docs/studies/tracking.md.
+  /// share. At least this share of a find's visible pixels must match. Range 0 to 1. Tuned: docs/studies/tracking.md.
   double min_hit_share = 0.85;
-  /// nats. Untempered, at the likelihood's resolution. Range 0 to 10000. Tuned: docs/studies/tracking.md.
+  /// nats. A find must explain the frame better by at least this log ratio (untempered, at the likelihood's
+  /// resolution). Range 0 to 10000. Tuned: docs/studies/tracking.md.
   double min_log_ratio = 60.0;
-  /// nats. Log odds from which on a candidate is accepted where a learned judge decides (FilterTools::learned) in place
-  /// of these thresholds, ... Range -10 to 10. Chosen.
-  double least_log_odds = -0.8;
-  /// probability. ... and that a find is right at the end. Range 0 to 1. Chosen.
+  /// probability. Finds that are less likely than this to be right are left out at the end. Range 0 to 1. Chosen.
   double least_probability = 0.5;
 };
 

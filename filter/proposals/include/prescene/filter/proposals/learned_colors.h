@@ -16,17 +16,18 @@ namespace prescene::filter {
 
 /// When colours are learned and how much they count. Source of the blending: region-based tracking [Bibby & Reid 2008].
 struct ColorLearningOptions {
-  /// switch. Learn the colours of every object; else of those alone whose model says so (learn_colors). Range true or
-  /// false. Chosen.
+  /// switch. Colours are learned of every object, not only of those whose model asks for it (learn_colors). Range true
+  /// or false. Chosen.
   bool learn = false;
-  /// share. Of a new frame in the histograms; the first 1 / gain frames are averaged evenly. Range 0 to 1. Chosen.
+  /// share. A new frame has this weight in the histograms; the first 1 / gain frames are averaged evenly. Range 0 to 1.
+  /// Chosen.
   double gain = 0.05;
-  /// frames. To learn from before the colours count. Range 1 to 1000. Chosen.
+  /// frames. The colours count after they were learned from this many frames. Range 1 to 1000. Chosen.
   int frames = 5;
-  /// nats per pixel. A tracked object's frame is learned from if so much speaks for each visible pixel ... Range 0 to
-  /// 10. Chosen.
+  /// nats per pixel. A frame is learned from only if it says at least this much for each visible pixel of the tracked
+  /// object. Range 0 to 10. Chosen.
   double min_evidence = 3.0;
-  /// share. ... and so much of it is seen. Range 0 to 1. Chosen.
+  /// share. A frame is learned from only if it shows at least this share of the object. Range 0 to 1. Chosen.
   double min_visible_share = 0.5;
   rendering::ColorModelOptions model;
 };

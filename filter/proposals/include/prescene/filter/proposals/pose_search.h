@@ -41,19 +41,21 @@ struct SearchTarget {
 rendering::PoseHypothesis hypothesis(const SearchTarget& target, const Pose& X_CO, double tempering_pixels = 0.0);
 
 struct RefineOptions {
-  /// count. Gauss-Newton steps, at most. Range 1 to 100. Chosen.
+  /// count. At most this many Gauss-Newton steps are taken. Range 1 to 100. Chosen.
   int steps = 12;
-  /// m. Residuals beyond about half of it lose their weight; shrinks geometrically to ... Range 0.001 to 1. Chosen.
+  /// m. In the first step, residuals beyond about half of this lose their weight; the gate then shrinks geometrically.
+  /// Range 0.001 to 1. Chosen.
   double first_gate = 0.06;
-  /// m. ... this. Range 0.001 to 1. Chosen.
+  /// m. The gate of the last step. Range 0.001 to 1. Chosen.
   double last_gate = 0.012;
 };
 
 struct SearchOptions {
   RefineOptions refine;
-  /// count. The best so many are improved by random moves that the likelihood accepts ... Range 0 to 100. Chosen.
+  /// count. This many of the best candidates are improved by random moves that the likelihood accepts; they follow the
+  /// silhouette, which Gauss-Newton does not see. Range 0 to 100. Chosen.
   int polish_candidates = 3;
-  /// count. ... so many each; they see silhouettes, which Gauss-Newton does not. Range 0 to 1000. Chosen.
+  /// count. Each of them is improved by this many moves. Range 0 to 1000. Chosen.
   int polish_draws = 20;
 };
 

@@ -25,23 +25,24 @@ using geometry::Vector3d;
 inline constexpr double kSupportOutlineMargin = 0.01;
 
 struct SegmentationOptions {
-  /// pixels. The image is sampled to about this width. Range 40 to 640. Chosen.
+  /// pixels. The image is sampled to about this width before it is segmented. Range 40 to 640. Chosen.
   int target_width = 160;
-  /// m. Nearer measurements are not looked at, ... Range 0 to 10. Chosen.
+  /// m. Measurements nearer to the camera than this are ignored. Range 0 to 10. Chosen.
   double min_depth = 0.2;
-  /// m. ... and neither are further ones. Range 0 to 10. Chosen.
+  /// m. Measurements further from the camera than this are ignored. Range 0 to 10. Chosen.
   double max_depth = 2.5;
-  /// m. Points so near to a plane are on it. Range 0.001 to 0.05. Tuned: docs/studies/tracking.md.
+  /// m. A point lies on a plane if its distance from it is less than this. Range 0.001 to 0.05. Tuned:
+  /// docs/studies/tracking.md.
   double plane_inlier = 0.008;
-  /// rad. Of a support, from up, where up is known. Range 0 to 1.6. Chosen.
+  /// rad. The normal of a support may differ from up by this angle, where up is known. Range 0 to 1.6. Chosen.
   double max_plane_tilt = 0.6;
-  /// m. Above the plane: nearer points are the plane's. Range 0.001 to 0.1. Tuned: docs/studies/tracking.md.
+  /// m. Points that are lower above a plane than this belong to the plane. Range 0.001 to 0.1. Tuned:
+  /// docs/studies/tracking.md.
   double min_height = 0.008;
-  /// m. Above the plane: further points are not on it. Range 0.01 to 2. Tuned: docs/studies/tracking.md.
+  /// m. Points that are higher above a plane than this are not on top of it. Range 0.01 to 2. Tuned:
+  /// docs/studies/tracking.md.
   double max_height = 0.4;
-  /// m. Between neighbouring pixels of one cluster, at most. Range 0.001 to 0.2. Tuned: docs/studies/tracking.md.
-  double depth_step = 0.02;
-  /// pixels. Of a cluster, at the sampled width. Range 1 to 1000. Chosen.
+  /// pixels. Clusters with fewer pixels, at the sampled width, are ignored. Range 1 to 1000. Chosen.
   int min_cluster_pixels = 25;
 };
 

@@ -2,7 +2,7 @@
 // Follows a flat support from frame to frame: where the frame shows it, against where it is believed to be. A support
 // that was found in a frame, and not given by the scene, is corrected by what later frames show.
 //
-//   if (auto seen = measure_support(sampled, X_WC, support, options)) correct_support(*seen, gain, support);
+//   if (auto seen = measure_support(sampled, X_WC, support)) correct_support(*seen, gain, support);
 #pragma once
 
 #include <optional>
@@ -18,14 +18,6 @@ inline constexpr const char* kFoundSupport = "support_plane";
 /// Whether a support of this name was found, and not given by the scene.
 bool is_found_support(const std::string& name);
 
-struct SupportTrackingOptions {
-  /// m. From the believed plane: measurements further off belong to something else. Range 0.001 to 0.1. Chosen.
-  double gate = 0.02;
-  /// share. A found support is averaged over the first frames and follows at this rate afterwards. Range 0 to 1.
-  /// Chosen.
-  double least_gain = 0.1;
-};
-
 /// A support as one frame shows it.
 struct SupportMeasurement {
   std::string support;
@@ -40,8 +32,7 @@ struct SupportMeasurement {
 
 /// Empty for supports that are no single box, and where too little of the upper (+z) face is seen.
 std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, const Pose& X_WC,
-                                                  const belief::Support& support,
-                                                  const SupportTrackingOptions& options);
+                                                  const belief::Support& support);
 
 /// Moves the support by `gain` (0 .. 1) of the way to where it was measured: tilted about the face's middle and lifted.
 void correct_support(const SupportMeasurement& measured, double gain, belief::Support& support);
