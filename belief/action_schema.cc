@@ -37,10 +37,8 @@ std::vector<ActionSchema> all_schemas() {
 }
 
 std::string meant(const std::string& name, const std::vector<std::string>& known, const std::string& what) {
-  const std::vector<std::string> nearest = core::nearest_words(name, known);
-  std::string names;
-  for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
-  return (nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ") + what + " " + names;
+  const std::string near = core::did_you_mean(name, known);
+  return near + (near.empty() ? "" : " ") + what + " " + core::comma_list(known);
 }
 
 }  // namespace

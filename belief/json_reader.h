@@ -3,6 +3,7 @@
 // kept with its path. Readers go on with harmless values after it, and the caller looks at the status once at the end.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -117,17 +118,10 @@ class JsonObject {
   ~JsonObject() {
     if (!at_.value.is_object()) return;
     for (const auto& [key, value] : at_.value.items()) {
-      bool known = false;
-      std::string names;
-      for (const std::string& name : known_) {
-        known = known || name == key;
-        names += (names.empty() ? "" : ", ") + name;
-      }
-      if (known) continue;
-      const std::vector<std::string> nearest = core::nearest_words(key, known_);
-      const std::string meant = nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ";
-      at_.errors.add(path_of(key),
-                     "unknown key; " + meant + (nearest.empty() ? "the" : "The") + " keys here are " + names);
+      if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+      const std::string near = core::did_you_mean(key, known_);
+      at_.errors.add(path_of(key), "unknown key; " + (near.empty() ? "the" : near + " The") + " keys here are " +
+                                       core::comma_list(known_));
     }
   }
   JsonObject(const JsonObject&) = delete;

@@ -126,12 +126,9 @@ core::Result<IntervalPattern> pattern_from_text(const std::string& text) {
   if (parts.empty()) return core::invalid_input("it is empty: give a relation and names, as 'touches carton mug'");
   const auto found = std::find(known.begin(), known.end(), parts[0]);
   if (found == known.end()) {
-    const std::vector<std::string> nearest = core::nearest_words(parts[0], known);
-    std::string all;
-    for (const std::string& word : known) all += (all.empty() ? "" : ", ") + word;
-    return core::invalid_input("'" + parts[0].substr(0, 40) + "' is no relation: " +
-                               (nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ") +
-                               "The relations are " + all);
+    const std::string near = core::did_you_mean(parts[0], known);
+    return core::invalid_input("'" + parts[0].substr(0, 40) + "' is no relation: " + near + (near.empty() ? "" : " ") +
+                               "The relations are " + core::comma_list(known));
   }
   IntervalPattern pattern;
   pattern.relation = relation_words()[static_cast<std::size_t>(found - known.begin())].second;

@@ -11,11 +11,21 @@ Pose grip(const KinematicBody& body, const SceneObject& object) {
   return pose_at(body, 0.0).inverse() * mean(object.pose);
 }
 
+}  // namespace
+
 double share_done(double begin, double duration, double time) {
   return duration > 0.0 ? std::clamp((time - begin) / duration, 0.0, 1.0) : (time >= begin ? 1.0 : 0.0);
 }
 
-}  // namespace
+double duration_of(const Action& action) {
+  if (const auto* place = std::get_if<Place>(&action.what)) return place->duration;
+  if (const auto* transport = std::get_if<Transport>(&action.what)) return transport->duration;
+  if (const auto* pour = std::get_if<Pour>(&action.what)) return pour->duration;
+  if (const auto* push = std::get_if<Push>(&action.what)) return push->duration;
+  if (const auto* release = std::get_if<Release>(&action.what))
+    return release->retreat.squaredNorm() > 0.0 ? release->retreat_duration : 0.0;
+  return 0.0;
+}
 
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body_index, double time) {
   const KinematicBody& body = scene.robot[static_cast<std::size_t>(body_index)];

@@ -13,8 +13,6 @@ namespace prescene::belief {
 namespace {
 
 constexpr double kUprightCosine = 0.96592582628906829;  // 15 degrees
-// Faster than this downwards (m/s) and touching nothing is falling: 5 mm of free fall.
-constexpr double kFallingSpeed = 0.3;
 
 using StatePredicate = std::function<bool(const WorldState&)>;
 

@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "prescene/core/check.h"
+#include "prescene/core/file_descriptor.h"
 #include "prescene/core/hash.h"
 
 namespace prescene::collision {
@@ -91,21 +92,6 @@ std::uint64_t checksum(Bytes bytes) {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  int number() const { return number_; }
-  bool close() { return ::close(std::exchange(number_, -1)) == 0; }
-
- private:
-  int number_;
-};
-
 Status write_error(const std::filesystem::path& path, int error) {
   if (error == ENOENT) return core::not_found(path.string() + ": its folder does not exist; make it first");
   if (error == ENOTDIR) return core::invalid_input(path.string() + ": its folder is a file; choose another path");
@@ -126,7 +112,7 @@ std::string partial_name() {
 
 // Zero or the error.
 int write_all(const std::filesystem::path& path, Bytes bytes) {
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  core::FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (file.number() < 0) return errno;
   while (!bytes.empty()) {
     const ssize_t written = ::write(file.number(), bytes.data(), bytes.size());
@@ -261,7 +247,7 @@ Result<TreeFile> TreeFile::open(const std::filesystem::path& path, const TreeFil
   check_kind(key.kind);
   const std::string name = path.string();
   // Opening a named pipe must not wait for its other end.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  const core::FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.number() < 0) {
     const int error = errno;
     if (error == ENOENT) return core::not_found(name + ": no such file; build the tree and save it");

@@ -50,4 +50,17 @@ std::vector<std::string> nearest_words(std::string_view word, const std::vector<
   return nearest;
 }
 
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& known) {
+  std::string text;
+  for (const std::string& near : nearest_words(word, known))
+    text += (text.empty() ? "did you mean '" : " or '") + near + "'";
+  return text.empty() ? text : text + "?";
+}
+
+std::string comma_list(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
 }  // namespace prescene::core

@@ -411,19 +411,4 @@ void number_islands(double gap, MeshCache& meshes, Belief& belief) {
     }
 }
 
-Belief present_objects(const Belief& belief, double min_existence) {
-  Belief present = belief;
-  auto scene = std::make_shared<belief::Scene>(*belief.scene);
-  present.objects.clear();
-  scene->objects.clear();
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    if (belief.objects[i].existence < min_existence || belief.objects[i].state == TrackState::kLost) continue;
-    present.objects.push_back(belief.objects[i]);
-    scene->objects.push_back(belief.scene->objects[i]);
-  }
-  if (present.objects.size() == belief.objects.size()) return belief;
-  present.scene = std::move(scene);
-  return present;
-}
-
 }  // namespace prescene::filter

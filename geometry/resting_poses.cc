@@ -184,4 +184,11 @@ core::Result<std::vector<RestingPose>> resting_poses_of_hull(TriangleMesh hull, 
   return poses;
 }
 
+int face_up(const Quaterniond& R_WB) {
+  const Vector3d up_B = R_WB.conjugate() * Vector3d::UnitZ();
+  Eigen::Index axis = 0;
+  up_B.cwiseAbs().maxCoeff(&axis);
+  return static_cast<int>(2 * axis) + (up_B[axis] < 0.0 ? 1 : 0);
+}
+
 }  // namespace prescene::geometry

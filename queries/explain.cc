@@ -153,12 +153,9 @@ class Explainer {
       if (events_->objects()[i].name == query_.object) return std::optional(i);
     std::vector<std::string> names;
     for (const belief::ObjectBelief& object : window_.start->objects) names.push_back(object.name);
-    std::string known;
-    for (const std::string& name : core::nearest_words(query_.object, names))
-      known += (known.empty() ? "" : " or ") + ("'" + name + "'");
-    if (!known.empty()) known = "did you mean " + known + "?";
-    for (std::size_t i = 0; known.empty() && i < names.size(); ++i) known += (i == 0 ? "there are " : "") + names[i];
-    return core::not_found("there is no object '" + query_.object + "': " + known);
+    const std::string near = core::did_you_mean(query_.object, names);
+    return core::not_found("there is no object '" + query_.object +
+                           "': " + (near.empty() ? "the objects are " + core::comma_list(names) : near));
   }
 
   struct Elsewhere {

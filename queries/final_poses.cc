@@ -8,6 +8,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
+#include "prescene/geometry/resting_poses.h"
 
 namespace prescene::queries {
 namespace {
@@ -102,13 +103,6 @@ void split_apart(std::span<const FinalSample> samples, std::vector<std::size_t> 
 
 }  // namespace
 
-int face_up(const Pose& X_WO) {
-  const Vector3d up_O = X_WO.rotation.conjugate() * Vector3d::UnitZ();
-  Eigen::Index axis = 0;
-  up_O.cwiseAbs().maxCoeff(&axis);
-  return static_cast<int>(2 * axis) + (up_O[axis] < 0.0 ? 1 : 0);
-}
-
 std::vector<Kernel> kernels(std::span<const FinalSample> samples, std::span<const std::string> outcomes,
                             const geometry::SymmetryGroup& symmetry, const DensityOptions& options) {
   // The first of an outcome and face is what the others are turned to; a symmetry may change the face, so the face is
@@ -120,7 +114,7 @@ std::vector<Kernel> kernels(std::span<const FinalSample> samples, std::span<cons
     const FinalSample& sample = samples[i];
     const Pose& reference = first_of_outcome.try_emplace(sample.outcome, sample.X_WO).first->second;
     poses.push_back(symmetry.trivial() ? sample.X_WO : geometry::closest_equivalent(sample.X_WO, reference, symmetry));
-    groups[{sample.outcome, face_up(poses.back())}].push_back(i);
+    groups[{sample.outcome, geometry::face_up(poses.back().rotation)}].push_back(i);
   }
 
   std::vector<Kernel> result(samples.size());

@@ -16,11 +16,9 @@ namespace {
 using belief::ActionParameter;
 
 std::string suggestion_of(const std::string& name, const std::vector<std::string>& known, const std::string& what) {
-  const std::vector<std::string> nearest = core::nearest_words(name, known);
-  if (!nearest.empty()) return "did you mean '" + nearest.front() + "'?";
-  std::string names;
-  for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
-  return names.empty() ? "there are none" : what + " " + names;
+  if (known.empty()) return "there are none";
+  const std::string near = core::did_you_mean(name, known);
+  return near.empty() ? what + " " + core::comma_list(known) : near;
 }
 
 /// The object that the action is about, in the prior's scene.

@@ -71,10 +71,6 @@ std::shared_ptr<belief::Scene> scene_of(const belief::Belief& belief) {
 
 }  // namespace
 
-bool is_present(const belief::ObjectBelief& object) {
-  return object.state != belief::TrackState::kLost && object.existence >= 0.5 && !object.particles.empty();
-}
-
 Prior prior_of(const belief::Belief& belief) {
   auto present = std::make_shared<belief::Belief>(belief);
   std::erase_if(present->objects, [](const belief::ObjectBelief& object) { return !is_present(object); });

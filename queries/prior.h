@@ -8,6 +8,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/query.h"
+#include "prescene/filter/operators/track_state.h"
 #include "prescene/simulation/outcomes/start_distribution.h"
 
 namespace prescene::queries {
@@ -26,7 +27,7 @@ struct Prior {
 };
 
 /// Whether the object takes part in what is foreseen.
-bool is_present(const belief::ObjectBelief& object);
+using filter::is_present;
 
 /// Objects as the belief has them, those that lie still flush with what is below (Seating); robot bodies stand where
 /// they stood at the belief's step, times count from there.

@@ -6,6 +6,7 @@
 
 #include "kept_shapes.h"
 #include "prescene/belief/body_names.h"
+#include "prescene/belief/timeline.h"
 #include "prescene/core/check.h"
 #include "prescene/core/spelling.h"
 #include "prescene/queries/relations.h"
@@ -16,9 +17,6 @@ namespace {
 
 using belief::RelationKind;
 using belief::RelationProbability;
-
-/// m/s downwards, as belief::timeline_of has it: 5 mm of free fall.
-constexpr double kFallingSpeed = 0.3;
 
 double probability_of(const std::vector<RelationProbability>& relations, RelationKind kind, const std::string& name) {
   double most = 0.0;
@@ -38,7 +36,7 @@ void add_motion(const belief::Belief& belief, const belief::ObjectBelief& object
     state.V_WO = particle.V_WO;
     state.mode = particle.mode;
     if (belief::is_moving(state)) moves += weight;
-    if (particle.mode == belief::MotionMode::kMoving && up_W.dot(particle.V_WO.linear) < -kFallingSpeed)
+    if (particle.mode == belief::MotionMode::kMoving && up_W.dot(particle.V_WO.linear) < -belief::kFallingSpeed)
       falls += weight;
   }
   falls *= 1.0 - probability_of(relations, RelationKind::kOn, object.name);
@@ -64,10 +62,9 @@ core::Result<belief::TimelineAnswer> answer_of(std::vector<std::string> known, c
     if (!pattern) continue;
     for (const std::string& name : {pattern->subject, pattern->other}) {
       if (name.empty() || std::ranges::find(known, name) != known.end()) continue;
-      const std::vector<std::string> nearest = core::nearest_words(name, known);
-      return core::not_found(
-          "there is no '" + name + "' in the scene or its past: " +
-          (nearest.empty() ? "ask 'where' for the objects" : "did you mean '" + nearest.front() + "'?"));
+      const std::string near = core::did_you_mean(name, known);
+      return core::not_found("there is no '" + name +
+                             "' in the scene or its past: " + (near.empty() ? "ask 'where' for the objects" : near));
     }
   }
   return belief::match(*timeline, query);

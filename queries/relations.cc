@@ -53,21 +53,15 @@ struct Asked {
   std::size_t objects() const { return prior.scene->objects.size(); }
 };
 
-std::string names_of(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 /// "did you mean 'mug'? ", or nothing.
 std::string meant_by(const std::string& name, const std::vector<std::string>& known) {
-  const std::vector<std::string> nearest = core::nearest_words(name, known);
-  return nearest.empty() ? "" : "did you mean '" + nearest.front() + "'? ";
+  const std::string near = core::did_you_mean(name, known);
+  return near.empty() ? near : near + " ";
 }
 
 core::Status no_such_object(const std::string& name, const std::vector<std::string>& known) {
   return core::not_found("there is no object '" + name + "' now (it may be lost or not there at all): " +
-                         meant_by(name, known) + "Those that are: " + names_of(known));
+                         meant_by(name, known) + "Those that are: " + core::comma_list(known));
 }
 
 /// The names of the objects that take part.
@@ -92,8 +86,9 @@ core::Result<std::optional<int>> reach_body_of(const belief::Scene& scene, const
   if (body) return body;
   std::vector<std::string> known{"camera"};
   for (const belief::KinematicBody& robot : scene.robot) known.push_back(robot.name);
-  return core::not_found("reach.of: there is no robot body '" + query.reach->of + "': " +
-                         meant_by(query.reach->of, known) + "Known are " + names_of(known) + ", and points [x, y, z]");
+  return core::not_found("reach.of: there is no robot body '" + query.reach->of +
+                         "': " + meant_by(query.reach->of, known) + "Known are " + core::comma_list(known) +
+                         ", and points [x, y, z]");
 }
 
 /// The prior, with everything stopped and let go, and nothing done.

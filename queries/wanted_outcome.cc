@@ -193,14 +193,12 @@ core::Result<WantedOutcome> find_wanted(const belief::Scene& scene, const belief
       return core::not_found("outcome '" + query.outcome +
                              "' cannot be judged now, as an object that it names is lost or was not found");
     const std::vector<std::string> known = all_names(scene);
-    const std::vector<std::string> nearest = core::nearest_words(query.outcome, known);
-    std::string names;
-    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+    const std::string near = core::did_you_mean(query.outcome, known);
     return core::not_found("the scene has no outcome '" + query.outcome + "': " +
-                           (!nearest.empty() ? "did you mean '" + nearest.front() + "'?"
+                           (!near.empty() ? near
                             : known.empty()
                                 ? "it has none; add one to the scene file (outcomes), or give it in the question"
-                                : "its outcomes are " + names));
+                                : "its outcomes are " + core::comma_list(known)));
   }
   PRESCENE_RETURN_IF_ERROR(check_possible(found.front()));
   return std::move(found.front());

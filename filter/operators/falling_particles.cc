@@ -232,10 +232,6 @@ void move_on_among(const std::vector<std::size_t>& objects, std::span<const Fall
 
 }  // namespace
 
-bool is_present(const ObjectBelief& object) {
-  return object.existence >= 0.5 && object.state != belief::TrackState::kLost;
-}
-
 Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
   const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
   return model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/track_state.h"
 
 namespace prescene::filter {
 
@@ -20,8 +21,6 @@ struct Falling {
   bool woken = false;    ///< It rested, and something may push it: it rests on where physics does not move it.
 };
 
-/// Whether the object is believed to be there at all.
-bool is_present(const belief::ObjectBelief& object);
 /// The middle of an object, in O.
 Vector3d centre_of(const belief::Scene& scene, const belief::ObjectBelief& object);
 /// m, of the ball about that middle that holds it.

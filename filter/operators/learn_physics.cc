@@ -13,6 +13,7 @@
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
 #include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/track_state.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
@@ -59,9 +60,7 @@ class Judge {
     p_OQ_ = model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
     for (std::size_t i = 0; i < belief.objects.size(); ++i) {
       const belief::ObjectBelief& other = belief.objects[i];
-      if (i != object && (other.existence < 0.5 || other.state == belief::TrackState::kLost ||
-                          i >= episode_.others.size() || other.particles.empty()))
-        continue;
+      if (i != object && (!is_present(other) || i >= episode_.others.size())) continue;
       present_.push_back(i);
     }
     keep_within_reach();

@@ -30,6 +30,10 @@ void change_existence(double nats, ObjectBelief& object) {
 
 }  // namespace
 
+bool is_present(const ObjectBelief& object) {
+  return object.state != TrackState::kLost && object.existence >= 0.5 && !object.particles.empty();
+}
+
 double evidence_scale(double expected_evidence) {
   return std::clamp(expected_evidence / kFullEvidence, kLeastScale, 1.0);
 }

@@ -20,6 +20,7 @@
 #include <system_error>
 #include <utility>
 
+#include "prescene/core/file_descriptor.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -51,24 +52,9 @@ constexpr int kPipe = 3;  // In the child, after the three standard streams.
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return number_; }
-  void close() {
-    if (number_ >= 0) ::close(std::exchange(number_, -1));
-  }
-
- private:
-  int number_;
-};
-
 // Address space in use: a limit below it would let every allocation of the child fail.
 Result<std::size_t> mapped_bytes() {
-  const Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
+  const core::FileDescriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
   std::array<char, 128> text{};
   ssize_t length = -1;
   if (file.number() >= 0) length = ::read(file.number(), text.data(), text.size());
@@ -280,8 +266,8 @@ Result<std::vector<std::uint8_t>> run_in_child(const std::function<void(ChildOut
   }
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) return core::unavailable("cannot be started: " + reason(errno));
-  const Descriptor from_child(ends[0]);
-  Descriptor to_parent(ends[1]);
+  const core::FileDescriptor from_child(ends[0]);
+  core::FileDescriptor to_parent(ends[1]);
   ::fcntl(from_child.number(), F_SETPIPE_SZ, 1 << 20);  // Fewer turns between the two; less is as good.
 
   // No handler of this process may run in the child.

@@ -73,15 +73,6 @@ core::Status not_listening(const std::string& address, int port) {
 
 }  // namespace
 
-Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
-  std::swap(number_, other.number_);
-  return *this;
-}
-
-Descriptor::~Descriptor() {
-  if (number_ >= 0) close(number_);
-}
-
 bool is_loopback(const std::string& address) {
   const auto numeric = numeric_address(address, 0);
   return numeric && numeric->is_loopback;
@@ -108,7 +99,8 @@ core::Result<ListeningSocket> listen_on(const std::string& address, int port) {
         ": a numeric address such as 127.0.0.1 or 0.0.0.0 and a port from 0 to 65535 are needed");
   ListeningSocket made;
   made.host = numeric->host;
-  made.descriptor = Descriptor(socket(numeric->bytes.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  made.descriptor =
+      core::FileDescriptor(socket(numeric->bytes.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   const int number = made.descriptor.number();
   if (number < 0) return not_listening(address, port);
   const int yes = 1;

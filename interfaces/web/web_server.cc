@@ -63,11 +63,11 @@ WebMessagePtr make_web_message(WebSocketKind kind, std::string_view payload, Web
 
 struct WebServer::Impl {
   struct Connection {
-    Connection(Descriptor&& of, const WebServerOptions& options)
+    Connection(core::FileDescriptor&& of, const WebServerOptions& options)
         : socket(std::move(of)),
           queue(options.max_newest_waiting, options.max_bytes_waiting),
           reader(options.max_message_bytes) {}
-    Descriptor socket;
+    core::FileDescriptor socket;
     ClientQueue queue;
     WebSocketReader reader;
     std::string head;         // of the request, until it is complete
@@ -88,7 +88,7 @@ struct WebServer::Impl {
   WebHandlers handlers;
   core::LogSink log;
   ListeningSocket listening;
-  Descriptor wake;
+  core::FileDescriptor wake;
 
   mutable std::mutex mutex;  // guards the two below, and of connections what others than the server's thread change
   std::map<Number, Connection> connections;
@@ -129,7 +129,7 @@ core::Result<std::unique_ptr<WebServer>> WebServer::create(const WebServerOption
   impl->handlers = std::move(handlers);
   impl->log = log;
   PRESCENE_TRY(impl->listening, listen_on(options.address, options.port));
-  impl->wake = Descriptor(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC));
+  impl->wake = core::FileDescriptor(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC));
   if (impl->wake.number() < 0) return core::unavailable(std::string("an event descriptor: ") + std::strerror(errno));
   impl->thread = std::thread([raw = impl.get()] { raw->run(); });
   return std::unique_ptr<WebServer>(new WebServer(std::move(impl)));
@@ -235,7 +235,7 @@ void WebServer::Impl::turn() {
 void WebServer::Impl::accept_clients() {
   constexpr int kMostAtOnce = 16;
   for (int i = 0; i < kMostAtOnce; ++i) {
-    Descriptor socket(accept4(listening.descriptor.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    core::FileDescriptor socket(accept4(listening.descriptor.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (socket.number() < 0) {
       if (errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS)
         accept_again = Clock::now() + kAcceptPause;

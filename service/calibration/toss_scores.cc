@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/core/check.h"
+#include "prescene/geometry/resting_poses.h"
 #include "prescene/service/calibration/forecast_scores.h"
 
 namespace prescene::service {
@@ -89,13 +90,6 @@ nlohmann::ordered_json to_json(const ScoreValue& score) {
 
 }  // namespace
 
-std::size_t side_up(const geometry::Quaterniond& R_WO) {
-  const geometry::Vector3d up_O = R_WO.conjugate() * geometry::Vector3d::UnitZ();
-  Eigen::Index axis = 0;
-  up_O.cwiseAbs().maxCoeff(&axis);
-  return 2 * static_cast<std::size_t>(axis) + (up_O[axis] > 0.0 ? 0 : 1);
-}
-
 ScoredToss score_toss(const simulation::RecordedMotion& motion, const simulation::RecordedRest& rest,
                       const simulation::MotionForecast& forecast, double radius_of_gyration) {
   PRESCENE_CHECK(!forecast.ends.empty() && rest.last < motion.frames.size() && rest.first <= rest.last);
@@ -107,12 +101,13 @@ ScoredToss score_toss(const simulation::RecordedMotion& motion, const simulation
   const auto resting = static_cast<double>(rest.last - rest.first + 1);
   for (std::size_t i = rest.first; i <= rest.last; ++i)
     toss.true_place += motion.frames[i].X_WO.translation.head<2>() / resting;
-  toss.true_side = side_up(motion.frames[rest.first + (rest.last - rest.first) / 2].X_WO.rotation);
+  toss.true_side = static_cast<std::size_t>(
+      geometry::face_up(motion.frames[rest.first + (rest.last - rest.first) / 2].X_WO.rotation));
   std::array<int, kSides.size()> counts{};
   std::vector<int> sides;
   std::vector<Eigen::Vector2d> places;
   for (const geometry::Pose& X_WO : forecast.ends) {
-    const std::size_t side = side_up(X_WO.rotation);
+    const auto side = static_cast<std::size_t>(geometry::face_up(X_WO.rotation));
     ++counts[side];
     sides.push_back(static_cast<int>(side));
     places.emplace_back(X_WO.translation.head<2>());

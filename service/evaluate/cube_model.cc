@@ -120,11 +120,4 @@ simulation::MechanicsOptions make_cube_options(const CubeModel& model) {
   return options;
 }
 
-int face_up(const geometry::Quaterniond& R_WO) {
-  const geometry::Vector3d up_O = R_WO.conjugate() * geometry::Vector3d::UnitZ();
-  int axis = 0;
-  up_O.cwiseAbs().maxCoeff(&axis);
-  return 2 * axis + (up_O[axis] > 0.0 ? 0 : 1);
-}
-
 }  // namespace prescene::service

@@ -7,6 +7,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
+#include "prescene/geometry/resting_poses.h"
 #include "prescene/service/calibration/forecast_scores.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
 
@@ -46,7 +47,7 @@ belief::WorldState perturbed_start(const belief::WorldState& mean, const CubeMod
 CubeForecast make_forecast(const CubeToss& toss, const std::vector<belief::Trajectory>& runs, const CubeModel& model) {
   CubeForecast forecast;
   forecast.number = toss.number;
-  forecast.true_face = face_up(toss.frames.back().X_WO.rotation);
+  forecast.true_face = geometry::face_up(toss.frames.back().X_WO.rotation);
   const std::size_t last = std::min(kLastFrames, toss.frames.size());
   for (std::size_t i = toss.frames.size() - last; i < toss.frames.size(); ++i) {
     forecast.true_place += toss.frames[i].X_WO.translation.head<2>() / static_cast<double>(last);
@@ -56,7 +57,7 @@ CubeForecast make_forecast(const CubeToss& toss, const std::vector<belief::Traje
   std::vector<Eigen::Vector2d> places;
   for (const belief::Trajectory& run : runs) {
     const geometry::Pose& X_WO = run.final().objects[0].X_WO;
-    faces.push_back(face_up(X_WO.rotation));
+    faces.push_back(geometry::face_up(X_WO.rotation));
     places.emplace_back(X_WO.translation.head<2>());
     ++counts[static_cast<std::size_t>(faces.back())];
   }

@@ -23,13 +23,9 @@ using belief::WorldState;
 
 constexpr double kTimelineStep = 1.0 / 240.0;  // s; what a hand did by its actions is written down so finely
 
-double duration_of(const Action& action) {
-  if (const auto* place = std::get_if<belief::Place>(&action.what)) return place->duration;
-  if (const auto* transport = std::get_if<belief::Transport>(&action.what)) return transport->duration;
-  if (const auto* pour = std::get_if<belief::Pour>(&action.what)) return pour->duration;
-  if (const auto* release = std::get_if<belief::Release>(&action.what))
-    return release->retreat.squaredNorm() > 0.0 ? release->retreat_duration : 0.0;
-  return 0.0;  // a push goes on over a change
+/// How long an action lasts that a change would break off; a push goes on over a change.
+double unbroken_duration(const Action& action) {
+  return std::holds_alternative<belief::Push>(action.what) ? 0.0 : belief::duration_of(action);
 }
 
 core::Status check(const Scene& scene, const UnannouncedChange& change) {
@@ -40,7 +36,7 @@ core::Status check(const Scene& scene, const UnannouncedChange& change) {
     return core::invalid_input(at + ": its time is outside the scene's duration: give 0 to " +
                                std::to_string(scene.duration) + " s");
   for (const Action& action : scene.actions) {
-    if (action.time < change.time && change.time < action.time + duration_of(action))
+    if (action.time < change.time && change.time < action.time + unbroken_duration(action))
       return core::invalid_input(at + ": it lies within a " + belief::kind_of(action) +
                                  ", which it would break off: give a time before or after");
   }

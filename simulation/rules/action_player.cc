@@ -5,29 +5,16 @@
 #include <cmath>
 #include <limits>
 
+#include "prescene/belief/robot_motion.h"
+
 namespace prescene::simulation {
 namespace {
-
-double share_done(double begin, double duration, double time) {
-  return duration > 0.0 ? std::clamp((time - begin) / duration, 0.0, 1.0) : (time >= begin ? 1.0 : 0.0);
-}
 
 /// Horizontal unit vector to the left of a direction of travel; zero when it is vertical.
 Vector3d left_of(const Vector3d& travel) {
   const Vector3d left = Vector3d::UnitZ().cross(travel);
   const double norm = left.norm();
   return norm > 1e-12 ? Vector3d(left / norm) : Vector3d::Zero();
-}
-
-double duration_of(const belief::Action& action) {
-  if (const auto* place = std::get_if<belief::Place>(&action.what)) return place->duration;
-  if (const auto* transport = std::get_if<belief::Transport>(&action.what)) return transport->duration;
-  if (const auto* pour = std::get_if<belief::Pour>(&action.what)) return pour->duration;
-  if (const auto* push = std::get_if<belief::Push>(&action.what)) return push->duration;
-  if (const auto* release = std::get_if<belief::Release>(&action.what)) {
-    return release->retreat.squaredNorm() > 0.0 ? release->retreat_duration : 0.0;
-  }
-  return 0.0;
 }
 
 }  // namespace
@@ -75,14 +62,14 @@ Pose ActionPlayer::robot_pose(int robot, double time) const {
   for (std::size_t i = 0; i < actions_.size(); ++i) {
     if (!steps_[i].done || steps_[i].hand != robot) continue;
     const auto& release = std::get<belief::Release>(actions_[i].what);
-    X_WG.translation += share_done(begin_of(i), release.retreat_duration, time) * release.retreat;
+    X_WG.translation += belief::share_done(begin_of(i), release.retreat_duration, time) * release.retreat;
   }
   return X_WG;
 }
 
 Pose ActionPlayer::carried_pose(const Hold& hold, double time) const {
   const auto index = static_cast<std::size_t>(hold.action);
-  const double share = share_done(hold.begin, duration_of(actions_[index]), time);
+  const double share = belief::share_done(hold.begin, belief::duration_of(actions_[index]), time);
   if (const auto* pour = std::get_if<belief::Pour>(&actions_[index].what)) {
     Pose X_WO = hold.X_from;
     const Vector3d axis = pour->axis_W.normalized();
@@ -105,14 +92,15 @@ bool ActionPlayer::pusher_present(int pusher, double time) const {
 
 Vector3d ActionPlayer::pusher_position(int pusher, double time) const {
   const Pusher& p = pushers_[static_cast<std::size_t>(pusher)];
-  return p.from + share_done(start_ + p.begin, p.duration, time) * (p.to - p.from);
+  return p.from + belief::share_done(start_ + p.begin, p.duration, time) * (p.to - p.from);
 }
 
 bool ActionPlayer::finished(double time) const { return time >= finish_time(); }
 
 double ActionPlayer::finish_time() const {
   double last = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < actions_.size(); ++i) last = std::max(last, begin_of(i) + duration_of(actions_[i]));
+  for (std::size_t i = 0; i < actions_.size(); ++i)
+    last = std::max(last, begin_of(i) + belief::duration_of(actions_[i]));
   for (const belief::KinematicBody& body : scene_->robot) {
     if (body.timeline.size() > 1) last = std::max(last, body.timeline.back().time);
   }
@@ -123,7 +111,7 @@ double ActionPlayer::next_due() const {
   double next = std::numeric_limits<double>::infinity();
   for (const Hold& hold : objects_) {
     if (hold.control != Control::kCarried && hold.control != Control::kPoured) continue;
-    next = std::min(next, hold.begin + duration_of(actions_[static_cast<std::size_t>(hold.action)]));
+    next = std::min(next, hold.begin + belief::duration_of(actions_[static_cast<std::size_t>(hold.action)]));
   }
   for (std::size_t i = 0; i < actions_.size(); ++i) {
     if (!steps_[i].done) next = std::min(next, begin_of(i));
@@ -146,7 +134,7 @@ void ActionPlayer::advance(double time, double dt, const std::vector<Pose>& pose
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const Hold& hold = objects_[i];
     if (hold.control != Control::kCarried && hold.control != Control::kPoured) continue;
-    if (hold.begin + duration_of(actions_[static_cast<std::size_t>(hold.action)]) > due) continue;
+    if (hold.begin + belief::duration_of(actions_[static_cast<std::size_t>(hold.action)]) > due) continue;
     finish_carry(static_cast<int>(i), released);
   }
   for (std::size_t i = 0; i < actions_.size(); ++i) {
@@ -160,7 +148,7 @@ void ActionPlayer::advance(double time, double dt, const std::vector<Pose>& pose
 void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
   Hold& hold = objects_[static_cast<std::size_t>(object)];
   const auto index = static_cast<std::size_t>(hold.action);
-  const double end = hold.begin + duration_of(actions_[index]);
+  const double end = hold.begin + belief::duration_of(actions_[index]);
   const Pose X_WO = carried_pose(hold, end);
   if (hold.hand >= 0) {
     Hand& hand = hands_[static_cast<std::size_t>(hold.hand)];

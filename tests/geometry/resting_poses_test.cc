@@ -99,5 +99,14 @@ TEST(RestingPoses, RefusesACentreOfMassOutside) {
             core::StatusCode::kInvalidInput);
 }
 
+TEST(FaceUp, NamesTheFaceThatPointsUp) {
+  EXPECT_EQ(face_up(Quaterniond::Identity()), 4);         // +z
+  EXPECT_EQ(face_up(exp_rotation({3.1, 0.0, 0.0})), 5);   // -z
+  EXPECT_EQ(face_up(exp_rotation({1.5, 0.0, 0.0})), 2);   // +y
+  EXPECT_EQ(face_up(exp_rotation({-1.5, 0.0, 0.0})), 3);  // -y
+  EXPECT_EQ(face_up(exp_rotation({0.0, -1.5, 0.0})), 0);  // +x
+  EXPECT_EQ(face_up(exp_rotation({0.0, 1.5, 0.0})), 1);   // -x
+}
+
 }  // namespace
 }  // namespace prescene::geometry

@@ -262,12 +262,5 @@ TEST(FinalPoses, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(final_poses("carton", samples, kNames, {}, {}, one), final_poses("carton", samples, kNames, {}, {}, many));
 }
 
-TEST(FaceUp, NamesTheFaceThatPointsUp) {
-  EXPECT_EQ(face_up(Pose{}), 4);
-  EXPECT_EQ(face_up({geometry::exp_rotation({M_PI, 0.0, 0.0}), Vector3d::Zero()}), 5);
-  EXPECT_EQ(face_up({geometry::exp_rotation({0.0, M_PI / 2, 0.0}), Vector3d::Zero()}), 1);
-  EXPECT_EQ(face_up({geometry::exp_rotation({M_PI / 2, 0.0, 0.0}), Vector3d::Zero()}), 2);
-}
-
 }  // namespace
 }  // namespace prescene::queries

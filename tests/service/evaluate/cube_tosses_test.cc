@@ -17,18 +17,6 @@ namespace {
 using geometry::Vector3d;
 using tests::made_tosses;
 
-TEST(CubeModel, NamesTheFaceThatIsUp) {
-  const auto turned = [](const Vector3d& axis, double angle) {
-    return geometry::Quaterniond(Eigen::AngleAxisd(angle, axis));
-  };
-  EXPECT_EQ(face_up(geometry::Quaterniond::Identity()), 4);  // +z
-  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), 3.1)), 5);     // -z
-  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), 1.5)), 2);     // +y
-  EXPECT_EQ(face_up(turned(Vector3d::UnitX(), -1.5)), 3);    // -y
-  EXPECT_EQ(face_up(turned(Vector3d::UnitY(), -1.5)), 0);    // +x
-  EXPECT_EQ(face_up(turned(Vector3d::UnitY(), 1.5)), 1);     // -x
-}
-
 /// A toss that flies freely from 0.3 m with velocity v and spin w, seen at 148 Hz until it is below the board.
 CubeToss flight(const CubeModel& model, const Vector3d& v, const Vector3d& w, int frames) {
   const Vector3d center(0.0, 0.0, model.center_of_mass_z);

@@ -13,4 +13,11 @@ namespace prescene::belief {
 /// to the action's mean pose (in a straight line, at constant speed) and staying there. `actions` ascend in time.
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time);
 
+/// For how long (s) an action moves something: a release, while the hand retreats. 0 for what is done at once.
+double duration_of(const Action& action);
+
+/// Share of a motion from `begin` on, at constant speed for `duration` (s), that is done at `time`; 0 before it and 1
+/// after it.
+double share_done(double begin, double duration, double time);
+
 }  // namespace prescene::belief

@@ -7,6 +7,9 @@
 
 namespace prescene::belief {
 
+/// m/s; what moves downwards faster than this and touches nothing is falling: the speed after 5 mm of free fall.
+inline constexpr double kFallingSpeed = 0.3;
+
 enum class Relation { kContact, kSupports, kInside, kHolds, kMoving, kUpright, kFalling };
 std::string to_string(Relation relation);
 

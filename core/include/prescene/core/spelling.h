@@ -18,4 +18,10 @@ int edit_distance(std::string_view a, std::string_view b);
 /// words of more than 64 letters; for such a `word` the result is empty.
 std::vector<std::string> nearest_words(std::string_view word, const std::vector<std::string>& known);
 
+/// "did you mean 'mug'?", or "did you mean 'mug' or 'jug'?" of words that are equally near; empty if none is near.
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& known);
+
+/// "mug, jug, bin", in the order given.
+std::string comma_list(const std::vector<std::string>& words);
+
 }  // namespace prescene::core

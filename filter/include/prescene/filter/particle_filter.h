@@ -150,8 +150,4 @@ class ParticleFilter {
 /// Numbers the islands: objects whose surfaces are nearer than `gap` share the number of the first of them.
 void number_islands(double gap, MeshCache& meshes, belief::Belief& belief);
 
-/// The belief without objects that are not believed to be there (existence below `min_existence`, or lost), and a scene
-/// to match: what questions about the future start from.
-belief::Belief present_objects(const belief::Belief& belief, double min_existence = 0.5);
-
 }  // namespace prescene::filter

@@ -27,4 +27,7 @@ core::Result<std::vector<RestingPose>> resting_poses(const TriangleMesh& mesh, c
 core::Result<std::vector<RestingPose>> resting_poses_of_hull(TriangleMesh hull, const Vector3d& p_BoBcm,
                                                              double flatness = 0.02);
 
+/// Index of the direction of the body's axes that points most upwards (z of W): +x, -x, +y, -y, +z, -z.
+int face_up(const Quaterniond& R_WB);
+
 }  // namespace prescene::geometry

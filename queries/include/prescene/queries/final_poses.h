@@ -54,7 +54,4 @@ belief::FinalPoses final_poses(const std::string& object, std::span<const FinalS
                                std::span<const std::string> outcomes, const geometry::SymmetryGroup& symmetry,
                                const DensityOptions& options, core::ThreadPool& pool);
 
-/// Index of the body's face that points most upwards: +x, -x, +y, -y, +z, -z.
-int face_up(const belief::Pose& X_WO);
-
 }  // namespace prescene::queries

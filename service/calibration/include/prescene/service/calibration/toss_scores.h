@@ -20,10 +20,9 @@
 
 namespace prescene::service {
 
-/// Half axes of the object's frame, of which the one nearest to the vertical is the side that is up.
+/// Half axes of the object's frame, of which the one nearest to the vertical is the side that is up
+/// (geometry::face_up).
 inline constexpr std::array<const char*, 6> kSides = {"+x", "-x", "+y", "-y", "+z", "-z"};
-/// Place in kSides.
-std::size_t side_up(const geometry::Quaterniond& R_WO);
 
 /// What was forecast of one recording, and what came.
 struct ScoredToss {

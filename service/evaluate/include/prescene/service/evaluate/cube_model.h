@@ -55,7 +55,4 @@ nlohmann::ordered_json to_json(const CubeModel& model);
 belief::Scene make_cube_scene(const CubeModel& model);
 simulation::MechanicsOptions make_cube_options(const CubeModel& model);
 
-/// Index of the face that is up: +x, -x, +y, -y, +z, -z.
-int face_up(const geometry::Quaterniond& R_WO);
-
 }  // namespace prescene::service
