@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # The commands of docs/tutorial/first_steps.md run, one after the other in one folder, and print what the page shows.
 #   tutorial_test.sh <root of the checkout> <folder of the built program> [<sanitizers that it is built with>]
-# A block ```sh is run. A block ```text is what the blocks before it print: each of its lines is printed, in this order, whatever
-# its numbers are; "..." stands for any lines, or for the rest of a line.
+# A block ```sh is run. A block ```text is what the blocks before it print: each of its lines is printed, in this order, and each
+# of its numbers to within 5 % or two in its last digit, whichever is more; "..." stands for any lines, or for the rest of a line.
+# In a block ```text live, which depends on how messages arrive, numbers may be any.
 set -eu
 if [ -n "${3:-}" ]; then
   echo "skipped: under sanitizers the service is too slow for the pace of the recording; tests/system runs it under them"
@@ -15,9 +16,9 @@ trap 'kill "$(cat "$work/server" 2> /dev/null)" 2> /dev/null || true; rm -rf "$w
 mkdir "$work/reader"
 awk -v work="$work" '
 /^```sh$/ { kind = "sh"; next }
-/^```text$/ {
+/^```text( live)?$/ {
   kind = "text"
-  print "echo @shown" ++shown >> (work "/commands")
+  print "echo @shown" ++shown, $2 >> (work "/commands")
   next
 }
 /^```/ { kind = ""; next }
@@ -44,7 +45,24 @@ function plain(line) {
   sub(/ $/, "", line)
   return line
 }
-function compare(file,    line, wanted, start, i, found, any) {
+# Whether the numbers of a shown line are those at the beginning of a printed one.
+function same_numbers(shown, printed,    a, b, digits, most) {
+  while (match(shown, /-?[0-9]+(\.[0-9]+)?(e-?[0-9]+)?/)) {
+    a = substr(shown, RSTART, RLENGTH)
+    shown = substr(shown, RSTART + RLENGTH)
+    if (!match(printed, /-?[0-9]+(\.[0-9]+)?(e-?[0-9]+)?/)) return 0
+    b = substr(printed, RSTART, RLENGTH)
+    printed = substr(printed, RSTART + RLENGTH)
+    digits = index(a, ".") ? length(a) - index(a, ".") : 0
+    most = 2 * 10 ^ -digits
+    if (0.05 * a > most) most = 0.05 * a
+    if (-0.05 * a > most) most = -0.05 * a
+    if (b - a > most * 1.000001 || a - b > most * 1.000001) return 0
+    ++numbers
+  }
+  return 1
+}
+function compare(file, live,    line, wanted, start, i, found, any) {
   i = 0
   any = 1
   while ((getline line < file) > 0) {
@@ -58,6 +76,7 @@ function compare(file,    line, wanted, start, i, found, any) {
     for (found = 0; !found && i < count; ) {
       ++i
       found = start ? index(printed[i], wanted) == 1 : printed[i] == wanted
+      if (found && !live) found = same_numbers(line, text[i])
       if (!found && !any) break
     }
     if (!found) {
@@ -69,7 +88,7 @@ function compare(file,    line, wanted, start, i, found, any) {
   }
 }
 /^@shown/ {
-  compare(work "/promised" substr($0, 7))
+  compare(work "/promised" substr($1, 7), $2 == "live")
   count = 0
   next
 }
@@ -83,7 +102,11 @@ END {
     print "only " lines " lines of output are compared"
     exit 1
   }
-  print lines " lines of output are as the page shows them"
+  if (numbers < 60) {
+    print "only " numbers " numbers are compared"
+    exit 1
+  }
+  print lines " lines of output with " numbers " compared numbers are as the page shows them"
 }' "$work/printed"
 
 for file in box.yaml predict.html box.mcap box.html seen.png why.png still.mcap calibrated.yaml; do
