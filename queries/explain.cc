@@ -58,8 +58,8 @@ class Explainer {
     PRESCENE_RETURN_IF_ERROR(search_rivals());
     PRESCENE_RETURN_IF_ERROR(events_->failure());
     remark_what_was_cut_short();
-    Telling telling{window_, *events_, *likelihood_, times_, nothings_, judged_};
-    ExplainAnswer answer = tell(telling);
+    JudgedEvents judged{window_, *events_, *likelihood_, times_, nothings_, judged_};
+    ExplainAnswer answer = explain_answer(judged);
     answer.evaluated += evaluated_;
     answer.remarks.insert(answer.remarks.end(), remarks_.begin(), remarks_.end());
     answer.remarks.emplace_back(

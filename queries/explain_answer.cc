@@ -14,9 +14,9 @@ namespace {
 using belief::EventKind;
 using belief::Pose;
 
-constexpr std::size_t kToldPoints = 96;    // of a posterior: what is told of it is worked out from so many
-constexpr std::uint64_t kPlaceDraws = 32;  // from each part of a place's distribution
-constexpr double kWorthTelling = 0.002;    // probability from which on the parameters of an event are worked out
+constexpr std::size_t kReportedPoints = 96;  // of a posterior: its summary is computed from so many
+constexpr std::uint64_t kPlaceDraws = 32;    // from each part of a place's distribution
+constexpr double kLeastDetailed = 0.002;     // probability from which on the parameters of an event are worked out
 
 /// Quantiles of weighted values.
 double value_quantile(std::vector<std::pair<double, double>> values, double share) {
@@ -52,31 +52,31 @@ double place_radius(const std::vector<PossiblePlace>& places, const geometry::Ve
   return value_quantile(std::move(distances), share);
 }
 
-class Teller {
+class AnswerBuilder {
  public:
-  explicit Teller(Telling& telling)
-      : window_(telling.window),
-        events_(&telling.events),
-        likelihood_(&telling.likelihood),
-        times_(telling.times),
-        nothings_(telling.nothings),
-        judged_(telling.judged) {}
+  explicit AnswerBuilder(JudgedEvents& events)
+      : window_(events.window),
+        events_(&events.events),
+        likelihood_(&events.likelihood),
+        times_(events.times),
+        nothings_(events.nothings),
+        judged_(events.judged) {}
 
   ExplainAnswer answer() {
     ExplainAnswer answer;
     std::vector<const Judged*> all;
     for (Judged& nothing : nothings_) work_out(nothing);
     for (Judged& judged : judged_) {
-      if (judged.probability >= kWorthTelling) work_out(judged);
+      if (judged.probability >= kLeastDetailed) work_out(judged);
       all.push_back(&judged);
     }
     all.push_back(&nothings_.front());
     std::stable_sort(all.begin(), all.end(),
                      [](const Judged* a, const Judged* b) { return a->probability > b->probability; });
-    for (const Judged* judged : all) answer.explanations.push_back(told(*judged));
+    for (const Judged* judged : all) answer.explanations.push_back(explanation_of(*judged));
     std::vector<const Judged*> probable;
     for (const Judged* judged : all)
-      if (judged->probability >= kWorthTelling) probable.push_back(judged);
+      if (judged->probability >= kLeastDetailed) probable.push_back(judged);
     for (std::size_t i = 0; i < events_->objects().size(); ++i)
       if (events_->is_present(i) || !events_->track(i).times.empty()) answer.objects.push_back(where(i, probable));
     const auto frame_means = [&](const Judged* judged, std::size_t k) {
@@ -105,14 +105,14 @@ class Teller {
   }
 
  private:
-  /// At most kToldPoints of equal weights, every so many of them by weight.
+  /// At most kReportedPoints of equal weights, every so many of them by weight.
   static void thin_out(std::vector<TemperedPoint>& points) {
-    if (points.size() <= kToldPoints) return;
+    if (points.size() <= kReportedPoints) return;
     std::vector<TemperedPoint> kept;
     double reached = 0.0;
     for (const TemperedPoint& point : points) {
-      reached += point.weight * static_cast<double>(kToldPoints);
-      while (kept.size() < kToldPoints && static_cast<double>(kept.size()) + 0.5 < reached) kept.push_back(point);
+      reached += point.weight * static_cast<double>(kReportedPoints);
+      while (kept.size() < kReportedPoints && static_cast<double>(kept.size()) + 0.5 < reached) kept.push_back(point);
     }
     for (TemperedPoint& point : kept) point.weight = 1.0 / static_cast<double>(kept.size());
     points = std::move(kept);
@@ -137,7 +137,7 @@ class Teller {
         judged.frame_means[k] += judged.posterior.points[i].weight * ratios[i * times_.size() + k];
   }
 
-  Explanation told(const Judged& judged) const {
+  Explanation explanation_of(const Judged& judged) const {
     Explanation e;
     const EventKind kind = judged.hypothesis.kind;
     e.kind = kind;
@@ -292,6 +292,6 @@ class Teller {
 
 }  // namespace
 
-ExplainAnswer tell(Telling& telling) { return Teller(telling).answer(); }
+ExplainAnswer explain_answer(JudgedEvents& events) { return AnswerBuilder(events).answer(); }
 
 }  // namespace prescene::queries

@@ -27,16 +27,16 @@ struct Judged {
   double probability = 0.0, low = 0.0, high = 1.0;
 };
 
-struct Telling {
+struct JudgedEvents {
   const ExplainWindow& window;
   EventPaths& events;
   WindowLikelihood& likelihood;
   const std::vector<double>& times;
-  std::vector<Judged>& nothings;  // by candidate; the first is told
+  std::vector<Judged>& nothings;  // by candidate; the first is reported
   std::vector<Judged>& judged;    // all others
 };
 
 /// All but the numbers of evaluations before, and remarks of the search.
-ExplainAnswer tell(Telling& telling);
+ExplainAnswer explain_answer(JudgedEvents& events);
 
 }  // namespace prescene::queries

@@ -27,7 +27,7 @@ constexpr double kPathInterval = 1.0 / 30.0;
 constexpr std::size_t kPathsAtOnce = 48;          // bounds the memory; does not change results
 constexpr std::size_t kMostPathPoints = 300'000;  // of all paths: 20 MB of JSON
 
-void tell(const QueryContext& context, double fraction, const std::string& text) {
+void report_progress(const QueryContext& context, double fraction, const std::string& text) {
   if (context.progress) context.progress({fraction, std::nullopt, text});
 }
 
@@ -186,7 +186,7 @@ std::vector<belief::ChaosCheck> check_for_chaos(const Foresight& foresight, cons
   const std::size_t instances = foresight.estimate.instances.size();
   if (instances < kFewestComparedPairs || foresight.variables.empty()) return {};
   const std::size_t pairs = std::clamp(instances / 8, kFewestComparedPairs, kMostComparedPairs);
-  tell(context, 0.0, "looking whether small differences decide");
+  report_progress(context, 0.0, "looking whether small differences decide");
   const std::vector<belief::WorldState> starts =
       simulation::starts_nearby(prior.starts, foresight.estimate, pairs, kDisplacement, prior.stream, *context.pool);
   const auto after =
@@ -257,7 +257,7 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
                              Pairs& pairs) {
     pairs.after.resize(variants.size());
     for (std::size_t n = 0; n < variants.size(); ++n) {
-      tell(context, done, "the model's error: " + variants[n].what);
+      report_progress(context, done, "the model's error: " + variants[n].what);
       std::vector<belief::WorldState> changed = starts;
       if (variants[n].change)
         for (belief::WorldState& start : changed) variants[n].change(start);

@@ -127,12 +127,12 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
 std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
   std::vector<belief::ProbabilityStage> history;
   for (const simulation::EstimateStage& stage : foresight.estimate.history) {
-    belief::ProbabilityStage& told = history.emplace_back();
-    told.instances = stage.instances;
+    belief::ProbabilityStage& reported = history.emplace_back();
+    reported.instances = stage.instances;
     for (std::size_t v = 0; v < foresight.variables.size(); ++v)
       for (std::size_t c = 0; c < reported_classes(foresight.variables[v]); ++c) {
         const simulation::ClassEstimate& one = stage.variables[v].classes[c];
-        told.outcomes.push_back({one.probability, one.low, one.high});
+        reported.outcomes.push_back({one.probability, one.low, one.high});
       }
   }
   return history;

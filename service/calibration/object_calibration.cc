@@ -51,7 +51,7 @@ int samples_for(std::size_t recordings) {
 
 std::size_t place_of(MotionParameter parameter) { return static_cast<std::size_t>(parameter); }
 
-const char* what_tells(MotionParameter parameter) {
+const char* what_shows(MotionParameter parameter) {
   switch (parameter) {
     case MotionParameter::kFriction:
       return "record slides, or tosses that end in a slide";
@@ -103,7 +103,7 @@ void add_remarks(const MotionDataset& dataset, ObjectCalibration* found) {
     if (p.left_of_prior < kLittle) continue;
     found->remarks.push_back("these recordings say " +
                              std::string(p.left_of_prior >= simulation::kUnidentifiable ? "nothing" : "little") +
-                             " about " + words(p.parameter) + ": " + what_tells(p.parameter));
+                             " about " + words(p.parameter) + ": " + what_shows(p.parameter));
   }
   for (const simulation::CalibratedParameter& p : found->motion.parameters) {
     const bool friction = p.parameter == simulation::MotionParameter::kFriction ||

@@ -55,9 +55,9 @@ core::Status run(const AchieveVerbOptions& options, VerbContext& context) {
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   nlohmann::ordered_json document = {{"scene", scene->name}, {"seed", context.options().seed}};
-  const nlohmann::ordered_json told = belief::to_json(answer).at("achieve");
-  document.update(told);
-  context.print(document, achieve_text(told));
+  const nlohmann::ordered_json answered = belief::to_json(answer).at("achieve");
+  document.update(answered);
+  context.print(document, achieve_text(answered));
   if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
   return core::ok_status();
 }

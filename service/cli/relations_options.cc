@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 using core::fixed_text;
 
 /// Less probable relations are left to --json.
-constexpr double kTold = 0.05;
+constexpr double kLeastShown = 0.05;
 
 std::string in_brackets(const Json& relation) { return " (" + fixed_text(relation.value("probability", 0.0), 2) + ")"; }
 
@@ -29,32 +29,33 @@ std::string listed(const std::vector<std::string>& parts) {
   return text;
 }
 
-/// The relations of one object, for telling.
-class Told {
+/// The relations of one object, as text.
+class ObjectRelations {
  public:
-  Told(const Json& relations, std::string object) : relations_(relations), object_(std::move(object)) {}
+  ObjectRelations(const Json& relations, std::string object) : relations_(relations), object_(std::move(object)) {}
 
   /// "the table (0.98) and the tray (0.40)": the others of these relations, likely ones; "" = none.
   std::string others(const std::string& word, bool is_subject = true) {
     std::vector<std::string> parts;
     for (const Json& relation : relations_) {
-      if (relation.value("relation", "") != word || relation.value("probability", 0.0) < kTold) continue;
+      if (relation.value("relation", "") != word || relation.value("probability", 0.0) < kLeastShown) continue;
       if (relation.value(is_subject ? "subject" : "other", "") != object_) continue;
       const std::string other = relation.value(is_subject ? "other" : "subject", "");
-      told_.push_back(other);
+      reported_.push_back(other);
       parts.push_back("the " + other + in_brackets(relation));
     }
     return listed(parts);
   }
-  /// What it touches, besides what was told already.
+  /// What it touches, besides what was reported already.
   std::string touched() const {
     std::vector<std::string> parts;
     for (const Json& relation : relations_) {
-      if (relation.value("relation", "") != "touches" || relation.value("probability", 0.0) < kTold) continue;
+      if (relation.value("relation", "") != "touches" || relation.value("probability", 0.0) < kLeastShown) continue;
       const std::string first = relation.value("subject", ""), second = relation.value("other", "");
       if (first != object_ && second != object_) continue;
       const std::string& other = first == object_ ? second : first;
-      if (std::ranges::find(told_, other) == told_.end()) parts.push_back("the " + other + in_brackets(relation));
+      if (std::ranges::find(reported_, other) == reported_.end())
+        parts.push_back("the " + other + in_brackets(relation));
     }
     return listed(parts);
   }
@@ -68,21 +69,21 @@ class Told {
  private:
   const Json& relations_;
   std::string object_;
-  std::vector<std::string> told_;
+  std::vector<std::string> reported_;
 };
 
 std::string object_text(const Json& relations, const Json& item) {
   const std::string object = item.value("object", "");
-  Told told(relations, object);
-  const std::string on = told.others("on"), in = told.others("in");
+  ObjectRelations of_object(relations, object);
+  const std::string on = of_object.others("on"), in = of_object.others("in");
   std::string text =
       "The " + object + " is on " + (on.empty() ? "nothing" : on) + " and in " + (in.empty() ? "nothing" : in) + ".";
-  if (const std::string hand = told.others("holds", false); !hand.empty()) text += " It is held by " + hand + ".";
-  if (const std::string borne = told.others("supports"); !borne.empty()) text += " It bears " + borne + ".";
-  if (const std::string touched = told.touched(); !touched.empty()) text += " It touches " + touched + ".";
+  if (const std::string hand = of_object.others("holds", false); !hand.empty()) text += " It is held by " + hand + ".";
+  if (const std::string borne = of_object.others("supports"); !borne.empty()) text += " It bears " + borne + ".";
+  if (const std::string touched = of_object.touched(); !touched.empty()) text += " It touches " + touched + ".";
   std::vector<std::string> alone;
   const auto add = [&](const char* word, const std::string& is, const std::string& is_not) {
-    const Json* relation = told.alone(word);
+    const Json* relation = of_object.alone(word);
     if (!relation) return;
     const bool holds = relation->value("probability", 0.0) >= 0.5;
     std::string with = fixed_text(relation->value("probability", 0.0), 2);

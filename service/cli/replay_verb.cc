@@ -80,7 +80,7 @@ std::string window_text(const RecordingReadOptions& read) {
          (std::isfinite(read.to) ? " to " + core::rounded_text(read.to) + " s" : " s on");
 }
 
-void tell_unchecked(const ReplayOptions& options, const std::string& unchecked, VerbContext& context) {
+void warn_of_unchecked(const ReplayOptions& options, const std::string& unchecked, VerbContext& context) {
   if (!unchecked.empty()) core::log(context.log(), core::LogLevel::kInfo, options.input + ": " + unchecked);
 }
 
@@ -160,7 +160,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   }
   if (!result.loss.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + result.loss);
   if (damaged.count() > 0) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + damaged.text());
-  tell_unchecked(options, result.unchecked, context);
+  warn_of_unchecked(options, result.unchecked, context);
   context.print({{"recording", options.input},
                  {"messages", result.messages},
                  {"beliefs", result.beliefs.size()},
@@ -208,12 +208,12 @@ class ReplayTimeline {
     context_.timeline = [this] { return history_.timeline(); };
     PRESCENE_TRY(const belief::TimelineAnswer answer,
                  queries::observed(*last_, std::get<belief::TimelineQuery>(query.what), context_));
-    belief::Answer told;
-    told.what = answer;
-    document_ = belief::to_json(told).at("timeline");
+    belief::Answer answered;
+    answered.what = answer;
+    document_ = belief::to_json(answered).at("timeline");
     if (options_.timeline_file.empty()) return core::ok_status();
-    told.what = belief::match(*history_.timeline(), {});
-    const std::string text = belief::json_text(belief::to_json(told).at("timeline"), 2) + "\n";
+    answered.what = belief::match(*history_.timeline(), {});
+    const std::string text = belief::json_text(belief::to_json(answered).at("timeline"), 2) + "\n";
     PRESCENE_RETURN_IF_ERROR(interfaces::write_file(options_.timeline_file, std::string_view(text)));
     core::log(context.log(), core::LogLevel::kInfo, "timeline written to " + options_.timeline_file);
     return core::ok_status();
@@ -310,7 +310,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     }
   }
   if (damaged.count() > 0) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + damaged.text());
-  tell_unchecked(options, summary->unchecked, context);
+  warn_of_unchecked(options, summary->unchecked, context);
   context.print(
       {{"recording", options.input},
        {"seed", seed},

@@ -122,7 +122,7 @@ struct LiveService::Impl {
   core::TimeNs now();
   std::string domain_text() const { return "DDS domain " + std::to_string(settings.dds.domain); }
   ServiceHealth health() const;
-  void tell_what_changed(const ServiceHealth& health);
+  void report_changes(const ServiceHealth& health);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -162,7 +162,7 @@ struct LiveService::Impl {
   std::optional<core::Stopwatch> since_tick;  // since simulated time went on
   core::Stopwatch since_start;
   bool depth_has_come = false;
-  bool told_nothing_came = false;
+  bool reported_no_frames = false;
   bool was_tracking = false;
   bool was_degraded = false;
   bool reported_why_not = false;
@@ -493,7 +493,7 @@ ServiceHealth LiveService::Impl::health() const {
   return health;
 }
 
-void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
+void LiveService::Impl::report_changes(const ServiceHealth& health) {
   if (!health.physics_failure.empty())
     log_limiter.log_once(
         core::LogLevel::kWarning,
@@ -503,8 +503,8 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
                          "simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
                              health.steppers.last_reason);
   if (health.other_services > 0) log_limiter.log_once(core::LogLevel::kWarning, others_text(health.other_services));
-  if (!health.nothing_came.empty() && !told_nothing_came)
-    told_nothing_came = log_limiter.log(core::LogLevel::kWarning, health.nothing_came);
+  if (!health.nothing_came.empty() && !reported_no_frames)
+    reported_no_frames = log_limiter.log(core::LogLevel::kWarning, health.nothing_came);
   // What the log holds back is said at the next look, if it is still so then.
   const bool tracking = is_tracking(health);
   if (tracking && !was_tracking) {
@@ -523,7 +523,7 @@ void LiveService::Impl::tell_what_changed(const ServiceHealth& health) {
 void LiveService::Impl::publish_diagnostics() {
   const ServiceHealth now = health();
   const core::TimeNs stamp_ns = tracker->uses_simulated_time() ? tracker->simulated_now_ns() : core::wall_now_ns();
-  tell_what_changed(now);
+  report_changes(now);
   check_sent(node->publish(
       diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(stamp_ns), ""},
                                                   {to_diagnostic(now, last_reported, settings.dds.node_name)}}));

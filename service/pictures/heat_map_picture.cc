@@ -202,16 +202,16 @@ int part_height(const HeatMapLegend& legend) { return kTitle + kPanelHeight + 28
 core::Result<ColorImage> heat_map_picture(const belief::Scene& scene, const belief::PredictAnswer& answer,
                                           Backends& backends) {
   if (answer.final_poses.empty()) return core::not_found("no final poses to draw");
-  std::vector<const belief::FinalPoses*> told;
+  std::vector<const belief::FinalPoses*> drawn;
   for (const belief::FinalPoses& poses : answer.final_poses) {
     // Of things that surely stay there is nothing to see, unless they are all.
     const bool still = std::sqrt(poses.position_covariance.trace()) < kStill;
-    if (!still || answer.final_poses.size() == 1) told.push_back(&poses);
+    if (!still || answer.final_poses.size() == 1) drawn.push_back(&poses);
   }
-  if (told.empty()) told.push_back(&answer.final_poses.front());
-  told.resize(std::min(kMostObjects, told.size()));
+  if (drawn.empty()) drawn.push_back(&answer.final_poses.front());
+  drawn.resize(std::min(kMostObjects, drawn.size()));
   std::vector<HeatMapPart> parts;
-  for (const belief::FinalPoses* poses : told) parts.push_back(heat_map_part(scene, answer, *poses));
+  for (const belief::FinalPoses* poses : drawn) parts.push_back(heat_map_part(scene, answer, *poses));
   std::vector<HeatMapLegend> legends;
   int height = 0;
   for (const HeatMapPart& part : parts) height += part_height(legends.emplace_back(scene, answer, part));

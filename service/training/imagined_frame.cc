@@ -143,7 +143,7 @@ class Imagination {
     frame.observation.frame.camera = camera;
     frame.observation.frame.depth = std::move(depth);
     frame.observation.X_WC = X_WU * X_UC;
-    frame.scene = told_scene(X_WU);
+    frame.scene = known_scene(X_WU);
     return frame;
   }
 
@@ -260,18 +260,18 @@ class Imagination {
     return {rendering::SensorModel(sensor), camera};
   }
 
-  std::shared_ptr<const belief::Scene> told_scene(const Pose& X_WU) {
-    auto told = std::make_shared<belief::Scene>();
-    told->name = "imagined";
-    told->models = given_.models;
-    told->gravity_W = given_.gravity_W.norm() > 1e-9 ? given_.gravity_W : Vector3d(X_WU.rotation * world_.gravity_W);
-    told->depth_noise = given_.depth_noise;
+  std::shared_ptr<const belief::Scene> known_scene(const Pose& X_WU) {
+    auto known = std::make_shared<belief::Scene>();
+    known->name = "imagined";
+    known->models = given_.models;
+    known->gravity_W = given_.gravity_W.norm() > 1e-9 ? given_.gravity_W : Vector3d(X_WU.rotation * world_.gravity_W);
+    known->depth_noise = given_.depth_noise;
     // All supports, none or some of them; what is the user's own is mostly named.
     const double listed = draws_.uniform() < (own_supports_ ? 0.8 : 0.33) ? 1.0 : draws_.uniform() < 0.5 ? 0.0 : 0.5;
     for (belief::Support support : world_.supports) {
       if (support.name == "wall" || draws_.uniform() >= listed) continue;
       support.X_WS = X_WU * support.X_WS;
-      told->supports.push_back(std::move(support));
+      known->supports.push_back(std::move(support));
     }
     std::vector<int> wanted;
     for (std::size_t i = 0; i < known_; ++i) wanted.push_back(world_.objects[i].model);
@@ -284,12 +284,12 @@ class Imagination {
     anywhere.any_rotation = true;
     for (const int model : wanted) {
       belief::SceneObject object;
-      object.name = "object_" + std::to_string(told->objects.size() + 1);
+      object.name = "object_" + std::to_string(known->objects.size() + 1);
       object.model = model;
       object.pose = anywhere;
-      told->objects.push_back(std::move(object));
+      known->objects.push_back(std::move(object));
     }
-    return told;
+    return known;
   }
 
   struct Placed {

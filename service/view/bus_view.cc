@@ -226,17 +226,17 @@ void BusView::Impl::take_health(const ReceivedMessage& message) {
 void BusView::run(const core::Cancellation& cancellation) {
   const std::string none = std::string("no service publishes ") + kBeliefTopic + " in DDS domain " +
                            std::to_string(impl_->settings.dds.domain) + ": start `prescene serve`";
-  constexpr int kLooksBeforeTold = 60;  // of kLook: discovery takes a moment
-  bool told = false;
+  constexpr int kLooksBeforeReport = 60;  // of kLook: discovery takes a moment
+  bool reported = false;
   for (int looks = 0; !cancellation.requested(); ++looks) {
     std::this_thread::sleep_for(kLook);
-    const bool alone = looks >= kLooksBeforeTold && impl_->node->other_writers(kBeliefTopic) == 0;
-    if (alone && !told) {
+    const bool alone = looks >= kLooksBeforeReport && impl_->node->other_writers(kBeliefTopic) == 0;
+    if (alone && !reported) {
       core::log(impl_->log, core::LogLevel::kWarning, none);
       impl_->view->set_health(none);
     }
-    if (!alone && told) impl_->view->set_health("");
-    told = alone;
+    if (!alone && reported) impl_->view->set_health("");
+    reported = alone;
   }
 }
 

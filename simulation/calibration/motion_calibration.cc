@@ -110,8 +110,8 @@ SearchResult search_from(std::vector<std::vector<SearchParameter>> starts, const
 }
 
 /// What the recordings tell, and what they do not.
-std::vector<CalibratedParameter> told(const Estimate& estimate, const VariedParameters& varied,
-                                      const MotionPrior& prior, double slide_share, double position_noise) {
+std::vector<CalibratedParameter> reported(const Estimate& estimate, const VariedParameters& varied,
+                                          const MotionPrior& prior, double slide_share, double position_noise) {
   const auto n = static_cast<Eigen::Index>(varied.free().size());
   Eigen::VectorXd value = estimate.value;
   Eigen::MatrixXd covariance = estimate.covariance;
@@ -144,15 +144,15 @@ std::vector<CalibratedParameter> told(const Estimate& estimate, const VariedPara
 
 /// Of each fold; what the recordings do not tell stays as all of them leave it.
 std::vector<std::vector<double>> values_without(const Estimate& estimate, const VariedParameters& varied,
-                                                const std::vector<CalibratedParameter>& told_values) {
+                                                const std::vector<CalibratedParameter>& reported_values) {
   const std::vector<EstimatedParameter> estimated = varied.estimated({});
   std::vector<std::vector<double>> all;
   for (const Eigen::VectorXd& without : estimate.without) {
     std::vector<double>& values = all.emplace_back();
-    for (std::size_t i = 0; i < told_values.size(); ++i) {
-      const bool unidentifiable = told_values[i].left_of_prior >= kUnidentifiable;
+    for (std::size_t i = 0; i < reported_values.size(); ++i) {
+      const bool unidentifiable = reported_values[i].left_of_prior >= kUnidentifiable;
       values.push_back(unidentifiable
-                           ? told_values[i].value
+                           ? reported_values[i].value
                            : std::clamp(without[static_cast<Eigen::Index>(i)], estimated[i].low, estimated[i].high));
     }
   }
@@ -328,7 +328,7 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
   }
   const auto slides = std::ranges::count(motions, MotionBeginning::kSlide, &RecordedMotion::beginning);
   const double slide_share = static_cast<double>(slides) / static_cast<double>(motions.size());
-  result.parameters = told(estimate, varied, prior, slide_share, options.position_noise);
+  result.parameters = reported(estimate, varied, prior, slide_share, options.position_noise);
   result.without = values_without(estimate, varied, result.parameters);
   result.start_noise = best.start_noise;
   result.friction_scatter = best.friction_scatter;

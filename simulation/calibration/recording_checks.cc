@@ -100,7 +100,7 @@ bool same(const std::vector<Invariant>& a, const std::vector<Invariant>& b, std:
 }
 
 /// Whether anything but lying or sliding happens: things that slide on a level board all agree in height and tilt.
-bool tells_apart(const std::vector<Invariant>& motion) {
+bool is_distinctive(const std::vector<Invariant>& motion) {
   double low = motion.front().height, high = low, tilt = 0.0;
   for (const Invariant& each : motion) {
     low = std::min(low, each.height);
@@ -178,7 +178,7 @@ std::vector<std::size_t> find_twins(std::span<const std::span<const TimedPose>> 
   std::vector<std::size_t> first(motions.size());
   for (std::size_t b = 0; b < motions.size(); ++b) {
     first[b] = b;
-    if (motions[b].empty() || !tells_apart(motions[b])) continue;
+    if (motions[b].empty() || !is_distinctive(motions[b])) continue;
     for (std::size_t a = 0; a < b && first[b] == b; ++a) {
       if (first[a] != a || motions[a].empty()) continue;
       for (std::ptrdiff_t shift = -kMostShift; shift <= kMostShift; ++shift) {

@@ -35,7 +35,7 @@ std::size_t largest_chunk(const StartDistribution& starts, const std::vector<Sta
   return std::clamp<std::size_t>(bytes / bytes_of_run(request, objects), 1, kLargestChunk);
 }
 
-/// Foretells how many instances the stop rule will take, from how the widest interval shrank so far.
+/// Forecasts how many instances the stop rule will take, from how the widest interval shrank so far.
 class Forecast {
  public:
   Forecast(const EstimatorOptions& options, core::ProgressSink sink) : options_(options), sink_(std::move(sink)) {
@@ -64,7 +64,7 @@ class Forecast {
         wanted < limit ? std::min(limit, static_cast<double>(next_net_size(static_cast<int>(wanted) - 1))) : limit;
   }
 
-  void tell(double done) {
+  void report(double done) {
     if (!sink_) return;
     const double elapsed = watch_.seconds();
     const double total = std::max(done, expected_);
@@ -387,7 +387,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
       else if (options.max_seconds && !options.exact_instances && watch.seconds() >= *options.max_seconds)
         stop = EstimateStop::kTimeLimit;
       if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, most_at_once);
-      forecast.tell(static_cast<double>(estimate.instances.size()));
+      forecast.report(static_cast<double>(estimate.instances.size()));
     }
     bool switched_off = estimate.certificates.switched_off;
     if (runner.certifier && trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
