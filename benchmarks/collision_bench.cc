@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/collision_algorithms.h"
 #include "benchmarks/collision_measure.h"
 #include "benchmarks/collision_plots.h"
@@ -26,51 +27,19 @@
 namespace prescene::benchmarks {
 namespace {
 
-struct Arguments {
+struct Options {
   bool quick = false;
   std::vector<std::string> parts;  ///< All if empty.
   std::vector<std::string> only;
   std::string out;
 
   bool wants(std::string_view part) const {
+    if (!only.empty()) return part == "queries";
     return parts.empty() || std::find(parts.begin(), parts.end(), part) != parts.end();
   }
 };
 
-std::vector<std::string> split(std::string_view names) {
-  std::vector<std::string> words;
-  while (!names.empty()) {
-    const std::size_t comma = std::min(names.find(','), names.size());
-    words.emplace_back(names.substr(0, comma));
-    names.remove_prefix(std::min(comma + 1, names.size()));
-  }
-  return words;
-}
-
-bool parse(int count, char** words, Arguments* arguments) {
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i], value = word.substr(std::min(word.find('=') + 1, word.size()));
-    if (word == "--quick") {
-      arguments->quick = true;
-    } else if (word.starts_with("--benchmark_out=")) {
-      arguments->out = value;
-    } else if (word.starts_with("--part=")) {
-      arguments->parts = split(value);
-    } else if (word.starts_with("--only=")) {
-      arguments->only = split(value);
-      arguments->parts = {"queries"};
-    } else {
-      std::fprintf(stderr,
-                   "usage: %s [--quick] [--part=PART[,PART]...] [--only=NAME[,NAME]...] [--benchmark_out=PATH]\n"
-                   "parts: queries, study, cold, spheres\n",
-                   words[0]);
-      return false;
-    }
-  }
-  return true;
-}
-
-std::vector<Algorithm> chosen_algorithms(const Arguments& arguments) {
+std::vector<Algorithm> chosen_algorithms(const Options& arguments) {
   std::vector<Algorithm> algorithms = our_algorithms();
   for (Algorithm& peer : peer_algorithms()) algorithms.push_back(std::move(peer));
   if (arguments.only.empty()) return algorithms;
@@ -108,7 +77,7 @@ Measurements measure(const std::vector<tests::MeshPair>& pairs, const std::vecto
 }
 
 /// Other settings of our trees, on a few pairs of middle size.
-Measurements measure_study(const std::vector<tests::MeshPair>& pairs, const Arguments& arguments) {
+Measurements measure_study(const std::vector<tests::MeshPair>& pairs, const Options& arguments) {
   MeasureOptions options;
   options.configurations = arguments.quick ? 4 : 16;
   options.rounds = 3;
@@ -156,7 +125,7 @@ struct Results {
   Measurements queries, study, cold;
 };
 
-Results measure_all(const Arguments& arguments, Report* report) {
+Results measure_all(const Options& arguments, Report* report) {
   std::vector<tests::MeshPair> pairs = tests::recorded_mesh_pairs();
   if (pairs.empty()) {
     report->note(tests::missing_data_message("meshes"));
@@ -226,7 +195,7 @@ void add_raw_figures(const Results& results, Report* report) {
   for (Plot& plot : study_plots(results.study)) report->add(std::move(plot));
 }
 
-int run(const Arguments& arguments) {
+int run(const Options& arguments) {
   Report report("collision", best_simd_target());
   const Results results = measure_all(arguments, &report);
   print(report, results);
@@ -239,7 +208,11 @@ int run(const Arguments& arguments) {
 }  // namespace prescene::benchmarks
 
 int main(int count, char** words) {
+  prescene::benchmarks::Options options;
   prescene::benchmarks::Arguments arguments;
-  if (!prescene::benchmarks::parse(count, words, &arguments)) return 2;
-  return prescene::benchmarks::run(arguments);
+  arguments.flag("quick", [&] { options.quick = true; });
+  arguments.list("part", "PART", &options.parts);
+  arguments.list("only", "NAME", &options.only);
+  arguments.text("benchmark_out", "PATH", &options.out);
+  return arguments.parse(count, words) ? prescene::benchmarks::run(options) : 2;
 }

@@ -8,11 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
-#include <utility>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/report.h"
 #include "prescene/core/check.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
@@ -146,19 +145,9 @@ int run(int instances, const std::string& out) {
 int main(int count, char** words) {
   int instances = 512;
   std::string out;
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    const std::string value(word.substr(std::min(word.find('=') + 1, word.size())));
-    if (word == "--quick") {
-      instances = 64;
-    } else if (word.starts_with("--instances=") && std::atoi(value.c_str()) > 0) {
-      instances = std::atoi(value.c_str());
-    } else if (word.starts_with("--benchmark_out=")) {
-      out = value;
-    } else {
-      std::fprintf(stderr, "usage: %s [--quick] [--instances=N] [--benchmark_out=PATH]\n", words[0]);
-      return 2;
-    }
-  }
-  return prescene::benchmarks::run(instances, out);
+  prescene::benchmarks::Arguments arguments;
+  arguments.flag("quick", [&] { instances = 64; });
+  arguments.number("instances", 1, 1e6, &instances);
+  arguments.text("benchmark_out", "PATH", &out);
+  return arguments.parse(count, words) ? prescene::benchmarks::run(instances, out) : 2;
 }

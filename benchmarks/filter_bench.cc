@@ -7,13 +7,12 @@
 // --all: as many seeds, frames and rooms as the targets ask for, which takes hours. --seed: the first seed (301).
 // --sequences: of each kind of the simulated suite (2). --only: memory, cost, physics, tracking or finding alone.
 #include <algorithm>
-#include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <thread>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/filter_targets.h"
 #include "prescene/core/clock.h"
 #include "tests/support/paths.h"
@@ -21,54 +20,13 @@
 namespace prescene::benchmarks {
 namespace {
 
-struct FilterArguments {
+struct FilterOptions {
   FilterEffort effort;
   std::string out;
   std::string only;  // "" = all parts
 };
 
-constexpr std::array<std::string_view, 5> kParts = {"memory", "cost", "physics", "tracking", "finding"};
-
-bool parse(int count, char** words, FilterArguments* arguments) {
-  for (int i = 1; i < count; ++i)
-    if (std::string_view(words[i]) == "--all") arguments->effort = whole_filter_effort();
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    const char* value = words[i] + std::min(word.find('=') + 1, word.size());
-    const auto number = [&](long least) {
-      const long n = std::strtol(value, nullptr, 10);
-      if (n < least) std::fprintf(stderr, "%s: give a number of %ld or more\n", words[i], least);
-      return n;
-    };
-    if (word == "--all") continue;
-    if (word.starts_with("--benchmark_out=")) {
-      arguments->out = value;
-    } else if (word.starts_with("--only=")) {
-      arguments->only = value;
-      if (std::find(kParts.begin(), kParts.end(), arguments->only) == kParts.end()) {
-        std::fprintf(stderr, "%s: give memory, cost, physics, tracking or finding\n", words[i]);
-        return false;
-      }
-    } else if (word.starts_with("--seed=")) {
-      const long n = number(1);
-      if (n < 1) return false;
-      arguments->effort.seed = static_cast<std::uint64_t>(n);
-    } else if (word.starts_with("--sequences=")) {
-      const long n = number(1);
-      if (n < 1) return false;
-      arguments->effort.sequences = static_cast<int>(std::min(n, 1000L));
-    } else {
-      std::fprintf(
-          stderr,
-          "bench_filter [--all] [--only=PART] [--seed=N] [--sequences=N] [--benchmark_out=PATH]; this is none: %s\n",
-          words[i]);
-      return false;
-    }
-  }
-  return true;
-}
-
-int run(const FilterArguments& arguments) {
+int run(const FilterOptions& arguments) {
   const FilterEffort& effort = arguments.effort;
   core::ThreadPool threads(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
   Report report("filter", best_simd_target());
@@ -97,7 +55,15 @@ int run(const FilterArguments& arguments) {
 }  // namespace prescene::benchmarks
 
 int main(int count, char** words) {
-  prescene::benchmarks::FilterArguments arguments;
-  if (!prescene::benchmarks::parse(count, words, &arguments)) return 2;
-  return prescene::benchmarks::run(arguments);
+  prescene::benchmarks::FilterOptions options;
+  int seed = static_cast<int>(options.effort.seed);
+  prescene::benchmarks::Arguments arguments;
+  arguments.flag("all", [&] { options.effort = prescene::benchmarks::whole_filter_effort(); });
+  arguments.one_of("only", {"memory", "cost", "physics", "tracking", "finding"}, &options.only);
+  arguments.number("seed", 1, 1e9, &seed);
+  arguments.number("sequences", 1, 1000, &options.effort.sequences);
+  arguments.text("benchmark_out", "PATH", &options.out);
+  if (!arguments.parse(count, words)) return 2;
+  options.effort.seed = static_cast<std::uint64_t>(seed);
+  return prescene::benchmarks::run(options);
 }

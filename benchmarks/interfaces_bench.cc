@@ -10,7 +10,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -20,6 +19,7 @@
 #include <tuple>
 #include <vector>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/interfaces_processes.h"
 #include "benchmarks/report.h"
 #include "benchmarks/statistics.h"
@@ -57,31 +57,11 @@ camera:
   look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.03]}
 )";
 
-struct Arguments {
+struct Options {
   double seconds = 30.0;
   int domain = 97;
   std::string out;
 };
-
-bool parse(int count, char** words, Arguments* arguments) {
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    const char* value = words[i] + std::min(word.find('=') + 1, word.size());
-    if (word == "--quick") {
-      arguments->seconds = 8.0;
-    } else if (word.starts_with("--benchmark_out=")) {
-      arguments->out = value;
-    } else if (word.starts_with("--seconds=") && std::atof(value) > 0.0) {
-      arguments->seconds = std::atof(value);
-    } else if (word.starts_with("--domain=") && std::atoi(value) > 0) {
-      arguments->domain = std::atoi(value);
-    } else {
-      std::fprintf(stderr, "usage: %s [--quick] [--seconds=N] [--domain=N] [--benchmark_out=PATH]\n", words[0]);
-      return false;
-    }
-  }
-  return true;
-}
 
 struct Frames {
   std::vector<interfaces::RosImage> depths, colors;
@@ -185,7 +165,7 @@ std::optional<double> milliseconds(std::vector<double> seconds, double share) {
 }
 
 /// From the bus to a published belief, with a bare reader beside it.
-core::Status measure_bus(const Frames& frames, const Arguments& arguments, Child& service, Child& bare,
+core::Status measure_bus(const Frames& frames, const Options& arguments, Child& service, Child& bare,
                          const SharedFigures<FrameTimes>& steps, const SharedFigures<double>& delays, Report* report) {
   PRESCENE_TRY(const auto robot, Robot::join(frames, arguments.domain));
   if (!robot->wait_for_readers(2)) return core::unavailable("the service and the bare reader do not listen");
@@ -248,7 +228,7 @@ core::Status measure_bus(const Frames& frames, const Arguments& arguments, Child
 }
 
 /// The share of a core of a recorder, and what is missing at the end of its file when it is killed.
-core::Status measure_recorder(const Frames& frames, const Arguments& arguments, Child& recorder,
+core::Status measure_recorder(const Frames& frames, const Options& arguments, Child& recorder,
                               const std::filesystem::path& path, Report* report) {
   PRESCENE_TRY(const auto robot, Robot::join(frames, arguments.domain + 1));
   if (!robot->wait_for_readers(1)) return core::unavailable("the recorder does not listen");
@@ -326,7 +306,7 @@ void add_unmeasured(Report* report) {
   add("memory slope over a soak", Better::kLower, at_most(1.0), at_most(0.0), "MB/h", "takes hours");
 }
 
-int run(const Arguments& arguments) {
+int run(const Options& arguments) {
   const tests::ScratchDir folder;
   const std::filesystem::path recorded = folder.path() / "robot.mcap", played = folder.path() / "played.mcap";
   SharedFigures<FrameTimes> steps(1 << 16);
@@ -362,7 +342,11 @@ int run(const Arguments& arguments) {
 }  // namespace prescene::benchmarks
 
 int main(int count, char** words) {
+  prescene::benchmarks::Options options;
   prescene::benchmarks::Arguments arguments;
-  if (!prescene::benchmarks::parse(count, words, &arguments)) return 2;
-  return prescene::benchmarks::run(arguments);
+  arguments.flag("quick", [&] { options.seconds = 8.0; });
+  arguments.number("seconds", 0.1, 1e6, &options.seconds);
+  arguments.number("domain", 1, 230, &options.domain);
+  arguments.text("benchmark_out", "PATH", &options.out);
+  return arguments.parse(count, words) ? prescene::benchmarks::run(options) : 2;
 }

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/processor_time.h"
 #include "benchmarks/report.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
@@ -136,11 +137,9 @@ int main(int argc, char** argv) {
   int count = 2048;
   std::string scenarios = "scenarios";
   std::string out;
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view argument = argv[i];
-    if (argument == "--quick") count = 256;
-    if (argument.starts_with("--scenarios=")) scenarios = argument.substr(12);
-    if (argument.starts_with("--benchmark_out=")) out = argument.substr(16);
-  }
-  return prescene::benchmarks::run(count, scenarios, out);
+  prescene::benchmarks::Arguments arguments;
+  arguments.flag("quick", [&] { count = 256; });
+  arguments.text("scenarios", "FOLDER", &scenarios);
+  arguments.text("benchmark_out", "PATH", &out);
+  return arguments.parse(argc, argv) ? prescene::benchmarks::run(count, scenarios, out) : 2;
 }

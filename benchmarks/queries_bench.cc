@@ -5,16 +5,14 @@
 //   bench_queries [--quick] [--seeds=N] [--benchmark_out=PATH]
 //
 // --seeds: searches a scene (10; quick 2).
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/report.h"
 #include "benchmarks/statistics.h"
 #include "prescene/core/text.h"
@@ -25,32 +23,12 @@
 namespace prescene::benchmarks {
 namespace {
 
-struct Arguments {
+struct Options {
   int seeds = 10;
   int checks = 4000;   // instances that a claim is checked with
   int choices = 1000;  // that the share of good ones is estimated from
   std::string out;
 };
-
-bool parse(int count, char** words, Arguments* arguments) {
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    const char* value = words[i] + std::min(word.find('=') + 1, word.size());
-    if (word == "--quick") {
-      arguments->seeds = 2;
-      arguments->checks = 1000;
-      arguments->choices = 300;
-    } else if (word.starts_with("--benchmark_out=")) {
-      arguments->out = value;
-    } else if (word.starts_with("--seeds=") && std::atoi(value) > 0) {
-      arguments->seeds = std::atoi(value);
-    } else {
-      std::fprintf(stderr, "usage: %s [--quick] [--seeds=N] [--benchmark_out=PATH]\n", words[0]);
-      return false;
-    }
-  }
-  return true;
-}
 
 struct Measured {
   std::vector<double> seconds, ratios;                        // of the searches that found a choice
@@ -72,7 +50,7 @@ bool is_wrong(const queries::CheckedChoice& checked, double wanted) {
   return checked.successes / n < wanted - 3.1 * sigma;
 }
 
-core::Status measure(const tests::AchieveProblem& problem, const Arguments& arguments, service::Backends& backends,
+core::Status measure(const tests::AchieveProblem& problem, const Options& arguments, service::Backends& backends,
                      core::ThreadPool& pool, Measured* measured) {
   const queries::QueryContext context = backends.query_context(pool);
   PRESCENE_TRY(const double share,
@@ -150,7 +128,7 @@ void add_unmeasured(Report* report) {
       "of 8 scenes");
 }
 
-int run(const Arguments& arguments) {
+int run(const Options& arguments) {
   Report report("queries", best_simd_target());
   report.note("Ten scenes of four free parameters (tests/support/achieve_scenes.cc), 240 Hz, all threads.");
   core::ThreadPool pool;
@@ -223,7 +201,14 @@ int run(const Arguments& arguments) {
 }  // namespace prescene::benchmarks
 
 int main(int count, char** words) {
+  prescene::benchmarks::Options options;
   prescene::benchmarks::Arguments arguments;
-  if (!prescene::benchmarks::parse(count, words, &arguments)) return 2;
-  return prescene::benchmarks::run(arguments);
+  arguments.flag("quick", [&] {
+    options.seeds = 2;
+    options.checks = 1000;
+    options.choices = 300;
+  });
+  arguments.number("seeds", 1, 1e6, &options.seeds);
+  arguments.text("benchmark_out", "PATH", &options.out);
+  return arguments.parse(count, words) ? prescene::benchmarks::run(options) : 2;
 }

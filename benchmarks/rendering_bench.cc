@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/processor_time.h"
 #include "benchmarks/report.h"
 #include "prescene/core/check.h"
@@ -357,16 +357,8 @@ int run(int rounds, const std::string& out) {
 int main(int count, char** words) {
   std::string out;
   int rounds = 5;
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    if (word == "--quick") {
-      rounds = 1;
-    } else if (word.starts_with("--benchmark_out=")) {
-      out = word.substr(word.find('=') + 1);
-    } else {
-      std::fprintf(stderr, "usage: %s [--quick] [--benchmark_out=PATH]\n", words[0]);
-      return 2;
-    }
-  }
-  return prescene::benchmarks::run(rounds, out);
+  prescene::benchmarks::Arguments arguments;
+  arguments.flag("quick", [&] { rounds = 1; });
+  arguments.text("benchmark_out", "PATH", &out);
+  return arguments.parse(count, words) ? prescene::benchmarks::run(rounds, out) : 2;
 }

@@ -10,11 +10,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "benchmarks/arguments.h"
 #include "benchmarks/dice_steps.h"
 #include "benchmarks/heat_map_measure.h"
 #include "benchmarks/report.h"
@@ -32,7 +32,7 @@ constexpr double kConfidence = 0.90;
 constexpr int kRepetitions = 400;  // of plain Monte Carlo on the bank
 constexpr char kBaseline[] = "plain Monte Carlo, same simulator and step, Wald's stop at the same interval";
 
-struct Arguments {
+struct Options {
   int seeds = 1000;
   int instances = 13'500;
   int truth = 32'768;
@@ -44,44 +44,6 @@ struct Arguments {
   bool dice_only = false;
   std::string out;
 };
-
-bool parse(int count, char** words, Arguments* arguments) {
-  for (int i = 1; i < count; ++i)
-    if (std::string_view(words[i]) == "--quick") {
-      arguments->seeds = 24;
-      arguments->instances = 400;
-      arguments->truth = 4096;
-      arguments->bullet_seeds = 24;
-      arguments->walls = 10;
-      arguments->map_truth = 8192;
-      arguments->maps = 3;
-      arguments->dice = 32;
-    }
-  for (int i = 1; i < count; ++i) {
-    const std::string_view word = words[i];
-    const char* value = words[i] + std::min(word.find('=') + 1, word.size());
-    if (word == "--quick") continue;
-    if (word == "--dice-only") {
-      arguments->dice_only = true;
-      continue;
-    }
-    if (word.starts_with("--benchmark_out=")) {
-      arguments->out = value;
-    } else if (word.starts_with("--seeds=") && std::atoi(value) > 1) {
-      arguments->seeds = std::atoi(value);
-    } else if (word.starts_with("--dice=") && std::atoi(value) > 1) {
-      arguments->dice = std::atoi(value);
-    } else if (word.starts_with("--instances=") && std::atoi(value) > 0) {
-      arguments->instances = std::atoi(value);
-    } else {
-      std::fprintf(stderr,
-                   "usage: %s [--quick] [--seeds=N] [--instances=N] [--dice=N] [--dice-only] [--benchmark_out=PATH]\n",
-                   words[0]);
-      return false;
-    }
-  }
-  return true;
-}
 
 /// What is wanted of scenes A to D.
 struct Wanted {
@@ -129,7 +91,7 @@ void add_coverage(const UncertainProblem& problem, const Estimates& estimates, c
                .why = "greatest class " + std::to_string(most).substr(0, 5)});
 }
 
-void measure(const UncertainProblem& problem, const Wanted& wanted, const Arguments& arguments, int* certified,
+void measure(const UncertainProblem& problem, const Wanted& wanted, const Options& arguments, int* certified,
              int* wrong, Tables* tables, Report* report) {
   const auto classes = static_cast<int>(problem.variables[0].classes.size());
   std::fprintf(stderr, "%s: %d instances to rest\n", problem.name.c_str(), arguments.instances);
@@ -219,7 +181,7 @@ void add_tosses(Report* report) {
   }
 }
 
-int run(const Arguments& arguments) {
+int run(const Options& arguments) {
   Report report("uncertain", best_simd_target());
   report.note("Scenes A to D of tests/support/uncertain_scenes.cc, 240 Hz, one thread but for wall times.");
   Table dice = measure_dice_steps(arguments.dice, &report);
@@ -282,7 +244,22 @@ int run(const Arguments& arguments) {
 }  // namespace prescene::benchmarks
 
 int main(int count, char** words) {
+  prescene::benchmarks::Options options;
   prescene::benchmarks::Arguments arguments;
-  if (!prescene::benchmarks::parse(count, words, &arguments)) return 2;
-  return prescene::benchmarks::run(arguments);
+  arguments.flag("quick", [&] {
+    options.seeds = 24;
+    options.instances = 400;
+    options.truth = 4096;
+    options.bullet_seeds = 24;
+    options.walls = 10;
+    options.map_truth = 8192;
+    options.maps = 3;
+    options.dice = 32;
+  });
+  arguments.flag("dice-only", [&] { options.dice_only = true; });
+  arguments.number("seeds", 2, 1e6, &options.seeds);
+  arguments.number("instances", 1, 1e9, &options.instances);
+  arguments.number("dice", 2, 1e6, &options.dice);
+  arguments.text("benchmark_out", "PATH", &options.out);
+  return arguments.parse(count, words) ? prescene::benchmarks::run(options) : 2;
 }
