@@ -62,5 +62,22 @@ TEST(RobotMotion, ActionsOnWhatIsNotHeldDoNotMoveIt) {
   EXPECT_NEAR(robot_pose_at(scene, std::vector<Action>{{0.0, release}}, 0, 1.0).translation.z(), 1.0, 1e-12);
 }
 
+TEST(RobotMotion, ActionsLastAsLongAsTheyMoveSomething) {
+  Release release;
+  release.retreat_duration = 0.5;
+  EXPECT_EQ(duration_of({1.0, release}), 0.0);  // the hand stays
+  release.retreat = {0.0, 0.0, 0.1};
+  EXPECT_EQ(duration_of({1.0, release}), 0.5);
+  Push push;
+  push.duration = 2.0;
+  EXPECT_EQ(duration_of({1.0, push}), 2.0);
+  EXPECT_EQ(duration_of({1.0, Grasp{}}), 0.0);
+  EXPECT_EQ(share_done(1.0, 2.0, 0.5), 0.0);
+  EXPECT_EQ(share_done(1.0, 2.0, 1.5), 0.25);
+  EXPECT_EQ(share_done(1.0, 2.0, 4.0), 1.0);
+  EXPECT_EQ(share_done(1.0, 0.0, 0.9), 0.0);  // at once
+  EXPECT_EQ(share_done(1.0, 0.0, 1.0), 1.0);
+}
+
 }  // namespace
 }  // namespace prescene::belief
