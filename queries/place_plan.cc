@@ -138,8 +138,6 @@ class PlacePlan final : public PlannedAction {
     remarks_.push_back("Instances begin when the hand opens. " + *held.held_by +
                        " must not hit anything on its way straight down to there, and then takes no part: that it lets "
                        "go without pushing is taken for granted, apart from the velocity that it adds.");
-    if (belief::dimensions(query_.errors.delay) > 0 || belief::mean(query_.errors.delay) > 0.0)
-      remarks_.push_back("A delay changes nothing where an object is placed: the hand stands still until it opens.");
     return core::ok_status();
   }
 
@@ -211,6 +209,11 @@ core::Result<std::unique_ptr<PlannedAction>> plan_place(const Prior& prior, cons
                                                         core::ThreadPool& pool, std::vector<SceneValue>& scene_values) {
   if (belief::dimensions(query.errors.lateral_error) > 0 || belief::mean(query.errors.lateral_error) != 0.0)
     return core::invalid_input("errors.lateral_error: that is of a push; give errors.position to a place");
+  if (belief::dimensions(query.errors.delay) > 0 || belief::mean(query.errors.delay) > 0.0)
+    return core::invalid_input(
+        "errors.delay: that is of a release or push; where an object is placed, the hand stands still until it opens, "
+        "so "
+        "that a delay changes nothing: leave it out");
   PRESCENE_TRY(Base base, find_base(prior, query.support, wanted, index));
   const auto along = [&](const char* name, Eigen::Index axis) {
     scene_values.push_back({name, base.room.center()[axis], base.room.min()[axis], base.room.max()[axis]});

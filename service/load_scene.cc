@@ -21,10 +21,35 @@ interfaces::MeshReadOptions mesh_options(const interfaces::MeshRequest& request)
   return read;
 }
 
-void tell(const interfaces::MeshRequest& request, const interfaces::LoadedMesh& mesh, const core::LogSink& log) {
-  for (const std::string& warning : mesh.warnings)
-    core::log(log, core::LogLevel::kWarning, request.path.string() + ": " + warning);
-}
+/// How what was tidied up in meshes without changing their surface is reported: each, or only of how many meshes.
+enum class Repairs { kEach, kCounted };
+
+/// Logs what is odd about a scene's meshes.
+class MeshRemarks {
+ public:
+  MeshRemarks(core::LogSink log, Repairs repairs) : log_(std::move(log)), repairs_(repairs) {}
+
+  void add(const interfaces::MeshRequest& request, const interfaces::LoadedMesh& mesh) {
+    const bool keeps_surface = mesh.repair.non_finite_vertices == 0 && mesh.repair.out_of_range_triangles == 0;
+    const bool counted = repairs_ == Repairs::kCounted && mesh.repair.changed() && keeps_surface;
+    if (counted) ++tidied_;
+    for (const std::string& warning : mesh.warnings)
+      if (!counted || warning != mesh.repair.text())
+        core::log(log_, core::LogLevel::kWarning, request.path.string() + ": " + warning);
+  }
+  /// To be called when all meshes were read.
+  void finish(const std::filesystem::path& scene) const {
+    if (tidied_ == 0) return;
+    core::log(log_, core::LogLevel::kInfo,
+              scene.string() + ": " + std::to_string(tidied_) + (tidied_ == 1 ? " mesh has" : " meshes have") +
+                  " triangles or vertices that were tidied up; 'prescene validate' says which");
+  }
+
+ private:
+  core::LogSink log_;
+  Repairs repairs_;
+  int tidied_ = 0;
+};
 
 /// PLY, OBJ and STL are whole in one file.
 bool is_whole(interfaces::MeshFormat format) {
@@ -45,10 +70,11 @@ std::string carried_mesh_name(const interfaces::MeshRequest& request, const std:
   return name + "@" + core::rounded_text(request.scale) + (request.y_up ? "y" : "") + ".ply";
 }
 
-interfaces::SceneFileOptions options(const core::LogSink& log, const std::filesystem::path& scene = {},
+/// `remarks` must outlive the options.
+interfaces::SceneFileOptions options(MeshRemarks& remarks, const std::filesystem::path& scene = {},
                                      FilesOfScene* files = nullptr) {
   interfaces::SceneFileOptions options;
-  options.read_mesh = [=](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
+  options.read_mesh = [=, &remarks](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
     const interfaces::MeshReadOptions read = mesh_options(request);
     const auto format = interfaces::mesh_format(request.path);
     if (files && format && is_whole(*format)) {
@@ -56,11 +82,11 @@ interfaces::SceneFileOptions options(const core::LogSink& log, const std::filesy
       auto mesh = interfaces::decode_mesh(*format, bytes, read);
       if (!mesh) return mesh.status().at(request.path.string());
       (*files)[carried_mesh_name(request, scene)] = std::move(bytes);
-      tell(request, *mesh, log);
+      remarks.add(request, *mesh);
       return std::move(mesh->mesh);
     }
     PRESCENE_TRY(interfaces::LoadedMesh mesh, interfaces::read_mesh(request.path, read));
-    tell(request, mesh, log);
+    remarks.add(request, mesh);
     if (files) {
       const std::string ply = interfaces::encode_ply(mesh.mesh);
       (*files)[carried_mesh_name(request, scene)] = {ply.begin(), ply.end()};
@@ -93,14 +119,14 @@ interfaces::SceneFileOptions carried_options(const std::filesystem::path& scene,
   return options;
 }
 
-void tell(const interfaces::FileReport& report, const core::LogSink& log) {
+void log_warnings(const interfaces::FileReport& report, const core::LogSink& log) {
   for (const interfaces::Problem& warning : report.warnings) core::log(log, core::LogLevel::kWarning, warning.text());
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> shared(core::Result<belief::Scene> scene,
                                                           const interfaces::FileReport& report,
                                                           const core::LogSink& log) {
-  tell(report, log);
+  log_warnings(report, log);
   if (!scene) return scene.status();
   return std::shared_ptr<const belief::Scene>(std::make_shared<belief::Scene>(*std::move(scene)));
 }
@@ -122,14 +148,18 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
                                                                    const std::filesystem::path& path,
                                                                    const core::LogSink& log, FilesOfScene* files) {
   interfaces::FileReport report;
-  return shared(interfaces::parse_scene(text, path.string(), options(log, path, files), &report), report, log);
+  MeshRemarks remarks(log, Repairs::kCounted);
+  auto scene = interfaces::parse_scene(text, path.string(), options(remarks, path, files), &report);
+  remarks.finish(path);
+  return shared(std::move(scene), report, log);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std::string& text,
                                                                        const std::filesystem::path& path,
                                                                        const core::LogSink& log,
                                                                        interfaces::FileReport& report) {
-  return shared(interfaces::parse_scene(text, path.string(), options(log, path), &report), report, log);
+  MeshRemarks remarks(log, Repairs::kEach);
+  return shared(interfaces::parse_scene(text, path.string(), options(remarks, path), &report), report, log);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std::string& text,
@@ -141,19 +171,23 @@ core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std:
 }
 
 bool is_model_file(const std::filesystem::path& path) {
-  const auto document = interfaces::read_yaml(path, {});
+  interfaces::Problems repeated_keys;  // the file is one for all that
+  const auto document = interfaces::read_yaml(path, {}, &repeated_keys);
   return document && document->find("model") && !document->find("models") && !document->find("objects");
 }
 
 bool is_learned_file(const std::filesystem::path& path) {
-  const auto document = interfaces::read_yaml(path, {});
+  interfaces::Problems repeated_keys;  // the file is one for all that
+  const auto document = interfaces::read_yaml(path, {}, &repeated_keys);
   return document && document->find("learned") && !document->find("models") && !document->find("objects");
 }
 
-core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log) {
-  interfaces::FileReport report;
-  core::Result<belief::ObjectModel> model = interfaces::read_model(path, path.stem().string(), options(log), &report);
-  tell(report, log);
+core::Result<belief::ObjectModel> load_reported_model(const std::filesystem::path& path, const core::LogSink& log,
+                                                      interfaces::FileReport& report) {
+  MeshRemarks remarks(log, Repairs::kEach);
+  core::Result<belief::ObjectModel> model =
+      interfaces::read_model(path, path.stem().string(), options(remarks), &report);
+  log_warnings(report, log);
   return model;
 }
 

@@ -190,7 +190,7 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
   PRESCENE_RETURN_IF_ERROR(steps.begin(0.3, "edges"));
   found.topology = geometry::mesh_topology(mesh);
   found.box = geometry::bounding_box(mesh);
-  found.doubtful_scale = interfaces::scale_hint(found.box);
+  found.doubtful_scale = interfaces::scale_hint(found.box, options.read.metres_per_unit);
   found.surface_area = geometry::surface_area(mesh);
   found.remarks = found.loaded.warnings;
 

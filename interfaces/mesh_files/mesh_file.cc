@@ -93,7 +93,8 @@ Result<LoadedMesh> finish(RawMesh raw, const MeshReadOptions& options) {
   }
   out.mesh = *std::move(repaired);
   out.colors = colors_after_repair(before, raw.colors, out.mesh.vertices);
-  if (const auto hint = scale_hint(geometry::bounding_box(out.mesh))) out.warnings.push_back(*hint);
+  if (const auto hint = scale_hint(geometry::bounding_box(out.mesh), options.metres_per_unit))
+    out.warnings.push_back(*hint);
   out.warnings.insert(out.warnings.end(), raw.warnings.begin(), raw.warnings.end());
   if (!raw.first_non_finite.empty()) {
     out.warnings.push_back(raw.first_non_finite +
@@ -179,14 +180,21 @@ Result<LoadedMesh> decode_mesh(MeshFormat format, std::span<const std::uint8_t> 
   return finish(std::move(raw), options);
 }
 
-std::optional<std::string> scale_hint(const geometry::Box& box) {
+std::optional<std::string> scale_hint(const geometry::Box& box, double metres_per_unit) {
   if (box.isEmpty()) return std::nullopt;
   const geometry::Vector3d size = box.sizes();
-  if (size.maxCoeff() > kLargestObject)
-    return "the bounding box is " + extent_text(size) + ": the mesh is probably in millimetres; set its scale to 0.001";
-  if (size.maxCoeff() < kSmallestObject)
-    return "the bounding box is " + extent_text(size) + ": the scale was probably applied twice; set it to 1";
-  return std::nullopt;
+  const double longest = size.maxCoeff();
+  if (longest <= kLargestObject && longest >= kSmallestObject) return std::nullopt;
+  std::string hint = "the bounding box is " + extent_text(size);
+  if (metres_per_unit != 1.0) hint += " at the scale " + core::rounded_text(metres_per_unit);
+  // That of a file in metres, in millimetres, and of one that was scaled from millimetres once too often.
+  for (const double scale : {1.0, 0.001, 1000.0}) {
+    const double meant = longest / metres_per_unit * scale;
+    if (meant > kLargestObject || meant < kSmallestObject) continue;
+    const char* unit = scale == 1.0 ? "in metres" : scale < 1.0 ? "in millimetres" : "scaled by 0.001 already";
+    return hint + ": the mesh is probably " + unit + "; set its scale to " + core::rounded_text(scale);
+  }
+  return hint + ": hardly any object is of this size; check its scale";
 }
 
 Status check_triangle_count(std::size_t count, const MeshReadOptions& options) {

@@ -237,12 +237,12 @@ LearnedModel learned_model(const belief::ObjectModel& fitted) {
 
 core::Result<LearnedFile> parse_learned(std::string_view text, const std::string& file, FileReport* report,
                                         const YamlLimits& limits) {
-  const core::Result<LocatedValue> document = parse_yaml(text, file, limits);
+  Problems problems;
+  const core::Result<LocatedValue> document = parse_yaml(text, file, limits, &problems);
   if (!document) {
-    if (report) report->errors.push_back({file, 0, 0, "", document.status().message(), ""});
+    if (report) *report = unread_report(file, document.status(), problems);
     return document.status();
   }
-  Problems problems;
   LearnedFile learned;
   {
     Binder root(*document, problems);

@@ -26,14 +26,15 @@ constexpr std::size_t kMostKeys = 1024;  // of one map: each new one is compared
 
 // Carries a status out of the parser's callbacks; caught in parse_yaml.
 struct Stop : std::exception {
-  explicit Stop(core::Status s) : status(std::move(s)) {}
-  core::Status status;
+  Stop(core::StatusCode c, Problem p) : code(c), problem(std::move(p)) {}
+  core::StatusCode code;
+  Problem problem;
 };
 
 class TreeBuilder final : public YAML::EventHandler {
  public:
-  TreeBuilder(const std::string& file, const YamlLimits& limits)
-      : file_(std::make_shared<const std::string>(file)), limits_(limits) {}
+  TreeBuilder(const std::string& file, const YamlLimits& limits, Problems* problems)
+      : file_(std::make_shared<const std::string>(file)), limits_(limits), problems_(problems) {}
 
   bool has_document() const { return has_root_; }
   LocatedValue take() {
@@ -86,14 +87,14 @@ class TreeBuilder final : public YAML::EventHandler {
     LocatedValue value;
     YAML::anchor_t anchor;
     bool has_key = false;
+    bool key_is_repeated = false;  // the next value is left out
   };
 
   FilePlace place_of(const YAML::Mark& mark) const { return {file_, mark.line + 1, mark.column + 1}; }
 
   [[noreturn]] void stop(const FilePlace& place, std::string reason, std::string remedy,
                          core::StatusCode code = core::StatusCode::kInvalidInput) const {
-    const Problem problem{*place.file, place.line, place.column, "", std::move(reason), std::move(remedy)};
-    throw Stop(core::Status(code, problem.text()));
+    throw Stop(code, {*place.file, place.line, place.column, "", std::move(reason), std::move(remedy)});
   }
 
   // Of a value and everything in it.
@@ -145,8 +146,8 @@ class TreeBuilder final : public YAML::EventHandler {
     if (parent.value.kind == LocatedValue::Kind::kMap && !parent.has_key) {
       add_key(parent, value);
     } else {
-      parent.value.items.push_back(std::move(value));
-      parent.has_key = false;
+      if (!parent.key_is_repeated) parent.value.items.push_back(std::move(value));
+      parent.has_key = parent.key_is_repeated = false;
     }
   }
 
@@ -159,13 +160,17 @@ class TreeBuilder final : public YAML::EventHandler {
            core::StatusCode::kResourceExhausted);
     const auto same = std::find_if(map.value.keys.begin(), map.value.keys.end(),
                                    [&](const LocatedValue::Key& other) { return other.name == key.text; });
-    if (same != map.value.keys.end())
-      stop(key.place,
-           "the key " + interfaces::quote(key.text) + " is here twice, first on line " +
-               std::to_string(same->place.line),
-           "remove or rename one");
-    map.value.keys.push_back({key.text, key.place});
     map.has_key = true;
+    if (same == map.value.keys.end()) {
+      map.value.keys.push_back({key.text, key.place});
+      return;
+    }
+    std::string reason =
+        "the key " + interfaces::quote(key.text) + " is here twice, first on line " + std::to_string(same->place.line);
+    const char* remedy = "remove or rename one";
+    if (!problems_) stop(key.place, std::move(reason), remedy);
+    problems_->add(key.place, "", std::move(reason), remedy);
+    map.key_is_repeated = true;
   }
 
   static std::string shown(const std::string& key) {
@@ -188,6 +193,7 @@ class TreeBuilder final : public YAML::EventHandler {
 
   std::shared_ptr<const std::string> file_;
   const YamlLimits limits_;
+  Problems* problems_;
   LocatedValue root_;
   bool has_root_ = false;
   std::vector<Open> stack_;
@@ -196,12 +202,60 @@ class TreeBuilder final : public YAML::EventHandler {
   std::size_t bytes_ = 0;
 };
 
-core::Status syntax_error(const std::string& file, const YAML::Exception& error) {
-  std::string remedy =
+/// Lines of a text, each without its end.
+std::vector<std::string_view> lines_of(std::string_view text) {
+  std::vector<std::string_view> lines;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    lines.push_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return lines;
+}
+
+/// The parser notices what is missing at the end of a line when it reads on: an open bracket, or a key without its
+/// colon. The line (from 1) on which it is missing, with what to do; nothing if the mistake is where the parser noticed
+/// it.
+std::optional<std::pair<int, std::string>> mistake_before(const YAML::Exception& error, std::string_view text) {
+  const bool open_bracket = error.msg.find("flow not found") != std::string::npos;
+  if (error.mark.is_null() || (!open_bracket && error.msg != "illegal map value")) return std::nullopt;
+  const std::vector<std::string_view> lines = lines_of(text);
+  const auto noticed = std::min(static_cast<std::size_t>(error.mark.line), lines.size());
+  std::size_t line = noticed;  // from 1, the last one above that says something
+  const auto says_nothing = [](std::string_view of) {
+    const std::size_t first = of.find_first_not_of(" \t\r");
+    return first == std::string_view::npos || of[first] == '#';
+  };
+  while (line > 0 && says_nothing(lines[line - 1])) --line;
+  if (line == 0) return std::nullopt;
+  if (open_bracket) return std::pair(static_cast<int>(line), std::string("close the bracket that is open here"));
+  const std::string_view here = noticed < lines.size() ? lines[noticed] : std::string_view();
+  const std::string_view before_mark = here.substr(0, static_cast<std::size_t>(std::max(0, error.mark.column)));
+  const bool key_alone = before_mark.find(':') == std::string_view::npos && here.find('\t') == std::string_view::npos;
+  if (!key_alone || lines[line - 1].find(':') != std::string_view::npos) return std::nullopt;
+  return std::pair(static_cast<int>(line), std::string("write ':' and a space after the key"));
+}
+
+Problem syntax_error(const std::string& file, const YAML::Exception& error, std::string_view text) {
+  Problem problem{file, error.mark.is_null() ? 0 : error.mark.line + 1, error.mark.column + 1,
+                  "",   "this is not YAML (" + error.msg + ")",         ""};
+  problem.remedy =
       "check the indentation (spaces, no tabs), a space after each ':' and '-', and pairs of quotes and brackets";
-  const Problem problem{file, error.mark.is_null() ? 0 : error.mark.line + 1, error.mark.column + 1,
-                        "",   "this is not YAML (" + error.msg + ")",         std::move(remedy)};
-  return core::invalid_input(problem.text());
+  if (auto before = mistake_before(error, text)) {
+    problem.line = before->first;
+    problem.column = 0;
+    problem.remedy = std::move(before->second);
+  }
+  return problem;
+}
+
+/// What ends the reading, alone or after what was collected.
+core::Status failure(core::StatusCode code, const Problem& problem, Problems* problems) {
+  if (!problems) return core::Status(code, problem.text());
+  const bool alone = problems->empty();
+  problems->add({std::make_shared<const std::string>(problem.file), problem.line, problem.column}, problem.key,
+                problem.reason, problem.remedy);
+  return alone ? core::Status(code, problem.text()) : problems->status();
 }
 
 }  // namespace
@@ -222,7 +276,8 @@ bool is_wide(std::string_view text) {
 
 }  // namespace
 
-core::Result<LocatedValue> parse_yaml(std::string_view text, const std::string& file, const YamlLimits& limits) {
+core::Result<LocatedValue> parse_yaml(std::string_view text, const std::string& file, const YamlLimits& limits,
+                                      Problems* problems) {
   if (text.size() > limits.max_bytes)
     return core::resource_exhausted(file + ": " + size_text(text.size()) + " are more than the limit of " +
                                     size_text(limits.max_bytes) + ": make the file smaller");
@@ -234,23 +289,24 @@ core::Result<LocatedValue> parse_yaml(std::string_view text, const std::string& 
   try {
     std::istringstream stream{std::string(text)};
     YAML::Parser parser(stream);
-    TreeBuilder builder(file, limits);
+    TreeBuilder builder(file, limits, problems);
     while (parser.HandleNextDocument(builder)) {
     }
     if (!builder.has_document()) return core::invalid_input(file + ": the file is empty: write at least one key");
     return builder.take();
   } catch (const Stop& stop) {
-    return stop.status;
+    return failure(stop.code, stop.problem, problems);
   } catch (const YAML::Exception& error) {
-    return syntax_error(file, error);
+    return failure(core::StatusCode::kInvalidInput, syntax_error(file, error, text), problems);
   } catch (const std::exception& error) {
     return core::invalid_input(file + ": this is not YAML (" + std::string(error.what()) + "): check the file");
   }
 }
 
-core::Result<LocatedValue> read_yaml(const std::filesystem::path& path, const YamlLimits& limits) {
+core::Result<LocatedValue> read_yaml(const std::filesystem::path& path, const YamlLimits& limits, Problems* problems) {
   PRESCENE_TRY(const std::vector<std::uint8_t> bytes, read_file(path, limits.max_bytes));
-  return parse_yaml(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path.string(), limits);
+  return parse_yaml(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path.string(), limits,
+                    problems);
 }
 
 }  // namespace prescene::interfaces

@@ -200,14 +200,15 @@ core::Status write_model(const std::filesystem::path& path, const ModelFile& fil
 
 namespace {
 
-core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& document, const std::string& file,
-                                           const std::string& name, const SceneFileOptions& options, FileReport* report,
+/// `problems`: those that the document was read with.
+core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& document, Problems problems,
+                                           const std::string& file, const std::string& name,
+                                           const SceneFileOptions& options, FileReport* report,
                                            std::optional<ModelThrows>* throws) {
   if (!document) {
-    if (report) report->errors.push_back({file, 0, 0, "", document.status().message(), ""});
+    if (report) *report = unread_report(file, document.status(), problems);
     return document.status();
   }
-  Problems problems;
   belief::Scene scene;
   SceneContext context{problems, options, scene, {}, {}, {}, {}, {}};
   belief::ObjectModel model;
@@ -232,13 +233,17 @@ core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& doc
 core::Result<belief::ObjectModel> read_model(const std::filesystem::path& path, const std::string& name,
                                              const SceneFileOptions& options, FileReport* report,
                                              std::optional<ModelThrows>* throws) {
-  return model_of(read_yaml(path, options.limits), path.string(), name, options, report, throws);
+  Problems problems;
+  const core::Result<LocatedValue> document = read_yaml(path, options.limits, &problems);
+  return model_of(document, std::move(problems), path.string(), name, options, report, throws);
 }
 
 core::Result<belief::ObjectModel> parse_model(std::string_view text, const std::string& file, const std::string& name,
                                               const SceneFileOptions& options, FileReport* report,
                                               std::optional<ModelThrows>* throws) {
-  return model_of(parse_yaml(text, file, options.limits), file, name, options, report, throws);
+  Problems problems;
+  const core::Result<LocatedValue> document = parse_yaml(text, file, options.limits, &problems);
+  return model_of(document, std::move(problems), file, name, options, report, throws);
 }
 
 }  // namespace prescene::interfaces

@@ -33,6 +33,9 @@ struct SceneContext {
   std::vector<std::string> all_things() const;
 };
 
+/// Of a file that could not be read: what was collected, or else the status.
+FileReport unread_report(const std::string& file, const core::Status& status, const Problems& problems);
+
 belief::ObjectModel read_object_model(const LocatedValue& value, const std::string& name, SceneContext& context);
 ModelThrows read_model_throws(const LocatedValue& value, Problems& problems);
 /// [xx, yy, zz] or three rows, about the centre of mass of a body of 1 kg.

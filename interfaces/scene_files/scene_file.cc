@@ -289,14 +289,19 @@ belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context
   return camera;
 }
 
+FileReport unread_report(const std::string& file, const core::Status& status, const Problems& problems) {
+  if (!problems.empty()) return {problems.errors(), problems.warnings()};
+  return {{{file, 0, 0, "", status.message(), ""}}, {}};
+}
+
 core::Result<Scene> parse_scene(std::string_view text, const std::string& file, const SceneFileOptions& options,
                                 FileReport* report) {
-  core::Result<LocatedValue> document = parse_yaml(text, file, options.limits);
+  Problems problems;
+  core::Result<LocatedValue> document = parse_yaml(text, file, options.limits, &problems);
   if (!document) {
-    if (report) report->errors.push_back({file, 0, 0, "", document.status().message(), ""});
+    if (report) *report = unread_report(file, document.status(), problems);
     return document.status();
   }
-  Problems problems;
   Scene scene;
   SceneContext context{problems, options, scene, {}, {}, {}, {}, {}};
   read_sections(*document, context);

@@ -20,6 +20,7 @@ struct AchieveVerbOptions {
 };
 
 core::Status run(const AchieveVerbOptions& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_png("--map", options.map));
   PRESCENE_RETURN_IF_ERROR(check_output("--map", options.map, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_apart("--map", options.map, "--report", options.report));

@@ -17,6 +17,12 @@ namespace {
 
 constexpr int kLastDomain = 230;
 
+/// What a flag `--NAME,!--no-NAME` says that was given `count` times more often than its opposite.
+bool says_yes(const char* name, std::int64_t count) {
+  if (count == 0) throw CLI::ValidationError(name, "it is given together with its opposite: leave one of the two out");
+  return count > 0;
+}
+
 }  // namespace
 
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
@@ -29,7 +35,7 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
       ->add_option_function<std::string>(
           "--ros-distro", [&dds, distros](const std::string& name) { dds.ros_distro = distros.at(name); },
           "Show up in `ros2 node list` of this release (humble or jazzy); topics work without")
-      ->check(CLI::IsMember({"humble", "jazzy"}));
+      ->check(one_of({"humble", "jazzy"}));
 }
 
 core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds) {
@@ -60,7 +66,7 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
       ->add_option_function<std::string>(
           "--camera", [&tracker](const std::string& name) { apply(*find_camera_preset(name), tracker); },
           "Names that the driver of this camera gives its topics, instead of the defaults below")
-      ->check(CLI::IsMember(presets));
+      ->check(one_of(presets));
   group->add_option("--depth-topic", topics.depth)->check(utf8_text())->capture_default_str();
   group->add_option("--color-topic", topics.color, "Empty = no colour")->check(utf8_text())->capture_default_str();
   group
@@ -68,11 +74,11 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
           "--depth-form", topics.depth_form,
           "What the depth topic carries: image, compressed (compressedDepth) or points (PointCloud2); default: "
           "as its name says")
-      ->check(CLI::IsMember({"image", "compressed", "points"}));
+      ->check(one_of({"image", "compressed", "points"}));
   group
       ->add_option("--color-form", topics.color_form,
                    "What the colour topic carries: image or compressed (JPEG, PNG); default: as its name says")
-      ->check(CLI::IsMember({"image", "compressed"}));
+      ->check(one_of({"image", "compressed"}));
   group->add_option("--camera-info-topic", topics.camera_info)->check(utf8_text())->capture_default_str();
   group->add_option("--tf-topic", topics.tf)->check(utf8_text())->capture_default_str();
   group->add_option("--tf-static-topic", topics.tf_static)->check(utf8_text())->capture_default_str();
@@ -112,10 +118,10 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
           "Pose of the camera where tf has none: x y z qw qx qy qz (m)")
       ->expected(7);
   group->add_flag_function(
-      "--rectified,!--not-rectified", [&assembler](std::int64_t count) { assembler.rectified = count > 0; },
+      "--rectified,!--not-rectified",
+      [&assembler](std::int64_t count) { assembler.rectified = says_yes("--rectified", count); },
       "Whether the images are rectified: P of the camera info is used then, not K and D; default: if the depth topic "
-      "is "
-      "named image_rect...");
+      "is named image_rect...");
 }
 
 void add_web_options(CLI::App& verb, const std::string& prefix, ViewOptions& view) {
@@ -141,7 +147,7 @@ void add_likelihood_options(CLI::App& verb, rendering::LikelihoodChoice& choice)
           "--likelihood", [&choice, names](const std::string& name) { choice.weigher = names.at(name); },
           "What scores poses, with the same bits: the processor; graphics (OpenGL 4.3, also in software); automatic: a "
           "graphics card where there is one")
-      ->check(CLI::IsMember({"automatic", "processor", "graphics"}))
+      ->check(one_of({"automatic", "processor", "graphics"}))
       ->default_str("automatic");
   verb.add_option("--graphics-device", choice.device, "Which of EGL's devices, from 0 on; -1 = the first that will do")
       ->check(CLI::Range(-1, 31))
@@ -160,7 +166,8 @@ void add_belief_options(CLI::App& verb, TrackerSettings& settings, std::string& 
                   "written in the end (docs/reference/scene_files.md)")
       ->check(file_name());
   verb.add_flag_function(
-      "--new-objects,!--no-new-objects", [&settings](std::int64_t count) { settings.new_objects = count > 0; },
+      "--new-objects,!--no-new-objects",
+      [&settings](std::int64_t count) { settings.new_objects = says_yes("--new-objects", count); },
       "Whether to look for things that the scene does not name; default: as the scene says (new_objects)");
 }
 

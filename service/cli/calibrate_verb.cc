@@ -217,7 +217,7 @@ Verb add_calibrate_verb(CLI::App& app) {
           "--keep", options->keep,
           "Parameter that stays as the scene has it; may be repeated (inertia_size is the natural logarithm of "
           "a factor)")
-      ->check(CLI::IsMember(names));
+      ->check(one_of(names));
   verb->add_option("--samples", options->samples,
                    "Simulated starts a recording; 16, of more than 125 recordings fewer, of cube_tosses 24")
       ->check(CLI::Range(2, 4096));
@@ -228,7 +228,7 @@ Verb add_calibrate_verb(CLI::App& app) {
   verb->add_option("--from", options->start,
                    "cube_tosses: where the search starts: measured (read off the recordings), described (by the data "
                    "set), shipped; default measured")
-      ->check(CLI::IsMember({"measured", "described", "shipped"}));
+      ->check(one_of({"measured", "described", "shipped"}));
   verb->footer("Example: prescene calibrate recordings -o mug.yaml");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

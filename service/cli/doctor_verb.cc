@@ -84,6 +84,7 @@ core::Status run(DoctorVerbOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.doctor.dds));
   if (!options.overlay.empty() && options.scene.empty())
     return core::invalid_input("--overlay draws a scene over the camera's image: name the scene file as well");
+  PRESCENE_RETURN_IF_ERROR(check_png("--overlay", options.overlay));
   PRESCENE_RETURN_IF_ERROR(check_output("--overlay", options.overlay, {options.scene}));
   std::shared_ptr<const belief::Scene> scene;
   DoctorCheck scene_check;

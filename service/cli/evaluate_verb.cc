@@ -253,7 +253,7 @@ Verb add_evaluate_verb(CLI::App& app) {
   verb->add_flag("--each", options->own.each, "Of a folder: print a line for each toss (--json always has them)");
   verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
-      ->check(CLI::IsMember({"calibrate", "report", "all"}))
+      ->check(one_of({"calibrate", "report", "all"}))
       ->capture_default_str();
   add_likelihood_options(*verb, options->likelihood);
   verb->add_option("--frames", options->frames,

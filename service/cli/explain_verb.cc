@@ -60,10 +60,17 @@ ExplanationTables tables_of(const Explained& explained) {
         {object.object, fixed_text(100.0 * object.present, 0),
          fixed_text(object.mean.x(), 3) + ", " + fixed_text(object.mean.y(), 3) + ", " + fixed_text(object.mean.z(), 3),
          fixed_text(100.0 * object.radius_90, 1), object.out_of_sight ? "out of sight" : ""});
-  tables.frames = {{"frame, s", "against nothing, nats", "against the second, nats"}};
-  for (const queries::DecidingFrame& frame : answer.frames)
-    tables.frames.push_back({fixed_text(frame.time + explained.from, 2), fixed_text(frame.against_nothing, 1),
-                             fixed_text(frame.against_second, 1)});
+  // Against itself, that nothing happened is worth 0 in every frame.
+  const bool something =
+      !answer.explanations.empty() && answer.explanations.front().kind != belief::EventKind::kNothing;
+  tables.frames = {{"frame, s", "against the second, nats"}};
+  if (something) tables.frames.front().insert(tables.frames.front().begin() + 1, "against nothing, nats");
+  for (const queries::DecidingFrame& frame : answer.frames) {
+    std::vector<std::string>& row = tables.frames.emplace_back();
+    row.push_back(fixed_text(frame.time + explained.from, 2));
+    if (something) row.push_back(fixed_text(frame.against_nothing, 1));
+    row.push_back(fixed_text(frame.against_second, 1));
+  }
   return tables;
 }
 

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"
@@ -127,10 +128,17 @@ core::Status describe_recording(const std::string& path, VerbContext& context) {
 core::Status inspect_recording(const RecordingInspection& options, VerbContext& context) {
   const std::string place = options.input.path.string();
   PRESCENE_RETURN_IF_ERROR(check_apart("--overlay", options.overlay, "--likelihood-map", options.likelihood_map));
-  PRESCENE_RETURN_IF_ERROR(check_output("--overlay", options.overlay, {place}));
-  PRESCENE_RETURN_IF_ERROR(check_output("--likelihood-map", options.likelihood_map, {place}));
+  for (const auto& [name, output] :
+       {std::pair("--overlay", &options.overlay), std::pair("--likelihood-map", &options.likelihood_map)}) {
+    PRESCENE_RETURN_IF_ERROR(check_png(name, *output));
+    PRESCENE_RETURN_IF_ERROR(check_output(name, *output, {place}));
+  }
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(options.input, context.log()));
-  PRESCENE_TRY(const TrackerSettings settings, input.recorded_settings());
+  TrackerSettings settings = options.tracker;
+  if (input.has_settings()) {
+    PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
+    settings = with_given(*options.verb, std::move(recorded), options.tracker);
+  }
   Backends backends(context.pool());
   const CommonOptions& common = context.options();
   const std::uint64_t seed = common.seed_given ? common.seed : input.seed_or(common.seed);

@@ -15,6 +15,8 @@ struct RecordingInspection {
   int frame = 0;               ///< Counted from 0 over the frames that belief steps used.
   std::string overlay;         ///< PNG to write; empty = none.
   std::string likelihood_map;  ///< The same.
+  TrackerSettings tracker;     ///< Topics and camera, where the verb's options name them or the recording does not.
+  const CLI::App* verb = nullptr;
 };
 
 /// Replays up to the frame, prints what is believed there and writes the pictures. kInvalidInput where the recording is

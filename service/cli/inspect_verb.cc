@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <span>
@@ -32,8 +34,12 @@ struct InspectOptions {
 };
 
 constexpr const char* kMeshOptions[] = {"--output", "--use", "--density", "--scale", "--y-up", "--report"};
-constexpr const char* kRecordingOptions[] = {"--frame",          "--scene",       "--overlay",
-                                             "--likelihood-map", "--depth-scale", "--depth-noise"};
+/// What says which frame is looked at, and how.
+constexpr const char* kFrameOptions[] = {
+    "--frame",        "--scene",       "--overlay",     "--likelihood-map",    "--camera",   "--depth-topic",
+    "--color-topic",  "--depth-form",  "--color-form",  "--camera-info-topic", "--tf-topic", "--tf-static-topic",
+    "--use-sim-time", "--world-frame", "--camera-pose", "--rectified"};
+constexpr const char* kOtherRecordingOptions[] = {"--depth-scale", "--depth-noise"};
 
 bool is_recording(const std::filesystem::path& path) {
   return path.extension() == ".mcap" || path.extension() == ".db3" || std::filesystem::is_directory(path);
@@ -41,8 +47,14 @@ bool is_recording(const std::filesystem::path& path) {
 
 /// kInvalidInput for an option that is for the other kind of file.
 core::Status check_options(const InspectOptions& options, bool recording) {
-  for (const char* name :
-       recording ? std::span<const char* const>(kMeshOptions) : std::span<const char* const>(kRecordingOptions))
+  std::vector<const char*> others;
+  if (recording) {
+    others.assign(std::begin(kMeshOptions), std::end(kMeshOptions));
+  } else {
+    others.assign(std::begin(kFrameOptions), std::end(kFrameOptions));
+    others.insert(others.end(), std::begin(kOtherRecordingOptions), std::end(kOtherRecordingOptions));
+  }
+  for (const char* name : others)
     if (options.verb->count(name) > 0)
       return core::invalid_input(std::string(name) + " is for " + (recording ? "meshes" : "recordings") + ", and " +
                                  options.file + " is " +
@@ -128,6 +140,8 @@ std::string text_of(const DepthNoise& noise) {
 }
 
 core::Status inspect_mesh(InspectOptions& options, VerbContext& context) {
+  if (!options.use.empty() && options.model.empty())
+    return core::invalid_input("--use is written into the model file: name one with -o, or leave it out");
   PRESCENE_RETURN_IF_ERROR(check_output("-o", options.model, {options.file}));
   PRESCENE_RETURN_IF_ERROR(check_apart("-o", options.model, "--report", options.report));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.file}));
@@ -159,19 +173,19 @@ core::Status run(InspectOptions& options, VerbContext& context) {
   const bool recording = is_recording(options.file);
   PRESCENE_RETURN_IF_ERROR(check_options(options, recording));
   if (!recording) return inspect_mesh(options, context);
+  const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
   if (options.depth_noise) {
-    for (const char* name : {"--frame", "--scene", "--overlay", "--likelihood-map"})
-      if (options.verb->count(name) > 0)
+    for (const char* name : kFrameOptions)
+      if (given(name))
         return core::invalid_input(std::string(name) + " does not go with --depth-noise: leave one of them out");
     PRESCENE_TRY(const DepthNoise noise, depth_noise_of(options.file, options.recording.input.metres_per_unit,
                                                         context.progress("reading"), context.cancellation()));
     context.print(to_json(noise), text_of(noise));
     return core::ok_status();
   }
-  const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
-  if (interfaces::is_bag(options.file) && !given("--frame") && !given("--scene") && !given("--overlay") &&
-      !given("--likelihood-map"))
+  if (interfaces::is_bag(options.file) && std::none_of(std::begin(kFrameOptions), std::end(kFrameOptions), given))
     return describe_recording(options.file, context);
+  options.recording.verb = options.verb;
   options.recording.input.path = options.file;
   options.recording.input.scene_file = options.scene;
   return inspect_recording(options.recording, context);
@@ -191,7 +205,7 @@ Verb add_inspect_verb(CLI::App& app) {
   verb->add_option("-o,--output", options->model, "Write a model file that scene files can name")->check(file_name());
   verb->add_option("--use", options->use,
                    "With -o: what the mesh collides as; default: by its shape, hollow objects as spheres")
-      ->check(CLI::IsMember({"convex_hull", "convex_parts", "decompose", "spheres"}));
+      ->check(one_of({"convex_hull", "convex_parts", "decompose", "spheres"}));
   verb->add_option("--density", options->inspection.density, "kg/m^3")
       ->check(number_between(0.1, 25000.0))
       ->capture_default_str();
@@ -217,6 +231,8 @@ Verb add_inspect_verb(CLI::App& app) {
   verb->add_option("--likelihood-map", options->recording.likelihood_map,
                    "Of a recording: write a PNG of what each pixel says for or against the poses believed")
       ->check(file_name());
+  add_topic_options(*verb, options->recording.tracker);
+  add_camera_options(*verb, options->recording.tracker.assembler);
   options->verb = verb;
   verb->footer(
       "Examples: prescene inspect cup.stl --scale 0.001 -o cup.yaml --report cup.html\n"

@@ -158,6 +158,7 @@ core::Status run(const PredictOptions& options, VerbContext& context) {
         "--outcomes-only is for --json without --report and --heat-map, which show where things end: leave it out (the "
         "text without --json works out no more than outcomes by itself)");
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.scene}));
+  PRESCENE_RETURN_IF_ERROR(check_png("--heat-map", options.heat_map));
   PRESCENE_RETURN_IF_ERROR(check_output("--heat-map", options.heat_map, {options.scene}));
   PRESCENE_RETURN_IF_ERROR(check_apart("--heat-map", options.heat_map, "--report", options.report));
   PRESCENE_TRY(auto scene, load_scene(options.scene, context.log()));
@@ -241,7 +242,7 @@ Verb add_predict_verb(CLI::App& app) {
           "Simulator. lockstep: many instances at once, 3 to 7 times faster, but not every scene "
           "(docs/reference/simulation.md says which; others are refused). bullet: every scene. automatic: lockstep "
           "where it can, else bullet, and the answer says why")
-      ->check(CLI::IsMember({"automatic", "bullet", "lockstep"}))
+      ->check(one_of({"automatic", "bullet", "lockstep"}))
       ->capture_default_str();
   verb->add_option("--step", options->step,
                    "Of the simulation, s, or auto: by the size of the smallest object; instead of the scene's")

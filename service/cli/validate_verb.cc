@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/scene_report.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -35,14 +38,32 @@ class Warnings {
   std::vector<std::string> texts_;
 };
 
-Checked bad(const std::string& file, const core::Status& status) {
-  return {status, {{"file", file}, {"valid", false}, {"errors", status.message()}}, status.message()};
+/// Each mistake by itself; a file that could not be read is one.
+Checked bad(const std::string& file, const core::Status& status, const interfaces::FileReport& report) {
+  nlohmann::ordered_json errors = nlohmann::ordered_json::array();
+  std::vector<interfaces::Problem> problems = report.errors;
+  std::stable_sort(problems.begin(), problems.end(), [](const interfaces::Problem& a, const interfaces::Problem& b) {
+    return std::tie(a.file, a.line, a.column) < std::tie(b.file, b.line, b.column);
+  });
+  for (const interfaces::Problem& problem : problems) {
+    const std::string key = problem.key.empty() ? "" : problem.key + ": ";
+    errors.push_back({{"file", problem.file},
+                      {"line", problem.line > 0 ? nlohmann::ordered_json(problem.line) : nlohmann::ordered_json()},
+                      {"message", key + problem.reason},
+                      {"remedy", problem.remedy}});
+  }
+  if (errors.empty())
+    errors.push_back({{"file", file}, {"line", nullptr}, {"message", status.message()}, {"remedy", ""}});
+  return {status, {{"file", file}, {"valid", false}, {"errors", std::move(errors)}}, status.message()};
 }
 
 Checked check_scene(const std::string& file, VerbContext& context) {
   Warnings warnings(context.log());
-  const auto scene = load_scene(file, warnings.sink());
-  if (!scene) return bad(file, scene.status());
+  interfaces::FileReport report;
+  const auto text = read_scene_text(file);
+  if (!text) return bad(file, text.status(), report);
+  const auto scene = load_reported_scene(*text, file, warnings.sink(), report);
+  if (!scene) return bad(file, scene.status(), report);
   const int dimensions = start_dimensions(**scene);
   return {{},
           {{"file", file},
@@ -59,18 +80,20 @@ Checked check_scene(const std::string& file, VerbContext& context) {
 
 Checked check_model(const std::string& file, VerbContext& context) {
   Warnings warnings(context.log());
-  const auto model = load_model(file, warnings.sink());
-  if (!model) return bad(file, model.status());
+  interfaces::FileReport report;
+  const auto model = load_reported_model(file, warnings.sink(), report);
+  if (!model) return bad(file, model.status(), report);
   return {{},
           {{"file", file}, {"valid", true}, {"model", model->name}, {"warnings", warnings.texts()}},
           file + ": valid: a model file" + warnings.count()};
 }
 
 Checked check_learned(const std::string& file) {
+  interfaces::FileReport report;
   const auto text = read_scene_text(file);
-  if (!text) return bad(file, text.status());
-  const auto learned = interfaces::parse_learned(*text, file);
-  if (!learned) return bad(file, learned.status());
+  if (!text) return bad(file, text.status(), report);
+  const auto learned = interfaces::parse_learned(*text, file, &report);
+  if (!learned) return bad(file, learned.status(), report);
   return {{},
           {{"file", file},
            {"valid", true},

@@ -26,6 +26,7 @@
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/scene_files/problems.h"
 #include "prescene/service/recording/recording.h"
 
 namespace prescene::service {
@@ -228,6 +229,16 @@ CLI::Validator in_range(const belief::ScalarRange& range) {
           core::rounded_text(range.low) + " to " + core::rounded_text(range.high)};
 }
 
+CLI::Validator one_of(std::vector<std::string> words) {
+  std::string known;
+  for (const std::string& word : words) known += (known.empty() ? "{" : ",") + word;
+  return {[words = std::move(words)](std::string& text) -> std::string {
+            if (std::find(words.begin(), words.end(), text) != words.end()) return "";
+            return interfaces::quote(text) + " is not known here: " + interfaces::suggestion(text, words);
+          },
+          known + "}"};
+}
+
 CLI::Validator utf8_text() {
   return {[](std::string& text) -> std::string {
             const std::optional<std::size_t> byte = core::not_utf8_at(text);
@@ -302,6 +313,13 @@ core::Status check_output(const std::string& option, const std::string& output,
   if (!aside) return core::unavailable(option + " " + aside.status().message());
   std::filesystem::remove(*aside, none);
   return core::ok_status();
+}
+
+core::Status check_png(const std::string& option, const std::string& output) {
+  const std::filesystem::path extension = std::filesystem::path(output).extension();
+  if (extension.empty() || extension == ".png" || extension == ".PNG") return core::ok_status();
+  return core::invalid_input(option + " " + output +
+                             ": the picture is written as PNG: give it a name that ends in .png");
 }
 
 core::Status check_recording(const std::string& option, const std::string& output,

@@ -137,6 +137,8 @@ CLI::Validator positive_number();
 CLI::Validator number_between(double low, double high);
 /// As questions over the bus and in JSON are checked: belief::check_number.
 CLI::Validator in_range(const belief::ScalarRange& range);
+/// One of these words; the message says which of them was probably meant.
+CLI::Validator one_of(std::vector<std::string> words);
 /// Text that others can read: UTF-8.
 CLI::Validator utf8_text();
 /// A name that is not empty, nor an option that took the place of one.
@@ -150,7 +152,10 @@ core::Status check_apart(const std::string& option, const std::string& output, c
 /// written, so that nobody waits for a result that is then lost. Empty names are no files.
 core::Status check_output(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
-/// The same for a recording, which is never a device or pipe.
+/// kInvalidInput if the name of a picture that is written as PNG ends like that of another kind of file (".jpg").
+core::Status check_png(const std::string& option, const std::string& output);
+
+/// check_output for a recording, which is never a device or pipe.
 core::Status check_recording(const std::string& option, const std::string& output,
                              const std::vector<std::string>& inputs);
 

@@ -254,6 +254,8 @@ TEST(Achieve, RefusesWhatMakesNoSense) {
   query = question();
   query.errors.delay = belief::NormalScalar{0.1, 0.1};
   EXPECT_THAT(error_of(query).message(), HasSubstr("delay"));
+  query.errors.delay = belief::FixedScalar{0.1};
+  EXPECT_THAT(error_of(query).message(), HasSubstr("of a release or push"));
   query = question();
   query.probability = 1.0;
   EXPECT_THAT(error_of(query).message(), HasSubstr("probability"));

@@ -92,6 +92,72 @@ TEST(CommandLine, AMistypedOptionIsNamedWithTheNearest) {
   }
 }
 
+TEST(CommandLine, AMistypedWordOfAnOptionIsNamedWithTheNearest) {
+  const Finished finished = run_program({"predict", scenario("milk_on_bin"), "--stepper", "lockstp"});
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_NE(finished.err.find("--stepper: 'lockstp' is not known here: did you mean 'lockstep'?"), std::string::npos)
+      << finished.err;
+}
+
+TEST(CommandLine, WhatWouldHaveNoEffectIsRefused) {
+  const std::string scene = scenario("milk_on_bin");
+  for (const auto& [args, said] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"predict", scene, "--heat-map", "map.jpg"}, "--heat-map map.jpg: the picture is written as PNG"},
+           {{"achieve", scene, "--outcome", "in_bin", "--free", "position", "--map", "map.svg"}, "is written as PNG"},
+           {{"achieve", scene, "--outcome", "in_bin", "--free", "position", "--delay", "0.1"},
+            "errors.delay: that is of"},
+           {{"inspect", "cup.ply", "--use", "spheres"}, "--use is written into the model file"},
+           {{"inspect", "cup.ply", "--depth-topic", "/d"}, "--depth-topic is for recordings"},
+           {{"inspect", "r.mcap", "--depth-noise", "--depth-topic", "/d"}, "does not go with --depth-noise"},
+           {{"doctor", "--rectified", "--not-rectified"}, "--rectified: it is given together with its opposite"},
+           {{"serve", "--scene", scene, "--new-objects", "--no-new-objects"}, "together with its opposite"}}) {
+    const Finished finished = run_program(args);
+    EXPECT_EQ(finished.exit_code, 2) << args[0] << finished.err;
+    EXPECT_NE(finished.err.find(said), std::string::npos) << finished.err;
+  }
+}
+
+TEST(CommandLine, ValidateListsEachMistakeByItself) {
+  const ScratchDir folder;
+  const std::string scene = (folder.path() / "wrong.yaml").string();
+  write_file(scene,
+             "models:\n  a: {box: [0.1, 0.1, 0.1], mass: 1, mass: 2, fricton: 1}\n"
+             "objects:\n  a: {model: b, pose: {position: [0, 0, 0]}}\n");
+  const Finished finished = run_program({"validate", scene, "--json"});
+  EXPECT_EQ(finished.exit_code, 2);
+  const auto errors = parsed(finished)["files"][0]["errors"];
+  ASSERT_EQ(errors.size(), 3u) << finished.out;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    EXPECT_EQ(errors[i]["file"], scene);
+    EXPECT_FALSE(errors[i]["remedy"].get<std::string>().empty());
+  }
+  std::string all;
+  for (const auto& error : errors)
+    all += std::to_string(error["line"].get<int>()) + " " + error["message"].get<std::string>() + "\n";
+  EXPECT_NE(all.find("2 the key 'mass' is here twice"), std::string::npos) << all;
+  EXPECT_NE(all.find("2 models.a.fricton: unknown key"), std::string::npos) << all;
+  EXPECT_NE(all.find("4 objects.a.model: 'b' is not a model"), std::string::npos) << all;
+}
+
+TEST(CommandLine, OnlyValidateSaysHowEachMeshWasTidiedUp) {
+  const ScratchDir folder;
+  // A tetrahedron with one corner twice.
+  write_file((folder.path() / "wedge.obj").string(),
+             "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nv 0 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 5 4\n");
+  const std::string scene = (folder.path() / "scene.yaml").string();
+  write_file(scene,
+             "models:\n  wedge: {mesh: {file: wedge.obj}, mass: 0.1}\nsupports:\n  floor: {ground: {size: 2}}\n"
+             "objects:\n  wedge: {model: wedge, pose: {position: [0, 0, 0.01]}}\n");
+  const Finished checked = run_program({"validate", scene});
+  EXPECT_NE(checked.err.find("wedge.obj: 1 vertices at the same place made one"), std::string::npos) << checked.err;
+  EXPECT_NE(checked.out.find("1 warning"), std::string::npos) << checked.out;
+  const Finished predicted = run_program({"predict", scene, "--max-instances", "16"});
+  EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+  EXPECT_NE(predicted.err.find("1 mesh has triangles or vertices that were tidied up"), std::string::npos)
+      << predicted.err;
+  EXPECT_EQ(predicted.err.find("made one"), std::string::npos) << predicted.err;
+}
+
 TEST(CommandLine, ProgressFitsTheTerminal) {
   for (const int columns : {24, 60, 80, 200}) {
     const std::string seen =

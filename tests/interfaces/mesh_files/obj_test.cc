@@ -77,7 +77,16 @@ TEST(ScaleHint, DoubtsUnlikelySizes) {
   EXPECT_EQ(*hint(97.0),
             "the bounding box is 0.97 x 97 x 9.7 m: the mesh is probably in millimetres; set its scale to 0.001");
   EXPECT_EQ(*hint(0.0002),
-            "the bounding box is 2e-06 x 0.0002 x 2e-05 m: the scale was probably applied twice; set it to 1");
+            "the bounding box is 2e-06 x 0.0002 x 2e-05 m: the mesh is probably scaled by 0.001 already; set its scale "
+            "to 1000");
+  const geometry::Box hundred_metres(Vector3d::Zero(), Vector3d(80.0, 97.0, 60.0));
+  EXPECT_EQ(*scale_hint(hundred_metres, 1000.0),
+            "the bounding box is 80 x 97 x 60 m at the scale 1000: the mesh is probably in metres; set its scale to 1");
+  EXPECT_EQ(
+      *scale_hint(geometry::Box(Vector3d::Zero(), Vector3d::Constant(1e-4)), 0.001),
+      "the bounding box is 0.0001 x 0.0001 x 0.0001 m at the scale 0.001: the mesh is probably in metres; set its "
+      "scale to 1");
+  EXPECT_THAT(*scale_hint(geometry::Box(Vector3d::Zero(), Vector3d::Constant(1e9))), HasSubstr("check its scale"));
   EXPECT_FALSE(hint(0.2));
   EXPECT_FALSE(hint(9.0));
   EXPECT_FALSE(scale_hint(geometry::Box()));

@@ -9,6 +9,7 @@ namespace prescene::interfaces {
 namespace {
 
 using core::StatusCode;
+using testing::AllOf;
 using testing::HasSubstr;
 using Kind = LocatedValue::Kind;
 
@@ -54,6 +55,33 @@ TEST(ParseYaml, NamesTheLineOfAMistakeInYaml) {
   EXPECT_THAT(status_of("# nothing\n").message(), HasSubstr("empty"));
   EXPECT_THAT(status_of("a: *b\n").message(), HasSubstr("f.yaml:1"));
   EXPECT_THAT(status_of("a: &b [1, *b]\n").message(), HasSubstr("not complete"));
+}
+
+TEST(ParseYaml, NamesTheLineThatLacksSomethingAndNotTheNext) {
+  EXPECT_THAT(status_of("a: 1\nb: {c: 2, d: 3\ne: 4\n").message(),
+              AllOf(HasSubstr("f.yaml:2: "), HasSubstr("close the bracket")));
+  EXPECT_THAT(status_of("a: 1\nb: [1, 2  # some\n\n# of it\ne: 4\n").message(),
+              AllOf(HasSubstr("f.yaml:2: "), HasSubstr("close the bracket")));
+  EXPECT_THAT(status_of("a: 1\ngravity 9\nb: 2\n").message(), AllOf(HasSubstr("f.yaml:2: "), HasSubstr("write ':'")));
+  EXPECT_THAT(status_of("a: 1\nb: c: d\n").message(), HasSubstr("f.yaml:2: "));
+}
+
+TEST(ParseYaml, CollectsKeysThatAreGivenTwice) {
+  Problems problems;
+  const auto tree = parse_yaml("a: 1\nb: {c: 2, c: [3, {d: 4}]}\na: {e: 5}\nf: 6\n", "f.yaml", {}, &problems);
+  ASSERT_TRUE(tree.ok());
+  ASSERT_EQ(problems.errors().size(), 2u);
+  EXPECT_EQ(problems.errors()[0].line, 2);
+  EXPECT_EQ(problems.errors()[1].line, 3);
+  ASSERT_EQ(tree->keys.size(), 3u);
+  ASSERT_EQ(tree->items.size(), 3u);
+  EXPECT_EQ(tree->find("a")->text, "1");  // the first counts
+  EXPECT_EQ(tree->find("b")->find("c")->text, "2");
+  EXPECT_EQ(tree->find("f")->text, "6");
+  Problems both;
+  const core::Status failed = parse_yaml("a: 1\na: 2\nb: [1\n", "f.yaml", {}, &both).status();
+  EXPECT_EQ(both.errors().size(), 2u);
+  EXPECT_THAT(failed.message(), AllOf(HasSubstr("f.yaml:2: the key 'a'"), HasSubstr("f.yaml:3: this is not YAML")));
 }
 
 TEST(ParseYaml, StopsBombs) {

@@ -16,8 +16,9 @@
 
 namespace prescene::service {
 
-/// Reads a scene file and its meshes; warnings go to the log. The status of a failure lists every mistake on a line of
-/// its own: file:line: key: reason: remedy.
+/// Reads a scene file and its meshes; warnings go to the log, and how many meshes were tidied up without changing their
+/// surface (load_reported_scene logs each). The status of a failure lists every mistake on a line of its own:
+/// file:line: key: reason: remedy.
 core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
                                                               const core::LogSink& log);
 
@@ -49,8 +50,6 @@ core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std:
 bool is_model_file(const std::filesystem::path& path);
 /// Whether a YAML file holds what was learned of physical parameters; false where it can't be read.
 bool is_learned_file(const std::filesystem::path& path);
-/// Reads a model file, as `inspect` writes them, and its mesh; errors as those of load_scene.
-core::Result<belief::ObjectModel> load_model(const std::filesystem::path& path, const core::LogSink& log);
 
 /// A scene of which nothing is known, named after the folder that it was seen in: its support is found and followed. Up
 /// is taken to be where a camera at X_WC has it that is held upright and looks down at 45 degrees; the search for the

@@ -17,10 +17,15 @@
 
 namespace prescene::service {
 
-/// load_scene_text, with the problems that its status lists and those that were logged.
+/// load_scene_text, with the problems that its status lists and those that were logged. What was tidied up in meshes is
+/// logged of each.
 core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std::string& text,
                                                                        const std::filesystem::path& path,
                                                                        const core::LogSink& log,
                                                                        interfaces::FileReport& report);
+
+/// Reads a model file, as `inspect` writes them, and its mesh, likewise.
+core::Result<belief::ObjectModel> load_reported_model(const std::filesystem::path& path, const core::LogSink& log,
+                                                      interfaces::FileReport& report);
 
 }  // namespace prescene::service

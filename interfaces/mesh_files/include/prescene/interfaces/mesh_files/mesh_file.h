@@ -67,9 +67,9 @@ core::Result<LoadedMesh> read_mesh(const std::filesystem::path& path, const Mesh
 core::Result<LoadedMesh> decode_mesh(MeshFormat format, std::span<const std::uint8_t> bytes,
                                      const MeshReadOptions& options = {});
 
-/// A sentence when an object of this size (m) is hardly meant in metres: above 10 m that the file is probably in
-/// millimetres, below 1 mm that it was probably scaled twice; nothing otherwise.
-std::optional<std::string> scale_hint(const geometry::Box& box);
+/// A sentence when an object of this size (m), read with this scale, is above 10 m or below 1 mm and so hardly meant,
+/// with the scale that was probably meant (1, 0.001 or 1000) if there is one; nothing otherwise.
+std::optional<std::string> scale_hint(const geometry::Box& box, double metres_per_unit = 1.0);
 
 enum class MeshEncoding { kBinary, kText };
 

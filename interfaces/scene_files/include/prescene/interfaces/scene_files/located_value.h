@@ -43,8 +43,12 @@ struct YamlLimits {
 
 /// Parses one YAML document (UTF-8). `file` is the name that messages use. Fails with the line of the first mistake in
 /// YAML itself: syntax, a key given twice, a key that is no scalar, several documents, a limit. Never throws.
-core::Result<LocatedValue> parse_yaml(std::string_view text, const std::string& file, const YamlLimits& limits = {});
-/// The same of a file.
-core::Result<LocatedValue> read_yaml(const std::filesystem::path& path, const YamlLimits& limits = {});
+/// With `problems`, keys that are given twice are collected there and do not end the reading: the first value counts.
+/// What ends it is then added, too, and the status of a failure holds all of `problems`.
+core::Result<LocatedValue> parse_yaml(std::string_view text, const std::string& file, const YamlLimits& limits = {},
+                                      Problems* problems = nullptr);
+/// The same of a file. Where it can't be read, nothing is added to `problems`.
+core::Result<LocatedValue> read_yaml(const std::filesystem::path& path, const YamlLimits& limits = {},
+                                     Problems* problems = nullptr);
 
 }  // namespace prescene::interfaces
