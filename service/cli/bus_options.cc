@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 
+#include "prescene/interfaces/bags/bag_reader.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/scene_files/learned_file.h"
@@ -96,6 +97,17 @@ void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, 
       ->capture_default_str();
   verb.add_flag("--salvage", salvage,
                 "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
+}
+
+core::Status check_folder_options(const CLI::App& verb, const std::string& input) {
+  if (!interfaces::is_bag(input)) return core::ok_status();
+  for (const char* name : {"--depth-scale", "--frame-rate"}) {
+    const CLI::Option* option = verb.get_option_no_throw(name);
+    if (option != nullptr && option->count() > 0)
+      return core::invalid_input(std::string(name) + " is for folders of images, and " + input +
+                                 " is none: leave it out");
+  }
+  return core::ok_status();
 }
 
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {

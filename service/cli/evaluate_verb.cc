@@ -36,6 +36,7 @@ struct EvaluateOptions {
   std::string proposals;
   std::string train;
   EvaluateFolderOptions own;
+  const CLI::App* verb = nullptr;
 };
 
 const std::vector<std::string>& known_names() {
@@ -45,6 +46,33 @@ const std::vector<std::string>& known_names() {
 }
 
 bool is_known(const std::string& name) { return std::ranges::find(known_names(), name) != known_names().end(); }
+
+/// kInvalidInput for an option that says nothing about this figure.
+core::Status check_options(const EvaluateOptions& options) {
+  static const std::vector<std::pair<const char*, std::vector<std::string>>> kOptionsOf = {
+      {"--split", {"cube_tosses"}},
+      {"--likelihood", {"ycb_video", "finding", "tracking"}},
+      {"--graphics-device", {"ycb_video", "finding", "tracking"}},
+      {"--frames", {"credible_regions", "finding"}},
+      {"--sequences", {"tracking"}},
+      {"--kind", {"tracking"}},
+      {"--rate", {"tracking"}},
+      {"--keep", {"tracking"}},
+      {"--episodes", {"explain"}},
+      {"--event", {"explain"}},
+      {"--proposals", {"finding"}},
+      {"--train", {"finding"}},
+      {"--data", {"cube_tosses", "ycb_video", "cleargrasp", "tracking"}},
+  };
+  for (const auto& [option, figures] : kOptionsOf) {
+    if (options.verb->count(option) == 0 || std::ranges::find(figures, options.name) != figures.end()) continue;
+    std::string names;
+    for (const std::string& figure : figures) names += (names.empty() ? "" : ", ") + figure;
+    return core::invalid_input(std::string(option) + " is for " + names + ", not for " + options.name +
+                               ": leave it out");
+  }
+  return core::ok_status();
+}
 
 std::string metres_as_mm(double metres) { return fixed_text(1e3 * metres, 1); }
 
@@ -153,9 +181,10 @@ core::Result<filter::LearnedModels> learned_of_rooms(const EvaluateOptions& opti
 }
 
 core::Status run(const EvaluateOptions& options, VerbContext& context) {
+  if (!is_known(options.name) && !options.data.empty())
+    return core::invalid_input("--data goes with data sets that have a name; give the folder itself");
+  PRESCENE_RETURN_IF_ERROR(check_options(options));
   if (!is_known(options.name)) {
-    if (!options.data.empty())
-      return core::invalid_input("--data goes with data sets that have a name; give the folder itself");
     EvaluateFolderOptions own = options.own;
     own.folder = options.name;
     return evaluate_folder(own, context);
@@ -165,8 +194,6 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
         "--model, --folds, --max-evaluations and --each go with a folder of your own tosses, "
         "not with " +
         options.name);
-  if (options.name != "finding" && !(options.proposals.empty() && options.train.empty()))
-    return core::invalid_input("--proposals and --train go with finding only: leave them out");
   if (options.name == "tracking") return run_tracking(options, context);
   const bool simulated = options.name == "credible_regions" || options.name == "finding" || options.name == "explain";
   if (!simulated && options.data.empty())
@@ -282,6 +309,7 @@ Verb add_evaluate_verb(CLI::App& app) {
           "Of finding: learn the rooms' models first, as `prescene train` does with seed 1, and write this file")
       ->check(file_name())
       ->excludes("--proposals");
+  options->verb = verb;
   verb->footer("Example: prescene evaluate recordings --model mug.yaml");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

@@ -135,6 +135,7 @@ core::Status write_explanation_report(const std::string& path, const std::string
 }
 
 core::Status run(ExplainVerbOptions& options, VerbContext& context) {
+  PRESCENE_RETURN_IF_ERROR(check_folder_options(*options.verb, options.input));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.input, options.scene}));
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},

@@ -173,6 +173,7 @@ core::Status run(InspectOptions& options, VerbContext& context) {
   const bool recording = is_recording(options.file);
   PRESCENE_RETURN_IF_ERROR(check_options(options, recording));
   if (!recording) return inspect_mesh(options, context);
+  PRESCENE_RETURN_IF_ERROR(check_folder_options(*options.verb, options.file));
   const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
   if (options.depth_noise) {
     for (const char* name : kFrameOptions)

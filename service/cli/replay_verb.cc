@@ -373,11 +373,7 @@ core::Status check_options(const ReplayOptions& options) {
       if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out");
     return core::ok_status();
   }
-  for (const char* name : {"--depth-scale", "--frame-rate"})
-    if (given(name))
-      return core::invalid_input(std::string(name) + " is for folders of images, and " + options.input +
-                                 " is none: leave it out");
-  return core::ok_status();
+  return check_folder_options(*options.verb, options.input);
 }
 
 }  // namespace

@@ -113,6 +113,8 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker);
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, TrackerSettings& tracker);
 /// Of a recording that is read: --depth-scale and --frame-rate of a folder of images, --salvage.
 void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, bool& salvage);
+/// kInvalidInput for --depth-scale and --frame-rate where the input is no folder of images.
+core::Status check_folder_options(const CLI::App& verb, const std::string& input);
 /// --world-frame and --camera-pose.
 void add_camera_options(CLI::App& verb, AssemblerSettings& assembler);
 /// --view-address, --view-token and --view-origin, with `prefix` in place of "view-"; the port is the verb's own.

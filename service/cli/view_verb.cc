@@ -110,12 +110,7 @@ core::Status check_options(const ViewVerbOptions& options) {
       return core::invalid_input(std::string(name) +
                                  " is for what is on the bus, and a recording needs none of it: "
                                  "leave it out");
-  const bool is_folder = !interfaces::is_bag(options.recording);
-  for (const char* name : {"--depth-scale", "--frame-rate"})
-    if (!is_folder && given(name))
-      return core::invalid_input(std::string(name) + " is for folders of images, and " + options.recording +
-                                 " is none: leave it out");
-  return core::ok_status();
+  return check_folder_options(*options.verb, options.recording);
 }
 
 }  // namespace
