@@ -302,8 +302,25 @@ const ObjectModel& model_of(const Belief& belief, const ObjectBelief& object) {
   return belief.scene->models[static_cast<std::size_t>(object.model)];
 }
 
+namespace {
+
+/// Those of the scene whose objects the belief has, as drop_loose_joints() leaves them.
+std::vector<Joint> whole_joints(const Belief& belief) {
+  if (!belief.scene || belief.scene->joints.empty()) return {};
+  Scene scene;
+  scene.supports = belief.scene->supports;
+  scene.joints = belief.scene->joints;
+  for (const ObjectBelief& object : belief.objects) scene.objects.emplace_back().name = object.name;
+  drop_loose_joints(scene);
+  return scene.joints;
+}
+
+}  // namespace
+
 WorldState most_likely_state(const Belief& belief) {
   WorldState state;
+  for (const Joint& joint : whole_joints(belief))
+    state.joints.push_back({joint.type, mean(joint.friction), mean(joint.damping)});
   for (const ObjectBelief& object : belief.objects) {
     const PhysicalParameters physical = PhysicalSampler(model_of(belief, object), object.physics).mean();
     state.objects.push_back(state_of(heaviest(object.particles), physical, Eigen::Matrix<double, 12, 1>::Zero()));
@@ -324,6 +341,9 @@ BeliefSampler::BeliefSampler(const Belief& belief) {
     largest_rank_ = std::max(largest_rank_, prepared.rank);
     objects_.push_back(std::move(prepared));
   }
+  joints_ = whole_joints(belief);
+  for (const Joint& joint : joints_)
+    dimensions_ += belief::dimensions(joint.friction) + belief::dimensions(joint.damping);
 }
 
 WorldState BeliefSampler::draw(std::span<const double> uniforms) const {
@@ -350,6 +370,18 @@ WorldState BeliefSampler::draw(std::span<const double> uniforms) const {
   WorldState state;
   for (std::size_t i = 0; i < objects_.size(); ++i)
     state.objects.push_back(state_of(objects_[i].belief->particles[particles[i]], physical[i], errors[i]));
+  const auto drawn = [&](const ScalarDistribution& distribution) {
+    const auto count = static_cast<std::size_t>(belief::dimensions(distribution));
+    const double value = belief::draw(distribution, uniforms.subspan(next, count));
+    next += count;
+    return value;
+  };
+  for (const Joint& joint : joints_) {
+    JointParameters& to = state.joints.emplace_back();
+    to.type = joint.type;
+    to.friction = drawn(joint.friction);
+    to.damping = drawn(joint.damping);
+  }
   return state;
 }
 

@@ -187,6 +187,21 @@ Json to_json(const ObjectBelief& object) {
   return json;
 }
 
+Json to_json(const std::vector<JointEstimate>& estimates) {
+  Json json = Json::array();
+  const auto limit = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
+  for (const JointEstimate& joint : estimates)
+    json.push_back({{"joint", joint.joint},
+                    {"type", to_string(joint.type)},
+                    {"unit", unit_of(joint.type)},
+                    {"position", joint.position},
+                    {"standard_deviation", joint.standard_deviation},
+                    {"velocity", joint.velocity},
+                    {"limits", {limit(joint.low), limit(joint.high)}},
+                    {"confidence", joint.confidence}});
+  return json;
+}
+
 Json to_json(const Belief& belief) {
   Json objects = Json::array(), robot = Json::array();
   for (const ObjectBelief& object : belief.objects) objects.push_back(to_json(object));

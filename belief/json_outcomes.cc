@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON of outcomes, both ways, with the keys of scene files.
+#include <cmath>
+
 #include "json_values.h"
 #include "prescene/belief/json.h"
 #include "prescene/geometry/angles.h"
@@ -9,8 +11,8 @@ namespace {
 
 // In the order of the variant.
 const std::vector<std::string> kConditions{"inside",          "resting_on",           "upright", "face_up", "below",
-                                           "moved_more_than", "turned_more_than_deg", "touched", "moving"};
-static_assert(std::variant_size_v<Predicate> == 9);
+                                           "moved_more_than", "turned_more_than_deg", "touched", "moving",  "joint"};
+static_assert(std::variant_size_v<Predicate> == 10);
 
 struct PredicateJson {
   Json operator()(const InsideVolume& inside) const {
@@ -30,6 +32,14 @@ struct PredicateJson {
   Json operator()(const TurnedMoreThan& turned) const { return geometry::exact_degrees(turned.angle); }
   Json operator()(const Touched& touched) const { return touched.other; }
   Json operator()(const StillMoving&) const { return true; }
+  Json operator()(const JointWithin& within) const {
+    const bool hinge = within.type == JointType::kHinge;
+    const auto number = [&](double end) { return hinge ? geometry::exact_degrees(end) : end; };
+    Json json{{"name", within.joint}};
+    if (std::isfinite(within.low)) json[hinge ? "min_deg" : "min"] = number(within.low);
+    if (std::isfinite(within.high)) json[hinge ? "max_deg" : "max"] = number(within.high);
+    return json;
+  }
 };
 
 InsideVolume inside_from(const JsonAt& at) {
@@ -60,6 +70,27 @@ UprightWithin upright_from(const JsonAt& at) {
   return upright;
 }
 
+JointWithin joint_from(const JsonAt& at) {
+  JointWithin within;
+  JsonObject fields(at);
+  if (const auto name = fields.require("name")) within.joint = name->text();
+  bool meters = false;
+  const auto end = [&](const char* key, double factor, double& to) {
+    const auto number = fields.find(key);
+    if (!number) return false;
+    to = factor * number->number();
+    return true;
+  };
+  meters = end("min", 1.0, within.low) || meters;
+  meters = end("max", 1.0, within.high) || meters;
+  bool degrees = end("min_deg", geometry::kDegree, within.low);
+  degrees = end("max_deg", geometry::kDegree, within.high) || degrees;
+  within.type = degrees ? JointType::kHinge : JointType::kSlider;
+  if (meters == degrees)
+    at.fail("give \"min\" or \"max\" in metres for a slider, \"min_deg\" or \"max_deg\" for a hinge");
+  return within;
+}
+
 Condition condition_from(const std::string& key, const JsonAt& at) {
   if (key == "inside") return {inside_from(at)};
   if (key == "resting_on") return {RestingOn{at.text()}};
@@ -69,6 +100,7 @@ Condition condition_from(const std::string& key, const JsonAt& at) {
   if (key == "moved_more_than") return {MovedMoreThan{at.number()}};
   if (key == "turned_more_than_deg") return {TurnedMoreThan{geometry::kDegree * at.number()}};
   if (key == "touched") return {Touched{at.text()}};
+  if (key == "joint") return {joint_from(at)};
   return {StillMoving{}, When::kAtEnd, !at.boolean()};
 }
 

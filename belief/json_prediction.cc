@@ -135,6 +135,18 @@ Json paths_json(const std::vector<ObjectPath>& paths) {
   return json;
 }
 
+Json joints_json(const std::vector<JointForecast>& joints) {
+  Json json = Json::array();
+  for (const JointForecast& joint : joints)
+    json.push_back({{"joint", joint.joint},
+                    {"type", to_string(joint.type)},
+                    {"unit", unit_of(joint.type)},
+                    {"mean", joint.mean},
+                    {"standard_deviation", joint.standard_deviation},
+                    {"quantiles", {joint.low, joint.middle, joint.high}}});
+  return json;
+}
+
 Json stepper_json(const Basis& basis) {
   Json json{{"name", basis.stepper}};
   if (!basis.not_lockstep.empty()) json["not_lockstep"] = basis.not_lockstep;
@@ -194,6 +206,7 @@ Json prediction_json(const PredictAnswer& predict) {
   json["final_poses"] = std::move(poses);
   json["typical_runs"] = std::move(runs);
   json["left_out"] = predict.left_out;
+  if (!predict.joints.empty()) json["joints"] = joints_json(predict.joints);
   if (!predict.inputs.empty()) json["inputs"] = inputs_json(predict.inputs);
   if (!predict.chaos.empty()) json["chaos"] = chaos_json(predict.chaos);
   if (!predict.contact_times.empty()) json["contacts"] = contacts_json(predict);

@@ -271,7 +271,9 @@ struct AnswerJson {
                        {"parameters", to_json(item.parameters)},
                        {"lessons", item.lessons},
                        {"learned_ns", item.learned_ns}});
-    return {{"items", std::move(items)}};
+    Json json{{"items", std::move(items)}};
+    if (!where.joints.empty()) json["joints"] = to_json(where.joints);
+    return json;
   }
   Json operator()(const PredictAnswer& predict) const { return prediction_json(predict); }
   Json operator()(const StabilityAnswer& stability) const {

@@ -83,6 +83,12 @@ class Judge {
            });
   }
   bool operator()(const StillMoving&, const WorldState& state) const { return is_moving(state.objects[object_]); }
+  bool operator()(const JointWithin& within, const WorldState& state) const {
+    const std::optional<int> joint = find_joint(scene_, within.joint);
+    if (!joint) return false;
+    const double position = joint_states(scene_, state)[static_cast<std::size_t>(*joint)].position;
+    return within.low <= position && position <= within.high;
+  }
 
  private:
   const Pose& pose(const WorldState& state) const { return state.objects[object_].X_WO; }
@@ -135,6 +141,13 @@ std::vector<Condition> all_conditions(const Outcome& outcome) {
 }
 
 core::Status complete_outcome(const Scene& scene, Outcome& outcome) {
+  if (outcome.object.empty()) {
+    for (const Condition& condition : all_conditions(outcome)) {
+      const auto* within = std::get_if<JointWithin>(&condition.predicate);
+      const std::optional<int> joint = within ? find_joint(scene, within->joint) : std::nullopt;
+      if (joint && outcome.object.empty()) outcome.object = scene.joints[static_cast<std::size_t>(*joint)].child;
+    }
+  }
   if (outcome.object.empty()) {
     if (scene.objects.size() != 1)
       return core::invalid_input(outcome.name + ": the key 'object' is missing: name the object that is judged");

@@ -41,6 +41,21 @@ class Dealer {
   std::span<const double> rest_;
 };
 
+/// What hangs on an object was drawn about that object's mean: it goes with it to where it was drawn.
+void move_with_parents(const Scene& scene, WorldState& state) {
+  for (const int j : joint_order(scene)) {
+    const Joint& joint = scene.joints[static_cast<std::size_t>(j)];
+    const std::optional<int> parent = find_object(scene, joint.parent);
+    if (!parent) continue;
+    const auto p = static_cast<std::size_t>(*parent);
+    const Pose X_WP_mean = mean(scene.objects[p].pose);
+    if (state.objects[p].X_WO == X_WP_mean) continue;
+    Pose& X_WC = state.objects[static_cast<std::size_t>(*find_object(scene, joint.child))].X_WO;
+    X_WC = geometry::normalized(state.objects[p].X_WO * (X_WP_mean.inverse() * X_WC));
+  }
+  obey_joints(scene, state);
+}
+
 MotionMode start_mode(const SceneObject& object) { return object.held_by ? MotionMode::kHeld : MotionMode::kMoving; }
 
 }  // namespace
@@ -53,6 +68,7 @@ int start_dimensions(const Scene& scene) {
            dimensions(model.contact.restitution) + dimensions(model.mass) + dimensions(model.center_of_mass);
     if (model.contact.impact_friction) sum += dimensions(*model.contact.impact_friction);
   }
+  for (const Joint& joint : scene.joints) sum += dimensions(joint.friction) + dimensions(joint.damping);
   return sum;
 }
 
@@ -87,7 +103,14 @@ WorldState draw_start(const Scene& scene, std::span<const double> uniforms) {
     to.physical.impact_friction =
         model.contact.impact_friction ? dealer.draw_from(*model.contact.impact_friction) : to.physical.friction;
   });
+  for (const Joint& joint : scene.joints) {
+    JointParameters& to = state.joints.emplace_back();
+    to.type = joint.type;
+    to.friction = dealer.draw_from(joint.friction);
+    to.damping = dealer.draw_from(joint.damping);
+  }
   PRESCENE_CHECK(dealer.done());
+  move_with_parents(scene, state);
   return state;
 }
 
@@ -102,6 +125,9 @@ WorldState mean_start(const Scene& scene) {
     to.physical = mean_physical(model);
     state.objects.push_back(to);
   }
+  for (const Joint& joint : scene.joints)
+    state.joints.push_back({joint.type, mean(joint.friction), mean(joint.damping)});
+  obey_joints(scene, state);
   return state;
 }
 

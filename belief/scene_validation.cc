@@ -4,6 +4,8 @@
 
 #include "prescene/belief/scene.h"
 #include "prescene/belief/validation.h"
+#include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 
 namespace prescene::belief {
 namespace {
@@ -59,10 +61,19 @@ Status check_depth_noise(const DepthNoiseSettings& noise) {
   return {};
 }
 
+/// An object that a hand can hold.
+Status check_held_name(const Scene& scene, const std::string& name) {
+  PRESCENE_RETURN_IF_ERROR(check_object_name(scene, name));
+  const std::optional<int> joint = joint_of(scene, name);
+  if (!joint) return {};
+  return invalid_input("'" + name + "' hangs on the joint '" + scene.joints[static_cast<std::size_t>(*joint)].name +
+                       "', so that no hand can hold it: push it, or pull it with a robot body");
+}
+
 struct ActionCheck {
   const Scene& scene;
   Status operator()(const Release& release) const {
-    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, release.object));
+    PRESCENE_RETURN_IF_ERROR(check_held_name(scene, release.object));
     PRESCENE_RETURN_IF_ERROR(check_point(release.retreat, "the retreat"));
     PRESCENE_RETURN_IF_ERROR(check_vector(release.disturbance.linear, kSpeedRange).at("velocity"));
     PRESCENE_RETURN_IF_ERROR(check_vector(release.disturbance.angular, kSpeedRange).at("angular_velocity"));
@@ -80,7 +91,7 @@ struct ActionCheck {
     return check_scalar(push.lateral_error, kLengthRange).at("lateral_error");
   }
   Status operator()(const Pour& pour) const {
-    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, pour.container));
+    PRESCENE_RETURN_IF_ERROR(check_held_name(scene, pour.container));
     if (!pour.axis_W.allFinite() || !(pour.axis_W.norm() > 1e-9) || !(pour.axis_W.norm() <= kLengthRange.high))
       return invalid_input("the axis is not a direction: give one of some length, like [0, 1, 0]");
     if (!(std::abs(pour.angle) <= kMostTurns))
@@ -88,17 +99,26 @@ struct ActionCheck {
     return check_finite_positive(pour.duration, "a duration");
   }
   Status operator()(const Grasp& grasp) const {
-    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, grasp.object));
+    PRESCENE_RETURN_IF_ERROR(check_held_name(scene, grasp.object));
     if (!find_robot_body(scene, grasp.hand))
       return not_found("there is no robot body '" + grasp.hand + "': name one of the scene's robot bodies");
     return {};
   }
   Status check_move(const std::string& object, const PoseDistribution& to, double duration) const {
-    PRESCENE_RETURN_IF_ERROR(check_object_name(scene, object));
+    PRESCENE_RETURN_IF_ERROR(check_held_name(scene, object));
     PRESCENE_RETURN_IF_ERROR(check_pose(to));
     return check_finite_positive(duration, "a duration");
   }
 };
+
+/// "0 and 0.3 m", "-90 and 0 degrees".
+std::string ends_of(const Joint& joint) {
+  const bool hinge = joint.type == JointType::kHinge;
+  const auto text = [&](double value) {
+    return core::rounded_text(hinge ? value * geometry::kDegreesPerRadian : value);
+  };
+  return text(joint.low) + " and " + text(joint.high) + (hinge ? " degrees" : " m");
+}
 
 struct PredicateCheck {
   const Scene& scene;
@@ -131,6 +151,21 @@ struct PredicateCheck {
   Status operator()(const TurnedMoreThan& turned) const { return check_angle(turned.angle); }
   Status operator()(const Touched& touched) const { return check_other(touched.other); }
   Status operator()(const StillMoving&) const { return {}; }
+  Status operator()(const JointWithin& within) const {
+    const std::optional<int> index = find_joint(scene, within.joint);
+    if (!index) return not_found("there is no joint '" + within.joint + "': name one of the scene's joints");
+    if (scene.joints[static_cast<std::size_t>(*index)].type != within.type)
+      return invalid_input("the joint '" + within.joint + "' is " +
+                           (within.type == JointType::kHinge ? "a slider: give 'min' and 'max' in metres"
+                                                             : "a hinge: give 'min_deg' and 'max_deg' in degrees"));
+    if (std::isnan(within.low) || std::isnan(within.high) || !(within.low < within.high))
+      return invalid_input("the interval of the joint's position is empty: give ends in order, or one of them");
+    const Joint& joint = scene.joints[static_cast<std::size_t>(*index)];
+    if (within.low > joint.high || within.high < joint.low)
+      return invalid_input("the joint '" + within.joint + "' never gets there, its limits are " + ends_of(joint) +
+                           ": give an interval that meets them");
+    return {};
+  }
 
   Status check_other(const std::string& name) const {
     if (name == object)
@@ -279,6 +314,7 @@ Status validate(const Scene& scene) {
     PRESCENE_RETURN_IF_ERROR(check_robot_body(body).at(quoted("robot body", body.name)));
   for (const SceneObject& object : scene.objects)
     PRESCENE_RETURN_IF_ERROR(check_object(scene, object).at(quoted("object", object.name)));
+  PRESCENE_RETURN_IF_ERROR(validate_joints(scene));
   if (scene.camera) {
     PRESCENE_RETURN_IF_ERROR(geometry::validate(scene.camera->intrinsics).at("camera"));
     PRESCENE_RETURN_IF_ERROR(check_pose(scene.camera->X_WC).at("camera"));

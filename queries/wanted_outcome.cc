@@ -38,6 +38,16 @@ struct PredicateText {
   }
   std::string operator()(const belief::Touched& touched) const { return "touched " + touched.other; }
   std::string operator()(const belief::StillMoving&) const { return "moving"; }
+  std::string operator()(const belief::JointWithin& within) const {
+    const auto end = [&](double value) {
+      return within.type == belief::JointType::kHinge ? degrees_text(value) : core::rounded_text(value) + " m";
+    };
+    std::string text = "with " + within.joint;
+    if (std::isfinite(within.low)) text += " at least at " + end(within.low);
+    if (std::isfinite(within.high))
+      text += (std::isfinite(within.low) ? " and" : "") + (" at most at " + end(within.high));
+    return text;
+  }
 };
 
 /// Whether whenever `a` holds at a moment, `b` does not.
@@ -56,6 +66,9 @@ struct Excludes {
   bool operator()(const belief::UprightWithin& a, const belief::UprightWithin& b) const {
     const double between = std::acos(std::clamp(a.axis_O.normalized().dot(b.axis_O.normalized()), -1.0, 1.0));
     return a.max_angle + b.max_angle < between;
+  }
+  bool operator()(const belief::JointWithin& a, const belief::JointWithin& b) const {
+    return a.joint == b.joint && (a.high < b.low || b.high < a.low);
   }
   bool operator()(const belief::RestingOn&, const belief::StillMoving&) const { return true; }
   bool operator()(const belief::StillMoving&, const belief::RestingOn&) const { return true; }
@@ -80,6 +93,9 @@ struct Implies {
   bool operator()(const belief::TurnedMoreThan& a, const belief::TurnedMoreThan& b) const { return a.angle >= b.angle; }
   bool operator()(const belief::UprightWithin& a, const belief::UprightWithin& b) const {
     return a.axis_O == b.axis_O && a.max_angle <= b.max_angle;
+  }
+  bool operator()(const belief::JointWithin& a, const belief::JointWithin& b) const {
+    return a.joint == b.joint && b.low <= a.low && a.high <= b.high;
   }
   bool operator()(const belief::RestingOn& a, const belief::Touched& b) const { return a.support == b.other; }
   template <class A, class B>

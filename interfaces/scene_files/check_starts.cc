@@ -68,6 +68,7 @@ void refuse_starts_inside(const LocatedValue& objects, const belief::Scene& scen
     for (const belief::CollisionShape& shape : support.collision) {
       const Solid solid(shape);
       for (std::size_t o = 0; o < scene.objects.size(); ++o) {
+        if (belief::are_jointed(scene, scene.objects[o].name, support.name)) continue;  // a drawer in its cabinet
         const geometry::Pose X_SO = support.X_WS.inverse() * start.objects[o].X_WO;
         if (!solid.holds(X_SO.translation)) continue;  // saves most of the work
         const geometry::TriangleMesh mesh = belief::collision_mesh(scene.model_of(scene.objects[o]));

@@ -43,7 +43,11 @@ class ActionReader {
  private:
   std::string object_name(Binder& fields, std::string_view key) {
     const LocatedValue* at = fields.require(key, "name one of the scene's objects");
-    return at ? context_.read_name(*at, context_.objects, "an object") : std::string();
+    std::string name = at ? context_.read_name(*at, context_.objects, "an object") : std::string();
+    if (!name.empty() && belief::joint_of(context_.scene, name))
+      problems_.add(at->place, at->path, interfaces::quote(name) + " is on a joint, so that no hand can hold it",
+                    "push it, or let a robot body pull it");
+    return name;
   }
 
   // The name of an object that is held now.

@@ -15,15 +15,16 @@ using belief::When;
 using geometry::Vector3d;
 
 constexpr NumberRange kTurn{0.0, 180.0, "give degrees between 0 and 180", "deg"};
+constexpr NumberRange kHingeTurn{-360.0, 360.0, "give degrees between -360 and 360", "deg"};
 constexpr NumberRange kDistance{0.0, 1000.0, "give metres between 0 and 1000", "m"};
 
 const std::vector<std::pair<std::string, When>> kWhens{
     {"at_end", When::kAtEnd}, {"ever", When::kEver}, {"always", When::kAlways}};
 const std::vector<std::string> kConditionKeys{"inside",          "resting_on",           "upright", "face_up", "below",
-                                              "moved_more_than", "turned_more_than_deg", "touched", "moving"};
+                                              "moved_more_than", "turned_more_than_deg", "touched", "moving",  "joint"};
 constexpr const char* kConditionRemedy =
     "give a condition: inside, resting_on, upright, face_up, below, moved_more_than, turned_more_than_deg, touched, "
-    "moving, not, or all_of or any_of with a list of them";
+    "moving, joint, not, or all_of or any_of with a list of them";
 
 class ConditionReader {
  public:
@@ -119,6 +120,7 @@ class ConditionReader {
     if (key == "turned_more_than_deg")
       return {belief::TurnedMoreThan{geometry::kDegree * read_number(value, problems_, kTurn).value_or(0.0)}};
     if (key == "touched") return {belief::Touched{read_thing(value)}};
+    if (key == "joint") return {read_joint_within(value)};
     Condition moving{belief::StillMoving{}};
     moving.negated = !read_bool(value, problems_).value_or(true);
     return moving;
@@ -181,6 +183,29 @@ class ConditionReader {
     return {(face % 2 == 0 ? 1.0 : -1.0) * Vector3d::Unit(static_cast<int>(face) / 2)};
   }
 
+  belief::JointWithin read_joint_within(const LocatedValue& value) {
+    belief::JointWithin within;
+    Binder binder(value, problems_);
+    std::vector<std::string> names;
+    for (const belief::Joint& joint : context_.scene.joints) names.push_back(joint.name);
+    if (const LocatedValue* at = binder.require("name", "name one of the joints"))
+      within.joint = context_.read_name(*at, names, "a joint");
+    const std::optional<int> index = belief::find_joint(context_.scene, within.joint);
+    const bool hinge = index ? context_.scene.joints[static_cast<std::size_t>(*index)].type == belief::JointType::kHinge
+                             : value.find("min_deg") || value.find("max_deg");
+    within.type = hinge ? belief::JointType::kHinge : belief::JointType::kSlider;
+    const bool low = binder.read(hinge ? "min_deg" : "min", within.low, hinge ? kHingeTurn : kPosition);
+    const bool high = binder.read(hinge ? "max_deg" : "max", within.high, hinge ? kHingeTurn : kPosition);
+    if (!low && !high)
+      binder.require(hinge ? "min_deg" : "min",
+                     hinge ? "give 'min_deg', 'max_deg' or both, in degrees" : "give 'min', 'max' or both, in metres");
+    if (hinge) {
+      within.low *= geometry::kDegree;
+      within.high *= geometry::kDegree;
+    }
+    return within;
+  }
+
   SceneContext& context_;
   Problems& problems_;
   const std::string& object_;
@@ -193,8 +218,17 @@ std::string find_judged(Binder& binder, const std::string& group_object, SceneCo
   return group_object;
 }
 
+/// The child of the joint that an outcome asks about.
+std::string child_of_joint(Binder& binder, SceneContext& context) {
+  const LocatedValue* within = binder.find("joint");
+  const LocatedValue* name = within ? within->find("name") : nullptr;
+  const std::optional<int> joint = name ? belief::find_joint(context.scene, name->text) : std::nullopt;
+  return joint ? context.scene.joints[static_cast<std::size_t>(*joint)].child : std::string();
+}
+
 std::string require_judged(Binder& binder, const std::string& group_object, SceneContext& context) {
   std::string object = find_judged(binder, group_object, context);
+  if (object.empty()) object = child_of_joint(binder, context);
   if (object.empty()) binder.require("object", "name the object that is judged");
   return object;
 }

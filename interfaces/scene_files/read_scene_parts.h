@@ -43,6 +43,8 @@ std::optional<geometry::Matrix3d> read_unit_inertia(const LocatedValue& value, P
 belief::Support read_support(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::SceneObject read_object(const LocatedValue& value, const std::string& name, SceneContext& context);
+/// After the objects and supports, with all poses in the world.
+belief::Joint read_joint(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context);
 std::vector<belief::Action> read_actions(const LocatedValue& value, SceneContext& context);
 belief::Outcome read_outcome(const LocatedValue& value, const std::string& name, const std::string& default_object,
@@ -52,6 +54,9 @@ belief::ExclusiveOutcomes read_exclusive(const LocatedValue& value, const std::s
 /// Reports objects whose mean start lies wholly inside one solid of a support, or outside of the world. The scene is
 /// valid.
 void refuse_starts(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
+/// Reports children that start where their joint does not allow them to be, and warns of starts that spread across it.
+/// The scene is valid.
+void refuse_starts_off_joints(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
 /// Where a model's file says how its mass is spread; null: nowhere.
 struct MassPlaces {
   const LocatedValue* center = nullptr;

@@ -174,6 +174,11 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   });
   if (const LocatedValue* at = binder.find("camera")) scene.camera = read_camera(*at, context);
   place_in_camera(context);
+  const LocatedValue* joints = binder.find("joints");
+  read_names(joints, problems);
+  for_each_named(joints, problems, [&](const LocatedValue& value, const std::string& name) {
+    scene.joints.push_back(read_joint(value, name, context));
+  });
   if (const LocatedValue* at = binder.find("depth_noise")) scene.depth_noise = read_depth_noise(*at, problems);
   if (const LocatedValue* at = binder.find("actions")) scene.actions = read_actions(*at, context);
   if (const LocatedValue* at = binder.find("events")) read_events(*at, problems);  // kept by parse_event_weights
@@ -310,6 +315,7 @@ core::Result<Scene> parse_scene(std::string_view text, const std::string& file, 
     if (const core::Status status = belief::validate(scene); !status.ok())
       problems.add({document->place.file, 0, 0}, "", status.message(), "correct it");
   }
+  if (problems.empty()) refuse_starts_off_joints(*document, scene, problems);
   if (problems.empty()) refuse_starts(*document, scene, problems);
   if (problems.empty()) warn_of_oddities(*document, scene, problems);
   if (report) *report = {problems.errors(), problems.warnings()};

@@ -23,3 +23,8 @@ namespace prescene::belief::given_belief::query_limits_h {
 extern const double value;
 extern const Query query;
 }  // namespace prescene::belief::given_belief::query_limits_h
+
+namespace prescene::belief::given_belief::joint_h {
+extern const Pose X_WP, X_WC;
+extern const Twist V_WC;
+}  // namespace prescene::belief::given_belief::joint_h

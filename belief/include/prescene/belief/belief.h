@@ -139,7 +139,7 @@ class BeliefSampler {
   /// Every object needs at least one particle (checked). The belief must outlive the sampler.
   explicit BeliefSampler(const Belief& belief);
   /// How many uniform numbers a draw takes: one an object for the choice of its particle (if it has several), those of
-  /// its physical parameters, and the largest rank of its covariances.
+  /// its physical parameters, and the largest rank of its covariances; and what is open of the joints.
   int dimensions() const { return dimensions_; }
   /// One world state, objects in the belief's order, drawn as if each existed; uniforms.size() == dimensions(). First
   /// come the choices of the particles, then the physical parameters, then the widest direction of each object, the
@@ -154,6 +154,7 @@ class BeliefSampler {
     Eigen::Index rank = 0;
   };
   std::vector<Prepared> objects_;
+  std::vector<Joint> joints_;
   Eigen::Index largest_rank_ = 0;
   int dimensions_ = 0;
 };

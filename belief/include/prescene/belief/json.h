@@ -25,6 +25,7 @@ nlohmann::ordered_json to_json(const Trajectory& trajectory);
 nlohmann::ordered_json to_json(const ObjectBelief& object);
 /// [{"name", "mean", "standard_deviation", "low", "high"}]
 nlohmann::ordered_json to_json(const std::vector<ParameterEstimate>& estimates);
+nlohmann::ordered_json to_json(const std::vector<JointEstimate>& estimates);
 /// Without the scene (which a scene file holds).
 nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);

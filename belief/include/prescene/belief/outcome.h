@@ -2,6 +2,7 @@
 // Outcomes: named predicates over a trajectory, and their evaluation (pure functions).
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "prescene/belief/distribution.h"
+#include "prescene/belief/joint.h"
 #include "prescene/core/status.h"
 
 namespace prescene::belief {
@@ -64,9 +66,18 @@ struct Touched {
 struct StillMoving {
   friend bool operator==(const StillMoving&, const StillMoving&) = default;
 };
+/// The position of a joint is between two ends, rad or m as its type says. Any object can be the one that is judged;
+/// complete_outcome() takes the joint's child.
+struct JointWithin {
+  std::string joint;
+  JointType type = JointType::kSlider;  ///< Of the joint; validate() finds another.
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  friend bool operator==(const JointWithin&, const JointWithin&) = default;
+};
 
 using Predicate = std::variant<InsideVolume, RestingOn, UprightWithin, FaceUp, BelowHeight, MovedMoreThan,
-                               TurnedMoreThan, Touched, StillMoving>;
+                               TurnedMoreThan, Touched, StillMoving, JointWithin>;
 
 /// A predicate, when it has to hold, and whether it is turned round: negated = not (predicate at/ever/always).
 struct Condition {

@@ -213,6 +213,7 @@ struct Basis {
 struct PredictAnswer : Basis {
   std::vector<OutcomeProbability> outcomes;
   std::vector<FinalPoses> final_poses;
+  std::vector<JointForecast> joints;
   std::vector<TypicalRun> typical_runs;
   /// The scene's outcomes (groups by their name) that need an object which is lost or was never found.
   std::vector<std::string> left_out;

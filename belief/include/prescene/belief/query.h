@@ -89,6 +89,7 @@ struct WhereAnswer {
     friend bool operator==(const Item&, const Item&) = default;
   };
   std::vector<Item> items;
+  std::vector<JointEstimate> joints = {};  ///< Of the objects that were asked for.
 
   friend bool operator==(const WhereAnswer&, const WhereAnswer&) = default;
 };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "prescene/belief/action.h"
+#include "prescene/belief/joint.h"
 #include "prescene/belief/object_model.h"
 #include "prescene/belief/outcome.h"
 #include "prescene/belief/world_state.h"
@@ -83,6 +84,7 @@ struct Scene {
   std::vector<Support> supports;
   std::vector<KinematicBody> robot;
   std::vector<SceneObject> objects;
+  std::vector<Joint> joints;
   std::optional<SceneCamera> camera;
   DepthNoiseSettings depth_noise;
   /// A tracker also looks for things that the scene does not name.
@@ -117,7 +119,8 @@ core::Status validate(const Scene& scene, const Outcome& outcome);
 int start_dimensions(const Scene& scene);
 /// One start from a point of the unit cube (uniforms.size() == start_dimensions(scene)); the order of coordinates puts
 /// the widest uncertainties first (poses, that of the most uncertain object first, velocities, then friction,
-/// restitution, mass, centre of mass), as Sobol nets prefer. Held objects are kHeld, all others kMoving.
+/// restitution, mass, centre of mass, joints), as Sobol nets prefer. Held objects are kHeld, all others kMoving. Poses
+/// of jointed objects are drawn as any other: a simulator moves them to where their joint allows (obey_joints()).
 WorldState draw_start(const Scene& scene, std::span<const double> uniforms);
 /// The start with every distribution at its mean.
 WorldState mean_start(const Scene& scene);

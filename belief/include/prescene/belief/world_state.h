@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/belief/joint.h"
 #include "prescene/belief/object_model.h"
 
 namespace prescene::belief {
@@ -37,6 +38,7 @@ struct ObjectState {
 struct WorldState {
   double time = 0.0;  ///< Seconds since the scene's start.
   std::vector<ObjectState> objects;
+  std::vector<JointParameters> joints = {};  ///< In the order of Scene::joints; empty = the means of the scene's.
   friend bool operator==(const WorldState&, const WorldState&) = default;
 };
 
