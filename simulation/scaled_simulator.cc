@@ -12,6 +12,7 @@ namespace {
 void take_parameters(const belief::WorldState& from, belief::WorldState& to) {
   for (std::size_t i = 0; i < std::min(from.objects.size(), to.objects.size()); ++i)
     to.objects[i].physical = from.objects[i].physical;
+  if (from.joints.size() == to.joints.size()) to.joints = from.joints;
 }
 
 class ScaledEndRule : public EndRule {

@@ -108,6 +108,15 @@ void scale(double factor, std::optional<belief::Hollow>& hollow) {
   hollow->size *= factor;
 }
 
+/// Masses stay, and so do forces.
+struct JointScale {
+  double friction, damping;
+};
+JointScale scale_of(belief::JointType type, const Similarity& similarity) {
+  if (type == belief::JointType::kHinge) return {similarity.length, similarity.length * similarity.time()};
+  return {1.0, similarity.time() / similarity.length};
+}
+
 }  // namespace
 
 double Similarity::time() const { return std::sqrt(length); }
@@ -159,6 +168,16 @@ belief::Scene scaled(const belief::Scene& scene, const Similarity& similarity) {
     scale(length, object.pose);
     scale(similarity, object.twist);
   }
+  for (belief::Joint& joint : result.joints) {
+    const bool hinge = joint.type == belief::JointType::kHinge;
+    joint.anchor_P *= length;
+    scale(length, joint.X_PC0);
+    joint.low *= hinge ? 1.0 : length;
+    joint.high *= hinge ? 1.0 : length;
+    const JointScale factors = scale_of(joint.type, similarity);
+    scale(factors.friction, joint.friction);
+    scale(factors.damping, joint.damping);
+  }
   for (belief::Action& action : result.actions) action = scaled(action, similarity);
   result.duration *= similarity.time();
   return result;
@@ -195,6 +214,11 @@ belief::WorldState scaled(const belief::WorldState& state, const Similarity& sim
     object.V_WO.angular /= similarity.time();
     object.V_WO.linear *= similarity.length / similarity.time();
     object.physical.center_of_mass *= similarity.length;
+  }
+  for (belief::JointParameters& joint : result.joints) {
+    const JointScale factors = scale_of(joint.type, similarity);
+    joint.friction *= factors.friction;
+    joint.damping *= factors.damping;
   }
   return result;
 }

@@ -90,6 +90,22 @@ core::Result<CompiledBody> compile_body(const std::string& name, const std::vect
   return body;
 }
 
+CompiledJoint compile_joint(const belief::Joint& joint, const CompiledScene& compiled) {
+  CompiledJoint result;
+  result.joint = joint;
+  result.child = *belief::find_object(compiled.scene, joint.child);
+  if (const auto object = belief::find_object(compiled.scene, joint.parent)) {
+    result.parent = *object;
+  } else if (const auto support = belief::find_support(compiled.scene, joint.parent)) {
+    result.parent = compiled.object_count + *support;
+  }
+  result.across_1_P = joint.axis_P.unitOrthogonal();
+  result.across_2_P = joint.axis_P.cross(result.across_1_P);
+  result.anchor_C = joint.X_PC0.inverse() * joint.anchor_P;
+  result.arm = compiled.bodies[static_cast<std::size_t>(result.child)].radius;
+  return result;
+}
+
 }  // namespace
 
 core::Status validate(const BulletOptions& options) {
@@ -133,6 +149,8 @@ core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::S
     PRESCENE_TRY(CompiledBody body, compile_body(robot.name, robot.collision, robot.contact, true, maker));
     compiled->bodies.push_back(std::move(body));
   }
+  for (const belief::Joint& joint : scene.joints) compiled->joints.push_back(compile_joint(joint, *compiled));
+  compiled->joint_order = belief::joint_order(scene);
   return std::shared_ptr<const CompiledScene>(std::move(compiled));
 }
 

@@ -36,16 +36,33 @@ struct CompiledBody {
   Matrix3d R_OP = Matrix3d::Identity();      ///< Of objects: principal axes.
 };
 
+struct CompiledJoint {
+  belief::Joint joint;
+  int child = 0;                    ///< Object.
+  int parent = -1;                  ///< Body, or -1: the world.
+  Vector3d across_1_P, across_2_P;  ///< With the axis an orthonormal frame.
+  Vector3d anchor_C;                ///< The point of the child that is on the anchor at position 0.
+  double arm = 0.1;                 ///< m: of the child's farthest point from its frame.
+};
+
 struct CompiledScene {
   belief::Scene scene;
   BulletOptions options;
-  std::vector<CompiledBody> bodies;  ///< Objects, supports, robot bodies, in the scene's order.
-  std::uint64_t hash = 0;            ///< Of what steps depend on.
+  std::vector<CompiledBody> bodies;   ///< Objects, supports, robot bodies, in the scene's order.
+  std::vector<CompiledJoint> joints;  ///< In the scene's order.
+  std::vector<int> joint_order;       ///< Of these, parents first.
+  std::uint64_t hash = 0;             ///< Of what steps depend on.
   int object_count = 0;
   int support_count = 0;
   int robot_count = 0;
 
   int robot_body(int robot) const { return object_count + support_count + robot; }
+  /// Whether a joint joins them directly.
+  bool are_jointed(int a, int b) const {
+    for (const CompiledJoint& joint : joints)
+      if ((joint.child == a && joint.parent == b) || (joint.child == b && joint.parent == a)) return true;
+    return false;
+  }
 };
 
 core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::Scene& scene, ShapeStore& shapes,

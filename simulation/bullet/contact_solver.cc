@@ -9,13 +9,6 @@
 namespace prescene::simulation {
 namespace {
 
-btScalar relative_velocity(const btVector3& direction, const btVector3& torque_a, const btVector3& torque_b,
-                           const btSolverBody& a, const btSolverBody& b) {
-  return direction.dot(a.m_linearVelocity + a.m_deltaLinearVelocity - b.m_linearVelocity - b.m_deltaLinearVelocity) +
-         torque_a.dot(a.m_angularVelocity + a.m_deltaAngularVelocity) -
-         torque_b.dot(b.m_angularVelocity + b.m_deltaAngularVelocity);
-}
-
 // std::hypot guards against overflow, which a step cannot meet, at ten times the cost.
 btScalar length_of(btScalar x, btScalar y) { return std::sqrt(x * x + y * y); }
 
@@ -29,11 +22,13 @@ btScalar time_to_close(btScalar gap, btScalar speed, btScalar acceleration, btSc
 }  // namespace
 
 bool ContactSolver::solve_step(std::span<btCollisionObject*> bodies, std::span<SolverContact> contacts,
-                               const SolverSettings& settings, double dt, std::span<BodyResult> results,
-                               const core::Cancellation* cancellation) {
+                               std::span<SolverJoint> joints, const SolverSettings& settings, double dt,
+                               std::span<BodyResult> results, const core::Cancellation* cancellation) {
   PRESCENE_DCHECK(bodies.size() == results.size());
   bodies_ = bodies;
   given_ = contacts;
+  given_joints_ = joints;
+  dt_ = dt;
   results_ = results;
   settings_ = settings;
   cancellation_ = cancellation;
@@ -157,6 +152,7 @@ void ContactSolver::convertContacts(btPersistentManifold**, int, const btContact
     apply(c.tangent_2, slip_2, a, b);
     rows_.push_back(c);
   }
+  make_joints();
 }
 
 btScalar ContactSolver::solve_normal(Contact& c) {
@@ -233,9 +229,11 @@ void ContactSolver::solveGroupCacheFriendlySplitImpulseIterations(btCollisionObj
                                                                   btTypedConstraint**, int,
                                                                   const btContactSolverInfo& info, btIDebugDraw*) {
   const bool overlap = std::any_of(rows_.begin(), rows_.end(), [](const Contact& c) { return c.push_target > 0.0; });
-  if (!overlap) return;
+  if (!overlap && !joints_push()) return;
   for (int iteration = 0; iteration < info.m_numIterations && !cut_off(); ++iteration) {
     btScalar change = 0.0;
+    for (std::size_t j = 0; j < joints_.size(); ++j)
+      change = std::max(change, solve_joint_push(joints_[j], given_joints_[j]));
     for (Contact& c : rows_) change = std::max(change, solve_push(c));
     if (change <= settings_.converged) break;
   }
@@ -246,15 +244,18 @@ btScalar ContactSolver::solveSingleIteration(int iteration, btCollisionObject** 
                                              btTypedConstraint** constraints, int constraint_count,
                                              const btContactSolverInfo& info, btIDebugDraw* drawer) {
   if (cut_off()) return 0.0;  // the last iteration
-  // Bullet's own contact pools are empty: this solves the joints.
+  // Bullet's own pools are empty.
   btScalar residual = btSequentialImpulseConstraintSolver::solveSingleIteration(
       iteration, bodies, body_count, manifolds, manifold_count, constraints, constraint_count, info, drawer);
-  btScalar change = solve_contacts();
+  btScalar change = solve_joints();
+  change = std::max(change, solve_contacts());
   const bool last = iteration + 1 == info.m_numIterations;
   if (last && change > settings_.converged && adds_energy()) {
     take_back_impulses();
-    for (int again = 0; again < info.m_numIterations && change > settings_.converged; ++again)
-      change = solve_contacts();
+    for (int again = 0; again < info.m_numIterations && change > settings_.converged; ++again) {
+      change = solve_joints();
+      change = std::max(change, solve_contacts());
+    }
   }
   return std::max(residual, change * change);
 }

@@ -52,6 +52,7 @@ bool InstanceWorld::find_contacts(const core::Cancellation* cancellation) {
       const Moving& mb = moving_[static_cast<std::size_t>(b)];
       if (!mb.present || !(ma.dynamic || mb.dynamic)) continue;
       if ((ma.low.array() > mb.high.array()).any() || (mb.low.array() > ma.high.array()).any()) continue;
+      if (!scene_->joints.empty() && scene_->are_jointed(a, b)) continue;
       find_pair(a, b);
     }
   }
@@ -167,17 +168,7 @@ double InstanceWorld::free_acceleration(const SolverContact& c) const {
   return (falls(c.body_a) - falls(c.body_b)) * c.normal.dot(scene_->scene.gravity_W);
 }
 
-bool InstanceWorld::solve(const core::Cancellation* cancellation) {
-  // What stays open throughout, the solver would leave as it is.
-  const auto stays_open = [&](const SolverContact& c) {
-    const double speed = c.speed_before - c.turning + part_ * free_acceleration(c);
-    return c.gap > 0.0 && c.impulse == 0.0 && c.gap + part_ * speed > 0.0;
-  };
-  if (std::all_of(contacts_.begin(), contacts_.end(), stays_open)) {
-    for (BodyResult& result : results_) result = BodyResult{};
-    warm_.clear();
-    return true;
-  }
+void InstanceWorld::fill_bodies() {
   const auto count = static_cast<std::size_t>(body_count());
   for (std::size_t i = 0; i < count; ++i) {
     const Moving& m = moving_[i];
@@ -197,10 +188,31 @@ bool InstanceWorld::solve(const core::Cancellation* cancellation) {
     body.setAngularVelocity(to_bullet(m.spin));
     body.updateInertiaTensor();
   }
+  for (std::size_t i = count; i < rigid_pointers_.size(); ++i) {  // the world
+    rigid_[i]->setMassProps(0.0, btVector3(0, 0, 0));
+    rigid_[i]->setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
+    rigid_[i]->setWorldTransform(btTransform::getIdentity());
+    rigid_[i]->setLinearVelocity(btVector3(0, 0, 0));
+    rigid_[i]->setAngularVelocity(btVector3(0, 0, 0));
+    rigid_[i]->updateInertiaTensor();
+  }
+}
+
+bool InstanceWorld::solve(const core::Cancellation* cancellation) {
+  // What stays open throughout, the solver would leave as it is.
+  const auto stays_open = [&](const SolverContact& c) {
+    const double speed = c.speed_before - c.turning + part_ * free_acceleration(c);
+    return c.gap > 0.0 && c.impulse == 0.0 && c.gap + part_ * speed > 0.0;
+  };
+  list_joints();
+  if (joints_.empty() && std::all_of(contacts_.begin(), contacts_.end(), stays_open)) {
+    for (BodyResult& result : results_) result = BodyResult{};
+    warm_.clear();
+    return true;
+  }
   settings_.overlap_recovery = share() * scene_->options.overlap_recovery;
   const bool many = contacts_.size() >= kManyContacts;
-  if (!solver_.solve_step(rigid_pointers_, contacts_, settings_, part_, results_, many ? cancellation : nullptr))
-    return false;
+  if (!solve_with_joints(many ? cancellation : nullptr)) return false;
   warm_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const SolverContact& c = contacts_[i];

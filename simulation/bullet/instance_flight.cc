@@ -90,6 +90,7 @@ bool InstanceWorld::clear_for(int steps, double world_radius) {
 }
 
 int InstanceWorld::fly(int most, double world_radius) {
+  if (!scene_->joints.empty()) return 0;
   if (most < kShortest || !contacts_.empty() || !player_.over(time()) || !list_flyers()) return 0;
   if (scene_->robot_count > 0 || player_.pusher_count() > 0) place_kinematic();
   int steps = std::min(most, kLongest);

@@ -34,6 +34,11 @@ void InstanceWorld::save(ByteWriter& out) const {
     out.value(warm.impulse);
     out.vector(warm.friction_impulse);
   }
+  for (const Hinged& joint : hinged_) {
+    out.value(joint.drawn.friction);
+    out.value(joint.drawn.damping);
+    for (const double impulse : joint.impulse) out.value(impulse);
+  }
   out.value(static_cast<std::uint32_t>(touches_.size()));
   for (const Touch& touch : touches_) {
     out.value(touch.first);
@@ -72,6 +77,11 @@ bool InstanceWorld::restore(ByteReader& in) {
     warm.impulse = in.value<double>();
     warm.friction_impulse = in.vector();
   }
+  for (Hinged& joint : hinged_) {
+    joint.drawn.friction = in.value<double>();
+    joint.drawn.damping = in.value<double>();
+    for (double& impulse : joint.impulse) impulse = in.value<double>();
+  }
   const auto touch_count = in.value<std::uint32_t>();
   if (!in.ok() || touch_count > in.left()) return false;
   touches_.resize(touch_count);
@@ -102,10 +112,7 @@ InstanceWorld::Footing InstanceWorld::footing(int object, const Vector3d& down) 
 }
 
 void InstanceWorld::nudge(int index, const Vector3d& axis_W, double angle) {
-  Object& object = objects_[static_cast<std::size_t>(index)];
-  object.R_WO = (geometry::exp_rotation(angle * axis_W) * object.R_WO).normalized();
-  object.v_WCm.setZero();
-  object.w_WO.setZero();
+  turn_tree(index, geometry::exp_rotation(angle * axis_W), center_of_mass(index));
 }
 
 }  // namespace prescene::simulation

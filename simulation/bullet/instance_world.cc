@@ -52,9 +52,15 @@ const CompiledBody& InstanceWorld::compiled(int body) const {
                       : pushers_[static_cast<std::size_t>(body - count)];
 }
 
-void InstanceWorld::reset(const belief::WorldState& start, const std::vector<belief::Action>& actions,
+void InstanceWorld::reset(const belief::WorldState& given_start, const std::vector<belief::Action>& actions,
                           core::RandomStream stream) {
-  PRESCENE_CHECK(static_cast<int>(start.objects.size()) == scene_->object_count);
+  PRESCENE_CHECK(static_cast<int>(given_start.objects.size()) == scene_->object_count);
+  belief::WorldState on_joints;
+  if (!scene_->joints.empty()) {
+    on_joints = given_start;
+    belief::obey_joints(scene_->scene, on_joints);
+  }
+  const belief::WorldState& start = scene_->joints.empty() ? given_start : on_joints;
   start_time_ = start.time;
   steps_ = 0;
   warm_.clear();
@@ -74,6 +80,14 @@ void InstanceWorld::reset(const belief::WorldState& start, const std::vector<bel
     object.v_WCm = given.V_WO.linear + given.V_WO.angular.cross(arm);
     object.held = player_.kinematic(static_cast<int>(i));
   }
+  hinged_.assign(scene_->joints.size(), Hinged{});
+  jointed_.assign(objects_.size(), 0);
+  for (std::size_t j = 0; j < hinged_.size(); ++j) {
+    hinged_[j].drawn = belief::parameters_of(scene_->scene, start, static_cast<int>(j));
+    const CompiledJoint& joint = scene_->joints[j];
+    jointed_[static_cast<std::size_t>(joint.child)] = 1;
+    if (joint.parent >= 0 && joint.parent < scene_->object_count) jointed_[static_cast<std::size_t>(joint.parent)] = 1;
+  }
   parting_.assign(objects_.size() * static_cast<std::size_t>(scene_->robot_count), 0);
   pushers_.clear();
   for (int i = 0; i < player_.pusher_count(); ++i) {
@@ -91,10 +105,12 @@ void InstanceWorld::reset(const belief::WorldState& start, const std::vector<bel
   const auto count = static_cast<std::size_t>(body_count());
   moving_.assign(count, Moving{});
   flights_.resize(objects_.size());
-  results_.resize(count);
-  while (rigid_.size() < count) rigid_.push_back(make_rigid_body());
-  rigid_pointers_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) rigid_pointers_[i] = rigid_[i].get();
+  // The last is the world, which joints may hang on.
+  const std::size_t with_world = count + (scene_->joints.empty() ? 0 : 1);
+  results_.resize(with_world);
+  while (rigid_.size() < with_world) rigid_.push_back(make_rigid_body());
+  rigid_pointers_.resize(with_world);
+  for (std::size_t i = 0; i < with_world; ++i) rigid_pointers_[i] = rigid_[i].get();
   for (int i = 0; i < scene_->support_count; ++i) {
     const auto body = static_cast<std::size_t>(scene_->object_count + i);
     moving_[body].X_WO = Frame(scene_->bodies[body].X_WO);
@@ -216,6 +232,10 @@ void InstanceWorld::integrate() {
       object.p_WCm = X_WO.translation + object.R_WO * object.physical.center_of_mass;
       continue;
     }
+    if (jointed_[i]) {
+      integrate_jointed(static_cast<int>(i));
+      continue;
+    }
     const BodyResult& result = results_[i];
     const Flight& flight = flights_[i];
     if (result.touched) {
@@ -281,6 +301,10 @@ bool InstanceWorld::freeze_beyond(double radius) {
       object.v_WCm.setZero();
       object.w_WO.setZero();
       moving_[i].present = false;
+      if (jointed_[i]) {  // what hangs on it is fixed from now on
+        moving_[i].dynamic = false;
+        moving_[i].velocity = moving_[i].spin = Vector3d::Zero();
+      }
     }
     any = any || object.frozen;
   }
@@ -306,6 +330,8 @@ void InstanceWorld::read(belief::WorldState& state) const {
                                                  : belief::MotionMode::kMoving;
     out.physical = object.physical;
   }
+  state.joints.resize(hinged_.size());
+  for (std::size_t j = 0; j < hinged_.size(); ++j) state.joints[j] = hinged_[j].drawn;
 }
 
 }  // namespace prescene::simulation

@@ -4,6 +4,7 @@
 // and starting over leave nothing behind.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -76,6 +77,14 @@ class InstanceWorld {
   /// Turns an object about an axis through its centre of mass and stops it. Overlap that comes of it is pushed out by
   /// the steps that follow, without energy.
   void nudge(int object, const Vector3d& axis_W, double angle);
+  /// Whether it hangs on something, or something on it.
+  bool jointed(int object) const;
+  /// The joint of which it is the child, else -1.
+  int joint_of(int object) const;
+  /// Turns the child of a hinge, and what hangs on it, about the axis, and stops it.
+  void nudge_joint(int joint, double angle);
+  /// m: of a child's centre of mass from its hinge's axis.
+  double swing_radius(int joint) const;
   /// What an object stands on as it is now; a function of the state alone.
   struct Footing {
     std::span<const Vector3d> points;  ///< Where it touches others, W; valid until the next call or step.
@@ -122,6 +131,15 @@ class InstanceWorld {
     double impulse = 0.0;
     Vector3d friction_impulse;
   };
+  /// Of one joint.
+  struct Hinged {
+    belief::JointParameters drawn;
+    std::array<double, 6> impulse{};  // of the step before (SolverJoint)
+  };
+  /// Position and attitude of a joint's two bodies at the end of a step.
+  struct JointEnds {
+    Pose X_WP, X_WC;
+  };
   /// What a step's contacts did to an object, beside its velocity.
   struct Impact {
     std::optional<double> time;  // when in the step the first contact closed
@@ -166,6 +184,20 @@ class InstanceWorld {
   double free_acceleration(const SolverContact& contact) const;
   bool solve(const core::Cancellation* cancellation);
   void integrate();
+  // Joints: instance_joints.cc.
+  bool joint_acts(const CompiledJoint& joint) const;
+  void list_joints();
+  /// Where a body is at the end of what is taken of a step, with the velocities that the solver found.
+  Pose end_pose(int body) const;
+  std::array<double, 5> joint_errors(const CompiledJoint& joint, const SolverJoint& rows, const Pose& X_WP,
+                                     const Pose& X_WC) const;
+  /// Sets the solver's targets so that the joints hold at the end of the step, too. False once they do.
+  bool aim_joints();
+  bool solve_with_joints(const core::Cancellation* cancellation);
+  void fill_bodies();
+  void integrate_jointed(int object);
+  void turn_tree(int object, const Quaterniond& turn, const Vector3d& about_W);
+  Frame parent_frame(const CompiledJoint& joint) const;
   // Split steps: instance_impacts.cc.
   bool take_parts(const core::Cancellation* cancellation);
   /// What is taken of a step now: this many of kStepParts.
@@ -189,6 +221,8 @@ class InstanceWorld {
   double start_time_ = 0.0;
   std::int64_t steps_ = 0;
   std::vector<Warm> warm_;
+  std::vector<Hinged> hinged_;         // in the order of the scene's joints
+  std::vector<std::uint8_t> jointed_;  // by object: some joint is its
   std::vector<Touch> touches_;
   double overlap_ = 0.0;  // not in snapshots: nothing depends on it
 
@@ -204,7 +238,10 @@ class InstanceWorld {
   std::vector<Bounds> fixed_parts_;  // of the supports, with the margin at which contacts are made
   std::vector<ContactPoint> points_;
   std::vector<SolverContact> contacts_;
-  std::vector<SolverContact> pressed_;  // in the parts of this step that are over
+  std::vector<SolverJoint> joints_;           // that act in this step
+  std::vector<std::size_t> joint_ids_;        // of these, among the scene's
+  std::vector<std::array<double, 5>> begun_;  // their errors at the step's beginning
+  std::vector<SolverContact> pressed_;        // in the parts of this step that are over
   std::vector<std::uint64_t> contact_keys_;
   std::vector<std::unique_ptr<btRigidBody>> rigid_;
   std::vector<btCollisionObject*> rigid_pointers_;

@@ -18,11 +18,14 @@ bool RestDetector::at_rest(InstanceWorld& world, const core::Cancellation* cance
   if (!world.actions_finished()) return false;
   if (!tested_) {
     for (int i = 0; i < world.object_count(); ++i)
-      if (world.free(i) && world.velocity(i).norm() > kCreepSpeed && stands_firmly(world, i)) return false;
+      if (world.free(i) && world.velocity(i).norm() > kCreepSpeed && (world.jointed(i) || stands_firmly(world, i)))
+        return false;
     tested_ = true;
     stable_ = true;
     for (int i = 0; i < world.object_count() && stable_; ++i) {
-      if (world.free(i)) stable_ = stands_firmly(world, i) || returns_after_nudges(world, i, cancellation);
+      // What is jointed may stand on more than its own contacts, and carry more than itself.
+      if (world.free(i))
+        stable_ = (!world.jointed(i) && stands_firmly(world, i)) || returns_after_nudges(world, i, cancellation);
       if (cancellation && cancellation->requested()) tested_ = stable_ = false;
     }
   }
@@ -48,6 +51,11 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
   const Vector3d& gravity = world.scene().scene.gravity_W;
   if (gravity.isZero(0.0)) return true;
   const Vector3d down = gravity.normalized();
+  // A hinge is nudged both ways, a slider not at all: where it stands still it does so in a neighbourhood.
+  const int joint = world.joint_of(object);
+  const bool hinge =
+      joint >= 0 && world.scene().joints[static_cast<std::size_t>(joint)].joint.type == belief::JointType::kHinge;
+  if (joint >= 0 && !hinge) return true;
   before_.clear();
   double tallest = 0.0;
   for (int i = 0; i < world.object_count(); ++i) {
@@ -56,6 +64,7 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
     before_.push_back({world.rotation(i), center, world.footing(i, down).height});
     if (i == object) tallest = before_.back().height;
   }
+  if (hinge) tallest = world.swing_radius(joint);
   const int steps = static_cast<int>(std::ceil(nudge_window(tallest, gravity.norm()) / world.dt()));
 
   const auto runs_away = [&](int i) {
@@ -68,8 +77,8 @@ bool RestDetector::returns_after_nudges(InstanceWorld& world, int object, const 
   ByteWriter saved(saved_);
   world.save(saved);
   bool returns = true;
-  for (int k = 0; k < kNudgeAxes && returns; ++k) {
-    world.nudge(object, nudge_axis(down, k), kNudge);
+  for (int k = 0; k < (hinge ? 2 : kNudgeAxes) && returns; ++k) {
+    hinge ? world.nudge_joint(joint, k == 0 ? kNudge : -kNudge) : world.nudge(object, nudge_axis(down, k), kNudge);
     for (int s = 0; s < steps && returns; ++s) {
       if (cancellation && cancellation->requested()) returns = false;
       returns = world.step(cancellation) && returns;

@@ -217,6 +217,8 @@ core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const bel
     return core::unsupported("lockstep simulates one to " + std::to_string(kMaxObjects) +
                              " objects, and the scene has " + std::to_string(scene.objects.size()));
   }
+  if (!scene.joints.empty())
+    return core::unsupported("the joint " + scene.joints.front().name + " is not simulated in lockstep");
   PRESCENE_RETURN_IF_ERROR(check_pushers(scene.actions));
   auto compiled = std::make_shared<CompiledLockstep>();
   compiled->scene = scene;

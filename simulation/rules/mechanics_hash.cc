@@ -141,6 +141,16 @@ std::uint64_t mechanics_hash(const belief::Scene& scene, const MechanicsOptions&
       hasher.pose(waypoint.X_WG);
     }
   }
+  for (const belief::Joint& joint : scene.joints) {
+    hasher.text(joint.parent);
+    hasher.text(joint.child);
+    hasher.value(joint.type);
+    hasher.matrix(joint.axis_P);
+    hasher.matrix(joint.anchor_P);
+    hasher.pose(joint.X_PC0);
+    hasher.value(joint.low);
+    hasher.value(joint.high);
+  }
   return hasher.digest();
 }
 

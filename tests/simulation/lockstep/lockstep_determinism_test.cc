@@ -295,6 +295,13 @@ TEST(LockstepRefusals, NameTheBodyAndTheReason) {
     EXPECT_EQ(status.code(), core::StatusCode::kUnsupported) << text;
     EXPECT_THAT(status.message(), HasSubstr(text));
   };
+  Scene jointed = good;
+  belief::Joint joint;
+  joint.name = "slide";
+  joint.type = belief::JointType::kSlider;
+  joint.child = jointed.objects[0].name;
+  jointed.joints.push_back(joint);
+  expect_refused(jointed, "the joint slide");
   Scene five = good;
   for (int i = 1; i < 5; ++i) {
     add_object(five, primitive_model("box" + std::to_string(i), BoxShape{{0.1, 0.1, 0.1}}), std::to_string(i));
