@@ -6,6 +6,7 @@
 
 #include "prescene/belief/robot_motion.h"
 #include "prescene/core/check.h"
+#include "prescene/filter/operators/hold_joints.h"
 #include "prescene/filter/operators/learn_colors.h"
 #include "prescene/filter/operators/unknown_objects.h"
 
@@ -327,6 +328,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
     result.counters.not_simulated = report.not_simulated;
     result.physics_failure = std::move(report.failure);
     if (report.not_simulated > 0) result.degraded |= kPhysicsFailed;
+    hold_joints(belief);
   }
   belief.robot = X_WG;
   note("predict", result);
@@ -350,6 +352,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   weigh_all(current, first ? settings_.max_gap : dt);
   note("weight", result);
   exchange_all(current);
+  hold_joints(belief);
   learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
   result.counters.inferred_releases = infer_releases(belief);
   LearnReport learned = learn_physics(belief, settings_.learn_physics, simulators_, search_.threads());
@@ -365,7 +368,10 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
                                           belief.objects[i].particles);
   note("filter", result);
 
-  if (settings_.recover) recover_all(current);
+  if (settings_.recover) {
+    recover_all(current);
+    if (result.counters.recoveries > 0) hold_joints(belief);
+  }
   look_for_more(current);
   number_islands(kIslandGap, meshes_, belief);
   note_failed_rendering(result);
@@ -403,8 +409,10 @@ void number_islands(double gap, MeshCache& meshes, Belief& belief) {
           static_cast<double>(bodies[i].mesh->radius) + static_cast<double>(bodies[j].mesh->radius) + gap;
       const Vector3d between = bodies[i].X_WO * bodies[i].mesh->centre.cast<double>() -
                                bodies[j].X_WO * bodies[j].mesh->centre.cast<double>();
-      if (between.norm() > reach) continue;
-      if (!reaches_into(bodies[i], bodies[j]) && !reaches_into(bodies[j], bodies[i])) continue;
+      const bool jointed = !belief.scene->joints.empty() &&
+                           belief::are_jointed(*belief.scene, belief.objects[i].name, belief.objects[j].name);
+      if (!jointed && between.norm() > reach) continue;
+      if (!jointed && !reaches_into(bodies[i], bodies[j]) && !reaches_into(bodies[j], bodies[i])) continue;
       const int a = belief.objects[i].island, b = belief.objects[j].island;
       for (ObjectBelief& object : belief.objects)
         if (object.island == std::max(a, b)) object.island = std::min(a, b);

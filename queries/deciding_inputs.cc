@@ -91,6 +91,19 @@ void add_object(const std::string& name, std::size_t object, const belief::Objec
   columns.add_vector(name + ": centre of mass", [&](std::size_t i) { return at(i).physical.center_of_mass; });
 }
 
+void add_joints(const belief::Scene& scene, const std::vector<belief::WorldState>& starts, Columns& columns) {
+  std::vector<std::vector<belief::JointParameters>> drawn;
+  for (const belief::WorldState& start : starts) {
+    drawn.emplace_back();
+    for (std::size_t j = 0; j < scene.joints.size(); ++j)
+      drawn.back().push_back(belief::parameters_of(scene, start, static_cast<int>(j)));
+  }
+  for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+    columns.add(scene.joints[j].name + ": friction", [&](std::size_t i) { return drawn[i][j].friction; });
+    columns.add(scene.joints[j].name + ": damping", [&](std::size_t i) { return drawn[i][j].damping; });
+  }
+}
+
 void add_actions(const Foresight& foresight, const Prior& prior, Columns& columns) {
   const std::vector<belief::Action>& actions = foresight.request.actions;
   if (actions.empty()) return;
@@ -130,6 +143,7 @@ std::vector<UncertainInput> uncertain_inputs(const Foresight& foresight, const P
   const belief::Scene& scene = *foresight.scene;
   for (std::size_t o = 0; o < scene.objects.size(); ++o)
     add_object(scene.objects[o].name, o, prior.likeliest.objects[o], starts, columns);
+  add_joints(scene, starts, columns);
   add_actions(foresight, prior, columns);
   return std::move(columns).result();
 }

@@ -10,6 +10,7 @@ core::Status forecast_flight(const Foresight& foresight, const Prior& prior, con
                              belief::PredictAnswer& answer) {
   if (!context.shapes) return core::ok_status();
   const belief::Scene& scene = *foresight.scene;
+  if (!scene.joints.empty()) return core::unsupported("flights of things on joints are not followed");
   const auto bodies = simulation::FlightBodies::make(scene, *context.shapes);
   if (!bodies) return core::ok_status();
   const auto flight = simulation::common_flight(scene, *bodies, prior.starts, foresight.request, context.make_simulator,

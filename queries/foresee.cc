@@ -83,7 +83,8 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   options.exact_instances = effort.exact_instances;
   options.keep_contacts = detail.keep_contacts;
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
-  if (!detail.to_rest && !foresight.variables.empty())
+  // What is certain of a free body is not of one on a joint.
+  if (!detail.to_rest && !foresight.variables.empty() && foresight.scene->joints.empty())
     foresight.certifier =
         simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
                                    {.shapes = context.shapes,

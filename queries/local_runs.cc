@@ -41,7 +41,8 @@ core::Result<const LocalRuns::Part*> LocalRuns::part_of(std::size_t object) {
   auto part = std::make_unique<Part>();
   std::vector<Box> boxes;
   for (std::size_t i = 0; i < scene_.objects.size(); ++i) boxes.push_back(box_of(i, likeliest_.objects[i].X_WO));
-  std::vector<std::uint8_t> kept(boxes.size(), 0);
+  // What is jointed is told apart by no box: then all are simulated.
+  std::vector<std::uint8_t> kept(boxes.size(), scene_.joints.empty() ? 0 : 1);
   std::vector<std::size_t> open = {object};
   kept[object] = 1;
   // What it touches, what that touches, and so on.

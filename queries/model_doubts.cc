@@ -90,6 +90,30 @@ void add_object_ends(const std::shared_ptr<const belief::Scene>& scene, const st
   }
 }
 
+void add_joint_ends(const std::shared_ptr<const belief::Scene>& scene, const std::vector<belief::WorldState>& starts,
+                    std::vector<Variant>& variants) {
+  using Member = double belief::JointParameters::*;
+  const std::pair<const char*, Member> members[] = {{"friction", &belief::JointParameters::friction},
+                                                    {"damping", &belief::JointParameters::damping}};
+  for (std::size_t j = 0; j < scene->joints.size(); ++j) {
+    for (const auto& [name, member] : members) {
+      std::vector<double> values;
+      for (const belief::WorldState& start : starts)
+        if (j < start.joints.size()) values.push_back(start.joints[j].*member);
+      std::sort(values.begin(), values.end());
+      if (values.empty() || values.back() - values.front() <= 1e-9 * (1.0 + std::abs(values.front()))) continue;
+      for (const double end : {kLowEnd, kHighEnd}) {
+        const double value =
+            values[static_cast<std::size_t>(std::lround(end * static_cast<double>(values.size() - 1)))];
+        variants.push_back({Kind::kPrior, scene->joints[j].name + ": " + name + " at " + core::rounded_text(value), 1.0,
+                            scene, [j, member = member, value](belief::WorldState& start) {
+                              if (j < start.joints.size()) start.joints[j].*member = value;
+                            }});
+      }
+    }
+  }
+}
+
 void add_support_ends(const std::shared_ptr<const belief::Scene>& scene, std::vector<Variant>& variants) {
   using Member = belief::ScalarDistribution belief::ContactProperties::*;
   const std::pair<const char*, Member> members[] = {{"friction", &belief::ContactProperties::friction},
@@ -239,6 +263,7 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
                                    {Kind::kStep, "twice the step", 2.0, foresight.scene, {}}};
   add_object_ends(foresight.scene, own, variants);
   add_support_ends(foresight.scene, variants);
+  add_joint_ends(foresight.scene, own, variants);
   std::vector<std::unique_ptr<simulation::Simulator>> simulators;
   for (const Variant& variant : variants) {
     PRESCENE_TRY(auto simulator, context.make_simulator(*variant.scene, variant.step_factor));

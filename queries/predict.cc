@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // State anticipation: X*_t+1 ~ P(X_t+1 | U_t, X_t).
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <span>
 #include <utility>
@@ -65,6 +66,44 @@ belief::FinalPoses final_poses_of(const Foresight& foresight, std::size_t object
   const std::vector<std::string> nothing_asked{""};
   const std::vector<std::string>& names = variable ? foresight.variables[*variable].classes : nothing_asked;
   return final_poses(known.name, samples, names, scene.model_of(known).symmetry, {}, pool);
+}
+
+/// Of the joints at the end, over all instances that did not fail.
+std::vector<belief::JointForecast> joints_at_end(const Foresight& foresight) {
+  const belief::Scene& scene = *foresight.scene;
+  if (scene.joints.empty()) return {};
+  std::vector<std::vector<std::pair<double, double>>> positions(scene.joints.size());  // with weights
+  for (const simulation::InstanceRecord& record : foresight.estimate.instances) {
+    if (record.failed) continue;
+    const std::vector<belief::JointState> states = belief::joint_states(scene, record.final);
+    for (std::size_t j = 0; j < states.size(); ++j) positions[j].emplace_back(states[j].position, record.weight);
+  }
+  std::vector<belief::JointForecast> forecasts;
+  for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+    std::sort(positions[j].begin(), positions[j].end());
+    double mass = 0.0, first = 0.0, second = 0.0;
+    for (const auto& [position, weight] : positions[j]) {
+      mass += weight;
+      first += weight * position;
+      second += weight * position * position;
+    }
+    if (!(mass > 0.0)) continue;
+    belief::JointForecast& forecast = forecasts.emplace_back();
+    forecast.joint = scene.joints[j].name;
+    forecast.type = scene.joints[j].type;
+    forecast.mean = first / mass;
+    forecast.standard_deviation = std::sqrt(std::max(0.0, second / mass - forecast.mean * forecast.mean));
+    const auto quantile = [&](double share) {
+      double reached = 0.0;
+      for (const auto& [position, weight] : positions[j])
+        if ((reached += weight) >= share * mass) return position;
+      return positions[j].back().first;
+    };
+    forecast.low = quantile(0.05);
+    forecast.middle = quantile(0.5);
+    forecast.high = quantile(0.95);
+  }
+  return forecasts;
 }
 
 std::vector<belief::OutcomeProbability> probabilities_of(const Foresight& foresight) {
@@ -159,6 +198,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   account(foresight, answer);
   answer.outcomes = probabilities_of(foresight);
   answer.history = history_of(foresight);
+  answer.joints = joints_at_end(foresight);
   const std::vector<std::size_t> objects = objects_asked_about(*foresight.scene);
   // What was not worked out when the time ran out or somebody stopped it.
   std::vector<std::string> missing;

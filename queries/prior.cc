@@ -61,8 +61,10 @@ std::shared_ptr<belief::Scene> scene_of(const belief::Belief& belief) {
     known.name = object.name;
     known.model = object.model;
     known.pose = belief::FixedPose{belief::estimate(belief, object).mean};
-    known.held_by = holder_of(*belief.scene, object, X_WG);
+    // What hangs on a joint is pulled by a hand, not carried.
+    if (!belief::joint_of(*scene, object.name)) known.held_by = holder_of(*belief.scene, object, X_WG);
   }
+  belief::drop_loose_joints(*scene);
   for (std::size_t i = 0; i < X_WG.size(); ++i) scene->robot[i].timeline = {{0.0, X_WG[i]}};
   if (scene->camera) scene->camera->X_WC = belief.X_WC;
   scene->actions.clear();
@@ -85,12 +87,21 @@ Prior prior_of(const belief::Belief& belief) {
               std::move(left_out)};
   const auto seating = std::make_shared<const Seating>(*present, *scene);
   prior.starts = simulation::start_of(std::shared_ptr<const belief::Belief>(std::move(present)));
-  if (!seating->any()) return prior;
-  seating->apply(prior.likeliest);
+  if (!seating->any() && scene->joints.empty()) return prior;
+  // Poses are drawn object by object: what they stand on and what they hang on ties them together.
+  const auto tie = [seating, scene](belief::WorldState& state) {
+    seating->apply(state);
+    for (const belief::Joint& joint : scene->joints) {
+      belief::ObjectState& child = state.objects[static_cast<std::size_t>(*belief::find_object(*scene, joint.child))];
+      if (child.mode == belief::MotionMode::kHeld) child.mode = belief::MotionMode::kMoving;
+    }
+    belief::obey_joints(*scene, state);
+  };
+  tie(prior.likeliest);
   for (simulation::StartComponent& component : prior.starts.components) {
-    component.draw = [seating, draw = std::move(component.draw)](std::span<const double> uniforms) {
+    component.draw = [tie, draw = std::move(component.draw)](std::span<const double> uniforms) {
       belief::WorldState state = draw(uniforms);
-      seating->apply(state);
+      tie(state);
       return state;
     };
   }

@@ -61,7 +61,9 @@ Seating::Seating(const belief::Belief& belief, const belief::Scene& scene) {
   up_W_ = -scene.gravity_W.normalized();
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     Body& body = bodies_.emplace_back();
-    body.lies_still = lies_still(belief.objects[i], scene.objects[i]);
+    // What hangs on a joint lies where that holds it.
+    body.lies_still =
+        lies_still(belief.objects[i], scene.objects[i]) && !belief::joint_of(scene, scene.objects[i].name);
     any_ = any_ || body.lies_still;
   }
   if (!any_) return;

@@ -245,6 +245,11 @@ core::Status add_stability_detail(const Prior& prior, std::size_t object, const 
   if (query.detail.margin && asked.held_by)
     return core::invalid_input("detail: '" + asked.name + "' is held by '" + *asked.held_by +
                                "', so it has no margin: leave 'margin' out, or ask of what stands by itself");
+  if (query.detail.removal && std::ranges::any_of(prior.scene->joints, [&](const belief::Joint& joint) {
+        return joint.child == asked.name || joint.parent == asked.name;
+      }))
+    return core::invalid_input("detail: '" + asked.name +
+                               "' is on a joint, so it can't be taken away: leave 'removal' out, or ask of another");
   if (!context.make_simulator) return core::unavailable("no simulator: this service was set up without one");
   PRESCENE_TRY(const auto simulator, context.make_simulator(*prior.scene, 1.0));
   Trials trials(prior, query, context, *simulator);

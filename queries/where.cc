@@ -14,6 +14,16 @@ bool is_asked(const belief::WhereQuery& query, const std::string& name) {
   return !query.object || *query.object == name;
 }
 
+/// Those of the object that is asked for.
+std::vector<belief::JointEstimate> joints_of(const belief::Scene& scene, std::vector<belief::JointEstimate> all,
+                                             const belief::WhereQuery& query) {
+  std::erase_if(all, [&](const belief::JointEstimate& estimate) {
+    const belief::Joint& joint = scene.joints[static_cast<std::size_t>(*belief::find_joint(scene, estimate.joint))];
+    return !is_asked(query, joint.child) && !is_asked(query, joint.parent);
+  });
+  return all;
+}
+
 }  // namespace
 
 core::Result<belief::WhereAnswer> where(const belief::Belief& belief, const belief::WhereQuery& query) {
@@ -28,6 +38,7 @@ core::Result<belief::WhereAnswer> where(const belief::Belief& belief, const beli
                             object.physics.learned_ns});
   }
   if (query.object && answer.items.empty()) return no_such(*query.object, known);
+  if (belief.scene) answer.joints = joints_of(*belief.scene, belief::joint_estimates(belief), query);
   return answer;
 }
 
@@ -47,6 +58,7 @@ core::Result<belief::WhereAnswer> where(const belief::Scene& scene, const belief
                             belief::parameter_estimates(scene.model_of(object), {})});
   }
   if (query.object && answer.items.empty()) return no_such(*query.object, known);
+  answer.joints = joints_of(scene, belief::joint_estimates(scene), query);
   return answer;
 }
 

@@ -2,6 +2,7 @@
 #include "prescene/service/belief_summary.h"
 
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
@@ -72,6 +73,31 @@ void read_learned(const ordered_json& json, ObjectSummary& object) {
   }
 }
 
+/// What is not of the form is left out.
+void read_joints(const ordered_json& json, BeliefSummary& summary) {
+  constexpr std::size_t kMostJoints = 1024;
+  if (!json.is_array()) return;
+  for (const ordered_json& item : json) {
+    if (summary.joints.size() >= kMostJoints) return;
+    if (!item.is_object() || !item.contains("joint") || !item["joint"].is_string()) continue;
+    belief::JointEstimate& joint = summary.joints.emplace_back();
+    joint.joint = item["joint"].get<std::string>();
+    joint.type =
+        item.contains("type") && item["type"] == "slider" ? belief::JointType::kSlider : belief::JointType::kHinge;
+    joint.position = number_or(item, "position", 0.0);
+    joint.standard_deviation = number_or(item, "standard_deviation", 0.0);
+    joint.velocity = number_or(item, "velocity", 0.0);
+    joint.confidence = number_or(item, "confidence", 0.0);
+    const auto limits = item.find("limits");
+    const auto limit = [&](std::size_t i, double none) {
+      const bool given = limits != item.end() && limits->is_array() && limits->size() == 2 && (*limits)[i].is_number();
+      return given ? (*limits)[i].get<double>() : none;
+    };
+    joint.low = limit(0, -std::numeric_limits<double>::infinity());
+    joint.high = limit(1, std::numeric_limits<double>::infinity());
+  }
+}
+
 core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
   const core::Status bad = core::invalid_input("belief: an object without name, state or pose");
   if (!json.is_object()) return bad;
@@ -128,6 +154,7 @@ BeliefSummary summary_of(const belief::Belief& belief) {
     summary.objects.back().is_new = true;
     summary.objects.back().size = geometry::bounding_box(mesh_of(model)).sizes();
   }
+  summary.joints = belief::joint_estimates(belief);
   return summary;
 }
 
@@ -151,7 +178,9 @@ ordered_json to_json(const BeliefSummary& summary) {
                        {"learned_ns", object.learned_ns}});
     if (object.is_new) objects.back()["size"] = {object.size.x(), object.size.y(), object.size.z()};
   }
-  return {{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
+  ordered_json json{{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
+  if (!summary.joints.empty()) json["joints"] = belief::to_json(summary.joints);
+  return json;
 }
 
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text) {
@@ -168,6 +197,7 @@ core::Result<BeliefSummary> belief_summary_from_json(const std::string& text) {
     PRESCENE_TRY(ObjectSummary read, object_from_json(object));
     summary.objects.push_back(std::move(read));
   }
+  if (json.contains("joints")) read_joints(json["joints"], summary);
   return summary;
 }
 

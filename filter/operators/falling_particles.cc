@@ -32,6 +32,9 @@ belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_W
   std::vector<belief::SceneObject> kept;
   for (const std::size_t i : objects) kept.push_back(belief.scene->objects[i]);
   scene.objects = std::move(kept);
+  belief::drop_loose_joints(scene);
+  for (belief::SceneObject& object : scene.objects)  // a hand pulls what is on a joint, and does not carry it
+    if (belief::joint_of(scene, object.name)) object.held_by.reset();
   scene.actions.clear();
   scene.outcomes.clear();
   scene.exclusive_outcomes.clear();
@@ -107,10 +110,11 @@ std::optional<std::string> failure_of(const belief::Trajectory& run, std::size_t
 
 /// Moves falling particles of one duration by the simulator, each with the other objects (`objects`, by index in the
 /// belief) where they most likely are. Its physical parameters are drawn anew for each particle and step from what is
-/// believed of them.
+/// believed of them, and so are those of the joints.
 void simulate(belief::Belief& belief, std::span<const Falling> falling, const std::vector<std::size_t>& objects,
-              double dt, const PredictOptions& options, const simulation::Simulator& simulator,
-              const core::RandomStream& stream, core::ThreadPool& threads, PredictReport& report) {
+              const std::vector<belief::Joint>& joints, double dt, const PredictOptions& options,
+              const simulation::Simulator& simulator, const core::RandomStream& stream, core::ThreadPool& threads,
+              PredictReport& report) {
   belief::WorldState common;
   std::vector<belief::PhysicalSampler> physics;
   for (const std::size_t i : objects) {
@@ -134,6 +138,17 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     std::vector<double> uniforms(static_cast<std::size_t>(physics[place].dimensions()));
     for (double& u : uniforms) u = draws.uniform();
     settle_draws.push_back(draws.uniform());
+    for (const belief::Joint& joint : joints) {
+      const auto drawn = [&](const belief::ScalarDistribution& distribution) {
+        std::vector<double> numbers(static_cast<std::size_t>(belief::dimensions(distribution)));
+        for (double& u : numbers) u = draws.uniform();
+        return belief::draw(distribution, numbers);
+      };
+      belief::JointParameters& to = start.joints.emplace_back();
+      to.type = joint.type;
+      to.friction = drawn(joint.friction);
+      to.damping = drawn(joint.damping);
+    }
     start.objects[place] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, physics[place].draw(uniforms)};
     starts.push_back(std::move(start));
   }
@@ -225,7 +240,8 @@ void move_on_among(const std::vector<std::size_t>& objects, std::span<const Fall
   for (std::size_t begin = 0; begin < falling.size();) {
     std::size_t end = begin;
     while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
-    simulate(belief, falling.subspan(begin, end - begin), objects, dt, options, **simulator, stream, threads, report);
+    simulate(belief, falling.subspan(begin, end - begin), objects, scene.joints, dt, options, **simulator, stream,
+             threads, report);
     begin = end;
   }
 }

@@ -76,6 +76,9 @@ class Judge {
     std::vector<belief::SceneObject> kept;
     for (const std::size_t i : present_) kept.push_back(scene.objects[i]);
     scene.objects = std::move(kept);
+    belief::drop_loose_joints(scene);
+    for (belief::SceneObject& object : scene.objects)  // a hand pulls what is on a joint, and does not carry it
+      if (belief::joint_of(scene, object.name)) object.held_by.reset();
     for (std::size_t i = 0; i < scene.robot.size(); ++i) {
       std::vector<belief::KinematicBody::Waypoint> seen;
       for (const MotionSample& sample : episode_.samples)
@@ -376,7 +379,8 @@ LearnReport learn_physics(belief::Belief& belief, const LearnPhysicsOptions& opt
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     follow_motion(belief, static_cast<int>(i), belief.objects[i].motion);
     auto& episode = belief.objects[i].motion.episode;
-    if (!options.enabled || !simulators ||
+    // How a joint's own friction goes along with the object's is not told apart.
+    if (!options.enabled || !simulators || belief::joint_of(*belief.scene, belief.objects[i].name) ||
         belief::physical_dimensions(belief::model_of(belief, belief.objects[i])) == 0)
       episode.reset();
     if (episode && episode->closed && runs_left > 0) go_on_judging(i, simulators, threads, runs_left, belief, report);

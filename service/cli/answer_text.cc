@@ -4,6 +4,7 @@
 #include "achieve_options.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 #include "relations_options.h"
 #include "verb.h"
 
@@ -56,6 +57,23 @@ std::string learned_text(const nlohmann::ordered_json& item) {
                                         : ", the last at " + fixed_text(learned->get<double>(), 1) + " s";
   return item.value("object", "") + ", learned from " + counted(static_cast<std::size_t>(lessons), "motion") + when +
          ":\n" + text;
+}
+
+/// "slide at 0.213 +- 0.002 m", a line each; "" = there is none.
+std::string joints_text(const nlohmann::ordered_json& where) {
+  std::string text;
+  const auto joints = where.find("joints");
+  if (joints == where.end()) return text;
+  for (const auto& joint : *joints) {
+    const bool hinge = joint.value("unit", "") == "rad";
+    const auto number = [&](const char* key) {
+      const double value = joint.value(key, 0.0);
+      return hinge ? fixed_text(value * geometry::kDegreesPerRadian, 1) : fixed_text(value, 3);
+    };
+    text += joint.value("joint", "") + " at " + number("position") + " +- " + number("standard_deviation") +
+            (hinge ? " degrees" : " m") + "\n";
+  }
+  return text;
 }
 
 std::string impulse_text(const nlohmann::ordered_json& impulse) {
@@ -116,7 +134,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
                           fixed_text(p.at(2).get<double>(), 3)});
       learned += learned_text(item);
     }
-    return table(rows) + learned;
+    return table(rows) + joints_text(*where) + learned;
   }
   return document_text(answer);
 }

@@ -9,6 +9,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
@@ -79,6 +80,16 @@ std::string cost_text(const belief::PredictAnswer& predicted) {
   return text + (predicted.converged ? "\n" : "; not all intervals reached the tolerance\n");
 }
 
+/// "slide ends at 0.213 m (90 %: 0.187 to 0.244)".
+std::string joint_text(const belief::JointForecast& joint) {
+  const bool hinge = joint.type == belief::JointType::kHinge;
+  const auto number = [&](double value) {
+    return hinge ? fixed_text(value * geometry::kDegreesPerRadian, 1) : fixed_text(value, 3);
+  };
+  return joint.joint + " ends at " + number(joint.middle) + (hinge ? " degrees" : " m") +
+         " (90 %: " + number(joint.low) + " to " + number(joint.high) + ")\n";
+}
+
 std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
   std::vector<std::vector<std::string>> rows = {
       {"outcome", "probability", core::rounded_text(100.0 * confidence) + " % interval"}};
@@ -98,6 +109,7 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
               fixed_text(p.z(), 3) + " m\n";
     }
   }
+  for (const belief::JointForecast& joint : predicted.joints) text += joint_text(joint);
   for (const belief::DecidingInputs& inputs : predicted.inputs) {
     // Of what hardly varies it is idle to ask what decides it.
     const bool open = std::any_of(predicted.outcomes.begin(), predicted.outcomes.end(), [&](const auto& outcome) {

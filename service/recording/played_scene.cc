@@ -115,6 +115,7 @@ Scene scene_from(const Scene& whole, const Present& present, double time) {
     object.held_by = is_held ? holder_at(whole, object, time) : std::nullopt;
     scene.objects.push_back(std::move(object));
   }
+  belief::drop_loose_joints(scene);
   for (const Action& action : whole.actions) {
     const std::string object = belief::object_of(action);
     if (!object.empty() && !belief::find_object(scene, object)) continue;
@@ -222,6 +223,8 @@ core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector
     from.time = time;
     for (const std::optional<ObjectState>& object : present)
       if (object) from.objects.push_back(*object);
+    for (const belief::Joint& joint : part.scene.joints)
+      from.joints.push_back(start.joints[static_cast<std::size_t>(*belief::find_joint(scene, joint.name))]);
     simulation::RunRequest request;
     request.actions = part.scene.actions;
     request.stop.duration = until - time;

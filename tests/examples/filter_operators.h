@@ -12,6 +12,7 @@
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
 #include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/hold_joints.h"
 #include "prescene/filter/operators/infer_release.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/operators/learn_colors.h"

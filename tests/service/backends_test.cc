@@ -37,6 +37,18 @@ objects:
   e: {model: box, pose: {position: [1.6, 0, 0.05]}}
 )";
 
+// A drawer of 1 kg that begins at 0.6 m/s: 0.18 J are rubbed off by 1 N on 0.18 m, by 2 N on 0.09 m.
+constexpr const char* kDrawer = R"(name: drawer
+models:
+  drawer: {box: [0.3, 0.3, 0.1], mass: 1.0}
+objects:
+  drawer: {model: drawer, pose: {position: [0, 0, 0.5]}, velocity: [0.6, 0, 0]}
+joints:
+  slide: {type: slider, parent: world, child: drawer, axis: x, min: 0, max: 0.4, friction: {samples: [1, 1, 1, 2]}}
+outcomes:
+  opens_wide: {joint: {name: slide, min: 0.15}}
+)";
+
 std::shared_ptr<const belief::Scene> scene_of(const char* text) {
   const auto scene = load_scene_text(text, "test.yaml", {});
   EXPECT_TRUE(scene.ok()) << scene.status().message();
@@ -150,6 +162,36 @@ TEST(Backends, AnswersTellWhoSimulatedAndWhyItWasNotLockstep) {
   const belief::Answer refused = asked(Stepper::kLockstep, kFiveBoxes);
   EXPECT_EQ(refused.error.code(), core::StatusCode::kUnsupported);
   EXPECT_THAT(refused.error.message(), HasSubstr("the scene has 5"));
+}
+
+TEST(Backends, AnswersTellWhereJointsEnd) {
+  core::ThreadPool pool(1);
+  Backends backends(pool, settings_of(Stepper::kAutomatic));
+  belief::PredictQuery query;
+  query.effort.exact_instances = 64;
+  const auto scene = scene_of(kDrawer);
+  const belief::Answer answer = queries::answer(scene, 1, {"", query}, backends.query_context(pool));
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
+  EXPECT_EQ(predicted.stepper, "bullet");
+  EXPECT_THAT(predicted.not_lockstep, HasSubstr("the joint slide"));
+  ASSERT_EQ(predicted.outcomes.size(), 1u);
+  EXPECT_NEAR(predicted.outcomes[0].probability, 0.75, 0.02);
+  ASSERT_EQ(predicted.joints.size(), 1u);
+  EXPECT_EQ(predicted.joints[0].joint, "slide");
+  EXPECT_NEAR(predicted.joints[0].middle, 0.18, 0.003);
+  EXPECT_NEAR(predicted.joints[0].low, 0.09, 0.003);
+  EXPECT_NEAR(predicted.joints[0].mean, 0.75 * 0.18 + 0.25 * 0.09, 0.003);
+
+  const auto refused = [&](const belief::PredictQuery& asked) {
+    return queries::answer(scene, 1, {"", asked}, backends.query_context(pool)).error.message();
+  };
+  belief::PredictQuery held = query;
+  held.actions = {{0.1, belief::Transport{"drawer", belief::FixedPose{}, 0.5}}};
+  EXPECT_THAT(refused(held), HasSubstr("no hand can hold it"));
+  belief::PredictQuery beyond = query;
+  beyond.outcomes = {{"o", "", {{belief::JointWithin{"slide", belief::JointType::kSlider, 0.5}}}}};
+  EXPECT_THAT(refused(beyond), HasSubstr("never gets there"));
 }
 
 TEST(Backends, QueriesKnowHowTheirSimulatorsRoundEdges) {

@@ -37,12 +37,15 @@ struct BeliefSummary {
   std::uint64_t step = 0;
   core::TimeNs stamp_ns = 0;
   std::vector<ObjectSummary> objects;
+  std::vector<belief::JointEstimate> joints = {};
 };
 
 BeliefSummary summary_of(const belief::Belief& belief);
 /// {"step", "stamp_ns", "objects": [{"name", "model", "state", "confidence", "existence", "pose", "covariance" (36
 /// numbers, row-major), "twist", "evidence_per_pixel", "visible_share", "parameters": [{"name", "mean",
-/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", of new objects "size" ([x, y, z])}]}
+/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", of new objects "size" ([x, y, z])}],
+/// where the scene has joints "joints": [{"joint", "type", "unit", "position", "standard_deviation", "velocity",
+/// "limits", "confidence"}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text);
 
