@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // CPU time of an instance in lockstep against Bullet's stepper, on one thread, on the uncertain scenes and those of
-// scenarios/ that both simulate; and whether they end in the same class.
+// scenarios/ that both simulate, hollow things among them; and whether they end in the same class.
 //
 //   bench_lockstep [--quick] [--scenarios=FOLDER] [--benchmark_out=PATH]
 #include <hwy/targets.h>
@@ -19,6 +19,7 @@
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
 #include "prescene/simulation/lockstep/lockstep_simulator.h"
+#include "prescene/simulation/rules/contact_rules.h"
 #include "tests/support/uncertain_scenes.h"
 
 namespace prescene::benchmarks {
@@ -94,8 +95,11 @@ void compare(const std::string& name, const belief::Scene& scene, int count, Tab
   for (const std::size_t together : {starts.size(), std::size_t{64}, std::size_t{16}}) {
     Target target;
     target.work = "CPU time an instance, scene " + name + ", " + std::to_string(together) + " starts a call";
-    // Held to it are the scenes that the stepper was made for: one moving body.
-    if (together == starts.size() && scene.objects.size() == 1) target.must = at_least(3.0);
+    // Held to it are the scenes that the stepper was made for: one moving body, and hollow things.
+    const bool hollow = std::any_of(scene.models.begin(), scene.models.end(), [](const belief::ObjectModel& model) {
+      return simulation::collides_as_spheres(model.collision);
+    });
+    if (together == starts.size() && (hollow || scene.objects.size() == 1)) target.must = at_least(3.0);
     target.reached = ratio(best, together);
     target.unit = "x";
     target.n = count;
@@ -116,10 +120,16 @@ int run(int count, const std::string& scenarios, const std::string& out) {
   for (const auto& [name, scene] : tests::uncertain_scenes()) {
     compare(name, *scene, count, table, report);
   }
-  for (const char* name : {"milk_on_bin", "pushed_stack", "bottle_by_the_edge", "tossed_box"}) {
+  struct Scenario {
+    const char* name;
+    int share;  // of the count: an instance of hollow things takes Bullet's stepper 0.1 s and more
+  };
+  for (const auto& [name, share] :
+       {Scenario{"milk_on_bin", 1}, Scenario{"pushed_stack", 1}, Scenario{"bottle_by_the_edge", 1},
+        Scenario{"tossed_box", 1}, Scenario{"mug_on_hook", 16}, Scenario{"spoon_in_mug", 32}}) {
     const auto scene = interfaces::read_scene(scenarios + "/" + name + ".yaml");
     if (scene) {
-      compare(name, *scene, count, table, report);
+      compare(name, *scene, std::max(count / share, 16), table, report);
     } else {
       std::fprintf(stderr, "%s\n", core::to_string(scene.status()).c_str());
     }

@@ -18,20 +18,6 @@ using collision::SphereTree;
 using collision::SurfaceSpheres;
 using Eigen::Vector2d;
 
-// Points whose gaps at the end of the step are within the first (m) of the least bear; within the second they may.
-constexpr double kBearing = 3e-5;
-constexpr double kNearlyBearing = 2e-4;
-constexpr std::size_t kMostBearing = 6;
-constexpr std::size_t kMostNearlyBearing = 10;
-// Contacts bear on one plane when their normals differ by less than this (rad).
-constexpr double kSameWay = 0.01;
-// Contacts nearer to each other than this (m) are one.
-constexpr double kSamePlace = 3e-4;
-// What a change of direction (the difference of two normals) counts as in metres when contacts are spread.
-constexpr double kTurnLength = 0.1;
-// m/s: what closes slower than this is not faster than what is apart by as much as it will be in a step.
-constexpr double kSlow = 0.1;
-
 collision::PackedSphere lane(const SphereTree& tree, std::uint32_t node, std::size_t k) {
   const float* lanes = tree.lanes(node);
   const std::size_t n = tree.branching();
@@ -63,7 +49,6 @@ void for_near(const SphereTree& tree, std::vector<std::uint32_t>& stack, const W
 }  // namespace
 
 void SphereContactFinder::add(const ContactPoint& point, const MovingFrame& A, const MovingFrame& B, double dt) {
-  // Of slow contacts the pose alone decides, or the sets of contacts of resting bodies change with each step's noise.
   const double speed = point.normal.dot(A.motion.at(point.position) - B.motion.at(point.position));
   found_.push_back({point, point.gap + dt * std::min(0.0, speed + kSlow), 0.0});
 }
@@ -118,9 +103,7 @@ void SphereContactFinder::reduce(const Frame& X_WA, std::vector<ContactPoint>& c
   if (found_.empty()) return;
   double least = std::numeric_limits<double>::infinity();
   for (const Found& f : found_) least = std::min(least, f.at_end);
-  // The first is not the deepest of all: among those that bear that is noise. It is the outermost of these in a
-  // direction of the body that is none of its edges'.
-  const Vector3d outwards = X_WA.R * Vector3d(0.36, 0.48, 0.8);
+  const Vector3d outwards = X_WA.R * Vector3d(kFirstWay[0], kFirstWay[1], kFirstWay[2]);
   double outermost = -std::numeric_limits<double>::infinity();
   std::size_t first = 0;
   for (std::size_t i = 0; i < found_.size(); ++i) {
@@ -139,7 +122,7 @@ void SphereContactFinder::reduce(const Frame& X_WA, std::vector<ContactPoint>& c
   };
   const Tier tiers[] = {{least + kBearing, kMostBearing},
                         {std::max(0.0, least + kNearlyBearing), kMostNearlyBearing},
-                        {std::numeric_limits<double>::infinity(), kMaxPoints}};
+                        {std::numeric_limits<double>::infinity(), kMostSphereContacts}};
   for (const Tier& tier : tiers) {
     for (; taken < tier.most; ++taken) {
       std::size_t farthest = found_.size();

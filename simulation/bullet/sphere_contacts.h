@@ -13,6 +13,7 @@
 #include "contact_finder.h"
 #include "prescene/collision/spheres/sphere_queries.h"
 #include "prescene/collision/spheres/surface_spheres.h"
+#include "prescene/simulation/rules/sphere_rules.h"
 
 namespace prescene::simulation {
 
@@ -34,11 +35,9 @@ struct MovingFrame {
 };
 
 /// Scratch memory: one a thread. All functions append the contacts of A against B that are at most `range` (m) apart,
-/// at most kMaxPoints: those that bear first, spread wide, and so that each direction of contact has its own.
+/// at most kMostSphereContacts (prescene/simulation/rules/sphere_rules.h).
 class SphereContactFinder {
  public:
-  static constexpr std::size_t kMaxPoints = 12;
-
   SphereContactFinder();
   ~SphereContactFinder();
 

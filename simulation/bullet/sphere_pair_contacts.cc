@@ -14,10 +14,6 @@ namespace {
 using collision::SpherePair;
 using collision::SurfaceSpheres;
 
-// Patches whose normals agree by more than this cosine are of the same side of two bodies and don't meet.
-constexpr double kSameSide = 0.2;
-// Gaps that differ by less (m) are equal: the first pair of them counts.
-constexpr double kSameSphereGap = 1e-9;
 constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
 /// A patch and what was found for it.

@@ -7,16 +7,9 @@
 
 #include "contact_finder.h"
 #include "prescene/collision/spheres/surface_spheres.h"
+#include "prescene/simulation/rules/sphere_rules.h"
 
 namespace prescene::simulation {
-
-/// A patch ends this far (m) beyond its edge, so that things flush with it find it.
-inline constexpr double kPatchRoom = 1e-6;
-/// Share of a patch's reach: places deeper below it are inside of the body only if they are inside of its sphere.
-/// (Below a wall there may be the body's floor, and below that nothing.)
-inline constexpr double kShallow = 0.25;
-/// m: facets of round things overlap by this much when they roll.
-inline constexpr double kRollingOverlap = 5e-5;
 
 inline Vector3d widened(const collision::Vector3f& v) { return v.cast<double>(); }
 

@@ -39,10 +39,11 @@ PartId part_id(int number, const SurfaceCoefficients& surface) {
   return id;
 }
 
-void add_part(PartId id, int body, std::size_t part, LockstepScene& lanes) {
+void add_part(PartId id, int body, std::size_t part, const ConvexPart& shape, LockstepScene& lanes) {
   id.body = body;
   id.part = static_cast<int>(part);
   lanes.rolls = lanes.rolls || id.rolling_arm > 0;
+  lanes.has_spheres = lanes.has_spheres || shape.kind == CoreKind::kSpheres;
   lanes.parts.push_back(id);
 }
 
@@ -68,7 +69,7 @@ void add_fixed(const PartId& id, std::vector<ConvexPart> parts, LockstepScene& l
       lanes.planes.push_back(plane);
     }
     fixed.shape = std::move(part);
-    add_part(id, -1, lanes.fixed.size(), lanes);
+    add_part(id, -1, lanes.fixed.size(), fixed.shape, lanes);
     lanes.fixed.push_back(std::move(fixed));
   }
 }
@@ -83,7 +84,7 @@ void add_body(const PartId& id, LaneBody body, LockstepScene& lanes) {
   }
   lanes.first_part.push_back(static_cast<int>(lanes.parts.size()));
   const auto index = static_cast<int>(lanes.bodies.size());
-  for (std::size_t i = 0; i < body.parts.size(); ++i) add_part(id, index, i, lanes);
+  for (std::size_t i = 0; i < body.parts.size(); ++i) add_part(id, index, i, body.parts[i], lanes);
   lanes.bodies.push_back(std::move(body));
 }
 

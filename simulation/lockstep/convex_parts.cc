@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lane_spheres.h"
 #include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
@@ -82,13 +83,33 @@ ConvexPart hull_part(const ConvexPolytope& hull, const RoundedPolytope& rounded,
   for (const Vector3d& v : core.vertices) part.vertices.push_back(plain(Vector3d(X.R * v + X.p - center)));
   for (const ConvexPolytope::Face& face : core.faces) {
     const std::size_t corners = face.loop.size();
-    part.normals.push_back(plain(Vector3d(X.R * face.normal)));
+    const std::array<double, 3> normal = plain(Vector3d(X.R * face.normal));
+    const std::array<double, 3>& corner = part.vertices[face.loop[0]];
+    const double offset = normal[0] * corner[0] + normal[1] * corner[1] + normal[2] * corner[2];
+    part.normals.push_back(normal);
+    part.planes.push_back({static_cast<Real>(normal[0]), static_cast<Real>(normal[1]), static_cast<Real>(normal[2]),
+                           static_cast<Real>(offset)});
     part.corner_counts.push_back(static_cast<int>(corners));
     part.longest_loop = std::max(part.longest_loop, static_cast<int>(corners));
     for (std::size_t k = 0; k < static_cast<std::size_t>(kMaxLoop); ++k) {
       part.face_corners.push_back(part.vertices[face.loop[std::min(k, corners - 1)]]);
     }
   }
+  return part;
+}
+
+ConvexPart spheres_part(const geometry::TriangleMesh& mesh, const collision::SurfaceSpheres& spheres,
+                        const Placement& X) {
+  ConvexPart part;
+  part.kind = CoreKind::kSpheres;
+  const geometry::Box box = geometry::bounding_box(mesh);
+  const Vector3d middle = box.center();
+  const double rise = spheres.rise;
+  part.spheres = lanes_of(spheres, plain(middle));
+  part.R_PS = plain(X.R);
+  part.center = plain(Vector3d(X.R * middle + X.p));
+  part.box_half = plain(Vector3d(X.R.cwiseAbs() * (0.5 * box.sizes() + Vector3d::Constant(rise))));
+  for (const Vector3d& v : mesh.vertices) part.ball = std::max(part.ball, (v - middle).norm() + rise);
   return part;
 }
 
@@ -109,9 +130,9 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
     return core::unsupported("triangle surfaces are not simulated in lockstep");
   }
   if (mesh.use == belief::MeshUse::kSpheres) {
-    return core::unsupported(
-        "meshes of spheres are not simulated in lockstep; use convex_hull, convex_parts or decompose, or Bullet's "
-        "stepper");
+    PRESCENE_TRY(const auto spheres, shapes.surface_spheres(*mesh.mesh, mesh.spheres));
+    parts.push_back(spheres_part(*mesh.mesh, *spheres, placed(mesh.X_OS)));
+    return core::ok_status();
   }
   PRESCENE_TRY(const auto hulls, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
   std::vector<double> radii;

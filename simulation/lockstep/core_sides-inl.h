@@ -111,6 +111,7 @@ inline void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side&
   side.normal = {zero, zero, zero};
   switch (part.kind) {
     case CoreKind::kPoint:
+    case CoreKind::kSpheres:  // no core
       side.most = 0;
       side.count = zero;
       break;

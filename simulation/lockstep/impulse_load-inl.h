@@ -62,7 +62,7 @@ template <bool kPair>
 void ContactRows<kMany>::load_row(const RowGroup& group, int row) {
   const D d;
   const V one = set<V>(1.0);
-  HWY_ALIGN Real raw[12][kLaneMultiple];
+  HWY_ALIGN Real raw[13][kLaneMultiple];
   const Real arm = scene_.bodies[static_cast<std::size_t>(group.a)].rolling_arm;
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if (const LaneContact* c = contact(row, i)) {
@@ -77,6 +77,7 @@ void ContactRows<kMany>::load_row(const RowGroup& group, int row) {
       raw[9][i] = other.restitution;
       raw[10][i] = std::max(other.rolling_arm, arm);
       raw[11][i] = static_cast<Real>(c->part);
+      raw[12][i] = c->turning;
     } else {
       // Far off: never pressed.
       for (auto& values : raw) values[i] = 0;
@@ -144,15 +145,15 @@ void ContactRows<kMany>::load_row(const RowGroup& group, int row) {
   put(row, kPart, column(11));
   if constexpr (kPair) {
     const ObjectLanes& b = object(group.b);
-    load_motion<kPair>(group, row, on_other_W, column(6), b.restitution, b.impact_friction, b.friction);
+    load_motion<kPair>(group, row, on_other_W, column(6), column(12), b.restitution, b.impact_friction, b.friction);
   } else {
-    load_motion<kPair>(group, row, on_other_W, column(6), column(9), column(8), column(7));
+    load_motion<kPair>(group, row, on_other_W, column(6), column(12), column(9), column(8), column(7));
   }
 }
 
 template <bool kMany>
 template <bool kPair>
-void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap,
+void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap, V turning,
                                      V other_restitution, V other_impact, V other_friction) {
   const D d;
   const V zero = set<V>(0.0);
@@ -160,7 +161,7 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   const ObjectLanes& a = object(group.a);
   const ObjectLanes& b = object(kPair ? group.b : group.a);
   V speed = along<kPair>(axis<kPair>(row, kNormal), a.flown, b.flown);
-  V speed_before = along<kPair>(axis<kPair>(row, kNormal), a.before, b.before);
+  V speed_before = along<kPair>(axis<kPair>(row, kNormal), a.before, b.before) + turning;
   V base_1 = along<kPair>(axis<kPair>(row, kTangent1), a.flown, b.flown);
   V base_2 = along<kPair>(axis<kPair>(row, kTangent2), a.flown, b.flown);
   if constexpr (!kPair) {

@@ -201,7 +201,7 @@ class ContactRows {
   void load_row(const RowGroup& group, int row);
   template <bool kPair>
   /// `on_other_W` is the place of the other's surface from the middle of a.
-  void load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap, V other_restitution,
+  void load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap, V turning, V other_restitution,
                    V other_impact, V other_friction);
   void load_others(int row, Others& others) const;
   void note_supports();

@@ -35,16 +35,14 @@ void copy(const Rows<N>& rows, int from, int to) {
 }  // namespace
 
 LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
-    : scene_(std::move(scene)),
-      state_(slots, static_cast<int>(scene_->lanes.bodies.size()), scene_->lanes.objects),
-      scratch_(state_.slots(), scene_->lanes.objects) {
+    : scene_(std::move(scene)), state_(slots, scene_->lanes), scratch_(state_.slots(), scene_->lanes) {
   const auto most = static_cast<std::size_t>(state_.slots());
   const LockstepScene& lanes = scene_->lanes;
   const auto of_objects = most * static_cast<std::size_t>(lanes.objects);
   moved_.resize(of_objects);
   present_.resize(most * lanes.bodies.size() - of_objects);
   pairs_.planes.reserve(most * lanes.fixed.size());
-  pairs_.boxes.reserve(most * lanes.fixed.size());
+  pairs_.boxes.reserve(2 * most * lanes.fixed.size());
   pairs_.shapes.resize(lanes.parts.size());
   for (std::size_t i = 0; i < lanes.parts.size(); ++i) {
     const bool box = i < lanes.fixed.size() && lanes.fixed[i].shape.kind == CoreKind::kBox;
@@ -57,7 +55,7 @@ LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
   for (auto* flags : {&going_, &shortened_}) flags->reserve(most);
   for (auto* parts : {&left_, &taken_}) parts->reserve(most);
   pressed_.reserve(8 * most);
-  starts_.resize(static_cast<std::size_t>(kMaxContacts * lanes.objects) + 2);
+  starts_.resize(static_cast<std::size_t>(state_.room() * lanes.objects) + 2);
 }
 
 void LaneEngine::reset(int slot, const belief::WorldState& start) {
@@ -298,9 +296,21 @@ void LaneEngine::touch_objects(int object, std::span<const std::uint8_t> wanted)
       for (std::size_t j = first; j < last; ++j) pairs_.shapes[j].clear();
       find_body_pairs(lanes, {object, static_cast<int>(i), listed_}, other, state_, pairs_);
       for (std::size_t j = first; j < last; ++j) {
-        touch_shape(lanes, parts[i], static_cast<int>(j), pairs_.shapes[j], state_);
+        touch_part(parts[i], j);
       }
     }
+  }
+}
+
+/// The pairs of a part with another one.
+void LaneEngine::touch_part(const ConvexPart& part, std::size_t other) {
+  if (pairs_.shapes[other].empty()) return;
+  const LockstepScene& lanes = scene_->lanes;
+  const bool spheres = part.spheres || lanes.part_of(lanes.parts[other]).spheres;
+  if (spheres) {
+    touch_spheres(lanes, part, static_cast<int>(other), pairs_.shapes[other], state_, spheres_);
+  } else {
+    touch_shape(lanes, part, static_cast<int>(other), pairs_.shapes[other], state_);
   }
 }
 
@@ -317,11 +327,17 @@ void LaneEngine::touch_surroundings(int object, std::span<const std::uint8_t> wa
       if (!list_pair(object, body, wanted)) continue;
       find_body_pairs(lanes, {object, static_cast<int>(i), listed_}, body, state_, pairs_);
     }
-    touch_planes(lanes, parts[i], pairs_.planes, state_);
-    touch_boxes(lanes, parts[i], pairs_.boxes, state_);
-    for (std::size_t j = 0; j < pairs_.shapes.size(); ++j) {
-      touch_shape(lanes, parts[i], static_cast<int>(j), pairs_.shapes[j], state_);
+    if (parts[i].spheres) {
+      // Of a face or about an edge: the spheres see which.
+      for (const LanePairs::Plane& plane : pairs_.planes)
+        pairs_.boxes.push_back({plane.object, lanes.planes[static_cast<std::size_t>(plane.plane)].part});
+      for (const LanePairs::Near& box : pairs_.boxes)
+        touch_spheres(lanes, parts[i], box.other, std::span(&box, 1), state_, spheres_);
+    } else {
+      touch_planes(lanes, parts[i], pairs_.planes, state_);
+      touch_boxes(lanes, parts[i], pairs_.boxes, state_);
     }
+    for (std::size_t j = 0; j < pairs_.shapes.size(); ++j) touch_part(parts[i], j);
   }
 }
 
@@ -380,7 +396,7 @@ void LaneEngine::end_part(std::span<const std::uint8_t> wanted) {
   totals_.assign(wanted.size(), 0);
   // By the number of contacts, most first, so that slots that share a vector have about as many.
   std::fill(starts_.begin(), starts_.end(), 0);
-  const int most = kMaxContacts * objects();
+  const int most = state_.room() * objects();
   std::size_t touching = 0;
   for (int slot = 0; slot < count; ++slot) {
     if (!wanted[static_cast<std::size_t>(slot)]) continue;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compile_scene.h"
+#include "lane_spheres.h"
 #include "lane_state.h"
 
 namespace prescene::simulation {
@@ -112,12 +113,14 @@ class LaneEngine {
   bool may_split(int slot) const;
   int parts_to_impact(int slot, int left);
   void split(std::span<const std::uint8_t> wanted);
+  void shorten_contacts(int slot, int left);
   void set_share(int slot, int parts);
   void keep_pressed(int slot);
   void give_back_pressed();
   bool list_pair(int object, int body, std::span<const std::uint8_t> wanted);
   void touch_objects(int object, std::span<const std::uint8_t> wanted);
   void touch_surroundings(int object, std::span<const std::uint8_t> wanted);
+  void touch_part(const ConvexPart& part, std::size_t other);
   void part(int object, std::span<const std::uint8_t> wanted);
 
   std::shared_ptr<const CompiledLockstep> scene_;
@@ -126,6 +129,7 @@ class LaneEngine {
   std::vector<std::uint8_t> present_;  // of kinematic bodies
   LanePairs pairs_;
   SolverScratch scratch_;
+  SphereScratch spheres_;
   std::vector<std::uint8_t> listed_;
   std::vector<std::int32_t> touching_, flying_;
   std::vector<int> totals_;  // contacts by slot

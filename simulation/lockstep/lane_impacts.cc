@@ -41,7 +41,7 @@ int LaneEngine::parts_to_impact(int slot, int left) {
     for (const LaneContact& c : contacts) {
       const Vector3d normal = R * vector_of(c.normal);
       const Vector3d arm = R * vector_of(c.position);
-      double speed = normal.dot(v + w.cross(arm));
+      double speed = normal.dot(v + w.cross(arm)) + static_cast<double>(c.turning);
       double acceleration = normal.dot(gravity);
       const int other = scene_->lanes.parts[static_cast<std::size_t>(c.part)].body;
       if (other >= 0 && other < objects()) {
@@ -61,6 +61,22 @@ void LaneEngine::set_share(int slot, int parts) {
     state_.share[state_.at(object, slot)] = static_cast<Real>(parts) / static_cast<Real>(kStepParts);
 }
 
+/// Contacts stay: they were found for the parts that were left, and now as many are taken as taken_ says.
+void LaneEngine::shorten_contacts(int slot, int left) {
+  const auto parts = static_cast<Real>(left) / static_cast<Real>(kStepParts);
+  const Real before = static_cast<Real>(scene_->options.step) * parts;
+  const Real ratio = static_cast<Real>(taken_[static_cast<std::size_t>(slot)]) / static_cast<Real>(left);
+  for (int object = 0; object < objects(); ++object) {
+    const int at = state_.at(object, slot);
+    LaneContact* contacts = state_.contacts(at);
+    for (int k = 0; k < state_.contact_count[static_cast<std::size_t>(at)]; ++k) {
+      // Gaps have half of what turning adds in the time for which they were found.
+      contacts[k].gap -= Real(0.5) * before * contacts[k].turning * (1 - ratio * ratio);
+      contacts[k].turning *= ratio;
+    }
+  }
+}
+
 /// How far each slot goes: to the next impact, or on through it, or to the end of the step.
 void LaneEngine::split(std::span<const std::uint8_t> wanted) {
   bool any = false;
@@ -75,6 +91,7 @@ void LaneEngine::split(std::span<const std::uint8_t> wanted) {
     taken_[i] = parts_to_impact(slot, left_[i]);
     if (taken_[i] == left_[i]) continue;
     set_share(slot, taken_[i]);
+    shorten_contacts(slot, left_[i]);
     shortened_[i] = 1;
     any = true;
   }
@@ -94,7 +111,7 @@ void LaneEngine::give_back_pressed() {
   for (Pressed& kept : pressed_) {
     const int at = state_.at(kept.object, kept.slot);
     int& count = state_.contact_count[static_cast<std::size_t>(at)];
-    if (count == kMaxContacts) continue;
+    if (count == state_.room()) continue;
     const geometry::Matrix3d R = rotation(kept.slot, kept.object).toRotationMatrix();
     const Vector3d position = R.transpose() * kept.position_W, normal = R.transpose() * kept.normal_W;
     for (int k = 0; k < 3; ++k) {

@@ -5,8 +5,9 @@
 
 namespace prescene::simulation {
 
-LaneState::LaneState(int slots, int bodies, int objects)
-    : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple) {
+LaneState::LaneState(int slots, const LockstepScene& scene)
+    : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple), room_(scene.room()) {
+  const auto bodies = static_cast<int>(scene.bodies.size());
   constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 4 + 3 * 3 + 4 + 9 + 2 + 3;
   const auto size = static_cast<std::size_t>(slots_ * bodies);
   memory_.reset(static_cast<Real*>(::operator new[](kRows* size * sizeof(Real), std::align_val_t{64})));
@@ -35,12 +36,12 @@ LaneState::LaneState(int slots, int bodies, int objects)
   // Slots that hold nothing are computed with the others.
   std::fill_n(q[0], size, Real(1));
   std::fill_n(share, size, Real(1));
-  const auto of_objects = static_cast<std::size_t>(slots_ * objects);
+  const auto of_objects = static_cast<std::size_t>(slots_ * scene.objects);
   contact_count.assign(of_objects, 0);
   warm_count.assign(of_objects, 0);
   dropped_count.assign(of_objects, 0);
-  contacts_.resize(of_objects * kMaxContacts);
-  warm_.resize(of_objects * kMaxContacts);
+  contacts_.resize(of_objects * static_cast<std::size_t>(room_));
+  warm_.resize(of_objects * static_cast<std::size_t>(room_));
 }
 
 void ContactStage::flush(const std::int32_t* objects, LaneState& state) {
@@ -48,7 +49,7 @@ void ContactStage::flush(const std::int32_t* objects, LaneState& state) {
     if (counts_[lane] == 0) continue;
     const std::int32_t object = objects[lane];
     int& count = state.contact_count[static_cast<std::size_t>(object)];
-    const int room = std::min(counts_[lane], kMaxContacts - count);
+    const int room = std::min(counts_[lane], state.room() - count);
     std::copy_n(contacts_[lane].data(), room, state.contacts(object) + count);
     count += room;
     state.dropped_count[static_cast<std::size_t>(object)] += counts_[lane] - room + dropped_[lane];
@@ -56,12 +57,12 @@ void ContactStage::flush(const std::int32_t* objects, LaneState& state) {
   }
 }
 
-SolverScratch::SolverScratch(int slots, int objects)
-    : kept_each_(static_cast<std::size_t>(objects) * (6 + 6 * kMaxContacts)),
+SolverScratch::SolverScratch(int slots, const LockstepScene& scene)
+    : kept_each_(static_cast<std::size_t>(scene.objects * (6 + 6 * scene.room()))),
       kept_(static_cast<std::size_t>(slots) * kept_each_) {
   // Lanes differ in how many contacts each pair of bodies has, and each pair gets what the lane with most needs.
-  const auto groups = static_cast<std::size_t>(objects * (objects + 1) / 2);
-  const std::size_t rows = groups * kMaxContacts;
+  const auto groups = static_cast<std::size_t>(scene.objects * (scene.objects + 1) / 2);
+  const std::size_t rows = groups * static_cast<std::size_t>(scene.room());
   memory_.reset(
       static_cast<Real*>(::operator new[](rows* kFields* kLaneMultiple * sizeof(Real), std::align_val_t{64})));
   contacts_.resize(rows * kLaneMultiple);

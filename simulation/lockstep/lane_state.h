@@ -21,8 +21,10 @@ using Real = float;
 
 inline constexpr int kLaneMultiple = 16;  ///< Slots come in multiples of the widest vector.
 inline constexpr int kMaxObjects = 4;
-inline constexpr int kMaxContacts = 32;  ///< Of an object in a step with those after it and what is not an object.
-inline constexpr int kMaxLoop = 16;      ///< Corners of a side of a hull.
+/// Contacts of an object in a step with those after it and what is not an object; with bodies of spheres kMaxContacts.
+inline constexpr int kRoomForContacts = 32;
+inline constexpr int kMaxContacts = 64;
+inline constexpr int kMaxLoop = 16;  ///< Corners of a side of a hull.
 /// Points that stand for the rim of a cylinder, the first one where it is lowest: at 0, 30, 90, 150, 180, ... degrees.
 /// The two beside the lowest are as far from it as those of Bullet's stepper, since they take the energy out of a
 /// wobble.
@@ -31,7 +33,10 @@ inline constexpr double kRimCosine[kRimPoints] = {1,  0.86602540378443865,  0, -
                                                   -1, -0.86602540378443865, 0, 0.86602540378443865};
 inline constexpr double kRimSine[kRimPoints] = {0, 0.5, 1, 0.5, 0, -0.5, -1, -0.5};
 
-enum class CoreKind { kPoint, kSegment, kBox, kCylinder, kCone, kHull };
+/// kSpheres is no core: the part collides as spheres (lane_spheres.h).
+enum class CoreKind { kPoint, kSegment, kBox, kCylinder, kCone, kHull, kSpheres };
+
+struct SphereLanes;
 
 /// A convex core and the radius about it, as in Bullet's stepper: faces keep their true place, edges are rounded.
 struct ConvexPart {
@@ -50,10 +55,12 @@ struct ConvexPart {
   // Hulls: about the centre.
   std::vector<std::array<double, 3>> vertices;
   std::vector<std::array<double, 3>> normals;
+  std::vector<std::array<Real, 4>> planes;          ///< By face: normal and offset.
   std::vector<int> corner_counts;                   ///< By face.
   std::vector<std::array<double, 3>> face_corners;  ///< kMaxLoop by face, the last one repeated.
   int longest_loop = 0;
-  double hull_error = 0.0;  ///< m, of hulls that are simplified to fit (RoundedPolytope::error).
+  std::shared_ptr<const SphereLanes> spheres;  ///< Of kSpheres.
+  double hull_error = 0.0;                     ///< m, of hulls that are simplified to fit (RoundedPolytope::error).
 };
 
 struct FixedPart {
@@ -109,7 +116,13 @@ struct LockstepScene {
   std::vector<PartId> parts;       ///< The fixed ones, then those of each body.
   std::vector<int> first_part;     ///< In `parts`, by body.
   bool rolls = false;              ///< Something has a rolling arm.
+  bool has_spheres = false;        ///< Something collides as spheres.
 
+  const ConvexPart& part_of(const PartId& id) const {
+    const auto index = static_cast<std::size_t>(id.part);
+    return id.body < 0 ? fixed[index].shape : bodies[static_cast<std::size_t>(id.body)].parts[index];
+  }
+  int room() const { return has_spheres ? kMaxContacts : kRoomForContacts; }
   bool has_kinematic() const { return bodies.size() > static_cast<std::size_t>(objects); }
 };
 
@@ -121,6 +134,9 @@ struct LaneContact {
   std::int32_t part;  ///< The other one, of LockstepScene::parts.
   Real impulse;       ///< N s; of a scene with one object for each kilogram, m/s
   std::int32_t hit;   ///< 1: the gap closed in this step.
+  /// m/s; by how much the turning of bodies of spheres slows the closing of the gap in the time that the contact was
+  /// found for. `gap` has its share.
+  Real turning;
 };
 struct WarmContact {
   Real position[3];  ///< In the other part's frame; of what is not an object from its origin in W's directions.
@@ -137,10 +153,11 @@ using Rows = std::array<Real*, N>;
 /// s of body b is at b * slots() + s.
 class LaneState {
  public:
-  /// `slots` is rounded up to a multiple of kLaneMultiple; the first `objects` of the `bodies` are objects.
-  LaneState(int slots, int bodies, int objects);
+  /// `slots` is rounded up to a multiple of kLaneMultiple.
+  LaneState(int slots, const LockstepScene& scene);
 
   int slots() const { return slots_; }
+  int room() const { return room_; }  ///< For contacts of an object.
   int at(int body, int slot) const { return body * slots_ + slot; }
 
   Rows<3> p, v, w;  ///< Centre of mass (from the local origin), its velocity, spin; W. Of kinematic bodies the origin.
@@ -158,15 +175,23 @@ class LaneState {
 
   // Of objects: with the objects after it, then with all else.
   std::vector<int> contact_count, warm_count;
-  std::vector<int> dropped_count;  ///< Contacts beyond kMaxContacts, of this step.
-  LaneContact* contacts(int at) { return contacts_.data() + static_cast<std::size_t>(at) * kMaxContacts; }
-  WarmContact* warm(int at) { return warm_.data() + static_cast<std::size_t>(at) * kMaxContacts; }
+  std::vector<int> dropped_count;  ///< Contacts beyond room(), of this step.
+  LaneContact* contacts(int at) { return contacts_.data() + static_cast<std::size_t>(at * room_); }
+  WarmContact* warm(int at) { return warm_.data() + static_cast<std::size_t>(at * room_); }
+  /// Appends a contact to an object's, or counts that there is no room.
+  void add(int at, const LaneContact& contact) {
+    int& count = contact_count[static_cast<std::size_t>(at)];
+    if (count < room_)
+      contacts(at)[count++] = contact;
+    else
+      ++dropped_count[static_cast<std::size_t>(at)];
+  }
 
  private:
   struct Free {
     void operator()(Real* memory) const { ::operator delete[](memory, std::align_val_t{64}); }
   };
-  int slots_;
+  int slots_, room_;
   std::unique_ptr<Real[], Free> memory_;
   std::vector<LaneContact> contacts_;
   std::vector<WarmContact> warm_;
@@ -233,7 +258,7 @@ void touch_shape(const LockstepScene& scene, const ConvexPart& part, int other, 
 /// next.
 class SolverScratch {
  public:
-  SolverScratch(int slots, int objects);
+  SolverScratch(int slots, const LockstepScene& scene);
   Real* memory() { return memory_.get(); }
   /// The lanes' contacts of a row.
   LaneContact** contacts(int row) { return contacts_.data() + static_cast<std::size_t>(row) * kLaneMultiple; }

@@ -112,7 +112,7 @@ class LockstepInstance : public Instance {
     SlotState slot(start.objects.size());
     bool sound = true;
     const auto parts = static_cast<std::int32_t>(scene_->lanes.parts.size());
-    for (ObjectSlot& object : slot) sound = sound && read(in, parts, object);
+    for (ObjectSlot& object : slot) sound = sound && read(in, parts, scene_->lanes.room(), object);
     if (!sound || !in.ok()) return wrong_snapshot();
     const Snapshot now = save();
     std::swap(start_, start);
@@ -148,7 +148,7 @@ class LockstepInstance : public Instance {
     }
   }
 
-  static bool read(ByteReader& in, std::int32_t parts, ObjectSlot& object) {
+  static bool read(ByteReader& in, std::int32_t parts, int room, ObjectSlot& object) {
     const auto all = [&](auto& values) {
       for (auto& value : values) value = in.value<std::decay_t<decltype(value)>>();
     };
@@ -159,7 +159,7 @@ class LockstepInstance : public Instance {
     object.motion = in.value<LaneMotion>();
     object.parting = in.value<std::uint64_t>();
     object.warm_count = in.value<int>();
-    if (object.motion > LaneMotion::kFrozen || object.warm_count < 0 || object.warm_count > kMaxContacts) return false;
+    if (object.motion > LaneMotion::kFrozen || object.warm_count < 0 || object.warm_count > room) return false;
     for (int i = 0; i < object.warm_count; ++i) {
       all(object.warm[i].position);
       object.warm[i].impulse = in.value<Real>();

@@ -198,6 +198,8 @@ HWY_INLINE void try_ways_out(const ConvexPart& b, const Vec3<V>& c, const Try& t
     case CoreKind::kHull:
       for (const std::array<double, 3>& normal : b.normals) try_normal(set3<V>(normal));
       break;
+    case CoreKind::kSpheres:  // no core
+      break;
   }
 }
 
@@ -207,9 +209,7 @@ void touch_shape_lanes(const LockstepScene* scene, const ConvexPart* given, int 
   const ConvexPart& part = *given;
   const PartId& id = scene->parts[static_cast<std::size_t>(other)];
   const bool fixed = id.body < 0;
-  const auto index = static_cast<std::size_t>(id.part);
-  const ConvexPart& b =
-      fixed ? scene->fixed[index].shape : scene->bodies[static_cast<std::size_t>(id.body)].parts[index];
+  const ConvexPart& b = scene->part_of(id);
   const std::size_t width = hn::Lanes(d);
   const V zero = set<V>(0.0);
   const Mat3<V> R_BodyB = set_matrix<V>(b.R_PS);

@@ -20,6 +20,7 @@ HWY_INLINE Vec3<V> support_of(const ConvexPart& part, const Vec3<V>& direction) 
   const V zero = set<V>(0.0);
   switch (part.kind) {
     case CoreKind::kPoint:
+    case CoreKind::kSpheres:  // no core
       break;
     case CoreKind::kSegment: {
       const V z = set<V>(part.half[2]);

@@ -65,6 +65,7 @@ class PlaneWriter {
                      g[i],
                      lanes_.part[i],
                      0,
+                     0,
                      0});
     }
   }
@@ -267,6 +268,8 @@ void touch_planes_lanes(const LockstepScene* scene, const ConvexPart* given, con
         break;
       case CoreKind::kHull:
         hull_corners(part, n_S, add);
+        break;
+      case CoreKind::kSpheres:  // no core
         break;
     }
     stage.flush(lanes.object, *state);

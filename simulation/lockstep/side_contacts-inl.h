@@ -76,6 +76,7 @@ class NearWriter {
                      real(g[i]),
                      lanes_.part[i],
                      0,
+                     0,
                      0});
     }
   }

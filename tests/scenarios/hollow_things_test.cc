@@ -7,6 +7,7 @@
 
 #include "prescene/service/load_scene.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
+#include "prescene/simulation/lockstep/lockstep_simulator.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "recorded_scenario.h"
 #include "tests/support/paths.h"
@@ -23,11 +24,20 @@ struct Runs {
   core::ThreadPool pool{2};
 };
 
-void run_scenario(const std::string& name, int count, Runs* runs) {
+/// In both steppers.
+class HollowThings : public testing::TestWithParam<bool> {
+ protected:
+  static void run_scenario(const std::string& name, int count, Runs* runs);
+};
+INSTANTIATE_TEST_SUITE_P(Steppers, HollowThings, testing::Bool(),
+                         [](const auto& lockstep) { return lockstep.param ? "lockstep" : "bullet"; });
+
+void HollowThings::run_scenario(const std::string& name, int count, Runs* runs) {
   runs->scene = scenario(name);
   ASSERT_NE(runs->scene, nullptr);
   simulation::ShapeStore shapes;
-  auto made = simulation::make_bullet_simulator(*runs->scene, shapes, {});
+  auto made = GetParam() ? simulation::make_lockstep_simulator(*runs->scene, shapes, {})
+                         : simulation::make_bullet_simulator(*runs->scene, shapes, {});
   ASSERT_TRUE(made.ok()) << made.status().message();
   runs->simulator = *std::move(made);
   const simulation::StartDistribution starts = simulation::start_of(runs->scene);
@@ -109,7 +119,7 @@ std::vector<Rod> rods(const std::vector<belief::CollisionShape>& shapes, const g
   return found;
 }
 
-TEST(HollowThings, AMugHangsOnItsHandleOrFallsToTheFloor) {
+TEST_P(HollowThings, AMugHangsOnItsHandleOrFallsToTheFloor) {
   Runs runs;
   ASSERT_NO_FATAL_FAILURE(run_scenario("mug_on_hook", 192, &runs));
   expect_sound(runs);
@@ -143,7 +153,7 @@ TEST(HollowThings, AMugHangsOnItsHandleOrFallsToTheFloor) {
   EXPECT_LT(hanging, 180);
 }
 
-TEST(HollowThings, ASpoonStaysInTheMugTipsItOrMisses) {
+TEST_P(HollowThings, ASpoonStaysInTheMugTipsItOrMisses) {
   Runs runs;
   ASSERT_NO_FATAL_FAILURE(run_scenario("spoon_in_mug", 32, &runs));
   expect_sound(runs);

@@ -41,6 +41,10 @@ inline belief::MeshShape hull_of(const geometry::TriangleMesh& mesh) {
   return {std::make_shared<const geometry::TriangleMesh>(mesh), Pose{}, belief::MeshUse::kConvexHull};
 }
 
+inline belief::MeshShape spheres_of(const geometry::TriangleMesh& mesh, const belief::SphereSettings& settings = {}) {
+  return {std::make_shared<const geometry::TriangleMesh>(mesh), Pose{}, belief::MeshUse::kSpheres, settings};
+}
+
 /// Starts drawn from a scene's distributions by plain pseudo-random numbers.
 inline std::vector<WorldState> drawn_starts(const Scene& scene, int count, std::uint64_t seed) {
   std::vector<WorldState> starts;

@@ -1,0 +1,455 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two bodies of spheres: SphereContactFinder::spheres_spheres of Bullet's stepper in lanes. Of two surfaces one's
+// spheres are met with the other's patches; many patches reach under a sphere, and the one whose point is nearest knows
+// best.
+#if defined(PRESCENE_SIMULATION_SPHERE_PAIRS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef PRESCENE_SIMULATION_SPHERE_PAIRS_INL_H_
+#undef PRESCENE_SIMULATION_SPHERE_PAIRS_INL_H_
+#else
+#define PRESCENE_SIMULATION_SPHERE_PAIRS_INL_H_
+#endif
+
+#include <bit>
+#include <cmath>
+
+#include "lane_math-inl.h"
+#include "lane_spheres.h"
+#include "sphere_patches-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace prescene::simulation::HWY_NAMESPACE {
+
+HWY_INLINE std::array<Real, 3> lane_of(const std::array<SphereLanes::Row, 3>& rows, std::size_t lane) {
+  return {rows[0][lane], rows[1][lane], rows[2][lane]};
+}
+
+/// Spheres over patches: of each lane one.
+struct SpheresOver {
+  Vec3<V> centre;  ///< Of the sphere.
+  V radius;
+  Vec3<V> patch_centre, point, normal;
+  V reach;
+};
+
+class SphereMeeting {
+ public:
+  SphereMeeting(const SphereQuery& query, SphereScratch& scratch)
+      : query_(query),
+        scratch_(scratch),
+        found_(scratch.found),
+        pairs_(scratch.pairs),
+        a_(*query.spheres),
+        b_(*query.others),
+        R_BA_(one_lane(query.R_BS)),
+        p_BA_(one_lane(query.p_BS)),
+        velocity_(one_lane(query.velocity)),
+        spin_(one_lane(query.spin)),
+        range_(one_lane(query.range)),
+        dt_(one_lane(query.dt)),
+        a_is_finer_(a_.spacing <= b_.spacing) {
+    const auto size = [](const std::array<Real, 3>& v) {
+      return std::sqrt(static_cast<double>(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
+    };
+    travel_ = set<V>(static_cast<double>(query.dt) * (size(query.velocity) + size(query.spin) * a_.ball));
+    within_ = set<V>(static_cast<double>(query.range) + a_.reach + b_.reach);
+  }
+
+  void meet() {
+    found_.clear();
+    pairs_.begin(a_, b_);
+    descend();
+    look_at_nearest();
+    look_at_edges();
+    keep_best();
+  }
+
+ private:
+  /// The children of a node of B in A.
+  HWY_INLINE Vec3<V> centres_of_b(const SphereLanes::Node& node, std::size_t at) const {
+    return transposed(R_BA_, Vec3<V>{load(node.x, at), load(node.y, at), load(node.z, at)} - p_BA_);
+  }
+
+  void descend() {
+    std::vector<SpherePairs::Two>& stack = pairs_.stack;
+    stack.assign(1, {0, 0});
+    HWY_ALIGN SphereLanes::Row x, y, z;
+    while (!stack.empty()) {
+      const SpherePairs::Two two = stack.back();
+      stack.pop_back();
+      const SphereLanes::Node& of_a = a_.nodes[static_cast<std::size_t>(two.a)];
+      const SphereLanes::Node& of_b = b_.nodes[static_cast<std::size_t>(two.b)];
+      const auto count_b = static_cast<std::size_t>(of_b.count);
+      for (std::size_t at = 0; at < count_b; at += hn::Lanes(D())) {
+        const Vec3<V> centre = centres_of_b(of_b, at);
+        hn::Store(centre.x, D(), x.data() + at);
+        hn::Store(centre.y, D(), y.data() + at);
+        hn::Store(centre.z, D(), z.data() + at);
+      }
+      std::uint32_t any_b = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(of_a.count); ++i) {
+        const Vec3<V> centre{one_lane(of_a.x[i]), one_lane(of_a.y[i]), one_lane(of_a.z[i])};
+        const V reach = one_lane(of_a.radius[i]) + within_;
+        std::uint32_t near = 0;
+        for (std::size_t at = 0; at < count_b; at += hn::Lanes(D())) {
+          const Vec3<V> apart = Vec3<V>{load(x, at), load(y, at), load(z, at)} - centre;
+          const V limit = reach + load(of_b.radius, at);
+          near |= bits_of(hn::Le(dot(apart, apart), limit * limit)) << at;
+        }
+        near &= (1U << count_b) - 1U;
+        if (near == 0) continue;
+        any_b |= near;
+        const auto lane = static_cast<std::int32_t>(i);
+        if (of_a.bottom && of_b.bottom) {
+          meet_patches(of_a.first, i, of_b.first, near);
+        } else if (!of_a.bottom && of_b.bottom) {
+          stack.push_back({of_a.first + lane, two.b});
+        } else if (!of_a.bottom) {
+          for (std::uint32_t bits = near; bits != 0; bits &= bits - 1)
+            stack.push_back({of_a.first + lane, of_b.first + static_cast<std::int32_t>(std::countr_zero(bits))});
+        }
+      }
+      if (!of_a.bottom || of_b.bottom) continue;
+      for (std::uint32_t bits = any_b; bits != 0; bits &= bits - 1)
+        stack.push_back({two.a, of_b.first + static_cast<std::int32_t>(std::countr_zero(bits))});
+    }
+  }
+
+  /// B's patches in A.
+  const SphereLanes::PatchRows& placed(std::int32_t index) {
+    const auto i = static_cast<std::size_t>(index);
+    SphereLanes::PatchRows& rows = pairs_.placed[i];
+    if (pairs_.is_placed[i] != 0) return rows;
+    pairs_.is_placed[i] = 1;
+    const SphereLanes::PatchRows& given = b_.patches[i];
+    const auto place = [&](const std::array<SphereLanes::Row, 3>& from, std::array<SphereLanes::Row, 3>& to, bool point)
+                           HWY_ATTR {
+                             for (std::size_t at = 0; at < kNodeWidth; at += hn::Lanes(D())) {
+                               const Vec3<V> v = load(from, at);
+                               const Vec3<V> turned = transposed(R_BA_, point ? v - p_BA_ : v);
+                               hn::Store(turned.x, D(), to[0].data() + at);
+                               hn::Store(turned.y, D(), to[1].data() + at);
+                               hn::Store(turned.z, D(), to[2].data() + at);
+                             }
+                           };
+    place(given.centre, rows.centre, true);
+    place(given.point, rows.point, true);
+    place(given.normal, rows.normal, false);
+    if (given.bent) {
+      place(given.tangent, rows.tangent, false);
+      place(given.bitangent, rows.bitangent, false);
+    }
+    if (given.limited)
+      for (std::size_t k = 0; k < 2; ++k) place(given.out[k], rows.out[k], false);
+    rows.bend = given.bend;
+    rows.radius = given.radius;
+    rows.reach = given.reach;
+    rows.distance = given.distance;
+    rows.bent = given.bent;
+    rows.limited = given.limited;
+    return rows;
+  }
+
+  /// Where the lowest point of a sphere will be when it gets to the patch, if only the part of its way along the patch
+  /// counts. `sign` is 1 where the sphere is A's, else -1.
+  HWY_INLINE Vec3<V> shift_of(const Vec3<V>& p, const Vec3<V>& normal, V up, V sign) const {
+    const V zero = set<V>(0.0);
+    const Vec3<V> moves = (velocity_ + cross(spin_, p)) * sign;
+    const V closing = hn::Neg(dot(normal, moves));
+    const M closes = hn::And(hn::Gt(up, zero), hn::Gt(closing, zero));
+    const V time = hn::Min(dt_, up / select(closes, closing, set<V>(1.0)));
+    const Vec3<V> shift = (moves + normal * closing) * time;
+    return select(closes, shift, set3<V>(0.0, 0.0, 0.0));
+  }
+
+  /// How far (m^2) the spheres' lowest points are from the patches' points; `over`: where they are over them.
+  template <class Ends>
+  HWY_INLINE V far_from(const SpheresOver& s, V sign, M& over, const Ends& ends) const {
+    const D d;
+    const V zero = set<V>(0.0);
+    Vec3<V> to = s.centre - s.normal * s.radius - s.point;
+    const V up = dot(s.normal, to);
+    const V room = s.reach + travel_;
+    over = hn::And(over, hn::Le(up, range_ + s.reach));
+    over = hn::And(over, hn::Le(dot(to, to) - up * up, room * room));
+    over = hn::And(over, hn::Gt(dot(s.centre - s.patch_centre, s.normal), zero));
+    if (hn::AllFalse(d, over)) return zero;
+    const M moved = hn::And(over, hn::Gt(travel_, set<V>(0.1) * s.reach));
+    if (!hn::AllFalse(d, moved)) {
+      const Vec3<V> shifted = to + shift_of(to + s.point, s.normal, up, sign);
+      to = select(moved, shifted, to);
+    }
+    const V away = dot(to, to);
+    over = hn::And(over, hn::Le(away - up * up, s.reach * s.reach));
+    if (hn::AllFalse(d, over)) return zero;
+    over = hn::AndNot(ends(to, hn::Max(zero, hn::Neg(up))), over);
+    return away;
+  }
+
+  /// A sphere of A's and those of a node of B's that are near it.
+  void meet_patches(std::int32_t rows_a, std::size_t i, std::int32_t rows_b, std::uint32_t near) {
+    const D d;
+    const SphereLanes::PatchRows& of_a = a_.patches[static_cast<std::size_t>(rows_a)];
+    const SphereLanes::PatchRows& of_b = placed(rows_b);
+    const bool edge = of_a.reach[i] == Real(0);
+    const Vec3<V> centre = one_lane(lane_of(of_a.centre, i)), point = one_lane(lane_of(of_a.point, i)),
+                  normal = one_lane(lane_of(of_a.normal, i));
+    const V radius = one_lane(of_a.radius[i]), reach = one_lane(of_a.reach[i]);
+    SpherePairs::Best& best_a = pairs_.best_of(pairs_.best_a, rows_a);
+    SpherePairs::Best& best_b = pairs_.best_of(pairs_.best_b, rows_b);
+    const auto id_a = static_cast<std::int32_t>(static_cast<std::size_t>(rows_a) * kNodeWidth + i);
+    for (std::size_t at = 0; near >> at != 0; at += hn::Lanes(d)) {
+      const std::uint32_t bits = near >> at & ((1U << hn::Lanes(d)) - 1U);
+      if (bits == 0) continue;
+      const M wanted = lanes_in(bits);
+      const PatchLanes b(of_b, at);
+      const std::uint32_t edges = bits_of(hn::And(wanted, b.edge));
+      M a_over, b_over;  // A's sphere over B's patches, B's spheres over A's patch
+      if (edge) {
+        for (std::uint32_t left = edges; left != 0; left &= left - 1) {
+          const auto lane = static_cast<std::int32_t>(at) + static_cast<std::int32_t>(std::countr_zero(left));
+          pairs_.edges.push_back({id_a, rows_b * kNodeWidth + lane});
+        }
+        a_over = hn::AndNot(b.edge, wanted);
+        b_over = hn::Lt(reach, reach);
+      } else {
+        const M faces = hn::AndNot(hn::Or(b.edge, hn::Gt(dot(normal, b.normal), set<V>(kSameSide))), wanted);
+        b_over = hn::And(wanted, b.edge);
+        a_over = hn::Lt(reach, reach);
+        (a_is_finer_ ? a_over : b_over) = hn::Or(a_is_finer_ ? a_over : b_over, faces);
+      }
+      V away = set<V>(1e30);
+      if (!hn::AllFalse(d, a_over)) {
+        const SpheresOver s{centre, radius, b.centre, b.point, b.normal, b.reach};
+        const V mine = far_from(s, set<V>(1.0), a_over,
+                                [&](const Vec3<V>& to, V depth) HWY_ATTR { return ends_before(b, to, depth); });
+        away = select(a_over, mine, away);
+      }
+      if (!hn::AllFalse(d, b_over)) {
+        const SpheresOver s{b.centre, b.radius, centre, point, normal, reach};
+        const V mine = far_from(s, set<V>(-1.0), b_over, [&](const Vec3<V>& to, V depth) HWY_ATTR {
+          M ends = hn::Lt(depth, depth);
+          if (!of_a.limited) return ends;
+          const V room = set<V>(kPatchRoom) - depth;
+          for (std::size_t k = 0; k < 2; ++k)
+            ends =
+                hn::Or(ends, hn::Gt(dot(one_lane(lane_of(of_a.out[k], i)), to), one_lane(of_a.distance[k][i]) + room));
+          return ends;
+        });
+        away = select(b_over, mine, away);
+      }
+      note(away, at, i, id_a, rows_b, best_a, best_b);
+    }
+  }
+
+  /// The nearest of each sphere and patch.
+  HWY_INLINE void note(V away, std::size_t at, std::size_t i, std::int32_t id_a, std::int32_t rows_b,
+                       SpherePairs::Best& best_a, SpherePairs::Best& best_b) {
+    const D d;
+    const V known = load(best_b.away, at);
+    const M nearer = hn::Lt(away, known);
+    if (!hn::AllFalse(d, nearer)) {
+      hn::Store(select(nearer, away, known), d, best_b.away.data() + at);
+      const V partner = load(best_b.partner, at);
+      hn::Store(select(nearer, set<V>(id_a), partner), d, best_b.partner.data() + at);
+    }
+    const M mine = hn::Lt(away, one_lane(best_a.away[i]));
+    if (hn::AllFalse(d, mine)) return;
+    const Real least = hn::GetLane(hn::MinOfLanes(d, away));
+    const auto lane = static_cast<std::int32_t>(std::countr_zero(bits_of(hn::Eq(away, one_lane(least)))));
+    best_a.away[i] = least;
+    best_a.partner[i] = static_cast<Real>(rows_b * kNodeWidth + static_cast<std::int32_t>(at) + lane);
+  }
+
+  static HWY_INLINE M lanes_in(std::uint32_t bits) {
+    HWY_ALIGN Real values[kNodeWidth];
+    for (std::size_t k = 0; k < hn::Lanes(D()); ++k) values[k] = static_cast<Real>(bits >> k & 1U);
+    return hn::Gt(hn::Load(D(), values), set<V>(0.0));
+  }
+
+  // What is looked at, a vector at a time: spheres and the patches below them.
+  struct Batch {
+    SphereLanes::PatchRows sphere{}, patch{};
+    SphereLanes::Row sign{};
+    std::array<SpherePairs::Two, kNodeWidth> ids{};
+    std::size_t count = 0;
+  };
+  static void copy_lane(const SphereLanes::PatchRows& from, std::size_t i, SphereLanes::PatchRows& to, std::size_t k,
+                        bool whole) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      to.centre[j][k] = from.centre[j][i];
+      to.point[j][k] = from.point[j][i];
+      to.normal[j][k] = from.normal[j][i];
+    }
+    to.radius[k] = from.radius[i];
+    to.reach[k] = from.reach[i];
+    if (!whole) return;
+    for (std::size_t j = 0; j < 3; ++j) {
+      to.bend[j][k] = from.bend[j][i];
+      to.tangent[j][k] = from.bent ? from.tangent[j][i] : Real(0);
+      to.bitangent[j][k] = from.bent ? from.bitangent[j][i] : Real(0);
+      for (std::size_t l = 0; l < 2; ++l) to.out[l][j][k] = from.limited ? from.out[l][j][i] : Real(0);
+    }
+    for (std::size_t l = 0; l < 2; ++l) to.distance[l][k] = from.distance[l][i];
+    to.bent = to.bent || from.bent;
+    to.limited = to.limited || from.limited;
+  }
+
+  void look_at(std::int32_t id_a, std::int32_t id_b, Batch& batch) {
+    const auto width = static_cast<std::size_t>(kNodeWidth);
+    const std::size_t ia = static_cast<std::size_t>(id_a), ib = static_cast<std::size_t>(id_b);
+    const SphereLanes::PatchRows &of_a = a_.patches[ia / width], &of_b = placed(id_b / kNodeWidth);
+    const bool a_edge = of_a.reach[ia % width] == Real(0), b_edge = of_b.reach[ib % width] == Real(0);
+    const bool sphere_of_a = a_edge || (a_is_finer_ && !b_edge);
+    const std::size_t k = batch.count++;
+    copy_lane(of_a, ia % width, sphere_of_a ? batch.sphere : batch.patch, k, !sphere_of_a);
+    copy_lane(of_b, ib % width, sphere_of_a ? batch.patch : batch.sphere, k, sphere_of_a);
+    batch.sign[k] = sphere_of_a ? Real(1) : Real(-1);
+    batch.ids[k] = {id_a, id_b};
+    if (batch.count == width) meet_batch(batch);
+  }
+
+  void meet_batch(Batch& batch) {
+    const D d;
+    const V zero = set<V>(0.0);
+    for (std::size_t at = 0; at < batch.count; at += hn::Lanes(d)) {
+      const std::size_t filled = std::min(batch.count - at, hn::Lanes(d));
+      M wanted = lanes_in((1U << filled) - 1U);
+      const PatchLanes sphere(batch.sphere, at), patch(batch.patch, at);
+      const V sign = load(batch.sign, at);
+      Vec3<V> p = sphere.centre - patch.normal * sphere.radius;
+      const Vec3<V> shift = shift_of(p, patch.normal, dot(patch.normal, p - patch.point), sign);
+      M over;
+      PatchHeight height = height_of(patch, p + shift, over);
+      wanted = hn::And(wanted, over);
+      p = sphere.centre - height.normal * sphere.radius;
+      wanted = hn::And(wanted, stands_for(sphere, p));
+      height = height_of(patch, p + shift, over);
+      wanted = hn::And(wanted, hn::And(over, hn::Le(height.gap, range_)));
+      if (hn::AllFalse(d, wanted)) continue;
+      ContactLanes c{p - height.normal * (set<V>(0.5) * height.gap), height.normal * sign, height.gap, zero};
+      const M of_a = hn::Gt(sign, zero);
+      const Vec3<V> spin = select(of_a, one_lane(query_.own_spin), one_lane(query_.other_spin));
+      const Vec3<V> center = select(of_a, one_lane(query_.center), one_lane(query_.other_center));
+      turn(c, dot(height.normal, towards_center(spin, sphere.centre - center)), dt_);
+      wanted = hn::And(wanted, hn::Le(c.gap, range_));
+      offer(c, wanted, batch, at);
+    }
+    batch.count = 0;
+    batch.patch.bent = batch.patch.limited = false;
+  }
+
+  void offer(const ContactLanes& c, M wanted, const Batch& batch, std::size_t at) {
+    found_.reserve(kNodeWidth);
+    append(c, gap_at_end(query_, c, dt_), wanted, found_);
+    for (std::uint32_t bits = bits_of(wanted); bits != 0; bits &= bits - 1)
+      pairs_.contacts.push_back(batch.ids[at + static_cast<std::size_t>(std::countr_zero(bits))]);
+  }
+
+  void look_at_nearest() {
+    Batch batch;
+    for (const std::int32_t rows : pairs_.touched_a) {
+      const SpherePairs::Best& best = pairs_.best_a[static_cast<std::size_t>(rows)];
+      for (int i = 0; i < kNodeWidth; ++i) {
+        const Real partner = best.partner[static_cast<std::size_t>(i)];
+        if (partner >= 0) look_at(rows * kNodeWidth + i, static_cast<std::int32_t>(partner), batch);
+      }
+    }
+    for (const std::int32_t rows : pairs_.touched_b) {
+      const SpherePairs::Best& best = pairs_.best_b[static_cast<std::size_t>(rows)];
+      for (int i = 0; i < kNodeWidth; ++i) {
+        const Real partner = best.partner[static_cast<std::size_t>(i)];
+        if (partner < 0) continue;
+        const auto id_a = static_cast<std::size_t>(partner);
+        const std::int32_t id_b = rows * kNodeWidth + i;
+        const Real back = pairs_.best_a[id_a / kNodeWidth].partner[id_a % kNodeWidth];
+        if (back != static_cast<Real>(id_b)) look_at(static_cast<std::int32_t>(id_a), id_b, batch);
+      }
+    }
+    meet_batch(batch);
+  }
+
+  void look_at_edges() {
+    const D d;
+    HWY_ALIGN SphereLanes::Row a[4], b[4];
+    Batch batch;
+    for (std::size_t begin = 0; begin < pairs_.edges.size(); begin += hn::Lanes(d)) {
+      const std::size_t filled = std::min(hn::Lanes(d), pairs_.edges.size() - begin);
+      for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
+        const SpherePairs::Two& two = pairs_.edges[begin + std::min(k, filled - 1)];
+        batch.ids[k] = two;
+        const SphereLanes::PatchRows& of_a = a_.patches[static_cast<std::size_t>(two.a / kNodeWidth)];
+        const SphereLanes::PatchRows& of_b = placed(two.b / kNodeWidth);
+        const auto i = static_cast<std::size_t>(two.a % kNodeWidth), j = static_cast<std::size_t>(two.b % kNodeWidth);
+        for (std::size_t r = 0; r < 3; ++r) {
+          a[r][k] = of_a.centre[r][i];
+          b[r][k] = of_b.centre[r][j];
+        }
+        a[3][k] = of_a.radius[i];
+        b[3][k] = of_b.radius[j];
+      }
+      const Vec3<V> centre{load(a[0], 0), load(a[1], 0), load(a[2], 0)};
+      const Vec3<V> between = centre - Vec3<V>{load(b[0], 0), load(b[1], 0), load(b[2], 0)};
+      const V distance = length(between), radius = load(a[3], 0);
+      const M proper = hn::Gt(distance, set<V>(0.0));
+      const Vec3<V> normal = between * (set<V>(1.0) / select(proper, distance, set<V>(1.0)));
+      const V gap = distance - radius - load(b[3], 0);
+      const ContactLanes c{centre - normal * (radius + set<V>(0.5) * gap), normal, gap, set<V>(0.0)};
+      const M wanted = hn::And(hn::And(proper, hn::Le(gap, range_)), lanes_in((1U << filled) - 1U));
+      if (!hn::AllFalse(d, wanted)) offer(c, wanted, batch, 0);
+    }
+  }
+
+  /// Of each sphere and patch the contact with the least gap.
+  void keep_best() {
+    const auto count = static_cast<std::size_t>(found_.size());
+    if (count == 0) return;
+    const Real* gap = found_.row(FoundContacts::kGap);
+    for (auto* all : {&pairs_.best_a, &pairs_.best_b}) {
+      const auto& touched = all == &pairs_.best_a ? pairs_.touched_a : pairs_.touched_b;
+      for (const std::int32_t rows : touched) (*all)[static_cast<std::size_t>(rows)].partner.fill(Real(-1));
+    }
+    const auto partner_of = [&](std::vector<SpherePairs::Best>& all, std::int32_t id) -> Real& {
+      return all[static_cast<std::size_t>(id / kNodeWidth)].partner[static_cast<std::size_t>(id % kNodeWidth)];
+    };
+    for (std::size_t i = 0; i < count; ++i) {
+      const SpherePairs::Two& two = pairs_.contacts[i];
+      for (Real* known : {&partner_of(pairs_.best_a, two.a), &partner_of(pairs_.best_b, two.b)}) {
+        const bool nearer =
+            *known < 0 || gap[i] < gap[static_cast<std::size_t>(*known)] - static_cast<Real>(kSameSphereGap);
+        if (nearer) *known = static_cast<Real>(i);
+      }
+    }
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const SpherePairs::Two& two = pairs_.contacts[i];
+      const auto mine = static_cast<Real>(i);
+      if (partner_of(pairs_.best_a, two.a) != mine && partner_of(pairs_.best_b, two.b) != mine) continue;
+      for (int r = FoundContacts::kX; r <= FoundContacts::kAtEnd; ++r) {
+        Real* row = found_.row(static_cast<FoundContacts::Row>(r));
+        row[kept] = row[i];
+      }
+      ++kept;
+    }
+    found_.grow(static_cast<int>(kept) - static_cast<int>(count));
+  }
+
+  const SphereQuery& query_;
+  SphereScratch& scratch_;
+  FoundContacts& found_;
+  SpherePairs& pairs_;
+  const SphereLanes& a_;
+  const SphereLanes& b_;
+  Mat3<V> R_BA_;
+  Vec3<V> p_BA_, velocity_, spin_;
+  V range_, dt_, travel_, within_;
+  bool a_is_finer_;
+};
+
+inline void meet_spheres_lanes(const SphereQuery* query, SphereScratch* scratch) {
+  SphereMeeting(*query, *scratch).meet();
+}
+
+}  // namespace prescene::simulation::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
