@@ -101,7 +101,19 @@ struct SpherePairs {
     bool touched = false;
   };
 
-  std::vector<Two> stack;                      ///< Nodes.
+  /// A node of each, and B's bounding sphere in A.
+  struct Nodes {
+    std::int32_t a, b;
+    Real x, y, z, radius;
+  };
+  /// The spheres of two nodes.
+  struct Leaves {
+    std::int32_t rows_a = 0, rows_b = 0;
+    const SphereLanes::PatchRows *patches_a = nullptr, *patches_b = nullptr;
+    Best *best_a = nullptr, *best_b = nullptr;
+  };
+
+  std::vector<Nodes> stack;
   std::vector<SphereLanes::PatchRows> placed;  ///< B's in A, where `is_placed`.
   std::vector<std::uint8_t> is_placed;
   std::vector<Best> best_a, best_b;  ///< By PatchRows.

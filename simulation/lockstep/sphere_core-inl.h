@@ -215,7 +215,8 @@ class CoreMeeting {
     const PatchLanes patch(rows, at);
     const CorePlace place = place_of(R_BS_ * patch.centre, patch.radius + radius_ + within_, wanted);
     const V gap = place.distance - radius_ - patch.radius;
-    wanted = hn::And(wanted, hn::Le(gap, within_));
+    // What turning adds only opens a gap; a patch that bends away comes nearer by its reach at most.
+    wanted = hn::And(wanted, hn::Le(gap, select(hn::Or(place.flat, patch.edge), range_, within_)));
     if (hn::AllFalse(d, wanted)) return;
     const Vec3<V> normal = transposed(R_BS_, place.normal);
     const M faces = hn::Or(patch.edge, hn::Lt(dot(patch.normal, normal), zero));

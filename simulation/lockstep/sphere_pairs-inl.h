@@ -70,27 +70,38 @@ class SphereMeeting {
   }
 
   void descend() {
-    std::vector<SpherePairs::Two>& stack = pairs_.stack;
-    stack.assign(1, {0, 0});
+    const D d;
+    std::vector<SpherePairs::Nodes>& stack = pairs_.stack;
+    const Vec3<V> root = transposed(R_BA_, neg(p_BA_));
+    stack.assign(1, {0, 0, hn::GetLane(root.x), hn::GetLane(root.y), hn::GetLane(root.z), static_cast<Real>(b_.ball)});
     HWY_ALIGN SphereLanes::Row x, y, z;
     while (!stack.empty()) {
-      const SpherePairs::Two two = stack.back();
+      const SpherePairs::Nodes two = stack.back();
       stack.pop_back();
       const SphereLanes::Node& of_a = a_.nodes[static_cast<std::size_t>(two.a)];
       const SphereLanes::Node& of_b = b_.nodes[static_cast<std::size_t>(two.b)];
+      std::uint32_t near_a = near_sphere(of_a, two);
+      if (near_a == 0) continue;
       const auto count_b = static_cast<std::size_t>(of_b.count);
-      for (std::size_t at = 0; at < count_b; at += hn::Lanes(D())) {
+      for (std::size_t at = 0; at < count_b; at += hn::Lanes(d)) {
         const Vec3<V> centre = centres_of_b(of_b, at);
-        hn::Store(centre.x, D(), x.data() + at);
-        hn::Store(centre.y, D(), y.data() + at);
-        hn::Store(centre.z, D(), z.data() + at);
+        hn::Store(centre.x, d, x.data() + at);
+        hn::Store(centre.y, d, y.data() + at);
+        hn::Store(centre.z, d, z.data() + at);
       }
+      const auto push = [&](std::int32_t a, std::uint32_t lane) {
+        stack.push_back(
+            {a, of_b.first + static_cast<std::int32_t>(lane), x[lane], y[lane], z[lane], of_b.radius[lane]});
+      };
       std::uint32_t any_b = 0;
-      for (std::size_t i = 0; i < static_cast<std::size_t>(of_a.count); ++i) {
+      const SpherePairs::Leaves leaves =
+          of_a.bottom && of_b.bottom ? leaves_of(of_a.first, of_b.first) : SpherePairs::Leaves{};
+      for (; near_a != 0; near_a &= near_a - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(near_a));
         const Vec3<V> centre{one_lane(of_a.x[i]), one_lane(of_a.y[i]), one_lane(of_a.z[i])};
         const V reach = one_lane(of_a.radius[i]) + within_;
         std::uint32_t near = 0;
-        for (std::size_t at = 0; at < count_b; at += hn::Lanes(D())) {
+        for (std::size_t at = 0; at < count_b; at += hn::Lanes(d)) {
           const Vec3<V> apart = Vec3<V>{load(x, at), load(y, at), load(z, at)} - centre;
           const V limit = reach + load(of_b.radius, at);
           near |= bits_of(hn::Le(dot(apart, apart), limit * limit)) << at;
@@ -100,18 +111,41 @@ class SphereMeeting {
         any_b |= near;
         const auto lane = static_cast<std::int32_t>(i);
         if (of_a.bottom && of_b.bottom) {
-          meet_patches(of_a.first, i, of_b.first, near);
+          meet_patches(leaves, i, near);
         } else if (!of_a.bottom && of_b.bottom) {
-          stack.push_back({of_a.first + lane, two.b});
+          stack.push_back({of_a.first + lane, two.b, two.x, two.y, two.z, two.radius});
         } else if (!of_a.bottom) {
           for (std::uint32_t bits = near; bits != 0; bits &= bits - 1)
-            stack.push_back({of_a.first + lane, of_b.first + static_cast<std::int32_t>(std::countr_zero(bits))});
+            push(of_a.first + lane, static_cast<std::uint32_t>(std::countr_zero(bits)));
         }
       }
       if (!of_a.bottom || of_b.bottom) continue;
       for (std::uint32_t bits = any_b; bits != 0; bits &= bits - 1)
-        stack.push_back({two.a, of_b.first + static_cast<std::int32_t>(std::countr_zero(bits))});
+        push(two.a, static_cast<std::uint32_t>(std::countr_zero(bits)));
     }
+  }
+
+  /// Which children of a node of A's are near a node of B's.
+  HWY_INLINE std::uint32_t near_sphere(const SphereLanes::Node& of_a, const SpherePairs::Nodes& two) const {
+    const Vec3<V> centre{one_lane(two.x), one_lane(two.y), one_lane(two.z)};
+    const V reach = one_lane(two.radius) + within_;
+    const auto count = static_cast<std::size_t>(of_a.count);
+    std::uint32_t near = 0;
+    for (std::size_t at = 0; at < count; at += hn::Lanes(D())) {
+      const Vec3<V> apart = Vec3<V>{load(of_a.x, at), load(of_a.y, at), load(of_a.z, at)} - centre;
+      const V limit = reach + load(of_a.radius, at);
+      near |= bits_of(hn::Le(dot(apart, apart), limit * limit)) << at;
+    }
+    return near & ((1U << count) - 1U);
+  }
+
+  SpherePairs::Leaves leaves_of(std::int32_t rows_a, std::int32_t rows_b) {
+    return {rows_a,
+            rows_b,
+            &a_.patches[static_cast<std::size_t>(rows_a)],
+            &placed(rows_b),
+            &pairs_.best_of(pairs_.best_a, rows_a),
+            &pairs_.best_of(pairs_.best_b, rows_b)};
   }
 
   /// B's patches in A.
@@ -186,17 +220,15 @@ class SphereMeeting {
   }
 
   /// A sphere of A's and those of a node of B's that are near it.
-  void meet_patches(std::int32_t rows_a, std::size_t i, std::int32_t rows_b, std::uint32_t near) {
+  void meet_patches(const SpherePairs::Leaves& leaves, std::size_t i, std::uint32_t near) {
     const D d;
-    const SphereLanes::PatchRows& of_a = a_.patches[static_cast<std::size_t>(rows_a)];
-    const SphereLanes::PatchRows& of_b = placed(rows_b);
+    const SphereLanes::PatchRows &of_a = *leaves.patches_a, &of_b = *leaves.patches_b;
     const bool edge = of_a.reach[i] == Real(0);
     const Vec3<V> centre = one_lane(lane_of(of_a.centre, i)), point = one_lane(lane_of(of_a.point, i)),
                   normal = one_lane(lane_of(of_a.normal, i));
     const V radius = one_lane(of_a.radius[i]), reach = one_lane(of_a.reach[i]);
-    SpherePairs::Best& best_a = pairs_.best_of(pairs_.best_a, rows_a);
-    SpherePairs::Best& best_b = pairs_.best_of(pairs_.best_b, rows_b);
-    const auto id_a = static_cast<std::int32_t>(static_cast<std::size_t>(rows_a) * kNodeWidth + i);
+    const std::int32_t rows_b = leaves.rows_b;
+    const std::int32_t id_a = leaves.rows_a * kNodeWidth + static_cast<std::int32_t>(i);
     for (std::size_t at = 0; near >> at != 0; at += hn::Lanes(d)) {
       const std::uint32_t bits = near >> at & ((1U << hn::Lanes(d)) - 1U);
       if (bits == 0) continue;
@@ -237,7 +269,8 @@ class SphereMeeting {
         });
         away = select(b_over, mine, away);
       }
-      note(away, at, i, id_a, rows_b, best_a, best_b);
+      if (hn::AllFalse(d, hn::Or(a_over, b_over))) continue;
+      note(away, at, i, id_a, rows_b, *leaves.best_a, *leaves.best_b);
     }
   }
 
