@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -21,6 +22,7 @@ using geometry::Matrix3d;
 // What "is where the mean says" means in ObjectEstimate::confidence.
 constexpr double kHereDistance = 0.02;                   // m
 constexpr double kHereAngle = 15.0 * geometry::kDegree;  // rad
+constexpr double kOneTurn = 30.0 * geometry::kDegree;    // rad; poses turned by less are averaged
 
 // Inverse of the right Jacobian of the rotation exponential: log(exp(phi) exp(e)) = phi + J e for small e.
 Matrix3d inverse_right_jacobian(const Vector3d& phi) {
@@ -70,11 +72,11 @@ double probability_within(const Vector3d& m, const Matrix3d& S, double radius) {
   return core::normal_cdf((std::cbrt(y / h) - 1.0 + 2.0 / (9.0 * h)) / std::sqrt(2.0 / (9.0 * h)));
 }
 
-// The particles as the equivalents that are nearest to the heaviest one, with their covariances.
-std::vector<Particle> aligned(const std::vector<Particle>& particles, const geometry::SymmetryGroup& symmetry) {
+// The particles as the equivalents that are nearest to X_WR, with their covariances.
+std::vector<Particle> aligned(const std::vector<Particle>& particles, const geometry::SymmetryGroup& symmetry,
+                              const Pose& X_WR) {
   if (symmetry.trivial()) return particles;
   std::vector<Particle> result = particles;
-  const Pose X_WR = heaviest(particles).X_WO;
   for (Particle& particle : result) {
     const Pose X_equal = geometry::closest_equivalent(particle.X_WO, X_WR, symmetry);
     const geometry::Quaterniond S = particle.X_WO.rotation.conjugate() * X_equal.rotation;
@@ -99,6 +101,30 @@ double probability_of_rotation(const Particle& particle, const Pose& X_mean, con
   const Vector3d error = across * geometry::box_minus(particle.X_WO, X_mean).head<3>();
   const Matrix3d spread = across * particle.covariance.topLeftCorner<3, 3>() * across;
   return std::min(1.0, probability_within(error, spread, kHereAngle));
+}
+
+// Up to turns that symmetry allows.
+bool is_turned_like(const Pose& X, const Pose& X_leader, const geometry::SymmetryGroup& symmetry) {
+  return symmetry.ball || geometry::symmetric_angle(X, X_leader, symmetry) <= kOneTurn;
+}
+
+// The pose of the heaviest particle that has more than half of the weight turned like it, or else most of it.
+Pose likeliest_turn(const std::vector<Particle>& particles, const geometry::SymmetryGroup& symmetry) {
+  std::vector<const Particle*> sorted;
+  for (const Particle& particle : particles) sorted.push_back(&particle);
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Particle* a, const Particle* b) { return a->log_weight > b->log_weight; });
+  if (symmetry.ball) return sorted.front()->X_WO;
+  double most = 0.0;
+  const Particle* leader = sorted.front();
+  for (const Particle* particle : sorted) {
+    double mass = 0.0;
+    for (const Particle& other : particles)
+      if (is_turned_like(other.X_WO, particle->X_WO, symmetry)) mass += std::exp(other.log_weight);
+    if (mass > most) most = mass, leader = particle;
+    if (most > 0.5) break;
+  }
+  return leader->X_WO;
 }
 
 MotionMode likeliest_motion(const std::vector<Particle>& particles) {
@@ -233,10 +259,16 @@ bool operator==(const Belief& a, const Belief& b) {
 
 ObjectEstimate estimate(const ObjectBelief& object, const geometry::SymmetryGroup& symmetry) {
   ObjectEstimate estimate;
-  const std::vector<Particle> particles = aligned(object.particles, symmetry);
-  const Particle& best = heaviest(particles);
-  estimate.mode = best.X_WO;
-  estimate.mean = weighted_mean(particles, best.X_WO);
+  PRESCENE_CHECK(!object.particles.empty());
+  const Pose X_leader = likeliest_turn(object.particles, symmetry);
+  const std::vector<Particle> particles = aligned(object.particles, symmetry, X_leader);
+  estimate.mode = heaviest(particles).X_WO;
+  // A mean of poses that are turned against each other by more would be none of them.
+  std::vector<Particle> alike;
+  std::copy_if(particles.begin(), particles.end(), std::back_inserter(alike),
+               [&](const Particle& particle) { return is_turned_like(particle.X_WO, X_leader, symmetry); });
+  if (alike.size() < particles.size()) normalize(alike);
+  estimate.mean = weighted_mean(alike, X_leader);
   estimate.covariance = mixture_covariance(particles, estimate.mean);
   estimate.motion = likeliest_motion(particles);
   estimate.effective_sample_size = effective_sample_size(particles);

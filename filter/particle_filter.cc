@@ -8,7 +8,9 @@
 #include "prescene/core/check.h"
 #include "prescene/filter/operators/hold_joints.h"
 #include "prescene/filter/operators/learn_colors.h"
+#include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/unknown_objects.h"
+#include "prescene/filter/operators/wander.h"
 
 namespace prescene::filter {
 namespace {
@@ -22,6 +24,9 @@ constexpr double kIslandGap = 0.005;  // m; objects nearer than this form an isl
 // A support that was found in a frame is the average of what the first frames show of it, and follows later frames at
 // this rate. Chosen.
 constexpr double kLeastSupportGain = 0.1;
+// So often, in frames, and where so much of it is seen, rivals of an object that is followed are looked for.
+constexpr std::uint64_t kRivalsEvery = 5;
+constexpr double kMostlySeen = 0.5;
 
 const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
   return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
@@ -203,6 +208,8 @@ void ParticleFilter::weigh_all(FrameStep& step, double dt) {
     const SearchTarget target = target_in(step, i);
     const rendering::FrameTerms terms = terms_in(step, i, target);
     WeightReport& report = step.reports[i];
+    std::vector<double> before;
+    for (const Particle& particle : object.particles) before.push_back(particle.log_weight);
     report = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
                     stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
                     {.supports = frame.surfaces.get(),
@@ -210,6 +217,7 @@ void ParticleFilter::weigh_all(FrameStep& step, double dt) {
                      .depth = step.observation.frame.depth.get(),
                      .camera = step.observation.frame.camera});
     if (report.all_impossible) result.degraded |= kImpossibleWeights;
+    share_among_turns(before, model_of(belief, i).symmetry, object.particles);
     for (const ParticleWeight& particle : report.particles) result.counters.hidden_particles += particle.hidden;
     update_track(report, frame.stamp_ns, settings_.track, object);
     step.depths[i] = depth_in(step, i);
@@ -246,10 +254,22 @@ void ParticleFilter::recover_all(FrameStep& step) {
   StepCounters& counters = step.result.counters;
   Belief& belief = step.belief();
   const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
+  const auto rival = [&](std::size_t i, RivalPrior prior) {
+    const SearchTarget target = target_in(step, i);
+    propose_rivals(frame, terms_in(step, i, target), target, model_of(belief, i).symmetry, prior, settings_.weight,
+                   settings_.initialise, tools_, belief.objects[i]);
+  };
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
+    const bool is_seen = (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful) &&
+                         object.visible_share >= settings_.weight.hidden_share;
+    if (is_seen && belief.step == 1 && has_wide_prior(belief.scene->objects[i], settings_.initialise))
+      rival(i, RivalPrior::kFound);
+    else if (is_seen && object.visible_share >= kMostlySeen && (belief.step + i) % kRivalsEvery == 0)
+      rival(i, RivalPrior::kTracked);
     const bool look = wants_recovery(settings_.augment, object, belief.step + i);
-    if (!look && object.frames_refuted == 0) continue;
+    const bool is_unseen = object.state == TrackState::kUnseen;
+    if (!look && !is_unseen && object.frames_refuted == 0) continue;
     const SearchTarget target = target_in(step, i);
     const rendering::FrameTerms terms = terms_in(step, i, target);
     const WeightReport& report = step.reports[i];
@@ -258,6 +278,10 @@ void ParticleFilter::recover_all(FrameStep& step) {
     counters.recoveries_tried += look ? 1 : 0;
     if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
                           tools_, mine, object)) {
+      if (is_unseen) {
+        counters.hidden_proposed += wander_unseen(frame, terms, target, current, settings_.augment, settings_.weight,
+                                                  settings_.initialise, tools_, mine, object);
+      }
       if (object.frames_refuted > 0) {
         counters.hidden_proposed += propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment,
                                                    settings_.weight, settings_.initialise, tools_, mine, object);
@@ -269,6 +293,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     object.existence = std::max(object.existence, 0.5);
     object.frames_unseen = 0;
     object.frames_refuted = 0;
+    rival(i, RivalPrior::kFound);
     step.depths[i] = depth_in(step, i);
   }
 }

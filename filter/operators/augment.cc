@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hidden_places.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/geometry/sampling.h"
@@ -192,32 +193,15 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double shift = std::min(kHiddenFurthest, kHiddenShift + kHiddenSpeed * unseen);
   const double fall = std::min(kHiddenFurthest, 0.5 * gravity_W.norm() * unseen * unseen);
-  const Vector3d down = fall * gravity_W.normalized();
-  core::RandomStream draws = stream.for_purpose(core::Purpose::kProposal);
-  const Vector3d p_WQ = last.X_WO * target.centre();
-  std::vector<Pose> places_W;
-  std::vector<rendering::PoseHypothesis> hypotheses;
-  for (int i = 0; i < kHiddenDraws; ++i) {
-    Vector6d d;
-    for (int k = 0; k < 6; ++k) d[k] = draws.normal() * (k < 3 ? kHiddenTurn : shift);
-    if (fall > 0.0) d.tail<3>() += draws.uniform() * down;
-    const Pose X_WO = moved_about(last.X_WO, target.centre(), d);
-    if (frame.surfaces->crosses(p_WQ, X_WO * target.centre())) continue;
-    if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > 0.0) continue;
-    places_W.push_back(X_WO);
-    hypotheses.push_back(hypothesis(target, frame.X_CW * X_WO));
-  }
-  std::vector<rendering::PoseEvidence> evidence(hypotheses.size());
-  {
-    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    tools.search->batch().evaluate(terms, hypotheses, *workspace, evidence);
-  }
+  const std::vector<Pose> places =
+      hidden_places(frame, terms, target, last.X_WO, {shift, kHiddenTurn, fall * gravity_W.normalized()}, kHiddenDraws,
+                    weighting, tools, stream.for_purpose(core::Purpose::kProposal));
   const int wanted = static_cast<int>(std::lround(options.hidden_share * static_cast<double>(object.particles.size())));
-  int placed = 0;
-  for (std::size_t i = 0; i < places_W.size() && placed < wanted; ++i) {
-    if (evidence[i].measured == 0 || evidence[i].visible_share() >= weighting.hidden_share) continue;
-    Particle& particle = object.particles[static_cast<std::size_t>(placed++)];
-    particle = particles_about(places_W[i], belief::MotionMode::kMoving, 1, spread, stream).front();
+  const int placed = std::min(wanted, static_cast<int>(places.size()));
+  for (int i = 0; i < placed; ++i) {
+    Particle& particle = object.particles[static_cast<std::size_t>(i)];
+    particle =
+        particles_about(places[static_cast<std::size_t>(i)], belief::MotionMode::kMoving, 1, spread, stream).front();
     particle.log_weight = weighting.log_hidden - std::log(static_cast<double>(wanted));
   }
   if (placed > 0) belief::normalize(object.particles);

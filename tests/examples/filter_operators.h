@@ -24,6 +24,7 @@
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/segmentation.h"
 #include "prescene/filter/proposals/support_tracking.h"
+#include "prescene/geometry/symmetry.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/rendering/sensor/color_model.h"
 
@@ -73,10 +74,24 @@ extern const PredictOptions options;
 extern const simulation::SimulatorFactory simulators;
 }  // namespace predict_h
 
+namespace rivals_h {
+extern const geometry::SymmetryGroup symmetry;
+extern const std::vector<double> log_weights_before;
+extern const WeightOptions weighting;
+extern const InitialiseOptions spread;
+}  // namespace rivals_h
+
 namespace unknown_objects_h {
 extern const AugmentOptions options;
 extern const InitialiseOptions spread;
 }  // namespace unknown_objects_h
+
+namespace wander_h {
+extern const rendering::PoseEvidence evidence;
+extern const AugmentOptions options;
+extern const WeightOptions weighting;
+extern const InitialiseOptions spread;
+}  // namespace wander_h
 
 namespace watched_renderer_h {
 extern rendering::Renderer& renderer;
