@@ -45,10 +45,10 @@ bool operator==(const MeshShape& a, const MeshShape& b) {
 }
 
 bool operator==(const ObjectModel& a, const ObjectModel& b) {
-  return a.name == b.name && a.collision == b.collision && same_mesh(a.visual, b.visual) && a.mass == b.mass &&
-         a.center_of_mass == b.center_of_mass && a.unit_inertia == b.unit_inertia && a.contact == b.contact &&
-         a.symmetry == b.symmetry && a.surface == b.surface && a.color == b.color && a.learn_colors == b.learn_colors &&
-         a.hollow == b.hollow;
+  return a.name == b.name && a.collision == b.collision && same_mesh(a.visual, b.visual) &&
+         geometry::same_look(a.look, b.look) && a.mass == b.mass && a.center_of_mass == b.center_of_mass &&
+         a.unit_inertia == b.unit_inertia && a.contact == b.contact && a.symmetry == b.symmetry &&
+         a.surface == b.surface && a.color == b.color && a.learn_colors == b.learn_colors && a.hollow == b.hollow;
 }
 
 geometry::TriangleMesh collision_mesh(const std::vector<CollisionShape>& shapes) {

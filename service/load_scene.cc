@@ -2,6 +2,9 @@
 #include "prescene/service/load_scene.h"
 
 #include <algorithm>
+#include <map>
+#include <memory>
+#include <tuple>
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
@@ -51,6 +54,28 @@ class MeshRemarks {
   int tidied_ = 0;
 };
 
+/// The colours of the meshes that a scene has read.
+class Looks {
+ public:
+  void note(const interfaces::MeshRequest& request, const interfaces::LoadedMesh& mesh) {
+    if (mesh.colors.empty()) return;
+    auto look = std::make_shared<geometry::MeshLook>();
+    look->vertex_colors = mesh.colors;
+    looks_[key(request)] = std::move(look);
+  }
+  geometry::LookPtr of(const interfaces::MeshRequest& request) const {
+    const auto found = looks_.find(key(request));
+    return found == looks_.end() ? nullptr : found->second;
+  }
+
+ private:
+  using Key = std::tuple<std::string, double, bool>;
+  static Key key(const interfaces::MeshRequest& request) {
+    return {request.path.string(), request.scale, request.y_up};
+  }
+  std::map<Key, geometry::LookPtr> looks_;
+};
+
 /// PLY, OBJ and STL are whole in one file.
 bool is_whole(interfaces::MeshFormat format) {
   return format != interfaces::MeshFormat::kGltf && format != interfaces::MeshFormat::kCollada;
@@ -74,6 +99,8 @@ std::string carried_mesh_name(const interfaces::MeshRequest& request, const std:
 interfaces::SceneFileOptions options(MeshRemarks& remarks, const std::filesystem::path& scene = {},
                                      FilesOfScene* files = nullptr) {
   interfaces::SceneFileOptions options;
+  const auto looks = std::make_shared<Looks>();
+  options.read_look = [looks](const interfaces::MeshRequest& request) { return looks->of(request); };
   options.read_mesh = [=, &remarks](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
     const interfaces::MeshReadOptions read = mesh_options(request);
     const auto format = interfaces::mesh_format(request.path);
@@ -83,12 +110,14 @@ interfaces::SceneFileOptions options(MeshRemarks& remarks, const std::filesystem
       if (!mesh) return mesh.status().at(request.path.string());
       (*files)[carried_mesh_name(request, scene)] = std::move(bytes);
       remarks.add(request, *mesh);
+      looks->note(request, *mesh);
       return std::move(mesh->mesh);
     }
     PRESCENE_TRY(interfaces::LoadedMesh mesh, interfaces::read_mesh(request.path, read));
     remarks.add(request, mesh);
+    looks->note(request, mesh);
     if (files) {
-      const std::string ply = interfaces::encode_ply(mesh.mesh);
+      const std::string ply = interfaces::encode_ply(mesh.mesh, interfaces::MeshEncoding::kBinary, mesh.colors);
       (*files)[carried_mesh_name(request, scene)] = {ply.begin(), ply.end()};
     }
     return std::move(mesh.mesh);
@@ -105,6 +134,8 @@ interfaces::SceneFileOptions options(MeshRemarks& remarks, const std::filesystem
 interfaces::SceneFileOptions carried_options(const std::filesystem::path& scene, const CarriedFiles& files) {
   interfaces::SceneFileOptions options;
   options.read_file = [=](const std::filesystem::path& path) { return files(carried_name(path, scene)); };
+  const auto looks = std::make_shared<Looks>();
+  options.read_look = [looks](const interfaces::MeshRequest& request) { return looks->of(request); };
   options.read_mesh = [=](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
     const auto format = interfaces::mesh_format(request.path);
     if (!format) return core::unsupported(request.path.string() + ": is no mesh that can be read");
@@ -114,6 +145,7 @@ interfaces::SceneFileOptions carried_options(const std::filesystem::path& scene,
     auto mesh = interfaces::decode_mesh(whole ? *format : interfaces::MeshFormat::kPly, bytes,
                                         whole ? mesh_options(request) : interfaces::MeshReadOptions{});
     if (!mesh) return mesh.status().at(request.path.string());
+    looks->note(request, *mesh);
     return std::move(mesh->mesh);
   };
   return options;

@@ -39,8 +39,7 @@ void add_surroundings(BeliefView& view, const belief::Scene& scene, std::span<co
 
 void add_object(BeliefView& view, const std::string& name, const belief::ObjectModel& model, const belief::Pose& X_WO,
                 MeshDetail detail, MeshCache& meshes) {
-  add(view, name, InstanceKind::kObject, meshes.get(model.visual, model.collision, detail), X_WO,
-      material_of(model.surface, model.color));
+  add(view, name, InstanceKind::kObject, meshes.get(model, detail), X_WO, material_of(model.surface, model.color));
 }
 
 }  // namespace
@@ -59,6 +58,14 @@ rendering::MeshHandle MeshCache::get(const belief::MeshPtr& mesh, MeshDetail det
   }
   entry.mesh = handle;
   return handle;
+}
+
+rendering::MeshHandle MeshCache::get(const belief::ObjectModel& model, MeshDetail detail) {
+  if (detail != MeshDetail::kDisplay || !model.visual || !model.look) return get(model.visual, model.collision, detail);
+  const std::lock_guard lock(mutex_);
+  Entry& entry = with_look_[{model.visual.get(), model.look.get()}];
+  if (!entry.mesh) entry = {model.visual, model.look, rendering::make_render_mesh(*model.visual, *model.look)};
+  return entry.mesh;
 }
 
 rendering::MeshHandle MeshCache::get(const belief::MeshPtr& visual,

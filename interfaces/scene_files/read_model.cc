@@ -300,6 +300,7 @@ belief::ObjectModel read_object_model(const LocatedValue& value, const std::stri
   Binder binder(merged ? *merged : value, context.problems);
   const BodyShape shape = read_body_shape(binder, kObjectSize, true, context);
   model.visual = shape.visual;
+  if (const auto look = context.looks.find(shape.visual); look != context.looks.end()) model.look = look->second;
   model.hollow = shape.hollow;
   read_mass(binder, shape, model);
   read_inertia(binder, shape, model);

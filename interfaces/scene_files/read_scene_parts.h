@@ -24,6 +24,7 @@ struct SceneContext {
   std::vector<std::string> models, objects, supports, robot;
   /// Meshes read so far, so that two models of one file share it.
   std::map<std::tuple<std::string, double, bool>, belief::MeshPtr> meshes;
+  std::map<belief::MeshPtr, geometry::LookPtr> looks = {};  ///< Of those that have colours.
 
   /// Objects (by their number) whose poses were given in the camera's frame, and where; read before the camera is.
   std::vector<std::pair<std::size_t, const LocatedValue*>> in_camera = {};

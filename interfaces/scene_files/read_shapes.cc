@@ -172,6 +172,8 @@ class ShapeReader {
         return nullptr;
       }
       mesh = shared(*std::move(result));
+      if (context_.options.read_look)
+        if (geometry::LookPtr look = context_.options.read_look(request)) context_.looks[mesh] = std::move(look);
     }
     return mesh;
   }

@@ -214,6 +214,13 @@ void SimulatedCamera::sample(const RenderScene& scene, const RenderedView& view,
             std::clamp(std::lround(channel + options_.color_noise * noise.normal()), 0L, 255L));
 }
 
+bool has_look(const RenderMesh& mesh) { return !mesh.look.vertex_colors.empty() || !mesh.look.texture_places.empty(); }
+
+bool has_looks(const RenderScene& scene) {
+  return std::any_of(scene.instances.begin(), scene.instances.end(),
+                     [](const RenderInstance& instance) { return has_look(*instance.mesh); });
+}
+
 void shade(const RenderScene& scene, const RenderedView& view, const geometry::Pose& X_WC,
            const SimulatedCameraOptions& options, geometry::ColorImage* color) {
   const int width = view.labels.width();
@@ -234,6 +241,11 @@ void shade(const RenderScene& scene, const RenderedView& view, const geometry::P
       if (label == 0) continue;
       const Vector3f& normal = view.normals(x, y);
       const float light = 0.42f + 0.10f * normal.dot(up) + 0.48f * std::max(0.0f, normal.dot(window));
+      const RenderMesh& mesh = *scene.instances[label - 1u].mesh;
+      if (!view.color.empty() && has_look(mesh)) {
+        pixel = view.color(x, y);  // by the light of the view
+        continue;
+      }
       const geometry::Rgb& own = scene.instances[label - 1u].material.color;
       for (std::size_t i = 0; i < 3; ++i)
         pixel[i] =

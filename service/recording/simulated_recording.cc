@@ -82,6 +82,7 @@ class Player {
     const belief::SceneCamera& camera = *scene_.camera;
     rendering::RenderOptions render_options;
     render_options.normals = true;
+    render_options.color = rendering::has_looks(view.scene);
     rendering::RenderedView images;
     PRESCENE_RETURN_IF_ERROR(renderer_.render(view.scene, camera.intrinsics, camera.X_WC, render_options, &images));
     rendering::RenderedView behind;

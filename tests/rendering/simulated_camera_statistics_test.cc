@@ -254,6 +254,26 @@ TEST_F(SimulatedCameraTest, ShadesByMaterialAndLight) {
   EXPECT_GT(background, 1000);
 }
 
+TEST_F(SimulatedCameraTest, ShowsTheColoursOfMeshesWhereTheViewHasThem) {
+  RenderScene scene;
+  scene.instances = {card(0.4, {0, 0, 0.9}, 0.0, SurfaceMaterial::opaque({20, 20, 220}))};
+  EXPECT_FALSE(has_looks(scene));
+  auto red = std::make_shared<RenderMesh>(*scene.instances[0].mesh);
+  red->look.vertex_colors.assign(red->vertices.size(), {220, 20, 20});
+  scene.instances[0].mesh = red;
+  EXPECT_TRUE(has_looks(scene));
+  RenderedView view;
+  RenderOptions options;
+  options.normals = options.color = true;
+  ASSERT_TRUE(renderer_->render(scene, camera_, Pose::identity(), options, &view).ok());
+  geometry::ColorImage color;
+  shade(scene, view, Pose::identity(), {}, &color);
+  const int x = camera_.width / 2, y = camera_.height / 2;
+  EXPECT_EQ(color(x, y), view.color(x, y));
+  EXPECT_GT(color(x, y)[0], 3 * color(x, y)[2]);
+  EXPECT_NE(color(0, 0), view.color(0, 0));  // the background is the camera's own
+}
+
 TEST_F(SimulatedCameraTest, ColourNoiseHasItsSize) {
   RenderScene scene;
   scene.instances = {card(30.0, {0, 0, 1.0}, 0.0)};

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <numbers>
 #include <set>
 
@@ -408,6 +409,24 @@ TEST(SceneFile, ModelsOfOneMeshFileShareIt) {
       "0.6}\n"
       "objects:\n  o: {model: a, pose: {}}\n");
   EXPECT_EQ(scene.models[0].visual, scene.models[1].visual);
+}
+
+TEST(SceneFile, ModelsHaveTheColoursOfTheirMesh) {
+  SceneFileOptions options = tests::options_with_meshes();
+  const auto look = std::make_shared<const geometry::MeshLook>();
+  options.read_look = [&](const MeshRequest& request) {
+    return request.path.filename() == "colored.ply" ? look : nullptr;
+  };
+  const auto scene = parse_scene(
+      "models:\n  a: {mesh: {file: colored.ply, scale: 0.001}, mass: 0.5}\n  b: {mesh: {file: a.ply, scale: 0.001}, "
+      "mass: "
+      "0.5}\n  c: {box: [0.1, 0.1, 0.1], visual: {file: colored.ply, scale: 0.001}, mass: 0.5}\n"
+      "objects:\n  o: {model: a, pose: {}}\n",
+      "s.yaml", options);
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  EXPECT_EQ(scene->models[0].look, look);
+  EXPECT_EQ(scene->models[1].look, nullptr);
+  EXPECT_EQ(scene->models[2].look, look);
 }
 
 TEST(SceneFile, WarnsOfOdditiesButReads) {

@@ -10,6 +10,7 @@
 
 #include "prescene/belief/distribution.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/geometry/mesh_look.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/symmetry.h"
 #include "prescene/geometry/triangle_mesh.h"
@@ -79,7 +80,8 @@ struct Hollow {
 struct ObjectModel {
   std::string name;                       ///< Unique within a scene: letters, digits, '_', '-', '.'.
   std::vector<CollisionShape> collision;  ///< At least one.
-  MeshPtr visual;  ///< In O; what the camera sees. Made from the collision shapes if none is given.
+  MeshPtr visual;          ///< In O; what the camera sees. Made from the collision shapes if none is given.
+  geometry::LookPtr look;  ///< Of `visual`; null: all of `color`.
   ScalarDistribution mass = FixedScalar{1.0};                                         ///< kg, > 0
   Vector3Distribution center_of_mass = Vector3Distribution::fixed(Vector3d::Zero());  ///< p_OoOcm, m
   /// Inertia about the centre of mass in O for a mass of 1 kg (m^2).

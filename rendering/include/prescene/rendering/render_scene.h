@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "prescene/geometry/image.h"
+#include "prescene/geometry/mesh_look.h"
 #include "prescene/geometry/pose.h"
 #include "prescene/geometry/triangle_mesh.h"
 
@@ -49,16 +50,7 @@ class UniqueNumber {
   std::uint64_t value_;
 };
 
-/// The colours of a mesh's surface, sRGB, for pictures; likelihoods look at none of it. Where nothing is given a thing
-/// has its material's colour.
-struct MeshLook {
-  std::vector<geometry::Rgb> vertex_colors;  ///< One a vertex, or empty. Blended over a triangle in linear light.
-  /// Places in the texture, one for each corner of each triangle, or empty: u to the right and v down, (0, 0) and
-  /// (1, 1) are corners of the image, which is repeated beyond. Goes before colours of vertices.
-  std::vector<std::array<Eigen::Vector2f, 3>> texture_places;
-  std::shared_ptr<const geometry::ColorImage>
-      texture;  ///< Needed with places. Read bilinearly, without smaller copies.
-};
+using geometry::MeshLook;  // for pictures; likelihoods of depth look at none of it
 
 /// A triangle mesh in single precision as renderers want it; immutable once made, shared by handle.
 struct RenderMesh {

@@ -38,17 +38,22 @@ class MeshCache {
   rendering::MeshHandle get(const belief::MeshPtr& visual, const std::vector<belief::CollisionShape>& collision,
                             MeshDetail detail);
 
+  /// Of a model, with its look if it is for display.
+  rendering::MeshHandle get(const belief::ObjectModel& model, MeshDetail detail);
+
   /// facet_lever() (facets.h) of a mesh that get() returned.
   double facet_lever(const rendering::RenderMesh& mesh);
 
  private:
   struct Entry {
     belief::MeshPtr source;
+    geometry::LookPtr look;
     rendering::MeshHandle mesh;
   };
   int likelihood_triangles_;
   std::mutex mutex_;
   std::map<std::pair<const geometry::TriangleMesh*, MeshDetail>, Entry> by_address_;
+  std::map<std::pair<const geometry::TriangleMesh*, const geometry::MeshLook*>, Entry> with_look_;
   std::map<std::pair<std::uint64_t, MeshDetail>, rendering::MeshHandle> by_content_;
   std::map<std::uint64_t, double> facet_levers_;  // by the mesh's unique number
 };

@@ -31,14 +31,17 @@ struct MeshRequest {
 };
 /// Reads a mesh into metres with z up; its messages name file and remedy.
 using MeshReader = std::function<core::Result<geometry::TriangleMesh>(const MeshRequest&)>;
+/// The colours of a mesh that a MeshReader has read before; null where the file has none.
+using LookReader = std::function<geometry::LookPtr(const MeshRequest&)>;
 
 /// Reads another file that a scene names whole; errors of read_file().
 using FileReader = std::function<core::Result<std::vector<std::uint8_t>>(const std::filesystem::path&)>;
 
 struct SceneFileOptions {
-  MeshReader read_mesh;      ///< Empty: meshes and model files that name one are errors.
-  FileReader read_file;      ///< Of model files; empty: from the disk.
-  bool follow_files = true;  ///< Else `file:` of a model is an error: the text comes from somebody else.
+  MeshReader read_mesh;       ///< Empty: meshes and model files that name one are errors.
+  LookReader read_look = {};  ///< Empty: meshes have no colours.
+  FileReader read_file;       ///< Of model files; empty: from the disk.
+  bool follow_files = true;   ///< Else `file:` of a model is an error: the text comes from somebody else.
   YamlLimits limits;
 };
 

@@ -55,8 +55,13 @@ class SimulatedCamera {
   SimulatedCameraOptions options_;
 };
 
+/// Whether a mesh has colours of its own.
+bool has_look(const RenderMesh& mesh);
+/// Whether any mesh of the scene has: then a view of it is to be rendered with colours (RenderOptions::color).
+bool has_looks(const RenderScene& scene);
+
 /// Diffuse shading without noise, for reports and overlays: two fixed lights, materials' colours, a grey gradient
-/// behind.
+/// behind. Meshes with a look are drawn as in the view's colour image where it has one.
 void shade(const RenderScene& scene, const RenderedView& view, const geometry::Pose& X_WC,
            const SimulatedCameraOptions& options, geometry::ColorImage* color);
 
