@@ -224,6 +224,16 @@ void ParticleFilter::weigh_all(FrameStep& step, double dt) {
   }
 }
 
+void ParticleFilter::weigh_print_of(FrameStep& step, std::size_t object, bool found) {
+  if (!settings_.print.use) return;
+  ObjectBelief& seen = step.belief().objects[object];
+  const PrintedModel* printed = prints_.get(model_of(step.belief(), object), meshes_);
+  if (printed == nullptr) return;
+  const RivalLook look = rival_look(settings_.print, seen, step.belief().step + object, found);
+  const PrintReport report = weigh_print(*printed, step.frame, step.observation, settings_.print, look, seen);
+  step.result.counters.turned_by_print += report.turned ? 1 : 0;
+}
+
 void ParticleFilter::exchange_all(FrameStep& step) {
   const FilterFrame& frame = step.frame;
   Belief& belief = step.belief();
@@ -294,6 +304,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     object.frames_unseen = 0;
     object.frames_refuted = 0;
     rival(i, RivalPrior::kFound);
+    weigh_print_of(step, i, true);
     step.depths[i] = depth_in(step, i);
   }
 }
@@ -375,6 +386,8 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("initialise", result);
 
   weigh_all(current, first ? settings_.max_gap : dt);
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    weigh_print_of(current, i, first && has_wide_prior(belief.scene->objects[i], settings_.initialise));
   note("weight", result);
   exchange_all(current);
   hold_joints(belief);

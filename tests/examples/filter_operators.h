@@ -19,6 +19,7 @@
 #include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
 #include "prescene/filter/operators/still_update.h"
+#include "prescene/filter/operators/weigh_print.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/detection.h"
 #include "prescene/filter/proposals/frame.h"
@@ -104,6 +105,13 @@ namespace still_update_h {
 extern const geometry::Matrix6d covariance, information;
 extern const geometry::Vector6d gradient;
 }  // namespace still_update_h
+
+namespace weigh_print_h {
+extern PrintCache prints;
+extern const belief::ObjectModel model;
+extern MeshCache meshes;
+extern const WeighPrintOptions options;
+}  // namespace weigh_print_h
 
 namespace weight_h {
 extern const WeightOptions options;

@@ -17,6 +17,7 @@
 #include "prescene/filter/proposals/frame_surfaces.h"
 #include "prescene/filter/proposals/segmentation.h"
 #include "prescene/filter/proposals/support_tracking.h"
+#include "prescene/filter/proposals/surface_print.h"
 #include "prescene/rendering/renderer.h"
 #include "prescene/rendering/sensor/color_model.h"
 
@@ -112,5 +113,14 @@ namespace support_tracking_h {
 extern belief::Support support;
 extern const double gain;
 }  // namespace support_tracking_h
+
+namespace surface_print_h {
+extern const rendering::RenderMesh& mesh;
+extern const rendering::SurfaceMaterial material;
+extern const geometry::PinholeCamera camera;
+extern const geometry::DepthImage depth;
+extern const geometry::ColorImage color;
+extern const Pose X_OS;
+}  // namespace surface_print_h
 
 }  // namespace prescene::filter::given_filter_proposals

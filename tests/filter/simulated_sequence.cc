@@ -29,6 +29,7 @@ rendering::RenderedView rendered(const rendering::RenderScene& scene, const Simu
   rendering::RenderedView view;
   rendering::RenderOptions options;
   options.normals = true;
+  options.color = rendering::has_looks(scene);
   const core::Status status = renderer.render(scene, sequence.camera, sequence.X_WC, options, &view);
   PRESCENE_CHECK_MSG(status.ok(), status.message());
   return view;

@@ -29,6 +29,7 @@
 #include "prescene/filter/operators/resample.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/watched_renderer.h"
+#include "prescene/filter/operators/weigh_print.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/support_tracking.h"
@@ -43,6 +44,7 @@ struct FilterSettings {
   PredictOptions predict;
   AugmentOptions augment;
   WeightOptions weight;
+  WeighPrintOptions print;
   LearnPhysicsOptions learn_physics;
   ResampleOptions resample;
   TrackStateOptions track;
@@ -86,6 +88,7 @@ struct StepCounters {
   int physics_lessons = 0;      ///< ... episodes that changed what is believed of them, ...
   int physics_unexplained = 0;  ///< ... and episodes that no value of theirs explains.
   int exchanges = 0;            ///< Pairs of one shape that had been taken for each other.
+  int turned_by_print = 0;      ///< Objects moved to a pose that depth takes for the same.
   int hidden_particles = 0;     ///< That stayed hidden.
   int hidden_proposed = 0;      ///< Put at places where a refuted object may hide.
   int looked_for = 0;           ///< At the start.
@@ -130,6 +133,7 @@ class ParticleFilter {
   void follow_supports(const belief::Observation& observation, StepResult& result);
   void first_look(FrameStep& step);
   void weigh_all(FrameStep& step, double dt);
+  void weigh_print_of(FrameStep& step, std::size_t object, bool found);
   void recover_all(FrameStep& step);
   void exchange_all(FrameStep& step);
   void look_for_more(FrameStep& step);
@@ -145,6 +149,7 @@ class ParticleFilter {
   WatchedRenderer renderer_;
   FilterTools tools_;
   FrameCache frame_cache_;
+  PrintCache prints_;
 };
 
 /// Numbers the islands: objects whose surfaces are nearer than `gap` share the number of the first of them.
