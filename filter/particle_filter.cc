@@ -273,7 +273,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     ObjectBelief& object = belief.objects[i];
     const bool is_seen = (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful) &&
                          object.visible_share >= settings_.weight.hidden_share;
-    if (is_seen && belief.step == 1 && has_wide_prior(belief.scene->objects[i], settings_.initialise))
+    if (is_seen && belief.step == 1 && has_wide_prior(belief.scene->objects[i]))
       rival(i, RivalPrior::kFound);
     else if (is_seen && object.visible_share >= kMostlySeen && (belief.step + i) % kRivalsEvery == 0)
       rival(i, RivalPrior::kTracked);
@@ -387,7 +387,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   weigh_all(current, first ? settings_.max_gap : dt);
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    weigh_print_of(current, i, first && has_wide_prior(belief.scene->objects[i], settings_.initialise));
+    weigh_print_of(current, i, first && has_wide_prior(belief.scene->objects[i]));
   note("weight", result);
   exchange_all(current);
   hold_joints(belief);

@@ -11,6 +11,7 @@
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "prescene/interfaces/scene_files/located_value.h"
 #include "prescene/interfaces/scene_files/model_file.h"
+#include "prescene/interfaces/scene_files/robot_description.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/scene_report.h"
 
@@ -20,7 +21,8 @@ namespace {
 interfaces::MeshReadOptions mesh_options(const interfaces::MeshRequest& request) {
   interfaces::MeshReadOptions read;
   read.metres_per_unit = request.scale;
-  read.up_axis = request.y_up ? interfaces::UpAxis::kY : interfaces::UpAxis::kDeclared;
+  if (request.y_up) read.up_axis = interfaces::UpAxis::kY;
+  if (request.ignores_up) read.up_axis = interfaces::UpAxis::kZ;
   return read;
 }
 
@@ -92,7 +94,8 @@ std::string carried_mesh_name(const interfaces::MeshRequest& request, const std:
   std::string name = carried_name(request.path, scene);
   const auto format = interfaces::mesh_format(request.path);
   if (!format || is_whole(*format)) return name;
-  return name + "@" + core::rounded_text(request.scale) + (request.y_up ? "y" : "") + ".ply";
+  return name + "@" + core::rounded_text(request.scale) + (request.y_up ? "y" : "") + (request.ignores_up ? "z" : "") +
+         ".ply";
 }
 
 /// `remarks` must outlive the options.
@@ -200,6 +203,17 @@ core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std:
                                                                       const core::LogSink& log) {
   interfaces::FileReport report;
   return shared(interfaces::parse_scene(text, path.string(), carried_options(path, files), &report), report, log);
+}
+
+core::Result<std::shared_ptr<const interfaces::RobotKinematics>> load_robot(const std::string& text,
+                                                                            const std::filesystem::path& path) {
+  return interfaces::parse_robot_kinematics(text, path.string());
+}
+
+core::Result<std::shared_ptr<const interfaces::RobotKinematics>> load_carried_robot(const std::string& text,
+                                                                                    const std::filesystem::path& path,
+                                                                                    const CarriedFiles& files) {
+  return interfaces::parse_robot_kinematics(text, path.string(), carried_options(path, files));
 }
 
 bool is_model_file(const std::filesystem::path& path) {

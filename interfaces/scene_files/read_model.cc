@@ -18,18 +18,6 @@ using geometry::Vector3d;
 
 constexpr NumberRange kLever{0.0, 0.5, "give metres between 0 and 0.5", "m"};
 
-void read_contact(Binder& binder, ContactProperties& contact) {
-  Problems& problems = binder.problems();
-  if (const LocatedValue* at = binder.find("friction"))
-    contact.friction = read_scalar(*at, problems, kFriction, true, true);
-  if (const LocatedValue* at = binder.find("impact_friction"))
-    contact.impact_friction = read_scalar(*at, problems, kFriction, true, true);
-  if (const LocatedValue* at = binder.find("restitution"))
-    contact.restitution = read_scalar(*at, problems, kRestitution, true, true);
-  binder.read("rolling_friction", contact.rolling_friction, kLever);
-  binder.read("edge_radius", contact.edge_radius, kLever);
-}
-
 // A radius larger than half of the thinnest part would round away more than there is.
 void check_edges(Binder& binder, const BodyShape& shape, const ContactProperties& contact) {
   const LocatedValue* at = binder.find("edge_radius");
@@ -281,6 +269,18 @@ std::optional<LocatedValue> merged_with_file(const LocatedValue& value, SceneCon
 }
 
 }  // namespace
+
+void read_contact(Binder& binder, ContactProperties& contact) {
+  Problems& problems = binder.problems();
+  if (const LocatedValue* at = binder.find("friction"))
+    contact.friction = read_scalar(*at, problems, kFriction, true, true);
+  if (const LocatedValue* at = binder.find("impact_friction"))
+    contact.impact_friction = read_scalar(*at, problems, kFriction, true, true);
+  if (const LocatedValue* at = binder.find("restitution"))
+    contact.restitution = read_scalar(*at, problems, kRestitution, true, true);
+  binder.read("rolling_friction", contact.rolling_friction, kLever);
+  binder.read("edge_radius", contact.edge_radius, kLever);
+}
 
 std::optional<Matrix3d> read_unit_inertia(const LocatedValue& value, Problems& problems) {
   std::optional<Matrix3d> matrix = read_matrix(value, problems);

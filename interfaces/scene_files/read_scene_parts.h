@@ -43,6 +43,9 @@ ModelThrows read_model_throws(const LocatedValue& value, Problems& problems);
 std::optional<geometry::Matrix3d> read_unit_inertia(const LocatedValue& value, Problems& problems);
 belief::Support read_support(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::KinematicBody read_kinematic_body(const LocatedValue& value, const std::string& name, SceneContext& context);
+/// The bodies of a robot that a URDF file describes, with their names put into context.robot.
+std::vector<belief::KinematicBody> read_robot_description(const LocatedValue& value, SceneContext& context);
+void read_contact(Binder& binder, belief::ContactProperties& contact);
 belief::SceneObject read_object(const LocatedValue& value, const std::string& name, SceneContext& context);
 /// After the objects and supports, with all poses in the world.
 belief::Joint read_joint(const LocatedValue& value, const std::string& name, SceneContext& context);

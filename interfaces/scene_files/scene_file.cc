@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <optional>
 
@@ -159,6 +160,8 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   context.robot = read_names(robot, problems);
   context.objects = read_names(objects, problems);
   check_distinct(document, problems);
+  std::vector<belief::KinematicBody> links;
+  if (const LocatedValue* at = binder.find("robot_description")) links = read_robot_description(*at, context);
 
   for_each_named(models, problems, [&](const LocatedValue& value, const std::string& name) {
     scene.models.push_back(read_object_model(value, name, context));
@@ -169,6 +172,7 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   for_each_named(robot, problems, [&](const LocatedValue& value, const std::string& name) {
     scene.robot.push_back(read_kinematic_body(value, name, context));
   });
+  std::move(links.begin(), links.end(), std::back_inserter(scene.robot));
   for_each_named(objects, problems, [&](const LocatedValue& value, const std::string& name) {
     scene.objects.push_back(read_object(value, name, context));
   });

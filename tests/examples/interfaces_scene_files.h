@@ -28,6 +28,10 @@ extern const belief::Scene scene;
 extern const belief::Belief belief;
 }  // namespace learned_file_h
 
+namespace robot_description_h {
+extern const std::string text;
+}
+
 namespace scene_file_h {
 extern const MeshReader read_mesh;
 }

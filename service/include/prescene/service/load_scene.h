@@ -14,6 +14,10 @@
 #include "prescene/core/log.h"
 #include "prescene/core/status.h"
 
+namespace prescene::interfaces {
+struct RobotKinematics;
+}
+
 namespace prescene::service {
 
 /// Reads a scene file and its meshes; warnings go to the log, and how many meshes were tidied up without changing their
@@ -45,6 +49,15 @@ core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std:
                                                                       const std::filesystem::path& path,
                                                                       const CarriedFiles& files,
                                                                       const core::LogSink& log);
+
+/// How the robot moves that a scene's text describes under robot_description; null where it does not. `text` and `path`
+/// as for load_scene_text; errors of interfaces::parse_robot_kinematics.
+core::Result<std::shared_ptr<const interfaces::RobotKinematics>> load_robot(const std::string& text,
+                                                                            const std::filesystem::path& path);
+/// The same from files that were kept, as load_carried_scene.
+core::Result<std::shared_ptr<const interfaces::RobotKinematics>> load_carried_robot(const std::string& text,
+                                                                                    const std::filesystem::path& path,
+                                                                                    const CarriedFiles& files);
 
 /// Whether a YAML file describes one model and no scene; false where it can't be read.
 bool is_model_file(const std::filesystem::path& path);

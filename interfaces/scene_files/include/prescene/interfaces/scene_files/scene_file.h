@@ -28,6 +28,7 @@ struct MeshRequest {
   std::filesystem::path path;  ///< Already relative to the working folder or absolute.
   double scale = 1.0;          ///< Metres per unit of the file.
   bool y_up = false;           ///< The file's y axis points up: it becomes z.
+  bool ignores_up = false;     ///< Coordinates stay as they are, whatever axis the file calls up: ROS reads URDF so.
 };
 /// Reads a mesh into metres with z up; its messages name file and remedy.
 using MeshReader = std::function<core::Result<geometry::TriangleMesh>(const MeshRequest&)>;
