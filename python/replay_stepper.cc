@@ -64,6 +64,7 @@ core::Result<std::unique_ptr<ReplayStepper>> ReplayStepper::open(const ReplayReq
   PRESCENE_RETURN_IF_ERROR(check(request.input));
   PRESCENE_TRY(service::ReplayInput input, service::ReplayInput::open(request.input, log));
   PRESCENE_TRY(service::TrackerSettings settings, input.recorded_settings());
+  settings.assembler.robot = input.robot();
   PRESCENE_RETURN_IF_ERROR(read_learned(request.learned, settings));
   PRESCENE_RETURN_IF_ERROR(service::validate(settings.topics));
   auto engine = std::make_shared<Engine>(request.threads, service::BackendSettings{});

@@ -433,6 +433,9 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
   if (type == "diagnostic_msgs/msg/DiagnosticArray") return decoded(RosDiagnosticArray{});
   return core::unsupported("messages of type '" + type + "' can't be published from recordings");
 }
+core::Status DdsNode::publish(DdsPublisher publisher, const RosJointState& message) {
+  return impl_->write<sensor_msgs_msg_dds__JointState_>(publisher, "sensor_msgs/msg/JointState", message);
+}
 
 void DdsNode::stop_receiving() { impl_->stop_receiving(); }
 
@@ -468,3 +471,4 @@ std::string DdsNode::interfaces() const { return impl_->interfaces; }
 std::uint64_t DdsNode::dropped_samples() const { return impl_->dropped.load(std::memory_order_relaxed); }
 
 }  // namespace prescene::interfaces
+  if (type == "sensor_msgs/msg/JointState") return decoded(RosJointState{});

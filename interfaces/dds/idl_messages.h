@@ -85,6 +85,7 @@ PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__CameraInfo_, RosCameraInfo, 11, header
 PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__PointField_, RosPointField, 4, name, offset, datatype, count)
 PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__PointCloud2_, RosPointCloud2, 9, header, height, width, fields, is_bigendian,
                      point_step, row_step, data, is_dense)
+PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__JointState_, RosJointState, 5, header, name, position, velocity, effort)
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__ObjectHypothesis_, RosObjectHypothesis, 2, class_id, score)
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__ObjectHypothesisWithPose_, RosObjectHypothesisWithPose, 2, hypothesis, pose)
 PRESCENE_FILL_STRUCT(vision_msgs_msg_dds__BoundingBox3D_, RosBoundingBox3d, 2, center, size)

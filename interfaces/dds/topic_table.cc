@@ -19,6 +19,7 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
       {"sensor_msgs/msg/Image", &sensor_msgs_msg_dds__Image__desc},
       {"sensor_msgs/msg/CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
       {"sensor_msgs/msg/PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
+      {"sensor_msgs/msg/JointState", &sensor_msgs_msg_dds__JointState__desc},
       {"sensor_msgs/msg/CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
       {"tf2_msgs/msg/TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
       {"std_msgs/msg/String", &std_msgs_msg_dds__String__desc},
@@ -102,6 +103,10 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       break;
     case TopicQos::kTf:
       depth = 100;
+      break;
+    case TopicQos::kJoints:
+      depth = 100;
+      reliable = false;
       break;
     case TopicQos::kLatched:
       depth = 1;

@@ -83,6 +83,11 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
   group->add_option("--camera-info-topic", topics.camera_info)->check(utf8_text())->capture_default_str();
   group->add_option("--tf-topic", topics.tf)->check(utf8_text())->capture_default_str();
   group->add_option("--tf-static-topic", topics.tf_static)->check(utf8_text())->capture_default_str();
+  group
+      ->add_option("--joint-states-topic", topics.joint_states,
+                   "Positions of the joints of the scene's robot_description (sensor_msgs/JointState); empty = none")
+      ->check(utf8_text())
+      ->capture_default_str();
   group->add_flag_function(
       "--use-sim-time", [&topics](std::int64_t count) { topics.clock = count > 0 ? kClockTopic : ""; },
       "Time is simulated, and told on /clock (rosgraph_msgs/Clock), as for nodes of ROS with use_sim_time");
@@ -215,6 +220,7 @@ TrackerSettings with_given(const CLI::App& verb, TrackerSettings settings, const
   take("--camera-info-topic", settings.topics.camera_info, given.topics.camera_info);
   take("--tf-topic", settings.topics.tf, given.topics.tf);
   take("--tf-static-topic", settings.topics.tf_static, given.topics.tf_static);
+  take("--joint-states-topic", settings.topics.joint_states, given.topics.joint_states);
   take("--use-sim-time", settings.topics.clock, given.topics.clock);
   take("--world-frame", settings.assembler.world_frame, given.assembler.world_frame);
   take("--camera-pose", settings.assembler.X_WC, given.assembler.X_WC);

@@ -90,6 +90,10 @@ core::Status run(DoctorVerbOptions& options, VerbContext& context) {
   DoctorCheck scene_check;
   if (!options.scene.empty()) {
     PRESCENE_TRY(scene, check_scene_file(options.scene, scene_check, context.log()));
+    if (scene) {
+      PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
+      PRESCENE_TRY(options.doctor.tracker.assembler.robot, load_robot(text, options.scene));
+    }
   }
   core::log(context.log(), core::LogLevel::kInfo,
             "listening for " + core::fixed_text(options.doctor.seconds, 1) + " s in DDS domain " +

@@ -145,6 +145,7 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
     PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
     settings = with_given(*options.verb, std::move(recorded), options.tracker);
   }
+  settings.assembler.robot = input.robot();
   options.explain.path = options.input;
   options.explain.query.seed = context.options().seed;
   Backends backends(context.pool(), options.backends);

@@ -139,6 +139,7 @@ core::Status inspect_recording(const RecordingInspection& options, VerbContext& 
     PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
     settings = with_given(*options.verb, std::move(recorded), options.tracker);
   }
+  settings.assembler.robot = input.robot();
   Backends backends(context.pool());
   const CommonOptions& common = context.options();
   const std::uint64_t seed = common.seed_given ? common.seed : input.seed_or(common.seed);

@@ -236,6 +236,7 @@ class ReplayTimeline {
 core::Status run_here(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
   PRESCENE_TRY(TrackerSettings settings, settings_of(options, input));
+  settings.assembler.robot = input.robot();
   if (!options.proposals.empty()) {
     PRESCENE_TRY(settings.filter.learned, load_proposals(options.proposals, *input.scene()));
   }

@@ -47,6 +47,7 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   FilesOfScene files;
   PRESCENE_TRY(const auto scene,
                load_scene_text(text, options.scene, context.log(), options.record.empty() ? nullptr : &files));
+  PRESCENE_TRY(options.settings.tracker.assembler.robot, load_robot(text, options.scene));
   if (!options.proposals.empty()) {
     PRESCENE_TRY(options.settings.tracker.filter.learned, load_proposals(options.proposals, *scene));
   }

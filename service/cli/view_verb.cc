@@ -59,6 +59,7 @@ core::Status view_recording(ViewVerbOptions& options, VerbContext& context) {
     PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
     settings = with_given(*options.verb, std::move(recorded), options.tracker);
   }
+  settings.assembler.robot = input.robot();
   Backends backends(context.pool(), options.backends);
   const std::uint64_t seed =
       context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
@@ -89,7 +90,9 @@ core::Status view_bus(ViewVerbOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   std::shared_ptr<const belief::Scene> scene;
   if (!options.scene.empty()) {
-    PRESCENE_TRY(scene, load_scene(options.scene, context.log()));
+    PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
+    PRESCENE_TRY(scene, load_scene_text(text, options.scene, context.log()));
+    PRESCENE_TRY(options.tracker.assembler.robot, load_robot(text, options.scene));
   }
   PRESCENE_TRY(const auto view, BusView::create(scene, {options.dds, options.tracker, options.view}, context.log()));
   print_ready(view->url(), view->port(), "DDS domain " + std::to_string(options.dds.domain), context);

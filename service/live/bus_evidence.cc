@@ -35,12 +35,14 @@ BusEvidence::BusEvidence(const TrackerSettings& settings, const belief::Scene* s
     : settings_(settings),
       robot_(scene == nullptr ? std::vector<std::string>() : robot_names(*scene)),
       assembler_(settled_assembler(settings), robot_, settings.tf),
-      tf_(settings.tf) {
+      tf_(settings.tf),
+      joints_(settings.assembler.robot) {
   settings_.assembler = settled_assembler(settings);
   const InputTopics& topics = settings_.topics;
   for (const std::string* topic :
        {&topics.depth, &topics.color, &topics.camera_info, &topics.tf, &topics.tf_static, &topics.clock})
     if (!topic->empty()) topics_[*topic];
+  if (joints_.has_robot() && !topics.joint_states.empty()) topics_[topics.joint_states];
 }
 
 void BusEvidence::note_header(TopicEvidence& topic, const interfaces::RosHeader& header, core::TimeNs wall_ns) {
@@ -101,9 +103,18 @@ core::Status BusEvidence::take_in(const ReceivedMessage& message, TopicEvidence&
     PRESCENE_TRY(const auto tf,
                  interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage));
     PRESCENE_TRY(const auto transforms, interfaces::to_transforms(tf));
-    for (const interfaces::FrameTransform& transform : transforms.accepted)
+    for (const interfaces::FrameTransform& transform : transforms.accepted) {
+      joints_.give_way(transform.child, tf_);
       static_cast<void>(tf_.add(transform.parent, transform.child, transform.stamp_ns, transform.X_PC, is_static));
+    }
     return assembler_.add_tf(tf, index, is_static);  // tells what is wrong with them
+  }
+  if (message.topic == topics.joint_states) {
+    PRESCENE_TRY(const auto joints,
+                 interfaces::decode_cdr<interfaces::RosJointState>(message.cdr, interfaces::kSmallMessage));
+    note_header(topic, joints.header, wall_ns);
+    static_cast<void>(joints_.add(joints, settings_.assembler.world_frame, tf_));
+    return assembler_.add_joint_state(joints, index);  // tells what is wrong with them
   }
   const auto note_image = [&](const interfaces::RosHeader& header, const auto& image, const std::string& form) {
     note_header(topic, header, wall_ns);

@@ -20,7 +20,10 @@ constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t
 core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const InputTopics& topics,
                                           const core::Cancellation& cancellation, const core::LogSink& log,
                                           RecordingWriter& recording) {
-  Inbox inbox({{topics.depth, kWaitingImages}, {topics.color, kWaitingImages}, {topics.tf, kWaitingTransforms}});
+  Inbox inbox({{topics.depth, kWaitingImages},
+               {topics.color, kWaitingImages},
+               {topics.tf, kWaitingTransforms},
+               {topics.joint_states, kWaitingTransforms}});
   PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
   for (const BusTopic& topic : bus_topics(topics)) {
     PRESCENE_RETURN_IF_ERROR(

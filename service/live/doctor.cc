@@ -131,7 +131,10 @@ core::Result<Diagnosis> examine_bus(const DoctorOptions& options, const std::sha
   const InputTopics& topics = options.tracker.topics;
   PRESCENE_RETURN_IF_ERROR(validate(topics));
   constexpr InboxLimit kImages{.messages = 8, .bytes = std::size_t{128} << 20};
-  Inbox inbox({{topics.depth, kImages}, {topics.color, kImages}, {topics.tf, {.messages = 10'000}}});
+  Inbox inbox({{topics.depth, kImages},
+               {topics.color, kImages},
+               {topics.tf, {.messages = 10'000}},
+               {topics.joint_states, {.messages = 10'000}}});
   BusEvidence evidence(options.tracker, scene.get());
   interfaces::DdsOptions dds = options.dds;
   dds.node_name = "prescene_doctor";

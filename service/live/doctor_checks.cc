@@ -306,6 +306,30 @@ void check_camera(const BusEvidence& evidence, Checks& checks) {
     checks.ok("lens", lens + (evidence.lens().is_none() ? "" : ", by up to " + fixed_text(moved, 1) + " pixels"));
 }
 
+void check_joints(const BusEvidence& evidence, Checks& checks) {
+  const std::string& topic = evidence.settings().topics.joint_states;
+  if (!evidence.joints().has_robot() || topic.empty()) return;
+  const TopicEvidence& seen = evidence.topics().at(topic);
+  const std::string name = "joint states";
+  const std::string came = topic + ": " + rate_text(seen);
+  if (seen.refused > 0) {
+    checks.warn(name, came + ", of which " + std::to_string(seen.refused) + " were refused: " + seen.last_refusal,
+                "correct the sender as the text says");
+  } else if (seen.messages == 0) {
+    checks.ok(name, "nothing came on " + topic + ", so tf has to give the links' poses");
+  } else if (evidence.joints().messages() == 0) {
+    checks.warn(name, came + ", but none tells of a joint of " + evidence.settings().assembler.robot->file,
+                "name the topic of this robot with --joint-states-topic, or its URDF in the scene file");
+  } else if (const std::vector<std::string> missing = evidence.joints().missing(); !missing.empty()) {
+    checks.warn(name,
+                came + "; " + counted_text(missing.size(), "joint") + " without a position, the first is " +
+                    quote(missing.front()),
+                "publish them, or give their positions under robot_description.joint_positions in the scene file");
+  } else {
+    checks.ok(name, came + ", with every joint that moves");
+  }
+}
+
 void check_tf(const BusEvidence& evidence, Checks& checks) {
   const AssemblerSettings& settings = evidence.settings().assembler;
   const InputTopics& topics = evidence.settings().topics;
@@ -350,6 +374,7 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
                       " were refused: " + seen.last_refusal,
                   "correct the sender as the text says");
   }
+  check_joints(evidence, checks);
   std::string missing;
   for (const std::string& body : evidence.robot())
     if (!evidence.tf().lookup(settings.world_frame, body, stamp_ns) &&
@@ -357,8 +382,14 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
       missing += (missing.empty() ? "" : ", ") + body;
   if (!missing.empty())
     checks.warn("robot",
-                "tf does not give the pose of: " + missing + "; they are taken to be where the scene file says",
-                "publish their poses under these names, or rename the bodies in the scene file");
+                (evidence.joints().has_robot() ? "neither tf nor joint states give" : "tf does not give") +
+                    (" the pose of: " + missing) + "; they are taken to be where the scene file says",
+                evidence.joints().has_robot()
+                    ? "publish the joints' positions on " + topics.joint_states + " and the pose of " +
+                          evidence.settings().assembler.robot->root +
+                          " in tf (or as 'pose' "
+                          "under robot_description), or start robot_state_publisher"
+                    : "publish their poses under these names, or rename the bodies in the scene file");
   else if (!evidence.robot().empty())
     checks.ok("robot", "tf gives the pose of " + counted_text(evidence.robot().size(), "robot part") + " of the scene");
 }

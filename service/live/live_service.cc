@@ -49,6 +49,7 @@ std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
           {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
           {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}},
           {topics.clock, {.messages = 4, .bytes = kMiB}}};
+          {topics.joint_states, {.messages = 1000, .bytes = 4 * kMiB}},
 }
 
 /// True at most `rate` times a second.

@@ -235,6 +235,7 @@ bool RecordingReader::is_needed_later(const interfaces::McapChannel& channel, do
   constexpr double kTransformSeconds = 10.0;
   if (channel.schema.name == "tf2_msgs/msg/TFMessage")
     return before <= kTransformSeconds || channel.topic.ends_with("static");
+  if (channel.schema.name == "sensor_msgs/msg/JointState") return before <= kTransformSeconds;
   return channel.schema.name == "sensor_msgs/msg/CameraInfo";
 }
 

@@ -124,6 +124,9 @@ void SessionReport::add(const interfaces::ReceivedMessage& message) {
     if (const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage)) {
       taken = assembler_.add_tf(*tf, index, message.topic == topics_.tf_static);
     }
+  } else if (message.topic == topics_.joint_states) {
+    if (const auto joints = interfaces::decode_cdr<interfaces::RosJointState>(message.cdr, interfaces::kSmallMessage))
+      taken = assembler_.add_joint_state(*joints, index);
   }
   static_cast<void>(taken);
   while (const auto frame = assembler_.take(message.received_ns)) add(frame->observation);

@@ -46,7 +46,10 @@ std::vector<std::string> robot_names(const belief::Scene& scene) {
 
 FrameAssembler::FrameAssembler(AssemblerSettings settings, std::vector<std::string> robot_bodies,
                                TfBufferSettings tf_settings)
-    : settings_(std::move(settings)), robot_bodies_(std::move(robot_bodies)), tf_(tf_settings) {}
+    : settings_(std::move(settings)),
+      robot_bodies_(std::move(robot_bodies)),
+      tf_(tf_settings),
+      joints_(settings_.robot) {}
 
 interfaces::ImageRules FrameAssembler::image_rules() const {
   interfaces::ImageRules rules;
@@ -171,10 +174,16 @@ core::Status FrameAssembler::add_tf(const interfaces::RosTfMessage& message, Mes
   PRESCENE_TRY(const interfaces::FrameTransforms transforms, interfaces::to_transforms(message));
   core::Status first_bad = transforms.rejected.empty() ? core::ok_status() : transforms.rejected.front();
   for (const interfaces::FrameTransform& transform : transforms.accepted) {
+    joints_.give_way(transform.child, tf_);
     core::Status added = tf_.add(transform.parent, transform.child, transform.stamp_ns, transform.X_PC, is_static);
     if (!added.ok() && first_bad.ok()) first_bad = std::move(added);
   }
   return first_bad;
+}
+
+core::Status FrameAssembler::add_joint_state(const interfaces::RosJointState& message, MessageIndex index) {
+  tf_until_ = index;
+  return joints_.add(message, settings_.world_frame, tf_);
 }
 
 const FrameAssembler::Color* FrameAssembler::color_of(const Waiting& waiting) const {
@@ -232,6 +241,8 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
       return {{}, X_WG.status().message(), false};
     }
   }
+  const std::vector<std::string> joint_doubts = joints_.doubts(waiting.stamp_ns);
+  frame.doubts.insert(frame.doubts.end(), joint_doubts.begin(), joint_doubts.end());
   return {std::move(frame), "", false};
 }
 
@@ -286,6 +297,7 @@ void FrameAssembler::clock_jumped_back() {
   waiting_.clear();
   colors_.clear();
   tf_.forget_moving();
+  joints_.begin_again();
   last_taken_.reset();
   ahead_in_a_row_ = behind_in_a_row_ = 0;
 }

@@ -117,6 +117,11 @@ void TfBuffer::forget_beyond_limits(Edge& edge) {
   }
 }
 
+void TfBuffer::forget(const std::string& child) {
+  const auto edge = edges_.find(without_slash(child));
+  if (edge != edges_.end()) erase(edge);
+}
+
 void TfBuffer::erase(std::map<std::string, Edge>::iterator edge) {
   sample_count_ -= edge->second.samples.size();
   if (--parents_[edge->second.parent] == 0) parents_.erase(edge->second.parent);

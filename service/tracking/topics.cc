@@ -42,15 +42,17 @@ std::string color_type(const InputTopics& topics) {
 core::Status validate(const InputTopics& topics) {
   const std::pair<const char*, const std::string*> named[] = {
       {"depth", &topics.depth}, {"color", &topics.color},         {"camera info", &topics.camera_info},
-      {"tf", &topics.tf},       {"static tf", &topics.tf_static}, {"clock", &topics.clock}};
+      {"tf", &topics.tf},       {"static tf", &topics.tf_static}, {"joint states", &topics.joint_states},
+      {"clock", &topics.clock}};
   std::map<std::string, const char*> seen;
   for (const auto& [what, topic] : named) {
     if (!core::is_utf8(*topic))
       return core::invalid_input(std::string("the ") + what +
                                  " topic's name is not UTF-8: give one of letters, digits, _ and /");
     if (topic->empty()) {
-      if (topic == &topics.color || topic == &topics.clock) continue;
-      return core::invalid_input(std::string("the ") + what + " topic has no name: only colour can be left out");
+      if (topic == &topics.color || topic == &topics.joint_states || topic == &topics.clock) continue;
+      return core::invalid_input(std::string("the ") + what +
+                                 " topic has no name: only colour and joint states can be left out");
     }
     const auto [other, is_new] = seen.emplace(*topic, what);
     if (!is_new)
@@ -81,6 +83,7 @@ std::vector<BusTopic> bus_topics(const InputTopics& topics) {
       {topics.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kSensor, TopicQos::kReliable},
       {topics.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf, TopicQos::kTf},
       {topics.tf_static, "tf2_msgs/msg/TFMessage", TopicQos::kTfStatic, TopicQos::kLatched},
+      {topics.joint_states, "sensor_msgs/msg/JointState", TopicQos::kJoints, TopicQos::kReliable},
       {topics.clock, "rosgraph_msgs/msg/Clock", TopicQos::kSensor, TopicQos::kReliable},
       {kControlTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kCommands},
       {kQueryTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kCommands},

@@ -127,6 +127,10 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
       PRESCENE_TRY(const auto tf, decoded<interfaces::RosTfMessage>(message, "tf2_msgs/msg/TFMessage"));
       return assembler_.add_tf(tf, index, message.topic == topics.tf_static);
     }
+    if (message.topic == topics.joint_states && settings_.assembler.robot) {
+      PRESCENE_TRY(const auto joints, decoded<interfaces::RosJointState>(message, "sensor_msgs/msg/JointState"));
+      return assembler_.add_joint_state(joints, index);
+    }
     if (message.topic == kControlTopic) {
       PRESCENE_RETURN_IF_ERROR(check_type(message, "std_msgs/msg/String"));
       const auto newest_ns = belief_->step > 0 ? std::optional(belief_->stamp_ns) : std::nullopt;

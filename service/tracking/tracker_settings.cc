@@ -76,6 +76,7 @@ void for_each_setting(Settings& settings, const Visit& visit) {
   visit("camera_info_topic", settings.topics.camera_info);
   visit("tf_topic", settings.topics.tf);
   visit("tf_static_topic", settings.topics.tf_static);
+  visit("joint_states_topic", settings.topics.joint_states);
   visit("clock_topic", settings.topics.clock);
   visit("world_frame", settings.assembler.world_frame);
   visit("camera_frame", settings.assembler.camera_frame);

@@ -132,7 +132,8 @@ core::Status BusView::Impl::join() {
   for (const BusTopic& topic : bus_topics(topics)) {
     const bool is_of_frames = topic.name == topics.depth || topic.name == topics.color ||
                               topic.name == topics.camera_info || topic.name == topics.tf ||
-                              topic.name == topics.tf_static;
+                              topic.name == topics.tf_static ||
+                              (settings.tracker.assembler.robot && topic.name == topics.joint_states);
     if (is_of_frames) PRESCENE_RETURN_IF_ERROR(subscribe(topic.name, topic.type, topic.read, &Impl::take_frame_part));
   }
   PRESCENE_RETURN_IF_ERROR(subscribe(kBeliefTopic, "std_msgs/msg/String", TopicQos::kState, &Impl::take_belief));
@@ -162,6 +163,9 @@ void BusView::Impl::take_frame_part(const ReceivedMessage& message) {
   } else if (message.topic == topics.camera_info) {
     add(decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage),
         [&](const auto& info) { return assembler.add_camera_info(info, index); });
+  } else if (message.topic == topics.joint_states) {
+    add(decode_cdr<interfaces::RosJointState>(message.cdr, interfaces::kSmallMessage),
+        [&](const auto& joints) { return assembler.add_joint_state(joints, index); });
   } else {
     add(decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage),
         [&](const auto& tf) { return assembler.add_tf(tf, index, message.topic == topics.tf_static); });

@@ -13,6 +13,12 @@ namespace prescene::service::given_service_tracking {
 extern Backends backends;
 extern const TrackerSettings settings;
 
+namespace joint_transforms_h {
+extern const std::shared_ptr<const interfaces::RobotKinematics> robot;
+extern const interfaces::RosJointState joint_state;
+extern TfBuffer tf;
+}  // namespace joint_transforms_h
+
 namespace tracker_h {
 extern const std::shared_ptr<const belief::Scene> scene;
 extern const std::uint64_t seed;

@@ -48,6 +48,7 @@ std::optional<int> granted_receive_buffer(int asked_bytes);
 /// How a topic is offered or asked for; names say who uses it.
 enum class TopicQos {
   kSensor,    ///< Best effort, keep last 5: readers of cameras match every driver.
+  kJoints,    ///< Best effort, keep last 100: readers of joint states, which come fast and from every sort of writer.
   kImages,    ///< Reliable, keep last 2: writers of images serve best-effort and reliable readers.
   kReliable,  ///< Reliable, keep last 10: queries and answers of clients.
   kState,     ///< As kReliable, but a writer never waits: for state that the next sample replaces (poses, markers).
@@ -113,6 +114,7 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
+  core::Status publish(DdsPublisher publisher, const RosJointState& message);
 
   /// No callback runs once this has returned, which takes no longer than the one that runs now; publishing goes on. Not
   /// to be called from a callback.

@@ -67,7 +67,9 @@ class BusEvidence {
   std::string lens_text() const { return assembler_.lens_text(); }
   /// Of the last depth image that could be read.
   const interfaces::DepthImageReport& depth_report() const { return depth_report_; }
+  /// With the transforms that follow from joint states.
   const TfBuffer& tf() const { return tf_; }
+  const JointTransforms& joints() const { return joints_; }
   /// What the clock of simulated time said last, and first; nothing: it is not asked for, or has not come.
   std::optional<core::TimeNs> simulated_ns() const { return simulated_ns_; }
   core::TimeNs first_simulated_ns() const { return first_simulated_ns_; }
@@ -84,6 +86,7 @@ class BusEvidence {
   std::vector<std::string> robot_;
   FrameAssembler assembler_;
   TfBuffer tf_;
+  JointTransforms joints_;
   std::map<std::string, TopicEvidence> topics_;
   MessageIndex next_index_ = 0;
   std::optional<core::TimeNs> simulated_ns_;

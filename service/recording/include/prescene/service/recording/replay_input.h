@@ -33,6 +33,8 @@ class ReplayInput {
   static core::Result<ReplayInput> open(const ReplayInputOptions& options, const core::LogSink& log);
 
   const std::shared_ptr<const belief::Scene>& scene() const { return scene_; }
+  /// How the robot that the scene describes moves, for AssemblerSettings::robot; null where it describes none.
+  const std::shared_ptr<const interfaces::RobotKinematics>& robot() const { return robot_; }
   /// The text of the scene file; "" of a folder without one.
   const std::string& scene_text() const { return scene_text_; }
   /// What it was made with, but for the topics, camera and filter of `settings` where it says nothing. kInvalidInput
@@ -53,6 +55,7 @@ class ReplayInput {
   RecordingInfo info_;
   std::string scene_text_;
   std::shared_ptr<const belief::Scene> scene_;
+  std::shared_ptr<const interfaces::RobotKinematics> robot_;
 };
 
 /// kInvalidInput with the reason if no frame was of use.

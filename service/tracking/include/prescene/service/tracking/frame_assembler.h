@@ -26,6 +26,7 @@
 #include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/tracking/image_messages.h"
+#include "prescene/service/tracking/joint_transforms.h"
 #include "prescene/service/tracking/tf_buffer.h"
 
 namespace prescene::service {
@@ -46,6 +47,9 @@ struct AssemblerSettings {
   /// that of the images. Empty = not, unless the topic's name says so (is_rectified(TrackerSettings)).
   std::optional<bool> rectified;
   bool mono16_is_depth = false;  ///< Take `mono16` depth images as millimetres.
+  /// How the robot of the scene moves, for its joint states; null: they are not used. Of the scene, not of recordings'
+  /// settings.
+  std::shared_ptr<const interfaces::RobotKinematics> robot;
 };
 
 /// Running number of a message in a recording (or since the start), over all topics.
@@ -56,7 +60,7 @@ struct AssembledFrame {
   MessageIndex depth = 0;
   std::optional<MessageIndex> color;
   MessageIndex camera_info = 0;
-  /// All tf messages up to this number had been taken in when the poses were looked up.
+  /// All messages of tf and joint states up to this number had been taken in when the poses were looked up.
   MessageIndex tf_until = 0;
   std::vector<std::string> doubts;  ///< Of its depth image and camera info: an unlikely unit, an unknown lens.
 };
@@ -84,6 +88,8 @@ class FrameAssembler {
   core::Status add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index);
   /// Takes every good transform of the message; the status tells of the first bad one.
   core::Status add_tf(const interfaces::RosTfMessage& message, MessageIndex index, bool is_static);
+  /// Takes the links' transforms that follow from the joints' positions, as JointTransforms::add.
+  core::Status add_joint_state(const interfaces::RosJointState& message, MessageIndex index);
 
   /// The newest frame that is complete at `now_ns`; older waiting frames are skipped.
   std::optional<AssembledFrame> take(core::TimeNs now_ns);
@@ -130,6 +136,7 @@ class FrameAssembler {
   AssemblerSettings settings_;
   std::vector<std::string> robot_bodies_;
   TfBuffer tf_;
+  JointTransforms joints_;
   MessageIndex tf_until_ = 0;
   std::deque<Waiting> waiting_;  // ascending stamps
   std::deque<Color> colors_;     // newest last, bounded

@@ -52,6 +52,8 @@ class TfBuffer {
   std::uint64_t forgotten() const { return forgotten_; }
   /// Transforms that came when they were older than the history, and were left out.
   std::uint64_t late() const { return late_; }
+  /// Forgets all that is known of `child` in its parent.
+  void forget(const std::string& child);
   /// Forgets moving edges: the clock jumped back.
   void forget_moving();
 

@@ -18,6 +18,7 @@ struct InputTopics {
   std::string camera_info = "/camera/color/camera_info";           ///< sensor_msgs/CameraInfo
   std::string tf = "/tf";                                          ///< tf2_msgs/TFMessage
   std::string tf_static = "/tf_static";                            ///< tf2_msgs/TFMessage, latched
+  std::string joint_states = "/joint_states";                      ///< sensor_msgs/JointState; empty = none.
   /// What the depth topic carries: "image", "compressed", "points", or "" = as its name says.
   std::string depth_form;
   std::string color_form;  ///< The same of the colour topic: "image", "compressed" or "".
@@ -41,7 +42,8 @@ bool is_image_type(const std::string& type);
 /// image_rect, image_rect_color, image_rect_raw and the like, also if they are compressed.
 bool names_rectified_images(const std::string& topic);
 
-/// kInvalidInput where a topic but colour and clock is empty, two are one, or a form is none of the above.
+/// kInvalidInput where a topic but colour, joint states and clock is empty, two are one, or a form is none of the
+/// above.
 core::Status validate(const InputTopics& topics);
 
 // Our own topics. JSON is carried by std_msgs/String, so that `ros2 topic pub` and `echo` can speak it.
