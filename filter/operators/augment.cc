@@ -23,17 +23,14 @@ constexpr double kNearTurn = 0.8;    // rad
 constexpr double kLearnedShare =
     0.33;  // of the starts, at places that look like learned ones, where something was learned
 constexpr SearchOptions kRecoverySearch = {.refine = {.steps = 10}, .polish_candidates = 1, .polish_draws = 12};
-constexpr double kExplained = 0.015;     // m; measurements so near to a known surface are explained
-constexpr double kLeastShown = 0.08;     // share of the pixels in view that must not be hidden for a find to count ...
-constexpr double kLeastHits = 0.5;       // ... and share of those that must match
-constexpr double kMostOverlap = 0.25;    // share of a find that may be inside of a support: its plane has errors, too
-constexpr double kInjectedShare = 0.5;   // of the particles are put at the find, the least probable ones
-constexpr int kHiddenDraws = 160;        // places that are tried for what may have gone where it cannot be seen
-constexpr double kHiddenFurthest = 0.3;  // m; their standard deviation grows no further
-constexpr double kHiddenTurn = 0.8;      // rad
-// The standard deviation of these places when the object was just lost from sight, and how fast it grows. Chosen.
-constexpr double kHiddenShift = 0.06;  // m
-constexpr double kHiddenSpeed = 0.3;   // m/s
+constexpr double kExplained = 0.015;    // m; measurements so near to a known surface are explained
+constexpr double kLeastShown = 0.08;    // share of the pixels in view that must not be hidden for a find to count ...
+constexpr double kLeastHits = 0.5;      // ... and share of those that must match
+constexpr double kMostOverlap = 0.25;   // share of a find that may be inside of a support: its plane has errors, too
+constexpr double kInjectedShare = 0.5;  // of the particles are put at the find, the least probable ones
+constexpr int kHiddenDraws = 160;       // places that are tried for what may have gone where it cannot be seen
+constexpr double kFurthestFall = 0.3;   // m
+constexpr double kHiddenTurn = 0.8;     // rad
 
 constexpr double kSameShift = 0.01;  // m; a find that is no further than this ...
 constexpr double kSameTurn = 0.2;    // rad; ... from where it is tracked is no other place
@@ -191,11 +188,10 @@ int propose_hidden(const FilterFrame& frame, const rendering::FrameTerms& terms,
   const Particle last = object.particles.back();
   if (last.mode == belief::MotionMode::kHeld) return 0;
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
-  const double shift = std::min(kHiddenFurthest, kHiddenShift + kHiddenSpeed * unseen);
-  const double fall = std::min(kHiddenFurthest, 0.5 * gravity_W.norm() * unseen * unseen);
+  const double fall = std::min(kFurthestFall, 0.5 * gravity_W.norm() * unseen * unseen);
   const std::vector<Pose> places =
-      hidden_places(frame, terms, target, last.X_WO, {shift, kHiddenTurn, fall * gravity_W.normalized()}, kHiddenDraws,
-                    weighting, tools, stream.for_purpose(core::Purpose::kProposal));
+      hidden_places(frame, terms, target, last.X_WO, {hidden_shift(unseen), kHiddenTurn, fall * gravity_W.normalized()},
+                    kHiddenDraws, weighting, tools, stream.for_purpose(core::Purpose::kProposal));
   const int wanted = static_cast<int>(std::lround(options.hidden_share * static_cast<double>(object.particles.size())));
   const int placed = std::min(wanted, static_cast<int>(places.size()));
   for (int i = 0; i < placed; ++i) {

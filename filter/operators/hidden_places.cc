@@ -1,7 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hidden_places.h"
 
+#include <algorithm>
+
 namespace prescene::filter {
+namespace {
+
+constexpr double kHiddenShift = 0.06;    // m; when it was just lost from sight ...
+constexpr double kHiddenSpeed = 0.3;     // m/s; ... and how fast it grows, ...
+constexpr double kHiddenFurthest = 0.3;  // m; ... up to this. Chosen
+
+}  // namespace
+
+double hidden_shift(double seconds) { return std::min(kHiddenFurthest, kHiddenShift + kHiddenSpeed * seconds); }
 
 std::vector<Pose> hidden_places(const FilterFrame& frame, const rendering::FrameTerms& terms,
                                 const SearchTarget& target, const Pose& X_WO, const HiddenReach& reach, int draws,

@@ -15,6 +15,9 @@ struct HiddenReach {
   Vector3d fall = Vector3d::Zero();  ///< In W; a place is up to so much further down.
 };
 
+/// Standard deviation, m, of where it may be after so many seconds out of sight, when it is thought to have moved.
+double hidden_shift(double seconds);
+
 /// Those of `draws` poses about X_WO that are hidden in the frame, outside of supports and not beyond one.
 std::vector<Pose> hidden_places(const FilterFrame& frame, const rendering::FrameTerms& terms,
                                 const SearchTarget& target, const Pose& X_WO, const HiddenReach& reach, int draws,

@@ -12,18 +12,17 @@ namespace {
 using belief::ObjectBelief;
 using belief::Particle;
 
-constexpr double kMovedAfter = 1.0;      // s; on average, by what hides it and is not known
-constexpr double kMostlyUnknown = 0.5;   // share of its pixels in view that something unknown hides
-constexpr double kWanderTurn = 0.3;      // rad; things are moved more often than turned over
-constexpr double kWanderFurthest = 0.3;  // m; the standard deviation of their places grows no further
-constexpr int kWanderDraws = 12;         // places that are tried for each
+constexpr double kMovedAfter = 1.0;     // s; on average, by what hides it and is not known
+constexpr double kMostlyUnknown = 0.5;  // share of its pixels in view that something unknown hides
+constexpr double kWanderTurn = 0.3;     // rad; things are moved more often than turned over
+constexpr int kWanderDraws = 12;        // places that are tried for each
 
 }  // namespace
 
 int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
-                  const rendering::PoseEvidence& evidence, const AugmentOptions& options,
-                  const WeightOptions& weighting, const InitialiseOptions& spread, const FilterTools& tools,
-                  const core::RandomStream& stream, ObjectBelief& object) {
+                  const rendering::PoseEvidence& evidence, const WeightOptions& weighting,
+                  const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
+                  ObjectBelief& object) {
   if (object.state != belief::TrackState::kUnseen || object.frames_unseen <= 0) return 0;
   if (evidence.measured - evidence.visible < kMostlyUnknown * evidence.in_view) return 0;
   const Particle last = belief::heaviest(object.particles);
@@ -35,8 +34,7 @@ int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, 
   for (std::size_t i = 0; i < object.particles.size(); ++i)
     if (chances.uniform() < probability && object.particles[i].mode == belief::MotionMode::kResting) moved.push_back(i);
   if (moved.empty()) return 0;
-  const HiddenReach reach = {std::min(kWanderFurthest, options.hidden_shift + options.hidden_speed * unseen),
-                             kWanderTurn, Vector3d::Zero()};
+  const HiddenReach reach = {hidden_shift(unseen), kWanderTurn, Vector3d::Zero()};
   const std::vector<Pose> places =
       hidden_places(frame, terms, target, last.X_WO, reach, kWanderDraws * static_cast<int>(moved.size()), weighting,
                     tools, stream.for_purpose(core::Purpose::kProposal));

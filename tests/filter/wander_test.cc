@@ -77,8 +77,8 @@ TEST(WanderUnseen, NothingIsMovedThatIsSeenOrThatAKnownThingHides) {
   evidence.in_view = evidence.covered = evidence.measured = 40;
   const auto moved = [&] {
     belief::ObjectBelief copy = object;
-    return wander_unseen(frame, frame.terms, target, evidence, {}, {}, {}, backends.tools,
-                         {6, core::Purpose::kRecovery}, copy);
+    return wander_unseen(frame, frame.terms, target, evidence, {}, {}, backends.tools, {6, core::Purpose::kRecovery},
+                         copy);
   };
   object.state = belief::TrackState::kTracked;
   EXPECT_EQ(moved(), 0);

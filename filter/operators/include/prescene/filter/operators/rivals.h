@@ -53,8 +53,8 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
                    const InitialiseOptions& spread, const FilterTools& tools, belief::ObjectBelief& object);
 
 /// After a frame has weighed the particles: what makes one turn look better than another (mixed pixels at an edge, a
-/// coarse image, a mesh that is not quite right) mostly stays from frame to frame, so that many frames tell of two turns
-/// what one average frame does. Their log odds go to the mean of what single frames say, with a memory of twenty
+/// coarse image, a mesh that is not quite right) mostly stays from frame to frame, so that many frames tell of two
+/// turns what one average frame does. Their log odds go to the mean of what single frames say, with a memory of twenty
 /// frames, and turns that no frame tells apart keep sharing the weight. A turn that is 3 nats or more behind the
 /// likeliest was decided against: its log odds go to 5 nats less.
 /// `log_weights_before`: those of the same particles before the frame. Weights within one turn are left as they are to

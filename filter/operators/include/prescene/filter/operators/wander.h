@@ -2,20 +2,21 @@
 // Operator 3, augment: what is behind something that nobody knows may be moved by it. A hand that comes in front of a
 // thing may take it, and nothing shows that.
 //
-//   int moved = wander_unseen(frame, terms, target, evidence, options, weighting, spread, tools, stream, object);
+//   int moved = wander_unseen(frame, terms, target, evidence, weighting, spread, tools, stream, object);
 #pragma once
 
-#include "prescene/filter/operators/augment.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/weight.h"
 
 namespace prescene::filter {
 
 /// While an unseen object is mostly hidden by what nothing known explains (`evidence`: of its likeliest pose), each of
 /// its particles may be moved, once in a second on average: to a place that is hidden and free, about where it was, as
-/// far as AugmentOptions::hidden_shift and hidden_speed allow since it was seen last, from where physics takes it on.
+/// far as it may have come since it was seen last, from where physics takes it on.
 /// Weights stay. Returns how many were moved. What a hand holds stays in it.
 int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
-                  const rendering::PoseEvidence& evidence, const AugmentOptions& options,
-                  const WeightOptions& weighting, const InitialiseOptions& spread, const FilterTools& tools,
-                  const core::RandomStream& stream, belief::ObjectBelief& object);
+                  const rendering::PoseEvidence& evidence, const WeightOptions& weighting,
+                  const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
+                  belief::ObjectBelief& object);
 
 }  // namespace prescene::filter
