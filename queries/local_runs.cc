@@ -12,7 +12,8 @@ using belief::Pose;
 using geometry::Box;
 using geometry::Vector3d;
 
-constexpr double kApart = 0.01;  // m between boxes about things that are simulated without each other
+constexpr double kReachFactor = 1.001;  // for rounding
+constexpr double kApart = 0.01;         // m between boxes about things that are simulated without each other
 
 bool are_near(const Box& a, const Box& b) {
   return (a.min().array() < b.max().array() + kApart).all() && (b.min().array() < a.max().array() + kApart).all();
@@ -34,6 +35,12 @@ Box LocalRuns::box_of(std::size_t object, const Pose& X_WO) const {
   Box box;
   for (const Vector3d& vertex : shapes_[object].vertices) box.extend(X_WO * vertex);
   return box;
+}
+
+double LocalRuns::reach_of(std::size_t object) const {
+  double reach = 0.0;
+  for (const Vector3d& vertex : shapes_[object].vertices) reach = std::max(reach, vertex.norm());
+  return kReachFactor * reach;
 }
 
 core::Result<const LocalRuns::Part*> LocalRuns::part_of(std::size_t object) {
@@ -84,16 +91,20 @@ bool LocalRuns::meets(const Part& part, const belief::WorldState& start, const s
     if (near_any({push->from.cwiseMin(push->to) - radius, push->from.cwiseMax(push->to) + radius})) return true;
   }
   for (std::size_t k = 0; k < part.kept.size(); ++k) {
-    Box before = box_of(part.kept[k], local.states.front().objects[k].X_WO);
+    // Most are nowhere near: a box about the sphere that holds it says so, without a look at its vertices.
+    const double reach = reach_of(part.kept[k]);
+    const auto around = [&](const Pose& X_WO) {
+      return Box(X_WO.translation - Vector3d::Constant(reach), X_WO.translation + Vector3d::Constant(reach));
+    };
     const Pose* at = &local.states.front().objects[k].X_WO;
     for (const belief::WorldState& state : local.states) {
       const Pose& X_WO = state.objects[k].X_WO;
       if (X_WO == *at) continue;
-      at = &X_WO;
-      const Box now = box_of(part.kept[k], X_WO);
       // What it swept since the state before, straight.
-      if (near_any(before.merged(now))) return true;
-      before = now;
+      if (near_any(around(*at).merged(around(X_WO))) &&
+          near_any(box_of(part.kept[k], *at).merged(box_of(part.kept[k], X_WO))))
+        return true;
+      at = &X_WO;
     }
   }
   return false;

@@ -19,6 +19,8 @@ using geometry::Vector3d;
 constexpr int kStillFrames = 10;
 /// m; an object that lies still is drawn no further from where it lies.
 constexpr double kNear = 0.1;
+/// By which what a body reaches from its origin is taken for more than it is, for rounding.
+constexpr double kReachMargin = 1.001;
 /// Finer meshes are not looked at by ray: what lies on them starts where it was drawn.
 constexpr std::size_t kMostTriangles = 20'000;
 
@@ -71,6 +73,8 @@ Seating::Seating(const belief::Belief& belief, const belief::Scene& scene) {
     const belief::ObjectModel& model = scene.model_of(scene.objects[i]);
     bodies_[i].mesh = belief::collision_mesh(model);
     bodies_[i].p_OoOcm = belief::mean(model.center_of_mass);
+    for (const Vector3d& vertex : bodies_[i].mesh.vertices)
+      bodies_[i].reach = std::max(bodies_[i].reach, kReachMargin * vertex.norm());
     if (!bodies_[i].lies_still) continue;
     if (auto resting = geometry::resting_poses(bodies_[i].mesh, bodies_[i].p_OoOcm))
       bodies_[i].resting = *std::move(resting);
@@ -101,9 +105,13 @@ std::optional<Seating::Ground> Seating::below(const Vector3d& p_W, std::size_t o
     }
   };
   for (const geometry::TriangleMesh& support : supports_) look_at(support, Pose::identity());
-  for (std::size_t i = 0; i < bodies_.size(); ++i)
-    if (i != object && bodies_[i].mesh.triangles.size() <= kMostTriangles)
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (i == object || bodies_[i].mesh.triangles.size() > kMostTriangles) continue;
+    // What lies beside the vertical line is not below.
+    const Vector3d between = p_W - state.objects[i].X_WO.translation;
+    if ((between - up_W_ * up_W_.dot(between)).norm() <= bodies_[i].reach)
       look_at(bodies_[i].mesh, state.objects[i].X_WO);
+  }
   return ground;
 }
 

@@ -29,6 +29,7 @@ class Seating {
   struct Body {
     bool lies_still = false;
     geometry::TriangleMesh mesh;                 ///< Of its collision shapes, in O.
+    double reach = 0.0;                          ///< m from O, of all of the mesh.
     std::vector<geometry::RestingPose> resting;  ///< Empty = it has no face to lie on.
     geometry::Vector3d p_OoOcm = geometry::Vector3d::Zero();
   };

@@ -43,6 +43,8 @@ class LocalRuns {
   };
   core::Result<const Part*> part_of(std::size_t object);
   geometry::Box box_of(std::size_t object, const belief::Pose& X_WO) const;
+  /// m from its origin, of all of its shape.
+  double reach_of(std::size_t object) const;
   /// Whether what moves in the run comes near what was left out.
   bool meets(const Part& part, const belief::WorldState& start, const std::vector<belief::Action>& actions,
              const belief::Trajectory& local) const;
