@@ -117,9 +117,18 @@ class EventPaths {
   /// A guess of the event's parameters from the track, into `target`.
   void guess(const Hypothesis& hypothesis, TemperedTarget& target) const;
   EventDraw decode(const Hypothesis& hypothesis, const LatentPoint& z) const;
+  /// Which coordinates of a point say where its object is at the begin, but for which particle is taken.
+  std::vector<std::size_t> start_pose_coordinates(const Hypothesis& hypothesis) const;
+  /// Where its object is at the begin.
+  belief::Pose start_at(const Hypothesis& hypothesis, const LatentPoint& z) const;
+  /// Runs go on so long after the window's end, s: for who asks what comes of an event.
+  void go_on_for(double seconds) { horizon_ = duration_ + seconds; }
+  /// With its outcomes.
+  const belief::Scene& known_scene() const { return *prior_.scene; }
+  const std::vector<std::string>& left_out() const { return prior_.left_out; }
 
   /// paths[i] at points[i]; `draws`, where given, get the touched places too, `runs` the simulated instances from the
-  /// event on (kinds that are simulated; else empty ones).
+  /// event on (kinds that are simulated, and nothing; else empty ones).
   void simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
                 std::span<EventDraw> draws = {}, std::span<belief::Trajectory> runs = {});
 
@@ -177,7 +186,8 @@ class EventPaths {
   std::vector<belief::Action> actions_;  // known ones, times from the begin
   std::vector<double> times_;
   double duration_ = 0.0;
-  bool still_ = true;  // nothing moves by itself and nothing is done
+  double horizon_ = 0.0;  // s; until then runs go on, if that is later
+  bool still_ = true;     // nothing moves by itself and nothing is done
   std::vector<ObjectPath> base_;
   core::RandomStream stream_;
   int simulated_ = 0;

@@ -277,6 +277,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
     failed_ += paths[i].impossible ? 1 : 0;
     if (!draws.empty()) draws[i] = events[i];
     if (!runs_out.empty() && is_simulated(hypothesis.kind)) runs_out[i] = std::move(after[i]);
+    if (!runs_out.empty() && hypothesis.kind == EventKind::kNothing) runs_out[i] = std::move(before[i]);
   }
 }
 

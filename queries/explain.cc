@@ -8,11 +8,13 @@
 #include "event_hypotheses.h"
 #include "event_paths.h"
 #include "explain_answer.h"
+#include "explain_text.h"
 #include "frame_peaks.h"
 #include "missing_objects.h"
 #include "other_motion.h"
 #include "prescene/core/spelling.h"
 #include "prescene/queries/tempered_smc.h"
+#include "smallest_change.h"
 #include "weigh_events.h"
 #include "window_likelihood.h"
 
@@ -29,6 +31,8 @@ constexpr double kRefuted = -1.0;  // nats: what speaks so much against where it
 constexpr int kFirstRuns = 1;
 constexpr int kMostRounds = 2;      // times the query's runs: of what stays uncertain
 constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
+constexpr int kFreshRuns = 1000;    // numbers of runs from here on are for what must not have been seen
+constexpr double kGoesOn = 2.0;     // s after the window's end in which what an event leads to is looked at
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
@@ -41,7 +45,9 @@ class Explainer {
   core::Result<ExplainAnswer> run() {
     PRESCENE_TRY(events_, EventPaths::create(window_, context_, query_.priors, query_.seed));
     PRESCENE_TRY(const std::optional<std::size_t> asked, asked_object());
-    for (const std::size_t i : telling_frames(window_.frames, query_.frames)) frames_.push_back(window_.frames[i]);
+    PRESCENE_RETURN_IF_ERROR(look_up_wanted());
+    chosen_ = telling_frames(window_.frames, query_.frames);
+    for (const std::size_t i : chosen_) frames_.push_back(window_.frames[i]);
     likelihood_ = std::make_unique<WindowLikelihood>(*window_.start, events_->objects(), frames_, context_, tools_);
     PRESCENE_RETURN_IF_ERROR(likelihood_->prepare());
     for (std::size_t k = 0; k < likelihood_->frames(); ++k)
@@ -58,9 +64,12 @@ class Explainer {
     PRESCENE_RETURN_IF_ERROR(search_rivals());
     PRESCENE_RETURN_IF_ERROR(events_->failure());
     remark_what_was_cut_short();
-    JudgedEvents judged{window_, *events_, *likelihood_, times_, nothings_, judged_};
+    JudgedEvents judged{window_, *events_, *likelihood_, times_, nothings_, judged_, chosen_};
     ExplainAnswer answer = explain_answer(judged);
+    if (query_.change) add_change(answer);
+    if (cancelled()) return stopped();
     answer.evaluated += evaluated_;
+    answer.cut_short = out_of_time_;
     answer.remarks.insert(answer.remarks.end(), remarks_.begin(), remarks_.end());
     answer.remarks.emplace_back(
         "Intervals say how precisely the evidence was computed, not how well events are modelled: in 44 simulated "
@@ -71,6 +80,90 @@ class Explainer {
  private:
   bool cancelled() const {
     return context_.simulation.cancellation != nullptr && context_.simulation.cancellation->requested();
+  }
+
+  /// Notes it.
+  bool out_of_time() {
+    const auto& until = context_.simulation.simulate_until;
+    out_of_time_ = out_of_time_ || (until && core::Cancellation::Clock::now() >= *until);
+    return out_of_time_;
+  }
+
+  core::Status look_up_wanted() {
+    if (!query_.change || (query_.wanted_name.empty() && !query_.wanted)) return core::ok_status();
+    belief::AchieveQuery asked;
+    asked.outcome = query_.wanted_name;
+    asked.wanted = query_.wanted;
+    auto wanted = find_wanted(events_->known_scene(), asked, events_->left_out());
+    if (!wanted) return wanted.status().at("wanted");
+    wanted_ = *std::move(wanted);
+    return core::ok_status();
+  }
+
+  /// Of the first explanation.
+  void add_change(ExplainAnswer& answer) {
+    const Explanation& first = answer.explanations.front();
+    const bool can_be = first.kind == EventKind::kPushed || first.kind == EventKind::kBumped ||
+                        first.kind == EventKind::kSlipped || first.kind == EventKind::kNothing;
+    Judged* judged = first.kind == EventKind::kNothing ? &nothings_.front() : nullptr;
+    for (Judged& one : judged_)
+      if (one.hypothesis.kind == first.kind && events_->objects()[one.object].name == first.object) judged = &one;
+    if (!can_be || judged == nullptr) {
+      answer.remarks.push_back(std::string("No smallest change is worked out of '") + belief::name_of(first.kind) +
+                               "': what somebody does with the object is not simulated.");
+      return;
+    }
+    ChangeSearch search;
+    search.events = events_.get();
+    search.hypothesis = judged->hypothesis;
+    search.wanted = wanted_;
+    search.probability = query_.wanted_probability;
+    search.confidence = query_.confidence;
+    search.seed = query_.seed;
+    search.cancellation = context_.simulation.cancellation;
+    search.draws = [&](int number) {
+      return number == 0 ? equal_draws(judged->posterior) : fresh_draws(*judged, number);
+    };
+    events_->go_on_for(kGoesOn);
+    answer.change = smallest_change(search);
+    events_->go_on_for(0.0);
+    answer.change->sentence = sentence_of(*answer.change);
+    answer.text += " " + answer.change->sentence;
+  }
+
+  /// As many as there are points, each as probable.
+  static std::vector<LatentPoint> equal_draws(const TemperedResult& posterior) {
+    std::vector<LatentPoint> draws;
+    const auto n = static_cast<double>(posterior.points.size());
+    double reached = 0.0;
+    for (const TemperedPoint& point : posterior.points) {
+      reached += point.weight * n;
+      while (draws.size() < posterior.points.size() && static_cast<double>(draws.size()) + 0.5 < reached)
+        draws.push_back(point.z);
+    }
+    return draws;
+  }
+
+  /// Of runs that nothing was looked up in.
+  std::vector<LatentPoint> fresh_draws(const Judged& judged, int number) {
+    TemperedTarget target;
+    events_->guess(judged.hypothesis, target);
+    target.evaluate = [&](std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
+      evaluate(judged.hypothesis, points, log_likelihoods);
+    };
+    TemperedOptions options;
+    options.runs = query_.runs;
+    options.points = query_.points;
+    options.first_run = kFreshRuns + number * query_.runs;
+    events_->go_on_for(0.0);
+    const TemperedResult found =
+        tempered_posterior(target, options, stream_of(judged), context_.simulation.cancellation);
+    events_->go_on_for(kGoesOn);
+    return equal_draws(found);
+  }
+
+  core::RandomStream stream_of(const Judged& judged) const {
+    return core::RandomStream(query_.seed + (judged.number + 1) * 0x9e3779b97f4a7c15ULL, core::Purpose::kParameters);
   }
 
   bool may_be_explained(std::size_t object) const {
@@ -233,8 +326,7 @@ class Explainer {
   /// `runs` more searches of it; of `other`, which needs none, the evidence.
   void search(Judged& judged, int runs) {
     const Hypothesis& hypothesis = judged.hypothesis;
-    const core::RandomStream stream(query_.seed + (judged.number + 1) * 0x9e3779b97f4a7c15ULL,
-                                    core::Purpose::kParameters);
+    const core::RandomStream stream = stream_of(judged);
     if (hypothesis.kind == EventKind::kOther) {
       const OtherMotion other = other_motion(*events_, *likelihood_, hypothesis.object, query_.priors);
       judged.log_bayes = other.log_evidence;
@@ -262,6 +354,13 @@ class Explainer {
     judged.log_bayes = judged.posterior.mean_log_evidence;
   }
 
+  /// When an event is searched; nothing is before all others.
+  static int round_of(EventKind kind) {
+    if (kind == EventKind::kNothing) return -1;
+    if (kind == EventKind::kOther) return 0;
+    return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped ? 2 : 1;
+  }
+
   /// Each hypothesis once; those that can't compete end early.
   core::Status search_all(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses) {
     double prior_of_nothing = 0.0;
@@ -274,20 +373,27 @@ class Explainer {
       nothing.number = number_++;
       search(nothing, query_.runs);
       best_ = std::max(best_, std::log(prior_of_nothing) + nothing.log_bayes);
-      // `other` first: it says how likely the frames can get at all.
-      for (const bool other : {true, false})
-        for (const Hypothesis& hypothesis : hypotheses) {
-          const bool is_other = hypothesis.kind == EventKind::kOther;
-          if (hypothesis.object != object || hypothesis.kind == EventKind::kNothing || is_other != other) continue;
-          if (cancelled()) return stopped();
-          Judged& judged = judged_.emplace_back();
-          judged.hypothesis = hypothesis;
-          judged.object = object;
-          judged.number = number_++;
-          search(judged, kFirstRuns);
-          best_ = std::max(best_, std::log(hypothesis.prior) + judged.log_bayes);
-          judged.log_bayes -= nothings_.back().log_bayes;
-        }
+      std::vector<const Hypothesis*> about;
+      // `other` first: it says how likely the frames can get at all. Then what takes no simulation: the better the best
+      // of these, the sooner searches of the others end.
+      for (const int round : {0, 1, 2})
+        for (const Hypothesis& hypothesis : hypotheses)
+          if (hypothesis.object == object && round_of(hypothesis.kind) == round) about.push_back(&hypothesis);
+      const std::uint64_t first = number_;
+      for (const Hypothesis* hypothesis : about) {
+        if (cancelled()) return stopped();
+        if (out_of_time())
+          return core::unavailable(
+              "the time ran out before every event was searched once: give more of it, an object, or a shorter window");
+        Judged& judged = judged_.emplace_back();
+        judged.hypothesis = *hypothesis;
+        judged.object = object;
+        judged.number = first + static_cast<std::uint64_t>(hypothesis - hypotheses.data());
+        search(judged, kFirstRuns);
+        best_ = std::max(best_, std::log(hypothesis->prior) + judged.log_bayes);
+        judged.log_bayes -= nothings_.back().log_bayes;
+      }
+      number_ = first + hypotheses.size();
     }
     return core::ok_status();
   }
@@ -315,6 +421,7 @@ class Explainer {
       const bool hopeless = judged.posterior.gave_up || log_posterior(judged) <= best_ - kHopeless;
       if (judged.hypothesis.kind == EventKind::kOther || (hopeless && !unexplained)) continue;
       if (cancelled()) return stopped();
+      if (out_of_time()) break;
       more(judged, std::max(1, query_.runs - runs_of(judged)));
       if (unexplained) judged.posterior.gave_up = false;  // the run that did counts as one without evidence
     }
@@ -329,7 +436,7 @@ class Explainer {
         if (runs_of(judged) < kMostRounds * query_.runs && (least == nullptr || runs_of(judged) < runs_of(*least)))
           least = &judged;
       }
-      if (least == nullptr) return core::ok_status();
+      if (least == nullptr || out_of_time()) return core::ok_status();
       more(*least, std::max(2, query_.runs / 2));
     }
   }
@@ -337,6 +444,9 @@ class Explainer {
   static core::Status stopped() { return core::cancelled("stopped on request before all events were weighed"); }
 
   void remark_what_was_cut_short() {
+    if (out_of_time_)
+      remarks_.emplace_back(
+          "The time ran out before the intervals were as narrow as asked for: give more of it (max_seconds).");
     for (const Judged& judged : judged_)
       if (judged.posterior.cut_short)
         remarks_.push_back(std::string("The search for '") + belief::name_of(judged.hypothesis.kind) + "' of " +
@@ -349,7 +459,9 @@ class Explainer {
   const ExplainContext& context_;
   const filter::FilterTools& tools_;
   std::unique_ptr<EventPaths> events_;
-  std::vector<WindowFrame> frames_;
+  std::optional<WantedOutcome> wanted_;
+  std::vector<std::size_t> chosen_;  // of the window's frames
+  std::vector<WindowFrame> frames_;  // these
   std::unique_ptr<WindowLikelihood> likelihood_;
   std::vector<double> times_;
   std::vector<Judged> nothings_;  // by candidate
@@ -359,6 +471,7 @@ class Explainer {
   std::uint64_t number_ = 0;
   std::vector<std::string> remarks_;
   int evaluated_ = 0;
+  bool out_of_time_ = false;
 };
 
 }  // namespace
@@ -376,6 +489,8 @@ core::Status validate(const ExplainQuery& query) {
     return core::invalid_input("confidence: give 0.5 to 0.9999");
   if (!(query.half_width >= 0.001 && query.half_width <= 0.5))
     return core::invalid_input("half_width: give 0.001 to 0.5");
+  if (!(query.wanted_probability >= 0.5 && query.wanted_probability <= 0.999))
+    return core::invalid_input("wanted_probability: give 0.5 to 0.999");
   double sum = 0.0;
   for (const double weight : query.weights.weight) {
     if (!(weight >= 0.0 && weight <= 1e6)) return core::invalid_input("events: give weights between 0 and 1e6");

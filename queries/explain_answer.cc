@@ -60,7 +60,8 @@ class AnswerBuilder {
         likelihood_(&events.likelihood),
         times_(events.times),
         nothings_(events.nothings),
-        judged_(events.judged) {}
+        judged_(events.judged),
+        frames_(events.frames) {}
 
   ExplainAnswer answer() {
     ExplainAnswer answer;
@@ -87,9 +88,12 @@ class AnswerBuilder {
                  ? 0.0
                  : judged->frame_means[k] - nothing;
     };
+    const ScenePath best = most_probable_path(*all.front());
     for (std::size_t k = 0; k < times_.size(); ++k) {
       DecidingFrame frame;
       frame.time = times_[k];
+      frame.frame = frames_[k];
+      for (const WhereItIs& object : answer.objects) frame.X_WO.push_back(pose_in_frame(best, object.object, k));
       frame.against_nothing = frame_means(all[0], k);
       const bool known = all.size() > 1 && (!all[1]->frame_means.empty());
       frame.against_second = known ? frame.against_nothing - frame_means(all[1], k) : 0.0;
@@ -215,6 +219,26 @@ class AnswerBuilder {
     }
   }
 
+  /// Of the most probable instance.
+  static ScenePath most_probable_path(const Judged& judged) {
+    if (judged.hypothesis.kind == EventKind::kOther) return path_of(judged.object, judged.other_path);
+    if (judged.paths.empty()) return {};
+    std::size_t most = 0;
+    for (std::size_t i = 0; i < judged.paths.size(); ++i)
+      if (judged.posterior.points[i].log_likelihood > judged.posterior.points[most].log_likelihood) most = i;
+    return judged.paths[most];
+  }
+
+  std::optional<Pose> pose_in_frame(const ScenePath& path, const std::string& name, std::size_t frame) const {
+    for (std::size_t i = 0; i < events_->objects().size(); ++i) {
+      if (events_->objects()[i].name != name) continue;
+      const auto at = std::find(path.moved.begin(), path.moved.end(), i);
+      return at == path.moved.end() ? likelihood_->base()[i][frame]
+                                    : path.paths[static_cast<std::size_t>(at - path.moved.begin())][frame];
+    }
+    return std::nullopt;
+  }
+
   WhereItIs where(std::size_t object, const std::vector<const Judged*>& all) const {
     WhereItIs result;
     result.object = events_->objects()[object].name;
@@ -265,20 +289,8 @@ class AnswerBuilder {
       result.radius_90 =
           std::max(result.radius_90, std::sqrt(kChi90 * estimate.covariance.bottomRightCorner<3, 3>().trace() / 3.0));
     }
-    const Judged& best = *all.front();
-    const ScenePath none;
-    const ScenePath* path = &none;
-    ScenePath tracked;
-    if (!best.paths.empty()) {
-      std::size_t most = 0;
-      for (std::size_t i = 0; i < best.paths.size(); ++i)
-        if (best.posterior.points[i].log_likelihood > best.posterior.points[most].log_likelihood) most = i;
-      path = &best.paths[most];
-    } else if (best.hypothesis.kind == EventKind::kOther) {
-      tracked = path_of(best.object, best.other_path);
-      path = &tracked;
-    }
-    result.out_of_sight = result.present > 0.5 && likelihood_->visible_share(*path, times_.size() - 1, object) < 0.05;
+    const ScenePath path = most_probable_path(*all.front());
+    result.out_of_sight = result.present > 0.5 && likelihood_->visible_share(path, times_.size() - 1, object) < 0.05;
     return result;
   }
 
@@ -288,6 +300,7 @@ class AnswerBuilder {
   const std::vector<double>& times_;
   std::vector<Judged>& nothings_;
   std::vector<Judged>& judged_;
+  const std::vector<std::size_t>& frames_;
 };
 
 }  // namespace

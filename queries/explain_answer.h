@@ -32,8 +32,9 @@ struct JudgedEvents {
   EventPaths& events;
   WindowLikelihood& likelihood;
   const std::vector<double>& times;
-  std::vector<Judged>& nothings;  // by candidate; the first is reported
-  std::vector<Judged>& judged;    // all others
+  std::vector<Judged>& nothings;           // by candidate; the first is reported
+  std::vector<Judged>& judged;             // all others
+  const std::vector<std::size_t>& frames;  // that weigh, of the window's
 };
 
 /// All but the numbers of evaluations before, and remarks of the search.

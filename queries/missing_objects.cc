@@ -44,6 +44,7 @@ core::Result<std::vector<std::optional<belief::Pose>>> find_missing(const Window
   filter::FilterFrame frame;
   PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), last.observation,
                                                  belief.robot, colors, settings.frame, tools, cache, &frame));
+  frame.terms.step *= last.sampled;
   filter::find_in_frame(frame, last.observation, settings.initialise, tools,
                         core::RandomStream(seed, core::Purpose::kDetection), belief);
   for (std::size_t i = 0; i < found.size(); ++i)

@@ -29,16 +29,17 @@ constexpr int kSampled = 8;              // pixels between two that changes are 
 constexpr float kChanged = 0.02F;        // m; a depth that changes by more has changed
 constexpr int kColorChanged = 90;        // sum over red, green and blue
 
-/// Share of the sampled pixels that differ.
-double change_between(const belief::RgbdFrame& a, const belief::RgbdFrame& b) {
+/// Share of the sampled pixels that differ; both images hold every `held`-th pixel of the camera's.
+double change_between(const belief::RgbdFrame& a, const belief::RgbdFrame& b, int held) {
+  const int step = std::max(1, kSampled / std::max(1, held));
   if (!a.depth || !b.depth || a.depth->width() != b.depth->width() || a.depth->height() != b.depth->height())
     return 1.0;
   const bool colors = a.color && b.color && a.color->width() == a.depth->width() &&
                       b.color->width() == a.depth->width() && a.color->height() == a.depth->height() &&
                       b.color->height() == a.depth->height();
   int changed = 0, all = 0;
-  for (int y = kSampled / 2; y < a.depth->height(); y += kSampled)
-    for (int x = kSampled / 2; x < a.depth->width(); x += kSampled) {
+  for (int y = step / 2; y < a.depth->height(); y += step)
+    for (int x = step / 2; x < a.depth->width(); x += step) {
       ++all;
       const float p = (*a.depth)(x, y), q = (*b.depth)(x, y);
       bool differs = p > 0.0F && q > 0.0F && std::abs(p - q) > kChanged;
@@ -65,7 +66,8 @@ std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int
   // A quarter of the weight goes by time alone, so that stillness is seen, too.
   std::vector<double> passed(frames.size(), 0.0);
   for (std::size_t i = 1; i < frames.size(); ++i)
-    passed[i] = passed[i - 1] + change_between(frames[i - 1].observation.frame, frames[i].observation.frame);
+    passed[i] =
+        passed[i - 1] + change_between(frames[i - 1].observation.frame, frames[i].observation.frame, frames[i].sampled);
   const double all = passed.back();
   const auto at = [&](std::size_t i) {
     const double time = static_cast<double>(i) / static_cast<double>(frames.size() - 1);
@@ -97,6 +99,7 @@ core::Status WindowLikelihood::prepare() {
     filter::FilterFrame& frame = frames_.emplace_back();
     PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), seen.observation,
                                                    seen.belief->robot, colors, options, tools_, cache, &frame));
+    frame.terms.step *= seen.sampled;
     stamps_.push_back(seen.observation.stamp_ns);
     std::vector<filter::SearchTarget>& targets = targets_.emplace_back();
     for (const belief::SceneObject& object : objects_) {

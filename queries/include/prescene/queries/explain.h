@@ -20,6 +20,7 @@
 #include "prescene/belief/belief.h"
 #include "prescene/belief/event.h"
 #include "prescene/belief/observation.h"
+#include "prescene/belief/outcome.h"
 #include "prescene/belief/timeline.h"
 #include "prescene/filter/particle_filter.h"
 #include "prescene/queries/query_engine.h"
@@ -30,6 +31,9 @@ namespace prescene::queries {
 struct WindowFrame {
   belief::Observation observation;
   std::shared_ptr<const belief::Belief> belief;
+  /// The images hold every so-manyth pixel of the camera's, and the observation's camera is that of what they hold: the
+  /// likelihood looks at no others, so that frames are kept like this (prescene/service/recording/frame_history.h).
+  int sampled = 1;
 };
 
 struct ExplainWindow {
@@ -49,6 +53,12 @@ struct ExplainQuery {
   std::uint64_t seed = 1;
   belief::EventWeights weights;  ///< How probable events are before anything was seen.
   belief::EventPriors priors;    ///< Of their parameters.
+  /// Also the smallest change of the first explanation, or of the start, that would have led to a wanted outcome: to
+  /// `wanted`, or to the scene's that is called `wanted_name`; neither: that the object stays as it was.
+  bool change = false;
+  std::string wanted_name;
+  std::optional<belief::Outcome> wanted;
+  double wanted_probability = 0.9;  ///< In [0.5, 0.999].
 };
 /// kInvalidInput naming what is out of range.
 core::Status validate(const ExplainQuery& query);
@@ -93,17 +103,50 @@ struct WhereItIs {
 };
 
 struct DecidingFrame {
-  double time = 0.0;             ///< s from the window's begin.
+  double time = 0.0;      ///< s from the window's begin.
+  std::size_t frame = 0;  ///< Of the window.
+  /// Where the objects are (of ExplainAnswer::objects) in the most probable instance of the best explanation; empty =
+  /// it is not there.
+  std::vector<std::optional<belief::Pose>> X_WO;
   double against_nothing = 0.0;  ///< Nats (tempered) that it speaks for the best explanation against nothing ...
   double against_second = 0.0;   ///< ... and against the second best.
+};
+
+/// A parameter of the event, or the start, that is changed.
+struct ChangedPart {
+  std::string name, unit;
+  double from = 0.0, to = 0.0;  ///< Means of the posterior; of the start: 0, and how far it moves.
+  double deviations = 0.0;      ///< Standard deviations of the prior; of the start, of the belief.
+};
+
+/// What would have led to a wanted outcome.
+struct SmallestChange {
+  std::string wanted;  ///< Its name, or "stays as it was".
+  double wanted_probability = 0.9;
+  bool found = false;  ///< The probability below has reached it; else the change below is the best that was tried.
+  double size = 0.0;   ///< Length of the change, standard deviations; 0 = nothing has to change.
+  std::vector<ChangedPart> parts;
+  /// Share of instances with the outcome, and its interval: of `instances` that had no part in finding the change,
+  /// taken as independent.
+  double probability = 0.0, low = 0.0, high = 1.0;
+  int instances = 0;
+  double unchanged_probability = 0.0;  ///< The share without the change, of the same instances.
+  int instances_searched = 0;          ///< Simulated for all of it.
+  std::string sentence;
 };
 
 struct ExplainAnswer {
   std::vector<Explanation> explanations;  ///< Most probable first; the probabilities sum to one.
   std::vector<WhereItIs> objects;
   std::vector<DecidingFrame> frames;  ///< In the order of time.
-  std::string text;                   ///< A paragraph.
+  /// Where it was asked for, and the first explanation is an event that is simulated, or nothing; else a remark says
+  /// why not.
+  std::optional<SmallestChange> change;
+  std::string text;  ///< A paragraph.
   std::vector<std::string> remarks;
+  /// Time ran out (QueryContext::simulate_until) before the intervals were narrow; the same question says something
+  /// else on another machine then.
+  bool cut_short = false;
   double duration = 0.0;  ///< s, from the window's begin to its last frame.
   int simulated = 0;      ///< Instances.
   int evaluated = 0;      ///< Instances that were weighed.
@@ -111,9 +154,10 @@ struct ExplainAnswer {
   std::string stepper;
 };
 
-/// kInvalidInput for a query out of range and a window without frames, kNotFound for an unknown object (with the
-/// nearest names), for one that is lost in the whole window, and where the belief holds no object; errors of the
-/// simulator and the renderer; kCancelled.
+/// kInvalidInput for a query out of range, a wanted outcome that can't be, and a window without frames, kNotFound for
+/// an unknown object or outcome (with the nearest names), for one that is lost in the whole window, and where the
+/// belief holds no object; kUnavailable where QueryContext::simulate_until came before every event was searched once;
+/// errors of the simulator and the renderer; kCancelled.
 core::Result<ExplainAnswer> explain(const ExplainWindow& window, const ExplainQuery& query,
                                     const ExplainContext& context);
 
