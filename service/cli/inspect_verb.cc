@@ -35,10 +35,13 @@ struct InspectOptions {
 
 constexpr const char* kMeshOptions[] = {"--output", "--use", "--density", "--scale", "--y-up", "--report"};
 /// What says which frame is looked at, and how.
-constexpr const char* kFrameOptions[] = {
-    "--frame",        "--scene",       "--overlay",     "--likelihood-map",    "--camera",   "--depth-topic",
-    "--color-topic",  "--depth-form",  "--color-form",  "--camera-info-topic", "--tf-topic", "--tf-static-topic",
-    "--use-sim-time", "--world-frame", "--camera-pose", "--rectified"};
+std::vector<std::string> frame_options(const CLI::App& verb) {
+  std::vector<std::string> names = {"--frame", "--scene", "--overlay", "--likelihood-map"};
+  for (const char* group : {"Topics", "Camera"})
+    for (const CLI::Option* option : verb.get_option_group(group)->get_options())
+      names.push_back("--" + option->get_lnames().front());
+  return names;
+}
 constexpr const char* kOtherRecordingOptions[] = {"--depth-scale", "--depth-noise"};
 
 bool is_recording(const std::filesystem::path& path) {
@@ -47,18 +50,15 @@ bool is_recording(const std::filesystem::path& path) {
 
 /// kInvalidInput for an option that is for the other kind of file.
 core::Status check_options(const InspectOptions& options, bool recording) {
-  std::vector<const char*> others;
-  if (recording) {
-    others.assign(std::begin(kMeshOptions), std::end(kMeshOptions));
-  } else {
-    others.assign(std::begin(kFrameOptions), std::end(kFrameOptions));
+  std::vector<std::string> others(std::begin(kMeshOptions), std::end(kMeshOptions));
+  if (!recording) {
+    others = frame_options(*options.verb);
     others.insert(others.end(), std::begin(kOtherRecordingOptions), std::end(kOtherRecordingOptions));
   }
-  for (const char* name : others)
+  for (const std::string& name : others)
     if (options.verb->count(name) > 0)
-      return core::invalid_input(std::string(name) + " is for " + (recording ? "meshes" : "recordings") + ", and " +
-                                 options.file + " is " +
-                                 (recording ? "a recording" : "no recording (.mcap, .db3, or a folder)") +
+      return core::invalid_input(name + " is for " + (recording ? "meshes" : "recordings") + ", and " + options.file +
+                                 " is " + (recording ? "a recording" : "no recording (.mcap, .db3, or a folder)") +
                                  ": leave it out, or name another file");
   return core::ok_status();
 }
@@ -174,17 +174,17 @@ core::Status run(InspectOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_options(options, recording));
   if (!recording) return inspect_mesh(options, context);
   PRESCENE_RETURN_IF_ERROR(check_folder_options(*options.verb, options.file));
-  const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
+  const std::vector<std::string> of_frames = frame_options(*options.verb);
+  const auto given = [&options](const std::string& name) { return options.verb->count(name) > 0; };
   if (options.depth_noise) {
-    for (const char* name : kFrameOptions)
-      if (given(name))
-        return core::invalid_input(std::string(name) + " does not go with --depth-noise: leave one of them out");
+    for (const std::string& name : of_frames)
+      if (given(name)) return core::invalid_input(name + " does not go with --depth-noise: leave one of them out");
     PRESCENE_TRY(const DepthNoise noise, depth_noise_of(options.file, options.recording.input.metres_per_unit,
                                                         context.progress("reading"), context.cancellation()));
     context.print(to_json(noise), text_of(noise));
     return core::ok_status();
   }
-  if (interfaces::is_bag(options.file) && std::none_of(std::begin(kFrameOptions), std::end(kFrameOptions), given))
+  if (interfaces::is_bag(options.file) && std::none_of(of_frames.begin(), of_frames.end(), given))
     return describe_recording(options.file, context);
   options.recording.verb = options.verb;
   options.recording.input.path = options.file;
