@@ -25,8 +25,8 @@ constexpr int kBisections = 4, kShiftRounds = 4;
 constexpr std::size_t kShifts = 20, kLeaders = 5;
 // A shift of several parameters is preferred to one of a single parameter where it is so much shorter.
 constexpr double kWorthMixing = 0.8;
-constexpr double kWorthTellingPart = 0.1;                               // share of the shift's length
-constexpr int kChangeTests = 3;                                           // at most, each with fresh draws; ...
+constexpr double kReportedShare = 0.1;                                  // share of the shift's length
+constexpr int kChangeTests = 3;                                         // at most, each with fresh draws; ...
 constexpr double kStretch = 1.12;                                       // ... so much longer than the one before
 constexpr double kKeptTilt = std::numbers::pi / 6.0, kKeptDrop = 0.05;  // rad and m
 
@@ -288,7 +288,7 @@ class ChangeSearcher {
     double of_start = 0.0;
     for (std::size_t i = 0; i < free_.size(); ++i) {
       if (free_[i].value == nullptr) of_start += shift[i] * shift[i];
-      if (free_[i].value == nullptr || std::abs(shift[i]) <= kWorthTellingPart * change.size) continue;
+      if (free_[i].value == nullptr || std::abs(shift[i]) <= kReportedShare * change.size) continue;
       ChangedPart part{free_[i].name, free_[i].unit, 0.0, 0.0, std::abs(shift[i])};
       for (std::size_t d = 0; d < events_before.size(); ++d) {
         part.from += free_[i].value(events_before[d]) / static_cast<double>(events_before.size());
@@ -297,7 +297,7 @@ class ChangeSearcher {
       change.parts.push_back(std::move(part));
     }
     of_start = std::sqrt(of_start);
-    if (of_start <= kWorthTellingPart * change.size) return;
+    if (of_start <= kReportedShare * change.size) return;
     // How far its start moves, on average.
     ChangedPart part{"place at the begin", "m", 0.0, 0.0, of_start};
     for (std::size_t d = 0; d < before.size(); ++d)
