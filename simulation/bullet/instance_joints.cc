@@ -107,11 +107,14 @@ bool InstanceWorld::aim_joints() {
 }
 
 bool InstanceWorld::solve_with_joints(const core::Cancellation* cancellation) {
+  if (!joints_.empty()) found_.assign(contacts_.begin(), contacts_.end());
   for (int aims = 0;; ++aims) {
     fill_bodies();
     if (!solver_.solve_step(rigid_pointers_, contacts_, joints_, settings_, part_, results_, cancellation))
       return false;
     if (joints_.empty() || aims == kMostAims || !aim_joints()) break;
+    // Contacts start anew: of one that hits, the impulse found would pass for what the body did before it.
+    for (std::size_t i = 0; i < contacts_.size(); ++i) contacts_[i] = found_[i];
   }
   for (std::size_t k = 0; k < joints_.size(); ++k) hinged_[joint_ids_[k]].impulse = joints_[k].impulse;
   return true;

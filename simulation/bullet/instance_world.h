@@ -241,6 +241,7 @@ class InstanceWorld {
   std::vector<SolverJoint> joints_;           // that act in this step
   std::vector<std::size_t> joint_ids_;        // of these, among the scene's
   std::vector<std::array<double, 5>> begun_;  // their errors at the step's beginning
+  std::vector<SolverContact> found_;          // contacts before they are solved with joints
   std::vector<SolverContact> pressed_;        // in the parts of this step that are over
   std::vector<std::uint64_t> contact_keys_;
   std::vector<std::unique_ptr<btRigidBody>> rigid_;

@@ -277,13 +277,14 @@ TEST(Joints, DirectlyJointedPartsDoNotTouchAndOthersDo) {
   // From where the block starts, its front has 0.4 m to go.
   scene.supports.push_back(support_of("wall", block_of({0.6, 0.6, 0.6}), Pose::from_translation({-0.75, 0.0, 0.0})));
   WorldState start = start_of(scene);
-  start.objects[0].V_WO.linear = {-0.4, 0.0, 0.0};
+  start.objects[0].V_WO.linear = {-0.41, 0.0, 0.0};
   auto instance = instance_of(scene);
   instance->set_state(start);
   step_for(*instance, 0.5);
-  EXPECT_NEAR(joint_now(scene, *instance).position, 0.2, 1e-6);  // out of the cabinet, which does not stop it
+  EXPECT_NEAR(joint_now(scene, *instance).position, 0.205, 1e-6);  // out of the cabinet, which does not stop it
   const auto run = run_one(*simulator_of(scene), start, {.stop = {.duration = 1.5, .stop_at_rest = false}});
-  EXPECT_NEAR(belief::joint_states(scene, run.final())[0].position, 0.4, 1e-3);
+  // It may stop short by what it goes in a step.
+  EXPECT_NEAR(belief::joint_states(scene, run.final())[0].position, 0.4, 2e-3);
   ASSERT_FALSE(run.contacts.empty());
   for (const belief::ContactInterval& contact : run.contacts) EXPECT_EQ(contact.second, 2);  // the wall
 }
