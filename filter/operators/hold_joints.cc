@@ -94,13 +94,13 @@ Matrix56d by_twist(const Matrix56d& slope, const Pose& X) {
 template <int kRows>
 double measure(const Eigen::Matrix<double, kRows, 12>& H, const Eigen::Matrix<double, kRows, 1>& innovation,
                const Eigen::Matrix<double, kRows, kRows>& noise, Particle& particle) {
-  const Eigen::Matrix<double, kRows, 12> HS = H * particle.covariance;
-  const Eigen::Matrix<double, kRows, kRows> spread = HS * H.transpose() + noise;
+  const Eigen::Matrix<double, kRows, 12> cross = H * particle.covariance;
+  const Eigen::Matrix<double, kRows, kRows> spread = cross * H.transpose() + noise;
   Eigen::Matrix<double, kRows, 13> right;
-  right << HS, innovation;
+  right << cross, innovation;
   const Eigen::MatrixXd solved = geometry::solve_symmetric(spread, right);
-  const Eigen::Matrix<double, 12, 1> change = HS.transpose() * solved.col(12);
-  const belief::Matrix12d after = particle.covariance - HS.transpose() * solved.leftCols(12);
+  const Eigen::Matrix<double, 12, 1> change = cross.transpose() * solved.col(12);
+  const belief::Matrix12d after = particle.covariance - cross.transpose() * solved.leftCols(12);
   particle.covariance = 0.5 * (after + after.transpose());
   particle.X_WO = geometry::normalized(geometry::box_plus(particle.X_WO, change.head<6>()));
   particle.V_WO.angular += change.segment<3>(6);

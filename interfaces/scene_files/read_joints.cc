@@ -75,7 +75,7 @@ class JointReader {
                     "make it the parent, or an object");
       return {};
     }
-    const std::string child = context_.read_name(at, context_.objects, "an object");
+    std::string child = context_.read_name(at, context_.objects, "an object");
     if (child.empty()) return child;
     for (const Joint& other : context_.scene.joints) {
       if (other.child != child) continue;
@@ -101,7 +101,7 @@ class JointReader {
     names.insert(names.end(), context_.supports.begin(), context_.supports.end());
     if (at.text == belief::kWorldName && !has(names, at.text)) return {};
     names.emplace_back(belief::kWorldName);
-    const std::string parent = context_.read_name(at, names, "an object, a support or 'world'");
+    std::string parent = context_.read_name(at, names, "an object, a support or 'world'");
     if (!parent.empty() && parent == joint_.child)
       problems_.add(at.place, at.path, "the parent and the child are the same", "name what the child moves against");
     return parent;
