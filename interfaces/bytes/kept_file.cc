@@ -67,6 +67,11 @@ Status KeptFile::wait() {
   return status_;
 }
 
+bool KeptFile::is_busy() const {
+  const std::lock_guard lock(mutex_);
+  return waiting_.has_value() || is_writing_;
+}
+
 Status KeptFile::status() const {
   const std::lock_guard lock(mutex_);
   return status_;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <deque>
 #include <exception>
@@ -123,6 +124,34 @@ void check_buffer(const DdsOptions& options, const core::LogSink& log) {
 
 }  // namespace
 
+namespace {
+
+/// Of a CDR message: its header, the client and its request's number, and the request's own fields. Nothing where it is
+/// none of ours.
+std::optional<ServiceRequest> parse_request(const std::vector<std::uint8_t>& cdr, bool has_text) {
+  constexpr std::size_t kHeader = 4, kIdentity = 16, kLongest = std::size_t{4} << 20;
+  if (cdr.size() < kHeader + kIdentity || cdr.size() > kLongest || cdr[0] != 0 || cdr[1] > 1) return std::nullopt;
+  const bool is_little = cdr[1] == 1;
+  const auto number_at = [&](std::size_t at) {
+    std::uint64_t number = 0;
+    for (std::size_t i = 0; i < 8; ++i) number = number << 8 | cdr[at + (is_little ? 7 - i : i)];
+    return number;
+  };
+  ServiceRequest request;
+  request.client = number_at(kHeader);
+  request.sequence = static_cast<std::int64_t>(number_at(kHeader + 8));
+  if (!has_text) return request;
+  // The fields are aligned to 16 bytes, so that they are a message of their own.
+  std::vector<std::uint8_t> body(cdr.begin(), cdr.begin() + kHeader);
+  body.insert(body.end(), cdr.begin() + kHeader + kIdentity, cdr.end());
+  auto text = decode_cdr<RosString>(body, kSmallMessage);
+  if (!text) return std::nullopt;
+  request.text = std::move(text->data);
+  return request;
+}
+
+}  // namespace
+
 struct DdsNode::Impl {
   struct Subscription {
     std::string topic;
@@ -139,6 +168,12 @@ struct DdsNode::Impl {
     std::string type;
     dds_entity_t writer = 0;
   };
+  struct Service {
+    std::string name;
+    const ServiceType* type = nullptr;
+    dds_entity_t requests = 0;  // reader
+    dds_entity_t replies = 0;   // writer
+  };
 
   DdsOptions options;
   dds_entity_t participant = 0;
@@ -147,9 +182,10 @@ struct DdsNode::Impl {
   std::unique_ptr<GraphAnnouncement> graph;
   BusCensus census;
   std::string interfaces;    // as Cyclone names those that it uses, or ""
-  mutable std::mutex mutex;  // guards the two lists; their entries stay where they are
+  mutable std::mutex mutex;  // guards the three lists; their entries stay where they are
   std::deque<Subscription> subscriptions;
   std::deque<Publication> publications;
+  std::deque<Service> services;
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<bool> stopping{false};
   std::thread thread;
@@ -172,6 +208,9 @@ struct DdsNode::Impl {
   void deliver(Subscription& subscription, const ddsi_serdata* sample, const dds_sample_info_t& info);
   void count_losses(Subscription& subscription, std::uint64_t arrived);
   core::Result<dds_entity_t> make_topic(const std::string& topic, const std::string& type) const;
+  /// Has `reader` listened to; the lock is held.
+  core::Status listen(const std::string& topic, const std::string& type, dds_entity_t topic_entity, const QosPtr& qos,
+                      std::function<void(ReceivedMessage&&)> on_message);
   template <class CType, class Message>
   core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
   void announce();
@@ -267,6 +306,7 @@ void DdsNode::Impl::announce() {
   std::vector<dds_entity_t> writers;
   for (const Subscription& subscription : subscriptions) readers.push_back(subscription.reader);
   for (const Publication& publication : publications) writers.push_back(publication.writer);
+  for (const Service& service : services) writers.push_back(service.replies);
   graph->publish(options.node_name, readers, writers);
 }
 
@@ -312,11 +352,9 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   return std::unique_ptr<DdsNode>(new DdsNode(std::move(impl)));
 }
 
-core::Status DdsNode::subscribe(const std::string& topic, const std::string& type, TopicQos qos,
-                                std::function<void(ReceivedMessage&&)> on_message) {
-  PRESCENE_TRY(const dds_entity_t topic_entity, impl_->make_topic(topic, type));
-  const std::lock_guard lock(impl_->mutex);
-  Impl::Subscription& subscription = impl_->subscriptions.emplace_back();
+core::Status DdsNode::Impl::listen(const std::string& topic, const std::string& type, dds_entity_t topic_entity,
+                                   const QosPtr& qos, std::function<void(ReceivedMessage&&)> on_message) {
+  Subscription& subscription = subscriptions.emplace_back();
   subscription.topic = topic;
   subscription.type = type;
   subscription.on_message = std::move(on_message);
@@ -332,18 +370,25 @@ core::Status DdsNode::subscribe(const std::string& topic, const std::string& typ
   core::Status made = dds_status(dds_set_topic_filter_extended(topic_entity, &filter), "topic " + topic);
   dds_entity_t reader = 0;
   if (made.ok()) {
-    reader = dds_create_reader(impl_->participant, topic_entity, make_qos(qos, type).get(), nullptr);
+    reader = dds_create_reader(participant, topic_entity, qos.get(), nullptr);
     made = dds_status(reader, "reader of " + topic);
   }
   if (!made.ok()) {
-    impl_->subscriptions.pop_back();
+    subscriptions.pop_back();
     return made;
   }
   subscription.reader = reader;
-  impl_->announce();
+  announce();
   dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
-  return dds_status(dds_waitset_attach(impl_->waitset, reader, static_cast<dds_attach_t>(impl_->subscriptions.size())),
+  return dds_status(dds_waitset_attach(waitset, reader, static_cast<dds_attach_t>(subscriptions.size())),
                     "reader of " + topic);
+}
+
+core::Status DdsNode::subscribe(const std::string& topic, const std::string& type, TopicQos qos,
+                                std::function<void(ReceivedMessage&&)> on_message) {
+  PRESCENE_TRY(const dds_entity_t topic_entity, impl_->make_topic(topic, type));
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->listen(topic, type, topic_entity, make_qos(qos, type), std::move(on_message));
 }
 
 core::Result<DdsPublisher> DdsNode::advertise(const std::string& topic, const std::string& type, TopicQos qos) {
@@ -388,6 +433,9 @@ core::Status DdsNode::publish(DdsPublisher publisher, const RosCameraInfo& messa
 core::Status DdsNode::publish(DdsPublisher publisher, const RosTfMessage& message) {
   return impl_->write<tf2_msgs_msg_dds__TFMessage_>(publisher, "tf2_msgs/msg/TFMessage", message);
 }
+core::Status DdsNode::publish(DdsPublisher publisher, const RosJointState& message) {
+  return impl_->write<sensor_msgs_msg_dds__JointState_>(publisher, "sensor_msgs/msg/JointState", message);
+}
 core::Status DdsNode::publish(DdsPublisher publisher, const RosString& message) {
   return impl_->write<std_msgs_msg_dds__String_>(publisher, "std_msgs/msg/String", message);
 }
@@ -424,6 +472,7 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
   if (type == "sensor_msgs/msg/CompressedImage") return decoded(RosCompressedImage{});
   if (type == "sensor_msgs/msg/PointCloud2") return decoded(RosPointCloud2{});
   if (type == "sensor_msgs/msg/CameraInfo") return decoded(RosCameraInfo{});
+  if (type == "sensor_msgs/msg/JointState") return decoded(RosJointState{});
   if (type == "tf2_msgs/msg/TFMessage") return decoded(RosTfMessage{});
   if (type == "std_msgs/msg/String") return decoded(RosString{});
   if (type == "rosgraph_msgs/msg/Clock") return decoded(RosClock{});
@@ -433,8 +482,81 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
   if (type == "diagnostic_msgs/msg/DiagnosticArray") return decoded(RosDiagnosticArray{});
   return core::unsupported("messages of type '" + type + "' can't be published from recordings");
 }
-core::Status DdsNode::publish(DdsPublisher publisher, const RosJointState& message) {
-  return impl_->write<sensor_msgs_msg_dds__JointState_>(publisher, "sensor_msgs/msg/JointState", message);
+
+core::Status DdsNode::offer_service(const std::string& name, const std::string& type,
+                                    std::function<void(ServiceRequest&&)> on_request) {
+  PRESCENE_TRY(const std::string dds_name, dds_topic_name(name));
+  const std::string rest = dds_name.substr(2);  // behind "rt"
+  const ServiceType* service_type = find_service_type(type);
+  if (service_type == nullptr)
+    return core::unsupported("service " + name + ": the type '" + type + "' is not one that this program speaks");
+  const auto topic_of = [&](const dds_topic_descriptor_t* descriptor, const std::string& topic) {
+    return dds_create_topic(impl_->participant, descriptor, topic.c_str(), nullptr, nullptr);
+  };
+  const dds_entity_t requests = topic_of(service_type->request, "rq" + rest + "Request");
+  PRESCENE_RETURN_IF_ERROR(dds_status(requests, "service " + name));
+  const dds_entity_t replies = topic_of(service_type->response, "rr" + rest + "Reply");
+  PRESCENE_RETURN_IF_ERROR(dds_status(replies, "service " + name));
+  const std::lock_guard lock(impl_->mutex);
+  // As rmw_cyclonedds_cpp numbers them: the participant's part of its GUID, and a count.
+  std::array<std::uint8_t, 16> id{};
+  dds_guid_t guid;
+  PRESCENE_RETURN_IF_ERROR(dds_status(dds_get_guid(impl_->participant, &guid), "service " + name));
+  std::copy_n(std::begin(guid.v), 12, id.begin());
+  const int index = static_cast<int>(impl_->services.size());
+  id[15] = static_cast<std::uint8_t>(index + 1);
+  const dds_entity_t writer =
+      dds_create_writer(impl_->participant, replies, make_service_qos(id, service_type->response_hash).get(), nullptr);
+  PRESCENE_RETURN_IF_ERROR(dds_status(writer, "writer of " + name));
+  impl_->services.push_back({name, service_type, 0, writer});
+  const core::Status listens = impl_->listen(name, type, requests, make_service_qos(id, service_type->request_hash),
+                                             [impl = impl_.get(), index, has_text = service_type->has_text,
+                                              on_request = std::move(on_request)](auto&& message) {
+                                               std::optional<ServiceRequest> request =
+                                                   parse_request(message.cdr, has_text);
+                                               if (!request) {
+                                                 impl->dropped.fetch_add(1, std::memory_order_relaxed);
+                                                 return;
+                                               }
+                                               request->service = index;
+                                               on_request(*std::move(request));
+                                             });
+  if (!listens.ok()) {
+    impl_->services.pop_back();
+    dds_delete(writer);
+    return listens;
+  }
+  impl_->services.back().requests = impl_->subscriptions.back().reader;
+  return core::ok_status();
+}
+
+core::Status DdsNode::reply(const ServiceRequest& request, bool success, const std::string& text) {
+  Impl::Service service;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    PRESCENE_CHECK(request.service >= 0 && request.service < static_cast<int>(impl_->services.size()));
+    service = impl_->services[static_cast<std::size_t>(request.service)];
+  }
+  // Each client writes requests and reads replies. Whoever's writer was found first has a reader soon.
+  const auto all_found = [&service] {
+    dds_subscription_matched_status_t clients{};
+    dds_publication_matched_status_t readers{};
+    return dds_get_subscription_matched_status(service.requests, &clients) != DDS_RETCODE_OK ||
+           dds_get_publication_matched_status(service.replies, &readers) != DDS_RETCODE_OK ||
+           readers.current_count >= clients.current_count;
+  };
+  constexpr std::chrono::milliseconds kLook(2);
+  const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
+  while (!all_found() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(kLook);
+  // A C struct borrows its texts.
+  char* borrowed = const_cast<char*>(text.c_str());
+  const std::string writing = "reply of " + service.name;
+  if (service.type->has_text) {
+    const prescene_msgs_srv_dds__Ask_Response_ response{request.client, request.sequence, success, borrowed};
+    return dds_status(dds_write(service.replies, &response), writing);
+  }
+  const std_srvs_srv_dds__Trigger_Response_ response{request.client, request.sequence, success, borrowed};
+  return dds_status(dds_write(service.replies, &response), writing);
 }
 
 void DdsNode::stop_receiving() { impl_->stop_receiving(); }
@@ -471,4 +593,3 @@ std::string DdsNode::interfaces() const { return impl_->interfaces; }
 std::uint64_t DdsNode::dropped_samples() const { return impl_->dropped.load(std::memory_order_relaxed); }
 
 }  // namespace prescene::interfaces
-  if (type == "sensor_msgs/msg/JointState") return decoded(RosJointState{});

@@ -33,6 +33,20 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
   return row == std::end(kRows) ? nullptr : row->descriptor;
 }
 
+const ServiceType* find_service_type(const std::string& ros_type) {
+  static constexpr ServiceType kTypes[] = {
+      {"std_srvs/srv/Trigger", &std_srvs_srv_dds__Trigger_Request__desc, &std_srvs_srv_dds__Trigger_Response__desc,
+       "RIHS01_d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199",
+       "RIHS01_2d946c21e2fc3f1e9ca6986a8191d85fcc70097a8bb7771a053564bc47009cdf", false},
+      {"prescene_msgs/srv/Ask", &prescene_msgs_srv_dds__Ask_Request__desc, &prescene_msgs_srv_dds__Ask_Response__desc,
+       "RIHS01_c6d5bcfd7a1e216797019d28e201d3d1cfcd493afd7e05cf69d4f06895893905",
+       "RIHS01_849b94f7bb2b29b7aa41c925add18dd3fa3676acac8d6ccd84a141d063178db8", true},
+  };
+  const auto* type =
+      std::find_if(std::begin(kTypes), std::end(kTypes), [&](const ServiceType& t) { return t.name == ros_type; });
+  return type == std::end(kTypes) ? nullptr : type;
+}
+
 core::Result<std::string> dds_topic_name(const std::string& ros_topic) {
   const std::string remedy =
       ": ROS names are '/' and then letters, digits, '_' and '/', no token empty or begun by a digit";
@@ -90,6 +104,10 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       depth = 5;
       reliable = false;
       break;
+    case TopicQos::kJoints:
+      depth = 100;
+      reliable = false;
+      break;
     case TopicQos::kImages:
       depth = 2;
       break;
@@ -103,10 +121,6 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       break;
     case TopicQos::kTf:
       depth = 100;
-      break;
-    case TopicQos::kJoints:
-      depth = 100;
-      reliable = false;
       break;
     case TopicQos::kLatched:
       depth = 1;
@@ -132,6 +146,20 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
     const std::string user_data = "typehash=" + std::string(type->type_hash) + ";";
     dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
   }
+  return qos;
+}
+
+QosPtr make_service_qos(const std::array<std::uint8_t, 16>& service_id, std::string_view type_hash) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  QosPtr qos = make_qos(TopicQos::kCommands, "");
+  std::string user_data = "serviceid=";
+  for (const std::uint8_t byte : service_id) {
+    if (user_data.back() != '=') user_data += '.';
+    if (byte > 15) user_data += kDigits[byte / 16];
+    user_data += kDigits[byte % 16];
+  }
+  user_data += ";typehash=" + std::string(type_hash) + ";";
+  dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
   return qos;
 }
 

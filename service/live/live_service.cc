@@ -20,6 +20,7 @@
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
 #include "prescene/service/tracking/camera_presets.h"
+#include "service_calls.h"
 
 namespace prescene::service {
 namespace {
@@ -48,8 +49,8 @@ std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
           {topics.camera_info, {.messages = 4, .bytes = kMiB}},
           {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
           {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}},
-          {topics.clock, {.messages = 4, .bytes = kMiB}}};
           {topics.joint_states, {.messages = 1000, .bytes = 4 * kMiB}},
+          {topics.clock, {.messages = 4, .bytes = kMiB}}};
 }
 
 /// True at most `rate` times a second.
@@ -112,6 +113,10 @@ struct LiveService::Impl {
   void keep_learned();
   /// The same from time to time; a failure is logged and published, and tried again.
   void look_after_learned();
+  /// Writes what was learned for who called for it, and replies once it is on the disk.
+  void look_after_saves();
+  /// What a service was called with, as if it had come on a topic: taken in and recorded.
+  void put_text(const char* topic, const std::string& text);
   /// Steps the belief if a frame is complete, records what was answered, publishes.
   void look_after_frames();
   /// Counts and logs a message that the middleware did not take.
@@ -176,10 +181,12 @@ struct LiveService::Impl {
   std::unique_ptr<interfaces::KeptFile> learned_file;    // null where none is named
   std::string kept_learned;                              // the text that it was given
   std::string learned_failure;
+  std::vector<interfaces::ServiceRequest> saves;  // that wait for the disk
   ServiceHealth last_reported;
 
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
+  std::unique_ptr<ServiceCalls> calls;
   std::unique_ptr<HistoryKeeper> history;
   std::unique_ptr<QueryWorker> worker;
 
@@ -209,9 +216,18 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
       const std::lock_guard lock(raw->answered_mutex);
       raw->answered.push_back(answer);
     }
+    raw->calls->note_answer(answer);
     if (raw->settings.on_answer) raw->settings.on_answer(answer);
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
+  ServiceCalls::Hooks hooks;
+  hooks.ask = [raw](const std::string& question) {
+    raw->put_text(kQueryTopic, question);
+    raw->worker->ask(question);
+  };
+  hooks.restart = [raw] { raw->put_text(kControlTopic, R"({"restart": true})"); };
+  hooks.keeps_learned = impl->learned_file != nullptr;
+  impl->calls = std::make_unique<ServiceCalls>(*impl->node, std::move(hooks), impl->log);
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
   impl->worker = std::make_unique<QueryWorker>(
@@ -245,6 +261,7 @@ core::Status LiveService::Impl::join_bus() {
     }
     inbox.put(std::move(message));  // for the recording; an exception of it is the node's to count
   };
+  PRESCENE_RETURN_IF_ERROR(calls->offer());
   for (const BusTopic& topic : bus_topics(settings.tracker.topics)) {
     if (topic.name == kAnswerTopic) continue;  // ours
     const auto& take = topic.name == kQueryTopic ? deliver_question : deliver;
@@ -332,6 +349,23 @@ void LiveService::Impl::look_after_learned() {
   if (learned_limit.due()) keep_learned();
 }
 
+void LiveService::Impl::look_after_saves() {
+  for (interfaces::ServiceRequest& asked : calls->take_saves()) {
+    keep_learned();
+    saves.push_back(std::move(asked));
+  }
+  if (saves.empty() || learned_file->is_busy()) return;
+  const core::Status kept = learned_file->status();
+  for (const interfaces::ServiceRequest& asked : saves)
+    calls->reply(asked, kept.ok(), kept.ok() ? "written to " + settings.learned_file.string() : kept.message());
+  saves.clear();
+}
+
+void LiveService::Impl::put_text(const char* topic, const std::string& text) {
+  inbox.put({topic, "std_msgs/msg/String", interfaces::encode_cdr(interfaces::RosString{text}), core::wall_now_ns(),
+             core::steady_now_ns()});
+}
+
 void LiveService::Impl::take_in(ReceivedMessage& message) {
   message.received_ns = std::max(message.received_ns, last_now_ns);
   last_now_ns = message.received_ns;
@@ -398,6 +432,7 @@ void LiveService::Impl::look_after_frames() {
     note_failure("a frame", error);
   }
   look_after_learned();
+  look_after_saves();
   if (diagnostics_limit.due()) publish_diagnostics();
 }
 

@@ -151,9 +151,10 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   // What is known only changes at the end, all at once.
   std::shared_ptr<const belief::Belief> before = belief_;
   WaitingControls controls = controls_;
-  if (clock_went_back) {  // Nothing is known of the time between.
+  const bool restarts = controls.take_restart();
+  if (clock_went_back || restarts) {  // Nothing is known of the time between.
     before = std::make_shared<const belief::Belief>(start(belief_->seed));
-    controls.begin_again();
+    if (clock_went_back) controls.begin_again();
   }
   // The first frame of a belief predicts nothing, so that no control could act.
   const bool predicts = before->step > 0;
@@ -176,6 +177,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   std::ranges::move(frame->doubts, std::back_inserter(step.record.degraded));
   if (!rectified_doubt_.empty()) step.record.degraded.push_back(rectified_doubt_);
   if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
+  if (restarts) step.record.degraded.push_back("started again, as a control asked");
   if (const std::uint64_t dropped = controls.dropped() - controls_.dropped(); dropped > 0)
     step.record.degraded.push_back(std::to_string(dropped) +
                                    " actions of controls were dropped: they were stamped by another clock");

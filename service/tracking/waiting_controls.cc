@@ -33,10 +33,17 @@ core::TimeNs sent_in_time_of_frames(core::TimeNs sent_ns, core::TimeNs frame_ns)
 
 core::Result<ParsedControl> parse_control(const std::string& text) {
   const auto json = parse_or_discard(text);
-  if (!json.is_object() || !json.contains("actions") || !json["actions"].is_array()) {
-    return core::invalid_input("a control is {\"stamp_ns\": n, \"actions\": [...]}, this one is not");
-  }
   ParsedControl control;
+  if (json.is_object() && json.contains("restart")) {
+    if (json["restart"] != true || json.contains("actions"))
+      return core::invalid_input("restart: true is needed, and no 'actions' beside it");
+    control.restarts = true;
+    return control;
+  }
+  if (!json.is_object() || !json.contains("actions") || !json["actions"].is_array()) {
+    return core::invalid_input(
+        "a control is {\"stamp_ns\": n, \"actions\": [...]} or {\"restart\": true}, this one is neither");
+  }
   if (json.contains("stamp_ns")) {
     if (!json["stamp_ns"].is_number_integer())
       return core::invalid_input("stamp_ns: not a whole number of nanoseconds");
@@ -87,6 +94,11 @@ core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message
                                       std::optional<core::TimeNs> newest_frame_ns) {
   PRESCENE_TRY(const auto text, interfaces::decode_cdr<interfaces::RosString>(message.cdr, interfaces::kSmallMessage));
   PRESCENE_TRY(ParsedControl control, parse_control(text.data));
+  if (control.restarts) {
+    waiting_.clear();
+    restarts_ = true;
+    return core::ok_status();
+  }
   if (control.stamp_ns && newest_frame_ns && *control.stamp_ns - *newest_frame_ns > kFarthestAheadNs) {
     const auto seconds = [](core::TimeNs time_ns) { return core::fixed_text(core::seconds_of(time_ns), 3) + " s"; };
     return core::invalid_input("stamp_ns: " + seconds(*control.stamp_ns) + " is more than " +

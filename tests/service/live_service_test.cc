@@ -16,6 +16,7 @@
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/live/bus_replay.h"
 #include "prescene/service/load_scene.h"
+#include "tests/interfaces/dds/service_client.h"
 #include "tests/service/robot_on_bus.h"
 #include "tests/support/paths.h"
 
@@ -67,6 +68,7 @@ class LiveServiceTest : public ::testing::Test {
     settings.dds.domain = own_domain();
     settings.diagnostics_rate = 50.0;
     settings.tracker.topics.clock = clock;
+    settings.learned_file = learned_file_;
     const core::LogSink log = [this](core::LogLevel, const std::string& text) {
       const std::lock_guard lock(log_mutex_);
       log_.push_back(text);
@@ -118,6 +120,7 @@ class LiveServiceTest : public ::testing::Test {
   core::Cancellation cancellation_;
   core::Status status_;
   std::unique_ptr<LiveService> service_;
+  std::string learned_file_;
   std::thread runner_;
 };
 
@@ -141,6 +144,71 @@ TEST_F(LiveServiceTest, TracksPublishesAndAnswers) {
       },
       kNoon + 2000 * kSecond));
   EXPECT_THAT(robot_.answers().front(), HasSubstr("\"7\""));
+  EXPECT_TRUE(stop().ok());
+}
+
+TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon, 6));
+  tests::ServiceClient where(own_domain(), "/prescene/where");
+  ASSERT_TRUE(where.wait_for_service());
+  const auto known = where.call();
+  ASSERT_TRUE(known.has_value());
+  EXPECT_TRUE(known->success) << known->text;
+  const auto json = nlohmann::ordered_json::parse(known->text);
+  EXPECT_FALSE(json.contains("id"));
+  EXPECT_EQ(json.at("where").at("items").at(0).at("object"), "box") << known->text;
+  tests::ServiceClient relations(own_domain(), "/prescene/relations");
+  ASSERT_TRUE(relations.wait_for_service());
+  const auto related = relations.call();
+  ASSERT_TRUE(related.has_value());
+  EXPECT_TRUE(related->success) << related->text;
+  tests::ServiceClient ask(own_domain(), "/prescene/ask", true);
+  ASSERT_TRUE(ask.wait_for_service());
+  const auto asked = ask.call(R"({"where": {"object": "box"}})");
+  ASSERT_TRUE(asked.has_value());
+  EXPECT_TRUE(asked->success) << asked->text;
+  for (const char* nonsense : {"", "no JSON", "[]", R"({"where": 7})", R"({"stability": {"object": "nobody"}})"}) {
+    const auto refused = ask.call(nonsense);
+    ASSERT_TRUE(refused.has_value()) << nonsense;
+    EXPECT_FALSE(refused->success) << nonsense;
+    EXPECT_THAT(refused->text, HasSubstr("\"error\"")) << nonsense;
+  }
+  tests::ServiceClient save(own_domain(), "/prescene/save_learned");
+  ASSERT_TRUE(save.wait_for_service());
+  const auto saved = save.call();
+  ASSERT_TRUE(saved.has_value());
+  EXPECT_FALSE(saved->success);
+  EXPECT_THAT(saved->text, HasSubstr("--learned FILE"));
+  tests::ServiceClient restart(own_domain(), "/prescene/restart");
+  ASSERT_TRUE(restart.wait_for_service());
+  const std::size_t before = robot_.beliefs().size();
+  const auto restarted = restart.call();
+  ASSERT_TRUE(restarted.has_value());
+  EXPECT_TRUE(restarted->success);
+  EXPECT_TRUE(robot_.send_until(
+      [&] {
+        const std::vector<std::string> beliefs = robot_.beliefs();
+        return std::any_of(beliefs.begin() + static_cast<std::ptrdiff_t>(before), beliefs.end(), [](const auto& text) {
+          const auto summary = belief_summary_from_json(text);
+          return summary && summary->step == 1;
+        });
+      },
+      kNoon + 100 * kSecond));
+}
+
+TEST_F(LiveServiceTest, AServiceSavesWhatWasLearned) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path file = folder.path() / "learned.yaml";
+  learned_file_ = file.string();
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  tests::ServiceClient save(own_domain(), "/prescene/save_learned");
+  ASSERT_TRUE(save.wait_for_service());
+  const auto saved = save.call();
+  ASSERT_TRUE(saved.has_value());
+  EXPECT_TRUE(saved->success) << saved->text;
+  EXPECT_TRUE(std::filesystem::exists(file));
   EXPECT_TRUE(stop().ok());
 }
 

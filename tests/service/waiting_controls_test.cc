@@ -123,6 +123,54 @@ TEST(IdleControls, AreThoseOfWhatIsNotThereOrNotHeld) {
             "the action 'grasp' of 'box' changes nothing: the scene has no robot body 'foot'");
 }
 
+TEST(WaitingControls, ARestartDropsWhatWaitsAndIsToldOnce) {
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(kRelease, kNoon), kNoon).ok());
+  EXPECT_FALSE(controls.take_restart());
+  ASSERT_TRUE(controls.take_in(message(R"({"restart": true})", kNoon), kNoon).ok());
+  EXPECT_EQ(controls.count(), 0u);
+  EXPECT_TRUE(controls.take_restart());
+  EXPECT_FALSE(controls.take_restart());
+  for (const char* nonsense : {R"({"restart": false})", R"({"restart": 1})", R"({"restart": true, "actions": []})"})
+    EXPECT_THAT(controls.take_in(message(nonsense, kNoon), kNoon).message(), HasSubstr("restart: true")) << nonsense;
+  EXPECT_FALSE(controls.take_restart());
+}
+
+TEST(Tracker, ARestartBeginsTheBeliefAnewAndSaysSo) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path path = folder.path() / "run.mcap";
+  core::ThreadPool pool(1);
+  Backends backends(pool);
+  const std::string yaml = tests::box_on_table("0.5");
+  const auto scene = load_scene_text(yaml, "box.yaml", {});
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  ASSERT_TRUE(tests::record_scene(yaml, {}, 10.0, path).ok());
+  const auto tracker = Tracker::create(*scene, {}, 1, backends);
+  ASSERT_TRUE(tracker.ok()) << tracker.status().message();
+  const auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  std::vector<std::uint64_t> steps;
+  for (;;) {
+    const auto entry = (*reader)->next();
+    ASSERT_TRUE(entry.ok());
+    if (!*entry) break;
+    if ((*entry)->is_json) continue;
+    ASSERT_TRUE((*tracker)->take_in((*entry)->message, (*entry)->index).ok());
+    while (const auto step = (*tracker)->step((*entry)->message.received_ns)) {
+      steps.push_back(step->record.step);
+      const bool says =
+          !step->record.degraded.empty() && step->record.degraded.back() == "started again, as a control asked";
+      EXPECT_EQ(says, steps.size() == 4);
+      if (steps.size() == 3) {
+        ASSERT_TRUE((*tracker)->take_in(message(R"({"restart": true})", kNoon), 1'000'000).ok());
+      }
+    }
+  }
+  ASSERT_GE(steps.size(), 5u);
+  steps.resize(5);
+  EXPECT_THAT(steps, ElementsAre(1, 2, 3, 1, 2));
+}
+
 TEST(Tracker, AGraspBeforeTheFirstFrameActsInTheFirstStepThatPredicts) {
   const tests::ScratchDir folder;
   const std::filesystem::path path = folder.path() / "run.mcap";

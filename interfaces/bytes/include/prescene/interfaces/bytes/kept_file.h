@@ -32,6 +32,8 @@ class KeptFile {
   void put(std::string text);
   /// Waits until nothing waits, then as status().
   core::Status wait();
+  /// Whether something that was put is not written yet.
+  bool is_busy() const;
   /// Of the last one that was written: errors of write_file, and of a disk that does not keep it.
   core::Status status() const;
 

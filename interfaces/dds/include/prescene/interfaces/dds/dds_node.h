@@ -81,6 +81,14 @@ struct DdsPublisher {
   int index = -1;
 };
 
+/// What a client of a service of ours asks, as rmw_cyclonedds_cpp sends it.
+struct ServiceRequest {
+  int service = -1;          ///< Of the node: in the order of offer_service().
+  std::uint64_t client = 0;  ///< The client's own number, and that of its request: the reply repeats both.
+  std::int64_t sequence = 0;
+  std::string text;  ///< The request's one field, for types that have one.
+};
+
 class DdsNode {
  public:
   /// Joins the bus. Fails with kUnavailable and Cyclone's own words when the participant can't be made (a misspelt
@@ -106,6 +114,7 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosPointCloud2& message);
   core::Status publish(DdsPublisher publisher, const RosCameraInfo& message);
   core::Status publish(DdsPublisher publisher, const RosTfMessage& message);
+  core::Status publish(DdsPublisher publisher, const RosJointState& message);
   core::Status publish(DdsPublisher publisher, const RosString& message);
   core::Status publish(DdsPublisher publisher, const RosClock& message);
   core::Status publish(DdsPublisher publisher, const RosPoseWithCovarianceStamped& message);
@@ -114,7 +123,16 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
-  core::Status publish(DdsPublisher publisher, const RosJointState& message);
+
+  /// Offers a service of ROS 2, which nodes that use Cyclone DDS, too, can call (`ros2 service call`): other
+  /// middlewares carry requests in a form of their own. Types: "std_srvs/srv/Trigger" and "prescene_msgs/srv/Ask";
+  /// another one is kUnsupported. `on_request` is called as that of subscribe(); requests that make no sense count as
+  /// dropped.
+  core::Status offer_service(const std::string& name, const std::string& type,
+                             std::function<void(ServiceRequest&&)> on_request);
+  /// Answers a request; from any thread, once. Waits up to 100 ms for a client whose reader was not found yet: without
+  /// it, it would miss the reply. Errors as publish().
+  core::Status reply(const ServiceRequest& request, bool success, const std::string& text);
 
   /// No callback runs once this has returned, which takes no longer than the one that runs now; publishing goes on. Not
   /// to be called from a callback.

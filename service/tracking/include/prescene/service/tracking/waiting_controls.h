@@ -26,8 +26,9 @@ inline constexpr core::TimeNs kSameClockNs = 2'000'000'000;
 struct ParsedControl {
   std::optional<core::TimeNs> stamp_ns;
   std::vector<std::pair<core::TimeNs, belief::Action>> actions;  ///< Each with when it starts, ns after that.
+  bool restarts = false;                                         ///< The belief is to begin anew.
 };
-/// Of {"stamp_ns": n, "actions": [...]}; kInvalidInput naming the key that makes no sense.
+/// Of {"stamp_ns": n, "actions": [...]} or {"restart": true}; kInvalidInput naming the key that makes no sense.
 core::Result<ParsedControl> parse_control(const std::string& json);
 
 /// Actions that change nothing in what is tracked.
@@ -56,6 +57,10 @@ class WaitingControls {
   /// The clock went back: what waits counts from the first frame of the new one, but for what has a stamp.
   void begin_again();
 
+  /// Whether a control asked for the belief to begin anew, since this was asked last. What waited then was dropped with
+  /// it.
+  bool take_restart() { return std::exchange(restarts_, false); }
+
   /// All that is due at `end_ns`, in its order, with times in s from `begin_ns` on; what was due before has time 0.
   belief::Control due(core::TimeNs begin_ns, core::TimeNs end_ns) const;
   /// Forgets what due() said of this time.
@@ -79,6 +84,7 @@ class WaitingControls {
 
   std::vector<Waiting> waiting_;  // ascending times
   std::uint64_t dropped_ = 0;
+  bool restarts_ = false;
 };
 
 }  // namespace prescene::service
