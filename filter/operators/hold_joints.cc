@@ -24,9 +24,15 @@ using geometry::Vector6d;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 using Matrix56d = Eigen::Matrix<double, 5, 6>;
 
-constexpr double kPoseStep = 1e-5;  // rad and m, of numeric derivatives
-constexpr double kTimeStep = 1e-4;  // s
-constexpr double kClearTurn = 0.3;  // rad: an equivalent that fits better by less is left
+// How exactly real joints are where the scene says, and how exactly velocities obey them: standard deviations. Chosen.
+constexpr double kJointShift = 0.001;    // m
+constexpr double kJointTurn = 0.009;     // rad
+constexpr double kJointSpeed = 0.01;     // m/s
+constexpr double kJointRate = 0.05;      // rad/s
+constexpr double kMostJointDoubt = 8.0;  // nats; the most that being off may cost a particle; chosen
+constexpr double kPoseStep = 1e-5;       // rad and m, of numeric derivatives
+constexpr double kTimeStep = 1e-4;       // s
+constexpr double kClearTurn = 0.3;       // rad: an equivalent that fits better by less is left
 // Off by a large angle, the first update is not yet on the joint.
 constexpr int kUpdates = 2;
 
@@ -133,13 +139,13 @@ void take_fitting_equivalent(const Joint& joint, const Base& base, const geometr
 }
 
 /// Returns the nats that it costs the particle.
-double hold_pose(const Joint& joint, const Base& base, const HoldJointsOptions& options, Particle& particle) {
+double hold_pose(const Joint& joint, const Base& base, Particle& particle) {
   double nats = 0.0;
   const belief::Matrix12d before = particle.covariance;
   for (int k = 0; k < kUpdates; ++k) {
     // The second time only where the first was not enough: the same measurement counts once.
     const Vector5d off = off_joint(joint, base.X_WP, particle.X_WO);
-    const Vector5d sigma = joint_deviations(joint, options.shift, options.turn);
+    const Vector5d sigma = joint_deviations(joint, kJointShift, kJointTurn);
     if (k > 0 && (off.cwiseAbs().array() < sigma.array()).all()) break;
     if (k > 0) particle.covariance = before;
     const auto of_child = [&](const Pose& X) { return off_joint(joint, base.X_WP, X); };
@@ -155,7 +161,7 @@ double hold_pose(const Joint& joint, const Base& base, const HoldJointsOptions& 
   return nats;
 }
 
-void hold_twist(const Joint& joint, const Base& base, const HoldJointsOptions& options, Particle& particle) {
+void hold_twist(const Joint& joint, const Base& base, Particle& particle) {
   const Vector5d now = off_joint(joint, base.X_WP, particle.X_WO);
   const Vector5d then = off_joint(joint, pose_after(base.X_WP, base.V_WP, kTimeStep),
                                   pose_after(particle.X_WO, particle.V_WO, kTimeStep));
@@ -165,12 +171,12 @@ void hold_twist(const Joint& joint, const Base& base, const HoldJointsOptions& o
   H.rightCols<6>() = by_twist(derivative(of_child, particle.X_WO), particle.X_WO);
   const Matrix56d by_parent = by_twist(derivative(of_parent, base.X_WP), base.X_WP);
   Eigen::Matrix<double, 5, 5> noise = by_parent * base.twist_covariance * by_parent.transpose();
-  noise.diagonal() += joint_deviations(joint, options.speed, options.rate).cwiseAbs2();
+  noise.diagonal() += joint_deviations(joint, kJointSpeed, kJointRate).cwiseAbs2();
   measure<5>(H, (now - then) / kTimeStep, noise, particle);
 }
 
 /// Beyond a limit: back to it, and not on.
-void hold_limits(const Joint& joint, const Base& base, const HoldJointsOptions& options, Particle& particle) {
+void hold_limits(const Joint& joint, const Base& base, Particle& particle) {
   const auto state = [&](const Pose& X, const Twist& V) {
     return belief::joint_state(joint, base.X_WP, base.V_WP, X, V);
   };
@@ -186,18 +192,17 @@ void hold_limits(const Joint& joint, const Base& base, const HoldJointsOptions& 
                  (2 * kPoseStep);
   }
   const auto squared = [](double value) { return Eigen::Matrix<double, 1, 1>(value * value); };
-  measure<1>(by_pose, Eigen::Matrix<double, 1, 1>(allowed - at.position), squared(hinge ? options.turn : options.shift),
+  measure<1>(by_pose, Eigen::Matrix<double, 1, 1>(allowed - at.position), squared(hinge ? kJointTurn : kJointShift),
              particle);
   if ((at.position - allowed) * at.velocity <= 0.0) return;
   by_rate.rightCols<6>() = by_pose.leftCols<6>();
   by_rate.segment<3>(6) = by_pose.head<3>() * particle.X_WO.rotation.toRotationMatrix().transpose();
-  measure<1>(by_rate, Eigen::Matrix<double, 1, 1>(-at.velocity), squared(hinge ? options.rate : options.speed),
-             particle);
+  measure<1>(by_rate, Eigen::Matrix<double, 1, 1>(-at.velocity), squared(hinge ? kJointRate : kJointSpeed), particle);
 }
 
 }  // namespace
 
-void hold_joints(belief::Belief& belief, const HoldJointsOptions& options) {
+void hold_joints(belief::Belief& belief) {
   if (belief.scene->joints.empty()) return;
   for (const int j : belief::joint_order(*belief.scene)) {
     const Joint& joint = belief.scene->joints[static_cast<std::size_t>(j)];
@@ -206,13 +211,13 @@ void hold_joints(belief::Belief& belief, const HoldJointsOptions& options) {
     if (!index || !base) continue;
     ObjectBelief& child = belief.objects[static_cast<std::size_t>(*index)];
     if (child.particles.empty() || belief.scene->objects[static_cast<std::size_t>(*index)].held_by) continue;
-    double least = options.most_doubt;
+    double least = kMostJointDoubt;
     std::vector<double> nats;
     for (Particle& particle : child.particles) {
       take_fitting_equivalent(joint, *base, belief::model_of(belief, child).symmetry, particle);
-      nats.push_back(std::min(options.most_doubt, hold_pose(joint, *base, options, particle)));
-      hold_twist(joint, *base, options, particle);
-      hold_limits(joint, *base, options, particle);
+      nats.push_back(std::min(kMostJointDoubt, hold_pose(joint, *base, particle)));
+      hold_twist(joint, *base, particle);
+      hold_limits(joint, *base, particle);
       least = std::min(least, nats.back());
     }
     for (std::size_t k = 0; k < nats.size(); ++k) child.particles[k].log_weight -= nats[k] - least;

@@ -13,18 +13,7 @@
 
 namespace prescene::filter {
 
-struct HoldJointsOptions {
-  /// m and rad. How exactly real joints are where the scene says. Ranges 1e-5 to 0.1, 1e-4 to 1. Chosen.
-  double shift = 0.001;
-  double turn = 0.009;
-  /// m/s and rad/s. How exactly velocities obey. Ranges 1e-4 to 10. Chosen.
-  double speed = 0.01;
-  double rate = 0.05;
-  /// nats. The most that being off may cost a particle. Range 0 to 100. Chosen.
-  double most_doubt = 8.0;
-};
-
 /// Children that are held by a hand, whose parent is not there, or that have no particles are left as they are.
-void hold_joints(belief::Belief& belief, const HoldJointsOptions& options = {});
+void hold_joints(belief::Belief& belief);
 
 }  // namespace prescene::filter
