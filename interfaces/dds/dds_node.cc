@@ -74,10 +74,10 @@ std::optional<int> granted_receive_buffer(int asked) {
   if (socket < 0) return std::nullopt;
   int granted = 0;
   socklen_t size = sizeof(granted);
-  const bool granted = ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &asked, sizeof(asked)) == 0 &&
-                       ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size) == 0;
+  const bool answered = ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &asked, sizeof(asked)) == 0 &&
+                        ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size) == 0;
   ::close(socket);
-  if (!granted) return std::nullopt;
+  if (!answered) return std::nullopt;
   return granted / 2;  // Linux doubles it for its own bookkeeping
 }
 
