@@ -29,7 +29,7 @@ constexpr RefineOptions kRivalRefine = {.steps = 5, .first_gate = 0.03, .last_ga
 constexpr double kMostInSupport = 0.25;  // share of a rival; as of finds
 constexpr double kFoundLogOdds = -3.0;   // nats; rivals of a find that are less likely are not kept
 constexpr double kSlipLogOdds = -5.0;    // nats; prior log odds of what was followed to be turned otherwise
-constexpr double kLeastGain = 2.5;       // nats; of a frame, for a rival of what was followed
+constexpr double kTrackedLogOdds = 2.5;  // nats; of a frame, for a rival of what was followed
 constexpr double kFirstLogOdds = -3.5;   // nats; one frame alone makes it no likelier than this
 constexpr double kOpenLogOdds = -3.0;    // nats; a turn that is less likely was decided against: the prior counts
 constexpr double kCommonShare = 0.5;     // of the variance of a frame's errors, as of what lies still
@@ -272,7 +272,7 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
                    const InitialiseOptions& spread, const FilterTools& tools, ObjectBelief& object) {
   const Particle best = belief::heaviest(object.particles);
   const bool is_found = prior == RivalPrior::kFound;
-  const double least = is_found ? kFoundLogOdds : kLeastGain;
+  const double least = is_found ? kFoundLogOdds : kTrackedLogOdds;
   std::vector<Pose> standing = {best.X_WO};
   for (const Particle& particle : object.particles) {
     if (standing.size() >= kMostStanding) break;

@@ -17,7 +17,7 @@ using geometry::SymmetryGroup;
 
 constexpr double kShapeTolerance = 0.003;  // m; what depth can't tell apart
 constexpr int kTurns = 72;                 // compared about a continuous axis
-constexpr int kMostRivals = 4;             // whose turns are refined
+constexpr int kMostPrintRivals = 4;        // whose turns are refined
 constexpr double kHeadTurn = 0.035;        // rad; particles nearer than this, ...
 constexpr double kHeadShift = 0.004;       // m; ... and than this, are compared with the print at one pose
 constexpr double kStep = 0.06;             // rad of a turn, between the poses through which a parabola is put
@@ -136,37 +136,37 @@ std::vector<Pose> rival_motions(const SymmetryGroup& symmetry) {
   return motions;
 }
 
-struct Rival {
+struct PrintRival {
   Pose X_OS;  ///< From the present pose.
   double log_ratio = 0.0;
   double share = 0.0;
 };
 
 /// The most probable rivals, with their turns refined; the first is the present pose.
-std::vector<Rival> compared_rivals(const PrintedModel& printed, const PrintScore& score, const Pose& X_WO,
-                                   double rival_prior) {
+std::vector<PrintRival> compared_rivals(const PrintedModel& printed, const PrintScore& score, const Pose& X_WO,
+                                        double rival_prior) {
   const SymmetryGroup& symmetry = printed.shape_symmetry;
-  std::vector<Rival> rivals;
+  std::vector<PrintRival> rivals;
   for (const Pose& motion : rival_motions(symmetry)) rivals.push_back({motion, score.log_ratio(X_WO * motion)});
   std::stable_sort(rivals.begin(), rivals.end(),
-                   [](const Rival& a, const Rival& b) { return a.log_ratio > b.log_ratio; });
-  std::vector<Rival> best = {{Pose::identity(), score.log_ratio(X_WO)}};
-  for (const Rival& rival : rivals) {
-    if (best.size() > static_cast<std::size_t>(kMostRivals)) break;
-    Rival refined = rival;
+                   [](const PrintRival& a, const PrintRival& b) { return a.log_ratio > b.log_ratio; });
+  std::vector<PrintRival> best = {{Pose::identity(), score.log_ratio(X_WO)}};
+  for (const PrintRival& rival : rivals) {
+    if (best.size() > static_cast<std::size_t>(kMostPrintRivals)) break;
+    PrintRival refined = rival;
     refined.log_ratio = score.log_ratio(X_WO * rival.X_OS);
     if (symmetry.axis)
       if (const auto turn = measured_turn(score, symmetry, X_WO * rival.X_OS)) {
         refined.X_OS = rival.X_OS * turned(symmetry, turn->angle);
         refined.log_ratio = score.log_ratio(X_WO * refined.X_OS);
       }
-    const bool is_other = std::none_of(best.begin(), best.end(), [&](const Rival& other) {
+    const bool is_other = std::none_of(best.begin(), best.end(), [&](const PrintRival& other) {
       return geometry::log_rotation(other.X_OS.rotation.conjugate() * refined.X_OS.rotation).norm() < kOtherTurn;
     });
     if (is_other) best.push_back(refined);
   }
   double total = 0.0;
-  const double largest = std::max_element(best.begin(), best.end(), [](const Rival& a, const Rival& b) {
+  const double largest = std::max_element(best.begin(), best.end(), [](const PrintRival& a, const PrintRival& b) {
                            return a.log_ratio < b.log_ratio;
                          })->log_ratio;
   for (std::size_t i = 0; i < best.size(); ++i) {
@@ -174,12 +174,12 @@ std::vector<Rival> compared_rivals(const PrintedModel& printed, const PrintScore
     best[i].share = prior * std::exp(best[i].log_ratio - largest);
     total += best[i].share;
   }
-  for (Rival& rival : best) rival.share /= total;
+  for (PrintRival& rival : best) rival.share /= total;
   return best;
 }
 
 /// Moves particles near the heaviest one to the rivals, in proportion to their shares; together they keep their weight.
-bool spread_over(const std::vector<Rival>& rivals, const std::vector<std::size_t>& members, ObjectBelief& object) {
+bool spread_over(const std::vector<PrintRival>& rivals, const std::vector<std::size_t>& members, ObjectBelief& object) {
   std::vector<std::size_t> order = members;
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return object.particles[a].log_weight > object.particles[b].log_weight;
@@ -289,11 +289,11 @@ PrintReport weigh_print(const PrintedModel& printed, const FilterFrame& frame, c
   const SymmetryGroup& symmetry = printed.shape_symmetry;
   const Pose X_WO_best = belief::heaviest(object.particles).X_WO;
   if (look != RivalLook::kNone && !symmetry.trivial()) {
-    const double prior =
-        look == RivalLook::kFound ? static_cast<double>(kMostRivals) / (kMostRivals + 1) : options.rival_prior;
-    const std::vector<Rival> rivals = compared_rivals(printed, score, X_WO_best, prior);
+    const double prior = look == RivalLook::kFound ? static_cast<double>(kMostPrintRivals) / (kMostPrintRivals + 1)
+                                                   : options.rival_prior;
+    const std::vector<PrintRival> rivals = compared_rivals(printed, score, X_WO_best, prior);
     const bool any_printed =
-        std::any_of(rivals.begin(), rivals.end(), [](const Rival& rival) { return rival.log_ratio >= kPrinted; });
+        std::any_of(rivals.begin(), rivals.end(), [](const PrintRival& rival) { return rival.log_ratio >= kPrinted; });
     std::vector<std::size_t> members;
     for (std::size_t i = 0; i < object.particles.size(); ++i)
       if (is_near(object.particles[i].X_WO, X_WO_best, kMeasuredTurn, kMeasuredTurn)) members.push_back(i);

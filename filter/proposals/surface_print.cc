@@ -17,7 +17,7 @@ constexpr double kLeastPrinted = 0.02;   // share of the surface's cubes that di
 constexpr int kWindow = 4;               // cells to either side over which brightness is normalised
 constexpr double kNoise = 4.0;           // of 255; weaker contrast than this is mostly a camera's noise
 constexpr double kLeastEnergy = 0.02;    // of a normalised cell: keeps what has no contrast from correlating
-constexpr double kDepthStep = 0.02;      // m; pixels of a cell further from its nearest ones are another surface
+constexpr double kSurfaceStep = 0.02;    // m; pixels of a cell further from its nearest ones are another surface
 constexpr int kFewestCells = 30;         // to compare
 
 double luma(const geometry::Rgb& c) { return 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]; }
@@ -217,7 +217,7 @@ PrintView::PrintView(const SurfacePrint& print, const geometry::PinholeCamera& c
       for (int v = y0; v < y0 + step; ++v)
         for (int w = x0; w < x0 + step; ++w) {
           const double z = depth(w, v);
-          if (!(z > 0.0) || z > static_cast<double>(nearest) + kDepthStep) continue;
+          if (!(z > 0.0) || z > static_cast<double>(nearest) + kSurfaceStep) continue;
           sum += z, columns += w, rows += v, lumas += luma(color(w, v));
           ++n;
         }
