@@ -126,7 +126,7 @@ int run(int count, const std::string& scenarios, const std::string& out) {
   };
   for (const auto& [name, share] :
        {Scenario{"milk_on_bin", 1}, Scenario{"pushed_stack", 1}, Scenario{"bottle_by_the_edge", 1},
-        Scenario{"tossed_box", 1}, Scenario{"mug_on_hook", 16}, Scenario{"spoon_in_mug", 32}}) {
+        Scenario{"tossed_box", 1}, Scenario{"mug_on_hook", 4}, Scenario{"spoon_in_mug", 16}}) {
     const auto scene = interfaces::read_scene(scenarios + "/" + name + ".yaml");
     if (scene) {
       compare(name, *scene, std::max(count / share, 16), table, report);

@@ -2,7 +2,9 @@
 #include "lane_spheres.h"
 
 #include <algorithm>
+#include <cmath>
 #include <new>
+#include <vector>
 
 #include "prescene/core/check.h"
 
@@ -146,9 +148,22 @@ std::shared_ptr<const SphereLanes> lanes_of(const collision::SurfaceSpheres& sph
   lanes->reach = static_cast<double>(spheres.longest_reach);
   lanes->spacing = spheres.spacing;
   const collision::PackedSphere& root = tree.root();
-  lanes->ball = (root.centre.cast<double>() - vector_of(middle)).norm() + static_cast<double>(root.radius);
+  lanes->ball =
+      (root.centre.cast<double>() - vector_of(middle)).norm() + static_cast<double>(root.radius) + lanes->reach;
   lanes->count = static_cast<int>(spheres.patches.size());
   const Vector3d origin = vector_of(middle);
+  // How far a sphere's patch reaches beyond it, and of a node the farthest below it. Children come after their nodes.
+  const auto beyond = [&](std::uint32_t sphere) {
+    const double radius = static_cast<double>(tree.packing().spheres()[sphere].radius);
+    return std::hypot(radius, static_cast<double>(spheres.patches[sphere].reach)) - radius;
+  };
+  std::vector<double> reaches(tree.nodes().size(), 0.0);
+  const auto child_reach = [&](const SphereTree::Node& node, std::size_t k) {
+    return node.is_bottom() ? beyond(tree.order()[node.first + k]) : reaches[node.first + k];
+  };
+  for (std::size_t index = tree.nodes().size(); index-- > 0;)
+    for (std::size_t k = 0; k < tree.nodes()[index].count; ++k)
+      reaches[index] = std::max(reaches[index], child_reach(tree.nodes()[index], k));
   for (std::size_t index = 0; index < tree.nodes().size(); ++index) {
     const SphereTree::Node& given = tree.nodes()[index];
     SphereLanes::Node node;
@@ -163,7 +178,7 @@ std::shared_ptr<const SphereLanes> lanes_of(const collision::SurfaceSpheres& sph
       node.x[k] = static_cast<Real>(static_cast<double>(row[k]) - origin.x());
       node.y[k] = static_cast<Real>(static_cast<double>(row[kNodeWidth + k]) - origin.y());
       node.z[k] = static_cast<Real>(static_cast<double>(row[2 * kNodeWidth + k]) - origin.z());
-      node.radius[k] = row[3 * kNodeWidth + k];
+      node.radius[k] = static_cast<Real>(static_cast<double>(row[3 * kNodeWidth + k]) + child_reach(given, k));
     }
     if (node.bottom) {
       SphereLanes::PatchRows rows{};

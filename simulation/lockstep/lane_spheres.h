@@ -22,7 +22,8 @@ inline constexpr int kNodeWidth = 16;  ///< Children of a node of a tree of sphe
 /// A tree of spheres by rows of 16: what stands for a mesh in lanes.
 struct SphereLanes {
   using Row = std::array<Real, kNodeWidth>;
-  /// Children of a node: their spheres. Unused ones are far away.
+  /// Children of a node: their spheres, larger by how far the patches below them reach beyond them. Unused ones are far
+  /// away.
   struct alignas(64) Node {
     Row x, y, z, radius;
     std::int32_t count = 0;
@@ -41,8 +42,8 @@ struct SphereLanes {
   std::vector<Node> nodes;  ///< The root first.
   std::vector<PatchRows> patches;
   std::array<double, 3> middle{};  ///< In the mesh's frame: S begins there.
-  double reach = 0.0;              ///< m: touching things may be that far from a sphere.
-  double ball = 0.0;               ///< m: about the middle, holds all.
+  double reach = 0.0;              ///< m: how far a patch reaches beyond its sphere at most.
+  double ball = 0.0;               ///< m: about the middle, holds all patches.
   double spacing = 0.0;            ///< m, of the spheres on faces.
   int count = 0;
 };

@@ -196,7 +196,7 @@ class CoreMeeting {
   HWY_INLINE M near(const SphereLanes::Node& node, std::size_t at) const {
     const V zero = set<V>(0.0);
     const Vec3<V> q = R_BS_ * Vec3<V>{load(node.x, at), load(node.y, at), load(node.z, at)};
-    const V limit = load(node.radius, at) + within_ + radius_;
+    const V limit = load(node.radius, at) + range_ + radius_;
     const Vec3<V> below = low_ - q, above = q - high_;
     const Vec3<V> beyond{hn::Max(hn::Max(below.x, above.x), zero), hn::Max(hn::Max(below.y, above.y), zero),
                          hn::Max(hn::Max(below.z, above.z), zero)};

@@ -51,7 +51,6 @@ class SphereMeeting {
       return std::sqrt(static_cast<double>(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
     };
     travel_ = set<V>(static_cast<double>(query.dt) * (size(query.velocity) + size(query.spin) * a_.ball));
-    within_ = set<V>(static_cast<double>(query.range) + a_.reach + b_.reach);
   }
 
   void meet() {
@@ -99,7 +98,7 @@ class SphereMeeting {
       for (; near_a != 0; near_a &= near_a - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(near_a));
         const Vec3<V> centre{one_lane(of_a.x[i]), one_lane(of_a.y[i]), one_lane(of_a.z[i])};
-        const V reach = one_lane(of_a.radius[i]) + within_;
+        const V reach = one_lane(of_a.radius[i]) + range_;
         std::uint32_t near = 0;
         for (std::size_t at = 0; at < count_b; at += hn::Lanes(d)) {
           const Vec3<V> apart = Vec3<V>{load(x, at), load(y, at), load(z, at)} - centre;
@@ -128,7 +127,7 @@ class SphereMeeting {
   /// Which children of a node of A's are near a node of B's.
   HWY_INLINE std::uint32_t near_sphere(const SphereLanes::Node& of_a, const SpherePairs::Nodes& two) const {
     const Vec3<V> centre{one_lane(two.x), one_lane(two.y), one_lane(two.z)};
-    const V reach = one_lane(two.radius) + within_;
+    const V reach = one_lane(two.radius) + range_;
     const auto count = static_cast<std::size_t>(of_a.count);
     std::uint32_t near = 0;
     for (std::size_t at = 0; at < count; at += hn::Lanes(D())) {
@@ -474,7 +473,7 @@ class SphereMeeting {
   const SphereLanes& b_;
   Mat3<V> R_BA_;
   Vec3<V> p_BA_, velocity_, spin_;
-  V range_, dt_, travel_, within_;
+  V range_, dt_, travel_;
   bool a_is_finer_;
 };
 

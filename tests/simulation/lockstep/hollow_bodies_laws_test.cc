@@ -142,7 +142,7 @@ TEST(HollowBodies, DropIntoEachOtherWithoutGainingEnergyOrSinkingIn) {
   add_object(scene, hollow_model("cup", cup(0.02, 0.05, 0.002), 0.05, {1000, 0.0}), "cup");
   core::RandomStream stream(9, core::Purpose::kTest);
   std::vector<WorldState> starts;
-  for (int i = 0; i < 48; ++i) {
+  for (int i = 0; i < 24; ++i) {
     WorldState start = start_of(scene);
     start.objects[0].X_WO.translation = {0.0, 0.0, 0.0005};
     start.objects[1].X_WO.translation = {stream.uniform(-0.02, 0.02), stream.uniform(-0.02, 0.02), 0.15};
@@ -170,7 +170,7 @@ TEST(HollowBodies, DropIntoEachOtherWithoutGainingEnergyOrSinkingIn) {
     EXPECT_LT(ball.head<2>().norm(), 0.037 - 0.015 + 1e-3) << i;
     EXPECT_GT(ball.z(), 0.003 + 0.015 - 1.5e-3) << i;
   }
-  EXPECT_GT(inside, 30);
+  EXPECT_GT(inside, 14);
 }
 
 }  // namespace

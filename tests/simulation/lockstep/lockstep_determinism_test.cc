@@ -92,8 +92,8 @@ Scene hollow_scene() {
     pose.covariance = geometry::Matrix6d(geometry::Matrix6d::Identity()) * 4e-4;
     scene.objects[static_cast<std::size_t>(add_object(scene, model, name))].pose = pose;
   };
-  add("bowl", spheres_of(bowl(0.06, 0.05, 0.003), {800, 0.0}), {0.06, 0.0, 0.3});
-  add("cup", spheres_of(cup(0.025, 0.06, 0.002), {800, 0.0}), {0.06, 0.01, 0.42});
+  add("bowl", spheres_of(bowl(0.06, 0.05, 0.003), {250, 0.0}), {0.06, 0.0, 0.3});
+  add("cup", spheres_of(cup(0.025, 0.06, 0.002), {250, 0.0}), {0.06, 0.01, 0.42});
   add("ball", belief::PrimitiveShape{geometry::Sphere{0.015}, Pose{}}, {0.05, 0.0, 0.55});
   return scene;
 }
