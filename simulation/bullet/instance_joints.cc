@@ -14,7 +14,7 @@ namespace {
 // m and rad: joints that are off by less at the end of a step hold.
 constexpr double kAim = 1e-9;
 // The error shrinks by the square of the angle of a step each time.
-constexpr int kMostAims = 2;
+constexpr int kMostAims = 4;
 
 }  // namespace
 
