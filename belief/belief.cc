@@ -22,7 +22,8 @@ using geometry::Matrix3d;
 // What "is where the mean says" means in ObjectEstimate::confidence.
 constexpr double kHereDistance = 0.02;                   // m
 constexpr double kHereAngle = 15.0 * geometry::kDegree;  // rad
-constexpr double kOneTurn = 30.0 * geometry::kDegree;    // rad; poses turned by less are averaged
+constexpr double kOneTurn = 30.0 * geometry::kDegree;    // rad; poses turned by no more ...
+constexpr double kOnePlace = 0.05;                       // m; ... and no further apart are averaged
 
 // Inverse of the right Jacobian of the rotation exponential: log(exp(phi) exp(e)) = phi + J e for small e.
 Matrix3d inverse_right_jacobian(const Vector3d& phi) {
@@ -103,24 +104,25 @@ double probability_of_rotation(const Particle& particle, const Pose& X_mean, con
   return std::min(1.0, probability_within(error, spread, kHereAngle));
 }
 
-// Up to turns that symmetry allows.
-bool is_turned_like(const Pose& X, const Pose& X_leader, const geometry::SymmetryGroup& symmetry) {
-  return symmetry.ball || geometry::symmetric_angle(X, X_leader, symmetry) <= kOneTurn;
+// Whether two poses may be averaged, up to turns that symmetry allows.
+bool is_alike(const Pose& X, const Pose& X_leader, const geometry::SymmetryGroup& symmetry) {
+  const Pose X_equal = geometry::closest_equivalent(X, X_leader, symmetry);
+  return (X_equal.translation - X_leader.translation).norm() <= kOnePlace &&
+         geometry::log_rotation(X_leader.rotation.conjugate() * X_equal.rotation).norm() <= kOneTurn;
 }
 
-// The pose of the heaviest particle that has more than half of the weight turned like it, or else most of it.
-Pose likeliest_turn(const std::vector<Particle>& particles, const geometry::SymmetryGroup& symmetry) {
+// The pose of the heaviest particle that has more than half of the weight about it, or else most of it.
+Pose likeliest_leader(const std::vector<Particle>& particles, const geometry::SymmetryGroup& symmetry) {
   std::vector<const Particle*> sorted;
   for (const Particle& particle : particles) sorted.push_back(&particle);
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Particle* a, const Particle* b) { return a->log_weight > b->log_weight; });
-  if (symmetry.ball) return sorted.front()->X_WO;
   double most = 0.0;
   const Particle* leader = sorted.front();
   for (const Particle* particle : sorted) {
     double mass = 0.0;
     for (const Particle& other : particles)
-      if (is_turned_like(other.X_WO, particle->X_WO, symmetry)) mass += std::exp(other.log_weight);
+      if (is_alike(other.X_WO, particle->X_WO, symmetry)) mass += std::exp(other.log_weight);
     if (mass > most) most = mass, leader = particle;
     if (most > 0.5) break;
   }
@@ -260,13 +262,13 @@ bool operator==(const Belief& a, const Belief& b) {
 ObjectEstimate estimate(const ObjectBelief& object, const geometry::SymmetryGroup& symmetry) {
   ObjectEstimate estimate;
   PRESCENE_CHECK(!object.particles.empty());
-  const Pose X_leader = likeliest_turn(object.particles, symmetry);
+  const Pose X_leader = likeliest_leader(object.particles, symmetry);
   const std::vector<Particle> particles = aligned(object.particles, symmetry, X_leader);
   estimate.mode = heaviest(particles).X_WO;
-  // A mean of poses that are turned against each other by more would be none of them.
+  // A mean of poses that differ by more would be none of them.
   std::vector<Particle> alike;
   std::copy_if(particles.begin(), particles.end(), std::back_inserter(alike),
-               [&](const Particle& particle) { return is_turned_like(particle.X_WO, X_leader, symmetry); });
+               [&](const Particle& particle) { return is_alike(particle.X_WO, X_leader, symmetry); });
   if (alike.size() < particles.size()) normalize(alike);
   estimate.mean = weighted_mean(alike, X_leader);
   estimate.covariance = mixture_covariance(particles, estimate.mean);

@@ -217,7 +217,9 @@ void ParticleFilter::weigh_all(FrameStep& step, double dt) {
                      .depth = step.observation.frame.depth.get(),
                      .camera = step.observation.frame.camera});
     if (report.all_impossible) result.degraded |= kImpossibleWeights;
-    share_among_turns(before, model_of(belief, i).symmetry, object.particles);
+    // What is hidden is not told apart by its turn.
+    if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share)
+      share_among_turns(before, model_of(belief, i).symmetry, object.particles);
     for (const ParticleWeight& particle : report.particles) result.counters.hidden_particles += particle.hidden;
     update_track(report, frame.stamp_ns, settings_.track, object);
     step.depths[i] = depth_in(step, i);
