@@ -155,7 +155,7 @@ std::vector<Particle> two_turns(double first, double second) {
   return particles;
 }
 
-double log_odds(const std::vector<Particle>& p) {
+double log_odds_of_two(const std::vector<Particle>& p) {
   return std::log(std::exp(p[0].log_weight) + std::exp(p[1].log_weight)) - p[2].log_weight;
 }
 
@@ -171,7 +171,7 @@ double after_frames(double nats, int frames) {
     share_among_turns(before, {}, particles);
     EXPECT_NEAR(particles[0].log_weight - particles[1].log_weight, 1.0, 1e-9);
   }
-  return log_odds(particles);
+  return log_odds_of_two(particles);
 }
 
 TEST(ShareAmongTurns, LogOddsGoToWhatAFrameSays) {

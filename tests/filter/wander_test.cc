@@ -32,7 +32,7 @@ SimulatedSequence hidden_can(const Vector3d& shift, std::uint64_t seed) {
   return sequence;
 }
 
-bool holds(const belief::ObjectEstimate& estimate, const Pose& truth) {
+bool region_holds_truth(const belief::ObjectEstimate& estimate, const Pose& truth) {
   const geometry::Matrix3d covariance = estimate.covariance.bottomRightCorner<3, 3>();
   const Vector3d d = truth.translation - estimate.mean.translation;
   return d.dot(geometry::solve_symmetric_3(covariance, d)) <= kRegion90;
@@ -51,8 +51,8 @@ TEST(WanderUnseen, WhatIsMovedBehindAnUnknownPlateIsInTheRegionThatIsBelieved) {
       EXPECT_EQ(belief.objects[0].state, belief::TrackState::kUnseen);
       const belief::ObjectEstimate estimate = belief::estimate(belief, belief.objects[0]);
       ++frames;
-      held += holds(estimate, sequence.objects[0](sequence.time_of(frame)));
-      stayed += holds(estimate, standing_can());
+      held += region_holds_truth(estimate, sequence.objects[0](sequence.time_of(frame)));
+      stayed += region_holds_truth(estimate, standing_can());
       EXPECT_LT(std::sqrt(estimate.covariance.diagonal().tail<3>().maxCoeff()), 0.3);  // not just anywhere
     }
   }
