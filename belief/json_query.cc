@@ -310,6 +310,9 @@ core::Result<Query> query_from_json(std::string_view text) {
   {
     JsonObject object({document, "", errors});
     if (const auto id = object.find("id")) query.id = id->text();
+    if (const auto explain = object.find("explain"))
+      explain->fail(
+          "this is asked of frames that were seen: ask a running 'serve', or 'prescene explain' of a recording");
     if (const auto what = object.one_of(kTasks)) {
       JsonObject fields(what->second);
       if (what->first == "where") {

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "achieve_options.h"
+#include "explanation_text.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/geometry/angles.h"
@@ -107,6 +108,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
     return stability->value("object", "") + " stays as it is: " + interval(stability->at("stable")) + "\n" +
            stability_detail_text(*stability) + basis(*stability);
   }
+  if (const auto explain = answer.find("explain"); explain != answer.end()) return explanation_text(*explain);
   if (const auto achieve = answer.find("achieve"); achieve != answer.end()) return achieve_text(*achieve);
   if (const auto relations = answer.find("relations"); relations != answer.end()) return relations_text(*relations);
   if (const auto timeline = answer.find("timeline"); timeline != answer.end()) return timeline_text(*timeline);

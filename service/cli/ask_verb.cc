@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "achieve_options.h"
+#include "prescene/belief/explain_question.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/service/backends.h"
@@ -26,12 +27,16 @@ struct AskOptions {
   AchieveOptions achieve;
   TimelineOptions timeline;
   std::string reach;
+  std::optional<double> from, to, last;  // of explain, and ...
+  bool change = false;                   // ... the same
+  std::string wanted;
   std::string scene;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
 };
 
-core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
+/// `seed`: of what asks for one.
+core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std::uint64_t seed) {
   if (!options.json.empty()) {
     if (!options.kind.empty())
       return core::invalid_input("'" + options.kind + "' and --question are two questions: leave one of them out");
@@ -50,6 +55,30 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     return core::invalid_input("--interval, --other and --relation are of 'ask timeline': leave them out");
   if (options.kind != "relations" && !options.reach.empty())
     return core::invalid_input("--reach is of 'ask relations': leave it out");
+  if (options.kind != "explain" &&
+      (options.from || options.to || options.last || options.change || !options.wanted.empty()))
+    return core::invalid_input("--from, --to, --last, --change and --wanted are of 'ask explain': leave them out");
+  if (options.kind == "explain") {
+    if (!options.scene.empty())
+      return core::invalid_input(
+          "ask explain is about frames that were seen, and of a scene file none was: ask a running 'serve' (without "
+          "--scene), or 'prescene explain' of a recording");
+    nlohmann::ordered_json explain = nlohmann::ordered_json::object();
+    if (!options.object.empty()) explain["object"] = options.object;
+    if (options.from) explain["from"] = *options.from;
+    if (options.to) explain["to"] = *options.to;
+    if (options.last) explain["last"] = *options.last;
+    if (options.change) explain["change"] = true;
+    if (!options.wanted.empty() && options.wanted.front() == '{') {
+      auto outcome = belief::parse_json(options.wanted);
+      if (!outcome) return outcome.status().at("--wanted");
+      explain["wanted"] = *std::move(outcome);
+    } else if (!options.wanted.empty()) {
+      explain["wanted"] = options.wanted;
+    }
+    explain["seed"] = seed;
+    return nlohmann::ordered_json{{"explain", std::move(explain)}};
+  }
   if (options.kind == "relations") {
     const std::string& named = options.achieve.object;
     if (!options.object.empty() && !named.empty())
@@ -88,7 +117,8 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options) {
     return achieve_question(achieve);
   }
   return core::invalid_input(
-      "ask where | relations | timeline | stability OBJECT | release OBJECT | achieve OUTCOME, or --question JSON");
+      "ask where | relations | timeline | explain | stability OBJECT | release OBJECT | achieve OUTCOME, or --question "
+      "JSON");
 }
 
 /// Of a scene file, of which nothing has been seen.
@@ -109,7 +139,7 @@ core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& 
 }
 
 core::Status run(AskOptions& options, VerbContext& context) {
-  PRESCENE_TRY(const auto question, question_of(options));
+  PRESCENE_TRY(const auto question, question_of(options, context.options().seed));
   if (!options.scene.empty()) return ask_scene(options, question, context);
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
@@ -126,14 +156,14 @@ core::Status run(AskOptions& options, VerbContext& context) {
 }  // namespace
 
 Verb add_ask_verb(CLI::App& app) {
-  auto* verb =
-      app.add_subcommand("ask",
-                         "Ask a running `serve`, or a scene file: where | relations | timeline | stability OBJECT | "
-                         "release OBJECT | achieve OUTCOME");
+  auto* verb = app.add_subcommand("ask",
+                                  "Ask a running `serve`, or a scene file: where | relations | timeline | explain | "
+                                  "stability OBJECT | release OBJECT | achieve OUTCOME");
   auto options = std::make_shared<AskOptions>();
   verb->add_option("KIND", options->kind,
                    "where: poses and confidence; relations: what is on, in, held by what; timeline: what was when; "
-                   "stability: does it stay; release: what if it is let go; achieve: how must it be done")
+                   "explain: what happened in the last seconds; stability: does it stay; release: what if it is let "
+                   "go; achieve: how must it be done")
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
       ->check(utf8_text());
@@ -151,6 +181,16 @@ Verb add_ask_verb(CLI::App& app) {
                    "Of relations: also what is within reach of a point or robot body, as 0.4,0,0.9:0.8 or hand:0.8 (m)")
       ->check(utf8_text());
   add_timeline_options(*verb, options->timeline);
+  verb->add_option("--last", options->last, "Of explain: what happened in so many last seconds; default: 2")
+      ->check(in_range(belief::kWindowSeconds));
+  verb->add_option("--from", options->from, "Of explain: start of the window, s since the session's first frame")
+      ->check(in_range(belief::kWindowEnds));
+  verb->add_option("--to", options->to, "Of explain: its end")->check(in_range(belief::kWindowEnds));
+  verb->add_flag("--change", options->change,
+                 "Of explain: also the smallest change that would have kept the object as it was");
+  verb->add_option("--wanted", options->wanted,
+                   "Of explain: the same for this outcome, a name of the scene's or one as JSON")
+      ->check(utf8_text());
   verb->add_option("--scene", options->scene, "Ask of this scene file instead of a running `serve`")
       ->check(file_name());
   options->verb = verb;
@@ -158,6 +198,7 @@ Verb add_ask_verb(CLI::App& app) {
   verb->footer(
       "Examples: prescene ask stability carton\n"
       "          prescene ask relations mug\n"
+      "          prescene ask explain carton --last 2\n"
       "          prescene ask timeline --interval 'touches carton mug' --relation before --other 'falls carton'");
   return {verb, [options](VerbContext& context) { return run(*options, context); }};
 }

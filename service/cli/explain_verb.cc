@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "explanation_text.h"
+#include "prescene/belief/json.h"
 #include "prescene/core/text.h"
+#include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/reports/report.h"
+#include "prescene/service/pictures/explanation_strip.h"
 #include "prescene/service/recording/explained.h"
 #include "verb.h"
 
@@ -13,10 +18,14 @@ namespace {
 
 using core::fixed_text;
 
+constexpr std::size_t kStrips = 4;  // frames that are shown
+
 struct ExplainVerbOptions {
   std::string input;
   std::string scene;
   std::string report;
+  std::string pictures;
+  std::string wanted;
   ExplainOptions explain;
   TrackerSettings tracker;
   BackendSettings backends;
@@ -25,73 +34,7 @@ struct ExplainVerbOptions {
   const CLI::App* verb = nullptr;
 };
 
-std::string interval_text(const std::optional<queries::EventValue>& value, int decimals, double shift = 0.0) {
-  if (!value) return "";
-  return fixed_text(value->mean + shift, decimals) + " (" + fixed_text(value->low + shift, decimals) + " to " +
-         fixed_text(value->high + shift, decimals) + ")";
-}
-
 using Rows = std::vector<std::vector<std::string>>;
-
-/// What an explanation is printed as, each with a head. Times count from the recording's first frame, those of the
-/// answer from the window's start.
-struct ExplanationTables {
-  Rows events, places, frames;
-};
-
-ExplanationTables tables_of(const Explained& explained) {
-  const queries::ExplainAnswer& answer = explained.answer;
-  ExplanationTables tables;
-  tables.events = {{"event", "object", "probability, %", "interval, %", "log Bayes factor", "time, s", "towards, deg",
-                    "speed, m/s", "tips, %", "falls, %"}};
-  for (const queries::Explanation& e : answer.explanations) {
-    if (e.probability < 0.0005 && tables.events.size() > 3) continue;
-    const bool with_effects = e.time.has_value();
-    tables.events.push_back(
-        {belief::name_of(e.kind), e.object + (e.partner.empty() ? "" : ", " + e.partner),
-         fixed_text(100.0 * e.probability, 1), fixed_text(100.0 * e.low, 1) + " to " + fixed_text(100.0 * e.high, 1),
-         fixed_text(e.log_bayes_factor, 1), interval_text(e.time, 2, explained.from), interval_text(e.towards, 0),
-         interval_text(e.speed, 2), with_effects ? fixed_text(100.0 * e.tips, 0) : "",
-         with_effects ? fixed_text(100.0 * e.falls, 0) : ""});
-  }
-  tables.places = {{"object", "there, %", "at the end, m", "90 % within, cm", ""}};
-  for (const queries::WhereItIs& object : answer.objects)
-    tables.places.push_back(
-        {object.object, fixed_text(100.0 * object.present, 0),
-         fixed_text(object.mean.x(), 3) + ", " + fixed_text(object.mean.y(), 3) + ", " + fixed_text(object.mean.z(), 3),
-         fixed_text(100.0 * object.radius_90, 1), object.out_of_sight ? "out of sight" : ""});
-  // Against itself, that nothing happened is worth 0 in every frame.
-  const bool something =
-      !answer.explanations.empty() && answer.explanations.front().kind != belief::EventKind::kNothing;
-  tables.frames = {{"frame, s", "against the second, nats"}};
-  if (something) tables.frames.front().insert(tables.frames.front().begin() + 1, "against nothing, nats");
-  for (const queries::DecidingFrame& frame : answer.frames) {
-    std::vector<std::string>& row = tables.frames.emplace_back();
-    row.push_back(fixed_text(frame.time + explained.from, 2));
-    if (something) row.push_back(fixed_text(frame.against_nothing, 1));
-    row.push_back(fixed_text(frame.against_second, 1));
-  }
-  return tables;
-}
-
-std::vector<std::string> remarks_of(const Explained& explained) {
-  std::vector<std::string> remarks = explained.answer.remarks;
-  remarks.insert(remarks.end(), explained.remarks.begin(), explained.remarks.end());
-  return remarks;
-}
-
-std::string work_text(const Explained& explained) {
-  return std::to_string(explained.answer.evaluated) + " instances weighed, " +
-         std::to_string(explained.answer.simulated) + " simulated, in " + fixed_text(explained.seconds, 1) + " s";
-}
-
-std::string explanation_text(const Explained& explained) {
-  const ExplanationTables tables = tables_of(explained);
-  std::string text = explained.answer.text + "\n";
-  for (const Rows* rows : {&tables.events, &tables.places, &tables.frames}) text += "\n" + table(*rows);
-  for (const std::string& remark : remarks_of(explained)) text += remark + "\n";
-  return text + work_text(explained) + "\n";
-}
 
 interfaces::TableBlock table_block(const std::string& caption, Rows rows) {
   std::vector<std::string> columns = std::move(rows.front());
@@ -99,15 +42,16 @@ interfaces::TableBlock table_block(const std::string& caption, Rows rows) {
   return {caption, std::move(columns), std::move(rows)};
 }
 
-core::Status write_explanation_report(const std::string& path, const std::string& recording,
-                                      const Explained& explained) {
-  ExplanationTables tables = tables_of(explained);
+core::Status write_explanation_report(const std::string& path, const std::string& recording, const Explained& explained,
+                                      const nlohmann::ordered_json& document,
+                                      const std::vector<ExplanationStrip>& strips) {
+  ExplanationTables tables = explanation_tables(document);
   interfaces::ReportContents contents;
   contents.title = "What happened";
   contents.subtitle = explained.answer.text;
   contents.facts = {{"recording", recording},
                     {"window", fixed_text(explained.from, 2) + " to " + fixed_text(explained.to, 2) + " s"},
-                    {"work", work_text(explained)}};
+                    {"work", explanation_work_text(document)}};
   interfaces::ReportSection& events = contents.sections.emplace_back();
   events.title = "Events";
   interfaces::OutcomeBlock bars{"probabilities with their intervals", {}};
@@ -123,19 +67,74 @@ core::Status write_explanation_report(const std::string& path, const std::string
     events.blocks.emplace_back(interfaces::TimelineBlock{"the most probable instance, s from the window's start",
                                                          explained.answer.explanations.front().timeline, 0.0,
                                                          explained.answer.duration});
+  if (explained.answer.change) {
+    interfaces::ReportSection& change = contents.sections.emplace_back();
+    change.title = "What would have kept it";
+    change.blocks.emplace_back(interfaces::TextBlock{explained.answer.change->sentence});
+    interfaces::TableBlock parts{
+        "the smallest change that was found", {"parameter", "from", "to", "unit", "deviations"}, {}};
+    for (const queries::ChangedPart& part : explained.answer.change->parts)
+      parts.rows.push_back(
+          {part.name, fixed_text(part.from, 3), fixed_text(part.to, 3), part.unit, fixed_text(part.deviations, 2)});
+    if (!parts.rows.empty()) change.blocks.emplace_back(std::move(parts));
+  }
+  if (!strips.empty()) {
+    interfaces::ReportSection& seen = contents.sections.emplace_back();
+    seen.title = "Seen, explained, and the difference";
+    seen.blocks.emplace_back(interfaces::TextBlock{
+        "The frames that decide most. Of the difference of depths, blue is nearer than the explanation has it, orange "
+        "further, both from 5 cm on in full; grey is not known."});
+    for (const ExplanationStrip& strip : strips)
+      seen.blocks.emplace_back(interfaces::PictureBlock{
+          {{fixed_text(strip.time + explained.from, 2) + " s, seen", strip.seen},
+           {"explained; " + fixed_text(strip.against_nothing, 1) + " nats against nothing", strip.explained},
+           {"difference", strip.difference}}});
+  }
   interfaces::ReportSection& end = contents.sections.emplace_back();
   end.title = "Where things are at the end, and what decides";
   end.blocks.emplace_back(table_block("over all events", std::move(tables.places)));
   end.blocks.emplace_back(table_block("how much each frame speaks for the first event (tempered log likelihoods)",
                                       std::move(tables.frames)));
   std::string remarks;
-  for (const std::string& remark : remarks_of(explained)) remarks += (remarks.empty() ? "" : "\n\n") + remark;
+  for (const std::string& remark : document.at("remarks").get<std::vector<std::string>>())
+    remarks += (remarks.empty() ? "" : "\n\n") + remark;
   if (!remarks.empty()) end.blocks.emplace_back(interfaces::TextBlock{remarks});
   return interfaces::write_report(path, contents);
 }
 
+/// A picture of each strip in the folder, named by its time: explained_1.73.png.
+core::Status write_strips(const std::string& folder, const std::vector<ExplanationStrip>& strips, double from) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return core::unavailable("--pictures: the folder " + folder + " can't be made: " + error.message());
+  for (const ExplanationStrip& strip : strips) {
+    const geometry::ColorImage picture = side_by_side(strip);
+    const std::string name = "explained_" + fixed_text(strip.time + from, 2) + ".png";
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_png(std::filesystem::path(folder) / name, picture.view()));
+  }
+  return core::ok_status();
+}
+
+/// "NAME", or an outcome as JSON.
+core::Status take_wanted(const std::string& text, queries::ExplainQuery& query) {
+  if (text.empty()) return core::ok_status();
+  query.change = true;
+  if (text.front() != '{') {
+    query.wanted_name = text;
+    return core::ok_status();
+  }
+  auto json = belief::parse_json(text);
+  if (!json) return json.status().at("--wanted");
+  if (!json->contains("name")) (*json)["name"] = "wanted";
+  if (!json->contains("object") && !query.object.empty()) (*json)["object"] = query.object;
+  auto outcome = belief::outcome_from_json(*json);
+  if (!outcome) return outcome.status().at("--wanted");
+  query.wanted = *std::move(outcome);
+  return core::ok_status();
+}
+
 core::Status run(ExplainVerbOptions& options, VerbContext& context) {
-  PRESCENE_RETURN_IF_ERROR(check_folder_options(*options.verb, options.input));
+  PRESCENE_RETURN_IF_ERROR(take_wanted(options.wanted, options.explain.query));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.input, options.scene}));
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},
@@ -155,13 +154,22 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
                                            context.progress("tracking"));
   context.end_progress();
   if (!explained) return explained.status();
-  if (!options.report.empty()) {
-    PRESCENE_RETURN_IF_ERROR(write_explanation_report(options.report, options.input, *explained));
-    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
-  }
   nlohmann::ordered_json document = {{"recording", options.input}, {"seed", options.explain.query.seed}};
   document.update(to_json(*explained));
-  context.print(document, explanation_text(*explained));
+  std::vector<ExplanationStrip> strips;
+  if (!options.report.empty() || !options.pictures.empty()) {
+    PRESCENE_TRY(strips, explanation_strips(explained->window, explained->answer, kStrips, backends));
+  }
+  if (!options.pictures.empty()) {
+    PRESCENE_RETURN_IF_ERROR(write_strips(options.pictures, strips, explained->from));
+    core::log(context.log(), core::LogLevel::kInfo,
+              counted(strips.size(), "picture") + " written to " + options.pictures);
+  }
+  if (!options.report.empty()) {
+    PRESCENE_RETURN_IF_ERROR(write_explanation_report(options.report, options.input, *explained, document, strips));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
+  context.print(document, explanation_text(document));
   return core::ok_status();
 }
 
@@ -184,8 +192,17 @@ Verb add_explain_verb(CLI::App& app) {
       ->check(utf8_text());
   verb->add_option("--scene", options->scene, "Scene file; default: the one that the recording holds")
       ->check(file_name());
-  verb->add_option("--report", options->report, "Write an HTML page with probabilities, tables and a timeline")
+  verb->add_option("--report", options->report,
+                   "Write an HTML page with probabilities, tables, pictures and a timeline")
       ->check(file_name());
+  verb->add_option("--pictures", options->pictures,
+                   "Write pictures of the frames that decide into this folder: seen, explained, difference")
+      ->check(file_name());
+  verb->add_flag("--change", options->explain.query.change,
+                 "Also the smallest change of the event or the start that would have kept the object as it was");
+  verb->add_option("--wanted", options->wanted,
+                   "The same, but for this outcome: a name of the scene's, or one as JSON with the keys of scene files")
+      ->check(utf8_text());
   verb->add_option("--frames", options->explain.query.frames, "Frames of the window that weigh the events")
       ->check(CLI::Range(2, 64))
       ->capture_default_str();

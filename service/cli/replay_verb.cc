@@ -15,11 +15,13 @@
 #include "prescene/service/live/bus_replay.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/outside_json.h"
+#include "prescene/service/recording/explained_again.h"
 #include "prescene/service/recording/foreseen.h"
 #include "prescene/service/recording/replay_input.h"
 #include "prescene/service/recording/session_report.h"
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
+#include "prescene/service/tracking/topics.h"
 #include "prescene/service/training/proposals_file.h"
 #include "relations_options.h"
 #include "replay_text.h"
@@ -252,6 +254,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   SupportScore supports;
   FinalStates states;
   ReplayTimeline timeline(options, backends);
+  ExplainedAgain explained(input, options.input, settings, backends, context.cancellation());
   SessionReport report(input.scene(), settings, backends);
   report.set_proposals(options.proposals);
   ordered_json steps = ordered_json::array();
@@ -262,6 +265,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     score.add(summary);
     states.add(summary);
     timeline.add(*at.belief());
+    explained.add(step.observation, at.belief());
     if (!options.report.empty()) {
       report.set_scene(at.belief()->scene);
       report.add(summary);
@@ -278,7 +282,9 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     return core::ok_status();
   };
   DamagedRecords damaged;
-  const JsonSink on_json = [&](const std::string& topic, const std::string& json, core::TimeNs) -> core::Status {
+  const JsonSink on_json = [&](const std::string& topic, const std::string& json,
+                               core::TimeNs time_ns) -> core::Status {
+    if (topic == kAnswerTopic) return explained.add_answer(json, time_ns);
     if (topic == kTruthTopic) {
       const auto truth = truth_from_json(json);
       if (truth)
@@ -321,6 +327,8 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"followed_step_records", summary->followed_step_records},
        {"compared_steps", summary->compared},
        {"different_steps", summary->different},
+       {"compared_explanations", explained.compared()},
+       {"different_explanations", explained.different()},
        {"loss", summary->loss},
        {"damaged_records", damaged.count()},
        {"unchecked", summary->unchecked},
@@ -338,6 +346,10 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
           (summary->followed_step_records ? std::to_string(summary->compared - summary->different) + " of " +
                                                 std::to_string(summary->compared) + " steps have the recorded bits\n"
                                           : "") +
+          (explained.compared() > 0
+               ? std::to_string(explained.compared() - explained.different()) + " of " +
+                     std::to_string(explained.compared()) + " recorded explanations have the recorded bits\n"
+               : "") +
           states.text() + tracking_text(rows) + supports_text(supports.rows()) + timeline.text() +
           warnings_text(*summary));
   if (summary->cancelled) return core::cancelled("stopped on request; what was done is printed");
@@ -345,6 +357,8 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +
                              " is the first that differs from the recording: another version, machine or setting?");
   }
+  if (explained.different() > 0)
+    return core::unavailable(explained.first_difference() + ": another version, machine or setting?");
   return check_steps(*summary, settings.topics).at(options.input + window_text(options.read));
 }
 

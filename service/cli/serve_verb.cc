@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/training/proposals_file.h"
@@ -48,6 +49,9 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_TRY(const auto scene,
                load_scene_text(text, options.scene, context.log(), options.record.empty() ? nullptr : &files));
   PRESCENE_TRY(options.settings.tracker.assembler.robot, load_robot(text, options.scene));
+  auto weights = interfaces::parse_event_weights(text, options.scene);
+  if (!weights) return weights.status();
+  options.settings.event_weights = *weights;
   if (!options.proposals.empty()) {
     PRESCENE_TRY(options.settings.tracker.filter.learned, load_proposals(options.proposals, *scene));
   }
@@ -95,6 +99,10 @@ Verb add_serve_verb(CLI::App& app) {
   verb->add_option("--most-question-seconds", options->settings.worker.most_seconds,
                    "Time that any question may take, s; they are answered one after the other")
       ->check(number_between(1e-3, 3600.0))
+      ->capture_default_str();
+  verb->add_option("--history", options->settings.frames.seconds,
+                   "Frames of so many seconds are kept, so that `ask explain` can say what happened; 0 = none")
+      ->check(number_between(0.0, 3600.0))
       ->capture_default_str();
   verb->add_option("--view", options->view.port,
                    "Port of a page for the browser that shows the belief live; 0 = any that is free")

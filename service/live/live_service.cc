@@ -69,6 +69,12 @@ class RateLimit {
   std::optional<steady_clock::time_point> last_;
 };
 
+FrameHistorySettings frame_settings(const LiveSettings& settings) {
+  FrameHistorySettings frames = settings.frames;
+  frames.width = settings.tracker.filter.frame.terms.target_width;
+  return frames;
+}
+
 }  // namespace
 
 struct LiveService::Impl {
@@ -84,6 +90,7 @@ struct LiveService::Impl {
         inbox(inbox_limits(settings.tracker.topics)),
         marker_limit(settings.marker_rate),
         diagnostics_limit(settings.diagnostics_rate),
+        frames(frame_settings(settings)),
         learned_limit(1.0 / settings.learned_interval) {
     learned_limit.due();  // not before there is a frame
     if (!settings.learned_file.empty()) learned_file = std::make_unique<interfaces::KeptFile>(settings.learned_file);
@@ -129,6 +136,9 @@ struct LiveService::Impl {
   std::string domain_text() const { return "DDS domain " + std::to_string(settings.dds.domain); }
   ServiceHealth health() const;
   void report_changes(const ServiceHealth& health);
+  /// Called on the thread that simulates for questions.
+  core::Result<nlohmann::ordered_json> explain(const belief::ExplainQuestion& question,
+                                               const queries::QueryContext& context);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -141,6 +151,7 @@ struct LiveService::Impl {
   Inbox inbox;
   RateLimit marker_limit;
   RateLimit diagnostics_limit;
+  FrameHistory frames;  // for questions what happened
   RateLimit learned_limit;
 
   DdsPublisher beliefs, detections, markers, diagnostics, answers;
@@ -159,7 +170,8 @@ struct LiveService::Impl {
   std::string physics_failure;
   std::uint64_t idle_controls = 0;
   std::string last_idle_control;
-  const Backends* backends = nullptr;
+  Backends* backends = nullptr;
+  std::unique_ptr<rendering::LikelihoodBatch> explaining;  // of the thread that simulates; made when it is needed
   /// Since the last frame that was used, s; by simulated time where there is one.
   std::optional<double> seconds_since_frame() const;
 
@@ -230,6 +242,9 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   impl->calls = std::make_unique<ServiceCalls>(*impl->node, std::move(hooks), impl->log);
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
+  impl->settings.worker.explain = [raw](const belief::ExplainQuestion& question, const queries::QueryContext& context) {
+    return raw->explain(question, context);
+  };
   impl->worker = std::make_unique<QueryWorker>(
       backends, std::max(1, backends.pool().threads() - 1), impl->settings.worker,
       [raw] { return raw->tracker->belief(); }, on_answer);
@@ -268,6 +283,18 @@ core::Status LiveService::Impl::join_bus() {
     PRESCENE_RETURN_IF_ERROR(node->subscribe(topic.name, topic.type, topic.read, take));
   }
   return core::ok_status();
+}
+
+core::Result<nlohmann::ordered_json> LiveService::Impl::explain(const belief::ExplainQuestion& question,
+                                                                const queries::QueryContext& context) {
+  PRESCENE_TRY(PastWindow past, frames.window(question));
+  if (!explaining) {
+    PRESCENE_TRY(explaining, backends->make_likelihood());
+  }
+  const queries::ExplainContext explain_context{context, explaining.get(), settings.tracker.filter};
+  PRESCENE_TRY(const Explained explained,
+               explain_past(std::move(past), question, settings.event_weights, explain_context));
+  return explain_answer_json(question, explained);
 }
 
 core::TimeNs LiveService::Impl::now() {
@@ -381,6 +408,9 @@ void LiveService::Impl::take_in(ReceivedMessage& message) {
   depth_has_come = depth_has_come || message.topic == settings.tracker.topics.depth;
   const core::TimeNs simulated_before_ns = tracker->simulated_now_ns();
   const core::Status taken = tracker->take_in(message, index);
+  if (message.topic == kControlTopic && taken.ok())
+    if (const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr, interfaces::kSmallMessage))
+      frames.add_control(text->data, message.source_ns);
   if (tracker->simulated_now_ns() != simulated_before_ns) since_tick.emplace();
   if (!taken.ok()) refuse(taken);
 }
@@ -426,6 +456,7 @@ void LiveService::Impl::look_after_frames() {
       note_idle(step->idle_controls);
       publish();
       history->note(tracker->belief());
+      frames.add(step->observation, tracker->belief());
       if (settings.on_step) settings.on_step(*step, tracker->belief());
     }
   } catch (const std::exception& error) {

@@ -39,6 +39,11 @@ void bound_effort(belief::Query& query, const QueryWorkerSettings& settings) {
   if (auto* achieve = std::get_if<belief::AchieveQuery>(&query.what)) bound(achieve->effort);
 }
 
+template <class Question>
+const std::string& id_in(const Question& question) {
+  return std::visit([](const auto& one) -> const std::string& { return one.id; }, question);
+}
+
 core::Status too_many_wait(std::size_t count) {
   return core::unavailable(std::to_string(count) + " " + kQuestionsWait + ": ask again later");
 }
@@ -168,29 +173,36 @@ void QueryWorker::read(const std::string& question_json) {
     if (question_json.size() > kLongestQuestion)
       return refuse("", core::resource_exhausted("the question is longer than " + std::to_string(kLongestQuestion) +
                                                  " bytes: make it shorter"));
-    auto read = belief::query_from_json(question_json);
-    if (!read) return refuse(id_of(question_json), read.status());
-    if (std::holds_alternative<belief::WhereQuery>(read->what) ||
-        std::holds_alternative<belief::TimelineQuery>(read->what))
-      return answer(*read);
-    id = read->id;
-    bound_effort(*read, settings_);
-    const auto query = std::make_shared<const belief::Query>(*std::move(read));
+    std::shared_ptr<const Question> question;
+    if (belief::asks_to_explain(question_json)) {
+      auto read = belief::explain_question_from_json(question_json);
+      if (!read) return refuse(id_of(question_json), read.status());
+      question = std::make_shared<const Question>(*std::move(read));
+    } else {
+      auto read = belief::query_from_json(question_json);
+      if (!read) return refuse(id_of(question_json), read.status());
+      const bool at_once = std::holds_alternative<belief::WhereQuery>(read->what) ||
+                           std::holds_alternative<belief::TimelineQuery>(read->what);
+      if (!at_once) bound_effort(*read, settings_);
+      question = std::make_shared<const Question>(*std::move(read));
+      if (at_once) return answer(*question);
+    }
+    id = id_in(*question);
     core::Status reason;
     {
       const std::lock_guard lock(mutex_);
-      const auto has_id = [&id](const auto& other) { return other && other->id == id; };
+      const auto has_id = [&id](const auto& other) { return other && id_in(*other) == id; };
       const auto same_id = std::find_if(waiting_.begin(), waiting_.end(), has_id);
       const auto& other = same_id != waiting_.end() ? *same_id : in_work_;
       if (!id.empty() && has_id(other)) {
-        if (*other == *query) {
+        if (*other == *question) {
           ++counts_.repeated;
           return;
         }
         reason = core::invalid_input("another question with the id '" + id +
                                      "' is not answered yet: choose another id, one that no other client uses");
       } else if (waiting_.size() < settings_.max_waiting) {
-        waiting_.push_back(query);
+        waiting_.push_back(question);
         simulate_changed_.notify_one();
         return;
       } else {
@@ -205,45 +217,50 @@ void QueryWorker::read(const std::string& question_json) {
 
 void QueryWorker::simulate_questions() {
   for (;;) {
-    std::shared_ptr<const belief::Query> query;
+    std::shared_ptr<const Question> question;
     {
       std::unique_lock lock(mutex_);
       simulate_changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
       if (stop_.requested()) return;
-      query = std::move(waiting_.front());
+      question = std::move(waiting_.front());
       waiting_.pop_front();
-      in_work_ = query;
+      in_work_ = question;
     }
-    answer(*query);
+    answer(*question);
   }
 }
 
-void QueryWorker::answer(const belief::Query& query) {
+void QueryWorker::answer(const Question& question) {
+  const std::string& id = id_in(question);
   const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
     const std::lock_guard lock(mutex_);
-    if (in_work_.get() == &query) in_work_.reset();
+    if (in_work_.get() == &question) in_work_.reset();
   };
   try {
-    const Reply reply = reply_to(query);
+    const Reply reply = reply_to(question);
     finish();
     if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
-      return refuse(query.id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
-                                                       " MiB, more than clients take: ask for less at a time"));
+      return refuse(id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
+                                                 " MiB, more than clients take: ask for less at a time"));
     send(reply.text, reply.is_answer ? &QueryCounts::answered : &QueryCounts::refused);
   } catch (const std::exception&) {
     finish();
-    refuse_after_exception(query.id, "the question could not be answered");
+    refuse_after_exception(id, "the question could not be answered");
   }
 }
 
-QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query) {
+QueryWorker::Reply QueryWorker::reply_to(const Question& question) {
   queries::QueryContext context = backends_.query_context(pool_);
   const core::Cancellation end(stop_, deadline_after(settings_.most_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
   context.simulate_until = deadline_after(settings_.most_seconds);
   context.most_bytes = settings_.most_bytes;
   context.timeline = settings_.timeline;
+  return std::visit([&](const auto& one) { return reply_to(one, context); }, question);
+}
+
+QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context) {
   const std::shared_ptr<const belief::Belief> belief = snapshot_();
   // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
   const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)
@@ -254,6 +271,23 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query) {
       begin_ns != 0 && std::holds_alternative<belief::WhereAnswer>(answer.what))
     add_learned_seconds(begin_ns, document["where"]["items"]);
   return {belief::json_text(document), answer.what.index() > 0};
+}
+
+QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question, queries::QueryContext context) {
+  if (!settings_.explain)
+    return {error_answer(question.id, core::unavailable("frames are not kept here, so that nothing can be explained")),
+            false};
+  if (question.max_seconds)
+    context.simulate_until = std::min(*context.simulate_until, deadline_after(*question.max_seconds));
+  const auto document = settings_.explain(question, context);
+  if (document) return {belief::json_text(*document), true};
+  // Nobody else stops it: its time was over in the middle of a search.
+  const bool too_late = document.status().code() == core::StatusCode::kCancelled && !stop_.requested();
+  return {error_answer(question.id,
+                       too_late ? core::unavailable("the time ran out: give an object, a shorter window or fewer "
+                                                    "points, or let questions take longer (--most-question-seconds)")
+                                : document.status()),
+          false};
 }
 
 void QueryWorker::refuse(const std::string& id, const core::Status& reason) {

@@ -2,14 +2,13 @@
 #include "prescene/service/recording/explained.h"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
-#include "prescene/service/tracking/waiting_controls.h"
+#include "prescene/service/recording/frame_history.h"
 
 namespace prescene::service {
 namespace {
@@ -19,34 +18,21 @@ using nlohmann::ordered_json;
 
 constexpr double kRounding = 1e-6;  // s
 
-/// What the robot said that it does, by the clock of the frames; controls that can't be placed are counted.
+/// What the robot said that it does in the window; a folder of images says nothing.
 core::Status read_actions(const ExplainOptions& options, queries::ExplainWindow& window,
                           std::vector<std::string>& remarks) {
   if (!interfaces::is_bag(options.path)) return core::ok_status();
   PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
-  const core::TimeNs begin = window.start->stamp_ns, end = window.frames.back().observation.stamp_ns;
-  int placeless = 0;
+  ControlLog controls;
   for (;;) {
     PRESCENE_TRY(const auto entry, reader->next());
     if (!entry) break;
     if (entry->is_json || entry->message.topic != kControlTopic) continue;
     const auto text = interfaces::decode_cdr<interfaces::RosString>(entry->message.cdr, interfaces::kSmallMessage);
     if (!text) continue;  // The tracker refused it, and said so.
-    const auto control = parse_control(text->data);
-    if (!control) continue;
-    if (!control->stamp_ns && std::abs(entry->message.source_ns - begin) > 3600 * core::TimeNs{1'000'000'000}) {
-      ++placeless;
-      continue;
-    }
-    for (const auto& [after_ns, action] : control->actions) {
-      const core::TimeNs time_ns = control->stamp_ns.value_or(entry->message.source_ns) + after_ns;
-      if (time_ns > begin && time_ns <= end) window.actions.emplace_back(time_ns, action);
-    }
+    controls.add(text->data, entry->message.source_ns);
   }
-  if (placeless > 0)
-    remarks.push_back(std::to_string(placeless) +
-                      " controls have no stamp and came by another clock than the frames': their actions are not known "
-                      "to the explanation.");
+  controls.put_into(window, remarks);
   return core::ok_status();
 }
 
@@ -81,6 +67,27 @@ ordered_json explanation_json(const queries::Explanation& e, double from) {
   }
   json["sentence"] = e.sentence;
   return json;
+}
+
+ordered_json change_json(const queries::SmallestChange& change) {
+  ordered_json parts = ordered_json::array();
+  for (const queries::ChangedPart& part : change.parts)
+    parts.push_back({{"name", part.name},
+                     {"unit", part.unit},
+                     {"from", part.from},
+                     {"to", part.to},
+                     {"deviations", part.deviations}});
+  return {{"wanted", change.wanted},
+          {"wanted_probability", change.wanted_probability},
+          {"found", change.found},
+          {"deviations", change.size},
+          {"parts", parts},
+          {"probability", change.probability},
+          {"interval", {change.low, change.high}},
+          {"instances", change.instances},
+          {"unchanged_probability", change.unchanged_probability},
+          {"instances_searched", change.instances_searched},
+          {"sentence", change.sentence}};
 }
 
 }  // namespace
@@ -142,6 +149,7 @@ core::Result<Explained> explain_recording(const ReplayInput& input, const Explai
   Explained explained;
   explained.from = core::seconds_of(window.start->stamp_ns - keeper.first_ns());
   explained.to = end;
+  explained.step = window.frames.back().belief->step;
   PRESCENE_RETURN_IF_ERROR(read_actions(options, window, explained.remarks));
   PRESCENE_TRY(const auto likelihood, backends.make_likelihood());
   queries::ExplainContext context;
@@ -154,6 +162,7 @@ core::Result<Explained> explain_recording(const ReplayInput& input, const Explai
   PRESCENE_TRY(explained.answer, queries::explain(window, query, context));
   explained.seconds = watch.seconds();
   explained.cpu_seconds = core::process_cpu_seconds() - cpu;
+  explained.window = std::move(window);
   return explained;
 }
 
@@ -173,19 +182,22 @@ ordered_json to_json(const Explained& explained) {
                       {"against_second", frame.against_second}});
   ordered_json remarks = answer.remarks;
   for (const std::string& remark : explained.remarks) remarks.push_back(remark);
-  return {{"from", explained.from},
-          {"to", explained.to},
-          {"explanations", explanations},
-          {"objects", objects},
-          {"frames", frames},
-          {"text", answer.text},
-          {"remarks", remarks},
-          {"simulated_instances", answer.simulated},
-          {"weighed_instances", answer.evaluated},
-          {"failed_instances", answer.failed},
-          {"stepper", answer.stepper},
-          {"wall_seconds", explained.seconds},
-          {"cpu_seconds", explained.cpu_seconds}};
+  ordered_json json = {{"from", explained.from},
+                       {"to", explained.to},
+                       {"explanations", explanations},
+                       {"objects", objects},
+                       {"frames", frames}};
+  if (answer.change) json["change"] = change_json(*answer.change);
+  json.update(ordered_json{{"text", answer.text},
+                           {"remarks", remarks},
+                           {"cut_short", answer.cut_short},
+                           {"simulated_instances", answer.simulated},
+                           {"weighed_instances", answer.evaluated},
+                           {"failed_instances", answer.failed},
+                           {"stepper", answer.stepper},
+                           {"wall_seconds", explained.seconds},
+                           {"cpu_seconds", explained.cpu_seconds}});
+  return json;
 }
 
 }  // namespace prescene::service

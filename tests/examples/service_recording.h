@@ -6,6 +6,7 @@
 #include "prescene/core/progress.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/belief_summary.h"
+#include "prescene/service/recording/frame_history.h"
 #include "prescene/service/recording/replay_input.h"
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/tracker.h"
@@ -29,6 +30,23 @@ extern const core::Cancellation cancellation;
 extern const core::ProgressSink progress;
 extern const std::uint64_t seed;
 }  // namespace explained_h
+
+namespace frame_history_h {
+extern const TrackerStep step;
+extern const Tracker tracker;
+extern const belief::ExplainQuestion question;
+extern const belief::EventWeights weights;
+extern const queries::ExplainContext context;
+}  // namespace frame_history_h
+
+namespace explained_again_h {
+extern const ReplayInput input;
+extern const core::Cancellation cancellation;
+extern const TrackerStep step;
+extern const Tracker tracker;
+extern const std::string json;
+extern const core::TimeNs time_ns;
+}  // namespace explained_again_h
 
 namespace residuals_h {
 extern const belief::Scene scene;

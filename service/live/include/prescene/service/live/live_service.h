@@ -17,6 +17,7 @@
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/service/live/history_keeper.h"
 #include "prescene/service/live/query_worker.h"
+#include "prescene/service/recording/frame_history.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/tracker.h"
 
@@ -25,9 +26,12 @@ namespace prescene::service {
 struct LiveSettings {
   TrackerSettings tracker;
   interfaces::DdsOptions dds;
-  QueryWorkerSettings worker;  ///< Its timeline is the service's own.
+  QueryWorkerSettings worker;  ///< Its timeline and explanations are the service's own.
   HistorySettings history;
-  double marker_rate = 5.0;  ///< Markers a second, at most.
+  /// Frames that are kept for questions what happened; their width is that of the filter's likelihood.
+  FrameHistorySettings frames;
+  belief::EventWeights event_weights;  ///< How probable events are, of such questions: the scene file's.
+  double marker_rate = 5.0;            ///< Markers a second, at most.
   double diagnostics_rate = 1.0;
   /// For who looks on, all optional: what they do delays the service, so that they only hand over. Called on the
   /// thread of the belief after each step, with its belief; on those of the questions with each answer; and with each

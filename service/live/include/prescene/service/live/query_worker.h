@@ -14,8 +14,10 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <thread>
+#include <variant>
 
 #include "prescene/belief/belief.h"
+#include "prescene/belief/explain_question.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
@@ -34,6 +36,11 @@ struct QueryWorkerSettings {
   std::size_t most_bytes = std::size_t{512} << 20;
   /// Of belief::TimelineQuery, see queries::QueryContext; called on both threads.
   std::function<std::shared_ptr<const belief::ObservedTimeline>()> timeline = {};
+  /// Answers belief::ExplainQuestion with the answer's document, or says why not; called on the thread that simulates,
+  /// with the time that it has in `context`. Empty: such questions are refused.
+  std::function<core::Result<nlohmann::ordered_json>(const belief::ExplainQuestion& question,
+                                                     const queries::QueryContext& context)>
+      explain = {};
 };
 
 /// What became of the questions since the start. Each that was asked and neither waits nor is worked on counts as
@@ -83,6 +90,7 @@ class QueryWorker {
   void begin_session(core::TimeNs first_frame_ns) { session_begin_ns_ = first_frame_ns; }
 
  private:
+  using Question = std::variant<belief::Query, belief::ExplainQuestion>;
   // No exception leaves these.
   void read_questions();
   void read(const std::string& question_json);
@@ -92,7 +100,7 @@ class QueryWorker {
     bool is_answer = false;  ///< Else the reason why there is none.
   };
   /// Answers and counts; no exception leaves it, nor the four below.
-  void answer(const belief::Query& query);
+  void answer(const Question& question);
   void refuse(const std::string& id, const core::Status& reason);
   /// In a handler, of an exception while `doing`.
   void refuse_after_exception(const std::string& id, const char* doing);
@@ -100,7 +108,9 @@ class QueryWorker {
   void send(const std::string& answer, std::uint64_t QueryCounts::*fate);
   /// In a handler: the question got no answer, because of the exception.
   void drop();
-  Reply reply_to(const belief::Query& query);
+  Reply reply_to(const Question& question);
+  Reply reply_to(const belief::Query& query, const queries::QueryContext& context);
+  Reply reply_to(const belief::ExplainQuestion& question, queries::QueryContext context);
   /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
   /// refuse the question with.
   core::Status note_exception(const char* doing);
@@ -119,8 +129,8 @@ class QueryWorker {
   std::deque<std::string> unread_;
   std::size_t unread_bytes_ = 0;
   std::deque<std::string> too_many_;  // ids of questions that found no room
-  std::deque<std::shared_ptr<const belief::Query>> waiting_;
-  std::shared_ptr<const belief::Query> in_work_;  // null: none
+  std::deque<std::shared_ptr<const Question>> waiting_;
+  std::shared_ptr<const Question> in_work_;  // null: none
   QueryCounts counts_;
 
   std::thread reader_, simulator_;  // last: they use all above

@@ -7,6 +7,7 @@
 //                                                  seed, backends, cancellation, progress));
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -28,8 +29,10 @@ struct ExplainOptions {
 
 struct Explained {
   queries::ExplainAnswer answer;
+  queries::ExplainWindow window;     ///< That it is about.
   double from = 0.0;                 ///< s since the first frame: of the frame that the window begins after, and ...
   double to = 0.0;                   ///< ... of its last.
+  std::uint64_t step = 0;            ///< Of the belief after that.
   std::vector<std::string> remarks;  ///< Of the replay.
   double seconds = 0.0;              ///< Wall time of the explanation, without the replay; ...
   double cpu_seconds = 0.0;          ///< ... CPU time of the process in it.

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON of the question what happened, both ways.
+#include "json_values.h"
+#include "prescene/belief/explain_question.h"
+#include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
+
+namespace prescene::belief {
+namespace {
+
+constexpr std::size_t kLongestExplainQuestion = std::size_t{1} << 16;
+constexpr ScalarRange kHalfWidths{1e-3, 0.5, "give a half width between 0.001 and 0.5, like 0.05"};
+
+std::optional<double> number_in(JsonObject& fields, const std::string& key, const ScalarRange& range) {
+  const auto at = fields.find(key);
+  if (!at) return std::nullopt;
+  const double number = at->number();
+  const core::Status in_range = check_number(number, range);
+  if (!in_range.ok()) at->fail(in_range.message());
+  return number;
+}
+
+void read_count(JsonObject& fields, const std::string& key, int low, int high, int& to) {
+  if (const auto at = fields.find(key)) to = static_cast<int>(at->integer(low, high));
+}
+
+void read_fields(const JsonAt& at, ExplainQuestion& question) {
+  JsonObject fields(at);
+  if (const auto name = fields.find("object")) {
+    question.object = name->text();
+    if (question.object.size() > kLongestName)
+      name->fail("the name has " + std::to_string(question.object.size()) + " bytes: give at most " +
+                 std::to_string(kLongestName));
+  }
+  question.from = number_in(fields, "from", kWindowEnds);
+  question.to = number_in(fields, "to", kWindowEnds);
+  const auto last = number_in(fields, "last", kWindowSeconds);
+  question.last = last.value_or(question.last);
+  if (question.from.has_value() != question.to.has_value())
+    at.fail("'from' and 'to' go together: give both, or 'last'");
+  else if (question.from && last)
+    at.fail("'last' and 'from' are two windows: give one of them");
+  else if (question.from && !(*question.from < *question.to))
+    at.fail("'from' is not before 'to': exchange them");
+  read_count(fields, "frames", 2, 64, question.frames);
+  read_count(fields, "runs", 2, 64, question.runs);
+  read_count(fields, "points", 8, 4096, question.points);
+  question.half_width = number_in(fields, "half_width", kHalfWidths).value_or(question.half_width);
+  if (const auto seed = fields.find("seed")) question.seed = seed->unsigned_integer();
+  if (const auto change = fields.find("change")) question.change = change->boolean();
+  if (const auto wanted = fields.find("wanted")) {
+    question.change = true;
+    if (wanted->value.is_string()) {
+      question.wanted_name = wanted->text();
+      if (question.wanted_name.empty()) wanted->fail("the name is empty: give an outcome of the scene, or a predicate");
+    } else if (wanted->value.is_object()) {
+      // As one of a list of outcomes.
+      Json list = Json::array({wanted->value});
+      if (!list[0].contains("name")) list[0]["name"] = "wanted";
+      const std::vector<Outcome> outcomes = outcomes_from({list, wanted->path, wanted->errors}, question.object);
+      if (!outcomes.empty()) question.wanted = outcomes.front();
+    } else {
+      wanted->fail("an outcome's name or an outcome {...} is needed, not " + wanted->type());
+    }
+  }
+  if (const auto effort = fields.find("effort")) {
+    JsonObject limits(*effort);
+    question.max_seconds = number_in(limits, "max_seconds", kWallSeconds);
+  }
+}
+
+}  // namespace
+
+bool asks_to_explain(std::string_view json) {
+  // Looked for first, as most questions are others and need not be parsed twice.
+  if (json.find("\"explain\"") == std::string_view::npos) return false;
+  const auto document = parse_json(json, kLongestExplainQuestion);
+  return document && document->is_object() && document->contains("explain");
+}
+
+core::Result<ExplainQuestion> explain_question_from_json(std::string_view json) {
+  PRESCENE_TRY(const Json document, parse_json(json, kLongestExplainQuestion));
+  JsonErrors errors;
+  ExplainQuestion question;
+  {
+    JsonObject object({document, "", errors});
+    if (const auto id = object.find("id")) {
+      question.id = id->text();
+      if (question.id.size() > kLongestId)
+        id->fail("the text has " + std::to_string(question.id.size()) + " bytes: give at most " +
+                 std::to_string(kLongestId));
+    }
+    if (const auto asked = object.require("explain")) read_fields(*asked, question);
+  }
+  if (!errors.ok()) return errors.status();
+  return question;
+}
+
+Json to_json(const ExplainQuestion& question) {
+  Json asked = Json::object();
+  if (!question.object.empty()) asked["object"] = question.object;
+  if (question.from && question.to) {
+    asked["from"] = *question.from;
+    asked["to"] = *question.to;
+  } else {
+    asked["last"] = question.last;
+  }
+  asked["frames"] = question.frames;
+  asked["runs"] = question.runs;
+  asked["points"] = question.points;
+  asked["half_width"] = question.half_width;
+  asked["seed"] = question.seed;
+  if (question.change) asked["change"] = true;
+  if (!question.wanted_name.empty()) asked["wanted"] = question.wanted_name;
+  if (question.wanted) asked["wanted"] = to_json(*question.wanted);
+  if (question.max_seconds) asked["effort"] = {{"max_seconds", *question.max_seconds}};
+  Json json = Json::object();
+  if (!question.id.empty()) json["id"] = question.id;
+  json["explain"] = std::move(asked);
+  return json;
+}
+
+}  // namespace prescene::belief

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prescene/service/recording/explained_again.h"
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "prescene/belief/json.h"
+#include "prescene/interfaces/bags/bag_reader.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
+#include "prescene/service/outside_json.h"
+
+namespace prescene::service {
+namespace {
+
+/// More than services keep by default, so that what they were asked about is here, too.
+FrameHistorySettings replayed_history(const TrackerSettings& settings) {
+  FrameHistorySettings history;
+  history.seconds = 300.0;
+  history.most_bytes = std::size_t{256} << 20;
+  history.width = settings.filter.frame.terms.target_width;
+  return history;
+}
+
+/// What is compared: not how long it took.
+std::string text_to_compare(nlohmann::ordered_json answer) {
+  nlohmann::ordered_json& explained = answer["explain"];
+  for (const char* key : {"wall_seconds", "cpu_seconds"}) explained.erase(key);
+  return belief::json_text(answer);
+}
+
+}  // namespace
+
+ExplainedAgain::ExplainedAgain(const ReplayInput& input, std::filesystem::path path, const TrackerSettings& settings,
+                               Backends& backends, const core::Cancellation& cancellation)
+    : path_(std::move(path)),
+      settings_(settings),
+      backends_(backends),
+      cancellation_(cancellation),
+      scene_text_(input.scene_text()),
+      history_(replayed_history(settings)) {}
+
+void ExplainedAgain::add(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief) {
+  history_.add(observation, std::move(belief));
+}
+
+core::Status ExplainedAgain::read_controls() {
+  if (std::exchange(controls_read_, true) || !interfaces::is_bag(path_)) return core::ok_status();
+  RecordingReadOptions options;
+  options.check_data = false;  // it was, when it was opened
+  PRESCENE_TRY(const auto reader, RecordingReader::open(path_, options));
+  for (;;) {
+    PRESCENE_TRY(const auto entry, reader->next());
+    if (!entry) return core::ok_status();
+    if (entry->is_json || entry->message.topic != kControlTopic) continue;
+    const auto text = interfaces::decode_cdr<interfaces::RosString>(entry->message.cdr, interfaces::kSmallMessage);
+    if (text) controls_.push_back({text->data, entry->message.source_ns, entry->message.received_ns});
+  }
+}
+
+core::Result<std::string> ExplainedAgain::explained(const belief::ExplainQuestion& question, PastWindow past,
+                                                    core::TimeNs recorded_ns) {
+  PRESCENE_RETURN_IF_ERROR(read_controls());
+  ControlLog controls;
+  for (const SentControl& control : controls_)
+    if (control.recorded_ns <= recorded_ns) controls.add(control.text, control.sent_ns);
+  controls.put_into(past.window, past.remarks);
+  belief::EventWeights weights;
+  if (!scene_text_.empty()) {
+    auto of_scene = interfaces::parse_event_weights(scene_text_, "the scene");
+    if (!of_scene) return of_scene.status();
+    weights = *of_scene;
+  }
+  if (!likelihood_) {
+    PRESCENE_TRY(likelihood_, backends_.make_likelihood());
+  }
+  queries::ExplainContext context{backends_.query_context(backends_.pool()), likelihood_.get(), settings_.filter};
+  context.simulation.cancellation = &cancellation_;
+  PRESCENE_TRY(const Explained found, explain_past(std::move(past), question, weights, context));
+  return text_to_compare(explain_answer_json(question, found));
+}
+
+core::Status ExplainedAgain::add_answer(const std::string& json, core::TimeNs recorded_ns) {
+  const auto answer = parse_or_discard(json);
+  if (!answer.is_object() || !answer.contains("explain") || !answer["explain"].is_object()) return core::ok_status();
+  const auto& recorded = answer["explain"];
+  const auto cut_short = recorded.find("cut_short");
+  if (!recorded.contains("asked") || (cut_short != recorded.end() && *cut_short == true)) return core::ok_status();
+  const auto question = belief::explain_question_from_json(
+      belief::json_text({{"id", id_of_document(answer)}, {"explain", recorded["asked"]}}));
+  if (!question) return question.status().at("a recorded answer");
+  auto past = history_.window(*question);
+  if (!past) return core::ok_status();
+  const auto again = explained(*question, *std::move(past), recorded_ns);
+  if (!again && again.status().code() == core::StatusCode::kCancelled) return again.status();
+  ++compared_;
+  if (again && *again == text_to_compare(answer)) return core::ok_status();
+  if (different_++ == 0)
+    first_difference_ = "the answer '" + id_of_document(answer) + "' " +
+                        (again ? "says something else when it is worked out again"
+                               : "can't be worked out again: " + again.status().message());
+  return core::ok_status();
+}
+
+}  // namespace prescene::service
