@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/event.h"
 #include "prescene/core/text.h"
 #include "verb.h"
 
