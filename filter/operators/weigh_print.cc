@@ -27,6 +27,7 @@ constexpr double kKnownTurn = 0.01;        // rad; a turn that is known so well 
 constexpr double kOtherTurn = 0.12;        // rad; a rival nearer than this is no other
 constexpr double kMeasuredTurn = 0.25;     // rad; the turn of particles within this of the heaviest one is measured
 constexpr double kPrinted = 1.0;           // nats from which on something is seen of the print
+constexpr double kStays = 0.5;             // no particle leaves a pose that is more probable than this
 constexpr double kLeastShare = 0.02;       // rivals that are less probable get no particle
 
 /// A motion of the body that keeps its shape.
@@ -297,7 +298,9 @@ PrintReport weigh_print(const PrintedModel& printed, const FilterFrame& frame, c
     std::vector<std::size_t> members;
     for (std::size_t i = 0; i < object.particles.size(); ++i)
       if (is_near(object.particles[i].X_WO, X_WO_best, kMeasuredTurn, kMeasuredTurn)) members.push_back(i);
-    if (any_printed) report.turned = spread_over(rivals, members, object);
+    // Where a thing is printed otherwise, a wrong pose may agree a little by chance, and in every frame anew: a frame
+    // is to decide by itself.
+    if (any_printed && rivals.front().share < kStays) report.turned = spread_over(rivals, members, object);
     // That it was turned is no motion that anything is learned from.
     if (report.turned) object.motion = {}, object.grip = {};
   }

@@ -107,7 +107,6 @@ extern const geometry::Vector6d gradient;
 }  // namespace still_update_h
 
 namespace weigh_print_h {
-extern PrintCache prints;
 extern const belief::ObjectModel model;
 extern MeshCache meshes;
 extern const WeighPrintOptions options;

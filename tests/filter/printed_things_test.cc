@@ -138,7 +138,7 @@ struct Outcome {
 };
 
 Outcome track(const belief::ObjectModel& model, const belief::ObjectModel& seen, const Pose& X_WO, const Pose& X_OS,
-              std::uint64_t seed, bool use, int frames = 26) {
+              std::uint64_t seed, bool use, int frames = 8) {
   Backends backends;
   SimulatedSequence sequence = still_sequence({seen}, {X_WO});
   sequence.seed = seed;

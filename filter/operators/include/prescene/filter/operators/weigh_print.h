@@ -76,8 +76,8 @@ struct PrintReport {
 std::vector<Pose> rival_poses(const geometry::SymmetryGroup& symmetry, const Pose& X_WO);
 
 /// Changes weights, the turn about a continuous axis (a measurement of it, Gaussian about the best one nearby), and
-/// where a rival is likelier, moves as many particles to it as it is probable. Nothing where the frame has no colours,
-/// the object is not seen, or no pose's print agrees with the frame better than chance.
+/// where the rivals are likelier, moves as many particles to each as it is probable. Nothing where the frame has no
+/// colours, the object is not seen, or no pose's print agrees with the frame better than chance.
 PrintReport weigh_print(const PrintedModel& printed, const FilterFrame& frame, const belief::Observation& observation,
                         const WeighPrintOptions& options, RivalLook look, belief::ObjectBelief& object);
 

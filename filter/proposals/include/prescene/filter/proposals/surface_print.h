@@ -2,7 +2,7 @@
 // What is printed on a model: the brightness of its surface, and how well a frame's brightness agrees with it at a
 // pose. It tells what depth cannot: the turn of a can, the front of a box, the face of a cube.
 //
-//   const SurfacePrint print(mesh, material);                  // once a model; print.says_anything()
+//   const SurfacePrint print(mesh, material);                     // once a model; print.says_anything()
 //   const PrintView view(print, camera, depth, color, X_CO, 40);  // once an object and frame
 //   const double share = view.independent_share(X_CO);
 //   double nats = view.match(X_CO * X_OS).log_ratio(share) - view.match(X_CO).log_ratio(share);
