@@ -266,5 +266,38 @@ TEST(QueryWorker, AQuestionThatIsNotUnderstoodIsAnsweredWithTheReason) {
   EXPECT_THAT(answers[2], HasSubstr("where, predict"));
 }
 
+TEST(QueryWorker, PassesOnWhatAsksForAnExplanation) {
+  QueryWorkerSettings settings;
+  std::atomic<int> asked{0};
+  settings.explain = [&](const belief::ExplainQuestion& question,
+                         const queries::QueryContext& context) -> core::Result<nlohmann::ordered_json> {
+    ++asked;
+    EXPECT_TRUE(context.simulate_until);
+    EXPECT_EQ(question.last, 1.5);
+    if (question.object == "nobody") return core::not_found("there is no object 'nobody'");
+    return nlohmann::ordered_json{{"id", question.id}, {"step", 4}, {"explain", {{"text", "nothing"}}}};
+  };
+  WorkerUnderTest worker(settings);
+  worker.ask(R"({"id": "1", "explain": {"last": 1.5}})");
+  EXPECT_EQ(worker.answers(1)[0], R"({"id":"1","step":4,"explain":{"text":"nothing"}})");
+  worker.ask(R"({"id": "2", "explain": {"last": 1.5, "object": "nobody"}})");
+  const auto unknown = parse_or_discard(worker.answers(2)[1]);
+  EXPECT_EQ(unknown["id"], "2");
+  EXPECT_EQ(unknown["code"], "not_found");
+  worker.ask(R"({"id": "3", "explain": {"lst": 1.5}})");
+  const std::string misspelt = worker.answers(3)[2];
+  EXPECT_THAT(misspelt, HasSubstr("did you mean 'last'?"));
+  EXPECT_EQ(id_of(misspelt), "3");
+  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(worker.counts().answered, 1u);
+  EXPECT_EQ(worker.counts().refused, 2u);
+  // One that keeps no frames says so, and goes on.
+  WorkerUnderTest without({});
+  without.ask(R"({"id": "4", "explain": {}})");
+  EXPECT_THAT(without.answers(1)[0], HasSubstr("frames are not kept here"));
+  without.ask(R"({"id": "5", "where": {}})");
+  EXPECT_THAT(without.answers(2)[1], HasSubstr("\"items\""));
+}
+
 }  // namespace
 }  // namespace prescene::service
