@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/explain_question.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/utf8.h"
 
@@ -111,6 +112,40 @@ TEST(QueryLimits, SoAreCountsAndLengths) {
   EXPECT_TRUE(validate(Query{std::string(kLongestId, 'i'), WhereQuery{}}).ok());
   EXPECT_THAT(validate(Query{std::string(kLongestId + 1, 'i'), WhereQuery{}}).message(), HasSubstr("id"));
   EXPECT_THAT(validate(Query{"\xff", WhereQuery{}}).message(), HasSubstr("UTF-8"));
+}
+
+TEST(ExplainQuestion, IsReadAsItIsWritten) {
+  ExplainQuestion question;
+  question.id = "7";
+  question.object = "carton";
+  question.seed = 3;
+  EXPECT_EQ(explain_question_from_json(json_text(to_json(question))).value(), question);
+  question.from = 2.25;
+  question.to = 4.5;
+  question.change = true;
+  question.wanted = Outcome{"up", "carton", {Condition{UprightWithin{0.25}}}};
+  question.max_seconds = 2.0;
+  EXPECT_EQ(explain_question_from_json(json_text(to_json(question))).value(), question);
+  EXPECT_TRUE(asks_to_explain(json_text(to_json(question))));
+  EXPECT_FALSE(asks_to_explain(R"({"where": {"object": "explain"}})"));
+  EXPECT_FALSE(asks_to_explain(R"({"explain")"));
+}
+
+TEST(ExplainQuestion, NamesWhatIsWrongInIt) {
+  const auto refusal = [](const std::string& asked) {
+    const auto question = explain_question_from_json(R"({"id": "1", "explain": )" + asked + "}");
+    return question ? "" : question.status().message();
+  };
+  EXPECT_THAT(refusal(R"({"from": 1})"), HasSubstr("'from' and 'to' go together"));
+  EXPECT_THAT(refusal(R"({"from": 1, "to": 2, "last": 1})"), HasSubstr("two windows"));
+  EXPECT_THAT(refusal(R"({"from": 2, "to": 1})"), HasSubstr("'from' is not before 'to'"));
+  EXPECT_THAT(refusal(R"({"last": 0})"), HasSubstr("explain.last"));
+  EXPECT_THAT(refusal(R"({"points": 1})"), HasSubstr("explain.points"));
+  EXPECT_THAT(refusal(R"({"objct": "a"})"), HasSubstr("did you mean 'object'?"));
+  EXPECT_THAT(refusal(R"({"wanted": 3})"), HasSubstr("explain.wanted"));
+  EXPECT_THAT(refusal(R"({"wanted": ""})"), HasSubstr("the name is empty"));
+  EXPECT_EQ(refusal(R"({"wanted": {"object": "a", "upright": {"within_deg": 5}}})"), "");
+  EXPECT_THAT(query_from_json(R"({"explain": {}})").status().message(), HasSubstr("ask a running 'serve'"));
 }
 
 }  // namespace

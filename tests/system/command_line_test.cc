@@ -59,6 +59,10 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
                                              {"explain", "none.mcap", "--from", "1"},
                                              {"explain", "none.mcap", "--from", "2", "--to", "1"},
                                              {"explain", "none.mcap", "--from", "-1", "--to", "1"},
+                                             {"explain", "none.mcap", "--from", "1", "--to", "2", "--wanted", "{"},
+                                             {"ask", "explain", "--scene", scenario("milk_on_bin")},
+                                             {"ask", "explain", "--last", "0"},
+                                             {"ask", "where", "--last", "2"},
                                              {"serve", "--scene", "x", "--domain", "999"}}) {
     const Finished finished = run_program(args);
     EXPECT_EQ(finished.exit_code, 2) << finished.err;

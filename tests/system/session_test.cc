@@ -227,6 +227,15 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
     const ordered_json second = parsed(run_program(replay, bus_));
     EXPECT_GT(second["tracking"][0]["frames"].get<int>(), 3) << second["tracking"].dump();
     EXPECT_LT(second["tracking"][0]["median_position_error_m"].get<double>(), 0.01) << second["tracking"].dump();
+    const Finished why =
+        run_program({"ask", "--json", "--question",
+                     R"({"explain": {"object": "box", "last": 0.5, "points": 8, "runs": 2}})", "--timeout", "30"},
+                    bus_);
+    ASSERT_EQ(why.exit_code, 0) << why.err;
+    EXPECT_EQ(parsed(why)["explain"]["explanations"][0]["event"], "nothing") << why.out;
+    const Finished too_early = run_program({"ask", "explain", "--last", "500"}, bus_);
+    EXPECT_EQ(too_early.exit_code, 2) << too_early.out;
+    EXPECT_NE(too_early.err.find("the history holds"), std::string::npos) << too_early.err;
     EXPECT_EQ(service.stop(SIGINT), 0);
   }
   const Finished again = run_program({"replay", path("session.mcap"), "--json"});
@@ -235,6 +244,8 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
   EXPECT_TRUE(json["followed_step_records"].get<bool>());
   EXPECT_GT(json["compared_steps"].get<int>(), 0);
   EXPECT_EQ(json["different_steps"], 0);
+  EXPECT_EQ(json["compared_explanations"], 1);
+  EXPECT_EQ(json["different_explanations"], 0) << again.err;
   // The service's own settings are in the recording, and explain has fewer options than replay to replace them by.
   const Finished explained = run_program(
       {"explain", path("session.mcap"), "--from", "0.1", "--to", "0.6", "--points", "8", "--runs", "2", "--json"});
