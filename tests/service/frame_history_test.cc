@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
@@ -264,41 +263,6 @@ TEST(FrameHistory, ExplainsWithTheSameBitsOnAnyThreadsAndWhenAskedAgain) {
   EXPECT_FALSE(taken->answer.change);
   EXPECT_THAT(taken->answer.remarks,
               ::testing::Contains(HasSubstr("No smallest change is worked out of 'taken_away'")));
-}
-
-TEST(FrameHistory, AnExplanationTellsTheSmallestChangeThatWouldHaveKeptIt) {
-  const tests::ScratchDir folder;
-  const auto path = folder.path() / "tipped.mcap";
-  std::string yaml = tests::box_on_table("1.8", ", normal: {position: [0.002, 0.002, 0]}");
-  yaml.replace(yaml.find("[0.12, 0.08, 0.1]"), 17, "[0.06, 0.06, 0.2]");
-  yaml.replace(yaml.find("[0, 0, 0.05]"), 12, "[0, 0, 0.10]");
-  record_change(yaml, {1.1, "box", std::nullopt, geometry::Twist{{0.0, 4.0, 0.0}, {0.5, 0.0, 0.0}}}, path);
-  TrackedRecording recording(path, 1);
-  belief::ExplainQuestion question = quick_question(1.0);
-  question.object = "box";
-  question.change = true;
-  const auto explained = recording.explained(question);
-  ASSERT_TRUE(explained.ok()) << explained.status().message();
-  const queries::ExplainAnswer& answer = explained->answer;
-  const belief::EventKind first = answer.explanations.front().kind;
-  EXPECT_TRUE(first == belief::EventKind::kBumped || first == belief::EventKind::kPushed) << answer.text;
-  ASSERT_TRUE(answer.change) << answer.text;
-  EXPECT_TRUE(answer.change->found) << answer.text;
-  EXPECT_GE(answer.change->probability, 0.9);
-  EXPECT_LE(answer.change->low, answer.change->probability);
-  EXPECT_LT(answer.change->unchanged_probability, 0.5) << answer.text;
-  EXPECT_GT(answer.change->size, 0.0);
-  ASSERT_FALSE(answer.change->parts.empty());
-  double squares = 0.0;
-  for (const queries::ChangedPart& part : answer.change->parts) squares += part.deviations * part.deviations;
-  EXPECT_LE(std::sqrt(squares), answer.change->size + 1e-9);
-
-  const auto strips = explanation_strips(explained->window, answer, 3, recording.backends());
-  ASSERT_TRUE(strips.ok()) << strips.status().message();
-  ASSERT_EQ(strips->size(), 3u);
-  EXPECT_LT((*strips)[0].time, (*strips)[1].time);
-  const geometry::ColorImage picture = side_by_side(strips->front());
-  EXPECT_EQ(picture.width(), 3 * strips->front().seen.width() + 8);
 }
 
 TEST(ExplanationStrip, ColoursWhatIsNearerAndWhatIsFurther) {
