@@ -288,8 +288,8 @@ void ParticleFilter::recover_all(FrameStep& step) {
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
     counters.recoveries_tried += look ? 1 : 0;
-    if (!look ||
-        !recover(frame, terms, target, current, settings_.weight, settings_.initialise, tools_, mine, object)) {
+    if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
+                          tools_, mine, object)) {
       if (is_unseen) {
         counters.hidden_proposed +=
             wander_unseen(frame, terms, target, current, settings_.weight, settings_.initialise, tools_, mine, object);
