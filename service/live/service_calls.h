@@ -29,8 +29,8 @@ class ServiceCalls {
  public:
   struct Hooks {
     std::function<void(const std::string& question)> ask;  ///< Called on the bus's thread, as the next.
-    std::function<void()> restart;                  ///< Has the belief begin anew.
-    bool keeps_learned = false;                     ///< Else nothing can be saved.
+    std::function<void()> restart;                         ///< Has the belief begin anew.
+    bool keeps_learned = false;                            ///< Else nothing can be saved.
   };
   /// `node` must outlive this; `hooks` hand over what is asked.
   ServiceCalls(interfaces::DdsNode& node, Hooks hooks, core::LogSink log)
