@@ -119,13 +119,13 @@ TEST(ExplainQuestion, IsReadAsItIsWritten) {
   question.id = "7";
   question.object = "carton";
   question.seed = 3;
-  EXPECT_EQ(explain_question_from_json(json_text(to_json(question))).value(), question);
+  EXPECT_EQ(*explain_question_from_json(json_text(to_json(question))), question);
   question.from = 2.25;
   question.to = 4.5;
   question.change = true;
-  question.wanted = Outcome{"up", "carton", {Condition{UprightWithin{0.25}}}};
+  question.wanted = Outcome{"up", "carton", {Condition{UprightWithin{Vector3d::UnitZ(), 0.25}}}};
   question.max_seconds = 2.0;
-  EXPECT_EQ(explain_question_from_json(json_text(to_json(question))).value(), question);
+  EXPECT_EQ(*explain_question_from_json(json_text(to_json(question))), question);
   EXPECT_TRUE(asks_to_explain(json_text(to_json(question))));
   EXPECT_FALSE(asks_to_explain(R"({"where": {"object": "explain"}})"));
   EXPECT_FALSE(asks_to_explain(R"({"explain")"));
