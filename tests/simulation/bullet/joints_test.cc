@@ -282,7 +282,8 @@ TEST(Joints, DirectlyJointedPartsDoNotTouchAndOthersDo) {
   instance->set_state(start);
   step_for(*instance, 0.5);
   EXPECT_NEAR(joint_now(scene, *instance).position, 0.205, 1e-6);  // out of the cabinet, which does not stop it
-  const auto run = run_one(*simulator_of(scene), start, {.stop = {.duration = 1.5, .stop_at_rest = false}});
+  const auto run =
+      run_one(*simulator_of(scene), start, {.actions = {}, .stop = {.duration = 1.5, .stop_at_rest = false}});
   // It may stop short by what it goes in a step.
   EXPECT_NEAR(belief::joint_states(scene, run.final())[0].position, 0.4, 2e-3);
   ASSERT_FALSE(run.contacts.empty());
@@ -292,14 +293,15 @@ TEST(Joints, DirectlyJointedPartsDoNotTouchAndOthersDo) {
 TEST(Joints, WhatBalancesOnItsHingeIsNotAtRest) {
   const Scene scene = pendulum();
   const auto rests = [&](double position) {
-    const auto run = run_one(*simulator_of(scene), at(scene, {{position, 0.0}}), {.stop = {.duration = 0.6}});
+    const auto run =
+        run_one(*simulator_of(scene), at(scene, {{position, 0.0}}), {.actions = {}, .stop = {.duration = 0.6}});
     return run.end == belief::TrajectoryEnd::kAtRest;
   };
   EXPECT_TRUE(rests(0.0));
   EXPECT_FALSE(rests(kPi));
   Scene stiff = scene;
   stiff.joints[0].friction = belief::FixedScalar{0.5};
-  const auto run = run_one(*simulator_of(stiff), at(stiff, {{kPi, 0.0}}), {.stop = {.duration = 0.6}});
+  const auto run = run_one(*simulator_of(stiff), at(stiff, {{kPi, 0.0}}), {.actions = {}, .stop = {.duration = 0.6}});
   EXPECT_EQ(run.end, belief::TrajectoryEnd::kAtRest);
 }
 
@@ -320,7 +322,7 @@ TEST(Joints, ABoxKeepsItsLidWhereItIsPushed) {
   WorldState start = start_of(scene);
   start.objects[1].X_WO = belief::child_pose(joint, start.objects[0].X_WO, -1.2);
   start.objects[0].V_WO.linear = start.objects[1].V_WO.linear = {0.8, 0.0, 0.0};
-  const auto run = run_one(*simulator_of(scene), start, {.stop = {.duration = 4.0}});
+  const auto run = run_one(*simulator_of(scene), start, {.actions = {}, .stop = {.duration = 4.0}});
   EXPECT_EQ(run.end, belief::TrajectoryEnd::kAtRest);
   const auto states = belief::joint_states(scene, run.final());
   EXPECT_NEAR(states[0].position, 0.0, 1e-3);  // it fell shut
