@@ -294,7 +294,7 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
                    up_best = best.X_WO.rotation.conjugate() * frame.up_W;
     return is_found && std::acos(std::clamp(up.dot(up_best), -1.0, 1.0)) < kRivalTurn;
   };
-  std::erase_if(rivals, [&](const Rival& rival) { return !is_open(rival) && rival.log_odds < kLeastGain; });
+  std::erase_if(rivals, [&](const Rival& rival) { return !is_open(rival) && rival.log_odds < kTrackedLogOdds; });
   if (rivals.empty()) return 0;
   std::vector<Particle>& particles = object.particles;
   double log_best = -std::numeric_limits<double>::infinity();
