@@ -13,11 +13,11 @@ using ::testing::HasSubstr;
 
 TrackerSettings unusual() {
   TrackerSettings settings;
-  settings.topics = {"/d", "/c", "/i", "/t", "/ts", "points", "compressed", "/clock"};
+  settings.topics = {"/d", "/c", "/i", "/t", "/ts", "/js", "points", "compressed", "/clock"};
   settings.assembler = {
       "base", "lens", geometry::normalized(geometry::Pose{{0.3, 0.1, -0.7, 0.2}, {0.1, 1.0 / 3.0, 2}}),
       0.07,   0.02,   false,
-      true,   true};
+      true,   true,   nullptr};
   settings.tf = {.history_s = 12.5, .max_frames = 77, .max_samples = 5000, .max_extrapolation_s = 0.3};
   settings.learned = "learned: {}\n";
   settings.learned_file = "learned.yaml";
