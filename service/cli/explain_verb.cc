@@ -135,6 +135,7 @@ core::Status take_wanted(const std::string& text, queries::ExplainQuery& query) 
 
 core::Status run(ExplainVerbOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_wanted(options.wanted, options.explain.query));
+  PRESCENE_RETURN_IF_ERROR(check_folder_options(*options.verb, options.input));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.input, options.scene}));
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},

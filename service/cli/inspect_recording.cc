@@ -130,8 +130,8 @@ core::Status inspect_recording(const RecordingInspection& options, VerbContext& 
   PRESCENE_RETURN_IF_ERROR(check_apart("--overlay", options.overlay, "--likelihood-map", options.likelihood_map));
   for (const auto& [name, output] :
        {std::pair("--overlay", &options.overlay), std::pair("--likelihood-map", &options.likelihood_map)}) {
-    PRESCENE_RETURN_IF_ERROR(check_png(name, *output));
     PRESCENE_RETURN_IF_ERROR(check_output(name, *output, {place}));
+    PRESCENE_RETURN_IF_ERROR(check_png(name, *output));
   }
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(options.input, context.log()));
   TrackerSettings settings = options.tracker;
