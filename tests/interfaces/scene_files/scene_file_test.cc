@@ -49,10 +49,11 @@ belief::PoseDistribution pose_of(const std::string& pose) {
 
 TEST(SceneFile, OfThePageHasAllThatThePageSays) {
   const Scene scene = scene_of(tests::code_blocks(tests::text_of_file("docs/reference/scene_files.md"), "yaml"));
-  EXPECT_EQ(scene.models.size(), 9U);
+  EXPECT_EQ(scene.models.size(), 11U);
   EXPECT_EQ(scene.supports.size(), 4U);
   EXPECT_EQ(scene.robot.size(), 2U);
-  EXPECT_EQ(scene.objects.size(), 6U);
+  EXPECT_EQ(scene.objects.size(), 8U);
+  EXPECT_EQ(scene.joints.size(), 2U);
   EXPECT_EQ(scene.actions.size(), 6U);
   EXPECT_EQ(scene.exclusive_outcomes[1].outcomes.size(), 6U);
   EXPECT_EQ(scene.objects[0].held_by, "gripper");
