@@ -21,7 +21,7 @@ using testing::HasSubstr;
 // Maps whose keys are names that the writer of the file chooses.
 bool holds_names(const std::string& path) {
   if (path == "models" || path == "supports" || path == "robot" || path == "objects" || path == "outcomes" ||
-      path == "exclusive_outcomes")
+      path == "joints" || path == "exclusive_outcomes")
     return true;
   const std::string group_end = ".outcomes";
   return path.rfind("exclusive_outcomes.", 0) == 0 && path.size() > group_end.size() &&
