@@ -286,15 +286,6 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
              (particle.X_WO * target.centre() - rival.X_WO * target.centre()).norm() < kHeldShift;
     });
   });
-  // Things are put down upright more often than turned over: what tilts a find needs as much evidence as what is to
-  // replace a pose that was followed.
-  const auto is_open = [&](const Rival& rival) {
-    const Pose X_equal = geometry::closest_equivalent(rival.X_WO, best.X_WO, symmetry);
-    const Vector3d up = X_equal.rotation.conjugate() * frame.up_W,
-                   up_best = best.X_WO.rotation.conjugate() * frame.up_W;
-    return is_found && std::acos(std::clamp(up.dot(up_best), -1.0, 1.0)) < kRivalTurn;
-  };
-  std::erase_if(rivals, [&](const Rival& rival) { return !is_open(rival) && rival.log_odds < kTrackedLogOdds; });
   if (rivals.empty()) return 0;
   std::vector<Particle>& particles = object.particles;
   double log_best = -std::numeric_limits<double>::infinity();
@@ -310,8 +301,8 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
     particle.covariance.topLeftCorner<6, 6>() = rivals[i].covariance;
     particle.covariance.bottomLeftCorner<6, 6>().setZero();
     particle.covariance.topRightCorner<6, 6>().setZero();
-    particle.log_weight = log_best + (is_open(rivals[i]) ? std::min(0.0, rivals[i].log_odds)
-                                                         : std::min(kFirstLogOdds, rivals[i].log_odds + kSlipLogOdds));
+    particle.log_weight = log_best + (is_found ? std::min(0.0, rivals[i].log_odds)
+                                               : std::min(kFirstLogOdds, rivals[i].log_odds + kSlipLogOdds));
   }
   belief::normalize(particles);
   return static_cast<int>(count);
