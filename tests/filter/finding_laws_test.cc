@@ -176,9 +176,10 @@ TEST_F(Finding, WhatIsFoundNeitherFloatsNorReachesIntoAnother) {
     std::vector<std::vector<Vector3d>> points;
     std::vector<std::size_t> there;
     for (std::size_t i = 0; i < things.size(); ++i) {
-      // What was not found is looked for where nothing is seen of it, and hardly believed to be there. The confidence
-      // of what was found may be less than one half, as one frame seldom tells how a thing is turned.
-      if (!reported(result.belief.objects[i]) || result.belief.objects[i].existence < 0.5) continue;
+      // What was not found is looked for where nothing is seen of it. The confidence of what was found may be less than
+      // one half, as one frame seldom tells how a thing is turned.
+      const belief::ObjectBelief& object = result.belief.objects[i];
+      if (!reported(object) || object.existence < 0.5 || object.visible_share < 0.3) continue;
       there.push_back(i);
       points.push_back(vertices_at(i, belief::estimate(result.belief.objects[i]).mode));
     }
