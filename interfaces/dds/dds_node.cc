@@ -509,18 +509,17 @@ core::Status DdsNode::offer_service(const std::string& name, const std::string& 
       dds_create_writer(impl_->participant, replies, make_service_qos(id, service_type->response_hash).get(), nullptr);
   PRESCENE_RETURN_IF_ERROR(dds_status(writer, "writer of " + name));
   impl_->services.push_back({name, service_type, 0, writer});
-  const core::Status listens = impl_->listen(name, type, requests, make_service_qos(id, service_type->request_hash),
-                                             [impl = impl_.get(), index, has_text = service_type->has_text,
-                                              on_request = std::move(on_request)](auto&& message) {
-                                               std::optional<ServiceRequest> request =
-                                                   parse_request(message.cdr, has_text);
-                                               if (!request) {
-                                                 impl->dropped.fetch_add(1, std::memory_order_relaxed);
-                                                 return;
-                                               }
-                                               request->service = index;
-                                               on_request(*std::move(request));
-                                             });
+  core::Status listens = impl_->listen(name, type, requests, make_service_qos(id, service_type->request_hash),
+                                       [impl = impl_.get(), index, has_text = service_type->has_text,
+                                        on_request = std::move(on_request)](auto&& message) {
+                                         std::optional<ServiceRequest> request = parse_request(message.cdr, has_text);
+                                         if (!request) {
+                                           impl->dropped.fetch_add(1, std::memory_order_relaxed);
+                                           return;
+                                         }
+                                         request->service = index;
+                                         on_request(*std::move(request));
+                                       });
   if (!listens.ok()) {
     impl_->services.pop_back();
     dds_delete(writer);
