@@ -208,7 +208,7 @@ class ChangeSearcher {
   }
 
   std::optional<Shift> shortest_shift() {
-    const std::optional<Shift> single = along_one_coordinate();
+    std::optional<Shift> single = along_one_coordinate();
     const double bound = single ? length_of(*single) : kFurthest;
     // Mixtures: the mean follows the shortest that reach it, or else those that come nearest.
     std::optional<Shift> best;
