@@ -42,7 +42,7 @@ JointEstimate estimate_of(const Belief& belief, const Joint& joint, const Object
   }
   result.confidence = parent_confidence * estimate(belief, child).confidence;
 
-  // Of the mixture, about the heaviest particle so that hinges are not averaged across half a turn.
+  // Of the mixture.
   double weights = 0.0, first = 0.0, second = 0.0;
   for (const Particle& particle : child.particles) {
     const double weight = std::exp(particle.log_weight);

@@ -11,15 +11,6 @@ namespace {
 constexpr std::size_t kLongestExplainQuestion = std::size_t{1} << 16;
 constexpr ScalarRange kHalfWidths{1e-3, 0.5, "give a half width between 0.001 and 0.5, like 0.05"};
 
-std::optional<double> number_in(JsonObject& fields, const std::string& key, const ScalarRange& range) {
-  const auto at = fields.find(key);
-  if (!at) return std::nullopt;
-  const double number = at->number();
-  const core::Status in_range = check_number(number, range);
-  if (!in_range.ok()) at->fail(in_range.message());
-  return number;
-}
-
 void read_count(JsonObject& fields, const std::string& key, int low, int high, int& to) {
   if (const auto at = fields.find(key)) to = static_cast<int>(at->integer(low, high));
 }
@@ -32,9 +23,9 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
       name->fail("the name has " + std::to_string(question.object.size()) + " bytes: give at most " +
                  std::to_string(kLongestName));
   }
-  question.from = number_in(fields, "from", kWindowEnds);
-  question.to = number_in(fields, "to", kWindowEnds);
-  const auto last = number_in(fields, "last", kWindowSeconds);
+  question.from = read_number(fields, "from", kWindowEnds);
+  question.to = read_number(fields, "to", kWindowEnds);
+  const auto last = read_number(fields, "last", kWindowSeconds);
   question.last = last.value_or(question.last);
   if (question.from.has_value() != question.to.has_value())
     at.fail("'from' and 'to' go together: give both, or 'last'");
@@ -45,7 +36,7 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
   read_count(fields, "frames", 2, 64, question.frames);
   read_count(fields, "runs", 2, 64, question.runs);
   read_count(fields, "points", 8, 4096, question.points);
-  question.half_width = number_in(fields, "half_width", kHalfWidths).value_or(question.half_width);
+  question.half_width = read_number(fields, "half_width", kHalfWidths).value_or(question.half_width);
   if (const auto seed = fields.find("seed")) question.seed = seed->unsigned_integer();
   if (const auto change = fields.find("change")) question.change = change->boolean();
   if (const auto wanted = fields.find("wanted")) {
@@ -65,7 +56,7 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
   }
   if (const auto effort = fields.find("effort")) {
     JsonObject limits(*effort);
-    question.max_seconds = number_in(limits, "max_seconds", kWallSeconds);
+    question.max_seconds = read_number(limits, "max_seconds", kWallSeconds);
   }
 }
 

@@ -39,16 +39,6 @@ Json effort_json(const Effort& effort) {
   return json;
 }
 
-/// A number of a range; what is outside would make no sense to work on.
-std::optional<double> read_number(JsonObject& fields, const std::string& key, const ScalarRange& range) {
-  const auto at = fields.find(key);
-  if (!at) return std::nullopt;
-  const double number = at->number();
-  const core::Status in_range = check_number(number, range);
-  if (!in_range.ok()) at->fail(in_range.message());
-  return number;
-}
-
 void read_number(JsonObject& fields, const std::string& key, const ScalarRange& range, double& to) {
   if (const std::optional<double> number = read_number(fields, key, range)) to = *number;
 }

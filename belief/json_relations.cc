@@ -9,16 +9,6 @@
 namespace prescene::belief {
 namespace {
 
-/// A number of the range, or an error at its place.
-void read_ranged(JsonObject& fields, const std::string& key, const ScalarRange& range, double unit, double& to) {
-  const auto at = fields.find(key);
-  if (!at) return;
-  const double number = at->number();
-  const core::Status in_range = check_number(number, range);
-  if (!in_range.ok()) at->fail(in_range.message());
-  to = unit * number;
-}
-
 Json reach_json(const Reach& reach) {
   Json json = Json::object();
   if (reach.of.empty())
@@ -40,7 +30,7 @@ Reach reach_from(const JsonAt& at) {
     if (of->value.is_string() && reach.of.empty())
       of->fail("the name is empty: give a robot body, \"camera\" or a point");
   }
-  read_ranged(fields, "radius", kReaches, 1.0, reach.radius);
+  reach.radius = read_number(fields, "radius", kReaches).value_or(reach.radius);
   return reach;
 }
 
@@ -91,8 +81,9 @@ RelationsQuery relations_from(JsonObject& fields) {
   if (const auto name = fields.find("object")) query.object = name->text();
   if (const auto draws = fields.find("draws"))
     query.draws = static_cast<int>(draws->integer(kFewestRelationDraws, kMostRelationDraws));
-  read_ranged(fields, "confidence", kConfidences, 1.0, query.confidence);
-  read_ranged(fields, "upright_deg", kTurnsDeg, geometry::kDegree, query.upright_within);
+  query.confidence = read_number(fields, "confidence", kConfidences).value_or(query.confidence);
+  if (const auto degrees = read_number(fields, "upright_deg", kTurnsDeg))
+    query.upright_within = geometry::kDegree * *degrees;
   if (const auto reach = fields.find("reach")) query.reach = reach_from(*reach);
   return query;
 }

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "prescene/belief/json.h"
+#include "prescene/belief/validation.h"
 
 namespace prescene::belief {
 namespace {
@@ -190,6 +191,15 @@ const std::vector<std::pair<std::string, When>>& when_words() {
 
 std::string json_text(const Json& document, int indent) {
   return document.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+std::optional<double> read_number(JsonObject& fields, const std::string& key, const ScalarRange& range) {
+  const auto at = fields.find(key);
+  if (!at) return std::nullopt;
+  const double number = at->number();
+  const core::Status in_range = check_number(number, range);
+  if (!in_range.ok()) at->fail(in_range.message());
+  return number;
 }
 
 core::Result<Json> parse_json(std::string_view text, std::size_t max_bytes) {

@@ -22,6 +22,9 @@ Json axis_json(const Vector3d& axis);
 Vector3d axis_from(const JsonAt& at);
 /// null where it is not finite.
 Json number_json(double value);
+struct ScalarRange;
+/// The key's number, or an error at its place where it is out of the range.
+std::optional<double> read_number(JsonObject& fields, const std::string& key, const ScalarRange& range);
 /// The keys `position` and `rotation`, both of which may be absent.
 void read_pose(JsonObject& fields, Pose& pose);
 Pose pose_from(const JsonAt& at);

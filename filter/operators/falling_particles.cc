@@ -32,9 +32,7 @@ belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_W
   std::vector<belief::SceneObject> kept;
   for (const std::size_t i : objects) kept.push_back(belief.scene->objects[i]);
   scene.objects = std::move(kept);
-  belief::drop_loose_joints(scene);
-  for (belief::SceneObject& object : scene.objects)  // a hand pulls what is on a joint, and does not carry it
-    if (belief::joint_of(scene, object.name)) object.held_by.reset();
+  keep_joints_of_present(scene);
   scene.actions.clear();
   scene.outcomes.clear();
   scene.exclusive_outcomes.clear();
@@ -273,6 +271,12 @@ bool is_slow(const Particle& particle) {
 void settle(Particle& particle) {
   particle.mode = MotionMode::kResting;
   clear_twist(particle);
+}
+
+void keep_joints_of_present(belief::Scene& scene) {
+  belief::drop_loose_joints(scene);
+  for (belief::SceneObject& object : scene.objects)
+    if (belief::joint_of(scene, object.name)) object.held_by.reset();
 }
 
 PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,

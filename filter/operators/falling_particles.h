@@ -32,6 +32,9 @@ bool is_slow(const belief::Particle& particle);
 /// Lies from now on.
 void settle(belief::Particle& particle);
 
+/// Leaves of a scene's joints those whose things it still has. A hand pulls what is on a joint, and does not carry it.
+void keep_joints_of_present(belief::Scene& scene);
+
 /// Moves all falling particles on to the end of the step: by physics where that can be done, else at constant velocity.
 PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "episode_evidence.h"
+#include "falling_particles.h"
 #include "motion_following.h"
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
@@ -76,9 +77,7 @@ class Judge {
     std::vector<belief::SceneObject> kept;
     for (const std::size_t i : present_) kept.push_back(scene.objects[i]);
     scene.objects = std::move(kept);
-    belief::drop_loose_joints(scene);
-    for (belief::SceneObject& object : scene.objects)  // a hand pulls what is on a joint, and does not carry it
-      if (belief::joint_of(scene, object.name)) object.held_by.reset();
+    keep_joints_of_present(scene);
     for (std::size_t i = 0; i < scene.robot.size(); ++i) {
       std::vector<belief::KinematicBody::Waypoint> seen;
       for (const MotionSample& sample : episode_.samples)
