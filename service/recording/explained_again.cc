@@ -2,10 +2,12 @@
 #include "prescene/service/recording/explained_again.h"
 
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <utility>
 
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/bags/bag_reader.h"
+#include "prescene/interfaces/mcap/mcap_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/outside_json.h"
@@ -20,6 +22,27 @@ FrameHistorySettings replayed_history(const TrackerSettings& settings) {
   history.most_bytes = std::size_t{256} << 20;
   history.width = settings.filter.frame.terms.target_width;
   return history;
+}
+
+/// Whether frames have to be kept: only a recording of ours holds explanations, and few do. A file that can't be read
+/// is left to the replay, which says so.
+bool may_hold_explanations(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path) || path.extension() == ".db3") return false;
+  interfaces::McapReaderOptions only_answers;
+  only_answers.topics = {kAnswerTopic};
+  only_answers.salvage = true;
+  only_answers.check_data = false;  // it was, when it was opened
+  const auto reader = interfaces::McapReader::open(path, only_answers);
+  if (!reader) return true;
+  for (;;) {
+    const auto answer = (*reader)->next();
+    if (!answer) return true;
+    if (!*answer) return false;
+    const std::vector<std::uint8_t>& data = (*answer)->data;
+    if (std::string_view(reinterpret_cast<const char*>(data.data()), data.size()).find("\"explain\"") !=
+        std::string_view::npos)
+      return true;
+  }
 }
 
 /// What is compared: not how long it took.
@@ -38,10 +61,11 @@ ExplainedAgain::ExplainedAgain(const ReplayInput& input, std::filesystem::path p
       backends_(backends),
       cancellation_(cancellation),
       scene_text_(input.scene_text()),
+      keeps_frames_(may_hold_explanations(path_)),
       history_(replayed_history(settings)) {}
 
 void ExplainedAgain::add(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief) {
-  history_.add(observation, std::move(belief));
+  if (keeps_frames_) history_.add(observation, std::move(belief));
 }
 
 core::Status ExplainedAgain::read_controls() {

@@ -25,6 +25,7 @@ class ExplainedAgain {
   ExplainedAgain(const ReplayInput& input, std::filesystem::path path, const TrackerSettings& settings,
                  Backends& backends, const core::Cancellation& cancellation);
 
+  /// Keeps nothing if the recording holds no explanation.
   void add(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief);
   /// An answer of /prescene/answer and when it was recorded. Others than explanations, those that were cut short by
   /// their time, and those about more than 300 s before are passed over. Errors of reading the recording, which says
@@ -50,6 +51,7 @@ class ExplainedAgain {
   Backends& backends_;
   const core::Cancellation& cancellation_;
   std::string scene_text_;
+  bool keeps_frames_;
   FrameHistory history_;
   bool controls_read_ = false;
   std::vector<SentControl> controls_;
