@@ -9,12 +9,14 @@
 #include <dds/ddsi/ddsi_serdata.h>
 
 // What idlc makes of the types; their fields are known from ROS's own definitions, and written down anew below.
+// NOLINTBEGIN(readability-identifier-naming): idlc's names
 extern "C" {
 extern const dds_topic_descriptor_t std_srvs_srv_dds__Trigger_Request__desc;
 extern const dds_topic_descriptor_t std_srvs_srv_dds__Trigger_Response__desc;
 extern const dds_topic_descriptor_t prescene_msgs_srv_dds__Ask_Request__desc;
 extern const dds_topic_descriptor_t prescene_msgs_srv_dds__Ask_Response__desc;
 }
+// NOLINTEND(readability-identifier-naming)
 
 namespace prescene::tests {
 namespace {
