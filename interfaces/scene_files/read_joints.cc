@@ -183,6 +183,7 @@ bool is_off(const belief::JointError& error) {
   return error.distance > belief::kJointDistanceTolerance || error.angle > belief::kJointAngleTolerance;
 }
 
+/// Which of the two is wrong, the child's start or the joint, the file does not say: both places are named.
 void check_start(const LocatedValue& at, const LocatedValue& pose, const Joint& joint, const Pose& X_WP,
                  const Pose& X_WC, Problems& problems) {
   const belief::JointError error = belief::joint_error(joint, X_WP, X_WC);
@@ -195,14 +196,19 @@ void check_start(const LocatedValue& at, const LocatedValue& pose, const Joint& 
                      " allows it to be",
                  "move it to [" + core::rounded_text(p.x()) + ", " + core::rounded_text(p.y()) + ", " +
                      core::rounded_text(p.z()) + "] or its like, or correct 'child_pose', 'axis' or 'anchor'");
+    problems.add(at.place, at.path,
+                 "its child " + interfaces::quote(joint.child) + " starts " + away_text(error) +
+                     " away from where it allows it to be",
+                 "correct 'child_pose', 'axis' or 'anchor', or move the child's start");
     return;
   }
   const double tolerance = is_hinge(joint) ? belief::kJointAngleTolerance : belief::kJointDistanceTolerance;
   if (position >= joint.low - tolerance && position <= joint.high + tolerance) return;
-  problems.add(at.place, at.path,
-               "the joint starts at " + position_text(joint, position) + ", beyond its limit of " +
-                   position_text(joint, std::clamp(position, joint.low, joint.high)),
-               "widen the limits, or move the child's start");
+  const std::string beyond = position_text(joint, position) + ", beyond its limit of " +
+                             position_text(joint, std::clamp(position, joint.low, joint.high));
+  problems.add(at.place, at.path, "the joint starts at " + beyond, "widen the limits, or move the child's start");
+  problems.add(pose.place, pose.path, "the joint " + interfaces::quote(joint.name) + " starts at " + beyond,
+               "move the start, or widen the joint's limits");
 }
 
 /// Draws of the start that the joint does not allow are moved to where it does, which whoever wrote them may not mean.
