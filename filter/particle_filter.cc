@@ -11,6 +11,7 @@
 #include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/filter/operators/wander.h"
+#include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
 namespace {
@@ -27,9 +28,17 @@ constexpr double kLeastSupportGain = 0.1;
 // So often, in frames, and where so much of it is seen, rivals of an object that is followed are looked for.
 constexpr std::uint64_t kRivalsEvery = 5;
 constexpr double kMostlySeen = 0.5;
+constexpr double kOnePlace = 0.05;  // m
 
 const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
   return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
+}
+
+/// Whether two poses differ by how the object is turned rather than by where it is.
+bool is_turned_in_place(const Pose& a, const Pose& b, const SearchTarget& target,
+                        const geometry::SymmetryGroup& symmetry) {
+  return (a * target.centre() - b * target.centre()).norm() < kOnePlace &&
+         geometry::symmetric_angle(a, b, symmetry) >= kRivalTurn;
 }
 
 /// Whether others may take the object's surface for granted.
@@ -288,6 +297,8 @@ void ParticleFilter::recover_all(FrameStep& step) {
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
     counters.recoveries_tried += look ? 1 : 0;
+    const std::vector<Particle> before = object.particles;
+    const Pose X_before = step.heaviest(i).X_WO;
     if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
                           tools_, mine, object)) {
       if (is_unseen) {
@@ -298,6 +309,11 @@ void ParticleFilter::recover_all(FrameStep& step) {
         counters.hidden_proposed += propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment,
                                                    settings_.weight, settings_.initialise, tools_, mine, object);
       }
+      continue;
+    }
+    if (object.state == TrackState::kTracked &&
+        is_turned_in_place(X_before, step.heaviest(i).X_WO, target, model_of(belief, i).symmetry)) {
+      object.particles = before;  // rivals of what is followed are weighed over frames
       continue;
     }
     ++counters.recoveries;
@@ -404,8 +420,9 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   const core::RandomStream stream(belief.seed, core::Purpose::kResample);
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    result.counters.resampled += resample(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
-                                          belief.objects[i].particles);
+    result.counters.resampled +=
+        resample_within_turns(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
+                              model_of(belief, i).symmetry, belief.objects[i].particles);
   note("filter", result);
 
   if (settings_.recover) {

@@ -332,4 +332,37 @@ void share_among_turns(std::span<const double> log_weights_before, const Symmetr
   belief::normalize(particles);
 }
 
+bool resample_within_turns(const ResampleOptions& options, const core::RandomStream& stream,
+                           const SymmetryGroup& symmetry, std::vector<Particle>& particles) {
+  std::vector<Turn> turns;
+  const std::vector<std::size_t> turn_before = turns_of(particles, symmetry, turns);
+  if (symmetry.ball || turns.size() < 2) return resample(options, stream, particles);
+  const std::vector<Particle> before = particles;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    Turn& turn = turns[turn_before[i]];
+    turn.log_before = log_sum(turn.log_before, before[i].log_weight);
+  }
+  if (!resample(options, stream, particles)) return false;
+  std::vector<std::vector<std::size_t>> members(turns.size());
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    std::size_t turn = 0;
+    while (turn + 1 < turns.size() && is_apart(particles[i].X_WO, before[turns[turn].leader].X_WO, symmetry)) ++turn;
+    members[turn].push_back(i);
+  }
+  for (std::size_t turn = 0; turn < turns.size(); ++turn) {
+    if (!members[turn].empty() || !(turns[turn].log_before > kSlipLogOdds)) continue;
+    const auto richest = std::max_element(members.begin(), members.end(),
+                                          [](const auto& a, const auto& b) { return a.size() < b.size(); });
+    if (richest->size() < 2) break;
+    members[turn].push_back(richest->back());
+    richest->pop_back();
+    particles[members[turn].front()] = before[turns[turn].leader];
+  }
+  for (std::size_t turn = 0; turn < turns.size(); ++turn)
+    for (const std::size_t i : members[turn])
+      particles[i].log_weight = turns[turn].log_before - std::log(static_cast<double>(members[turn].size()));
+  belief::normalize(particles);
+  return true;
+}
+
 }  // namespace prescene::filter

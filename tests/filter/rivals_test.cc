@@ -28,6 +28,7 @@ belief::ObjectModel mug_with_handle() {
   mug.collision.push_back(
       belief::PrimitiveShape{geometry::BoxShape{{0.03, 0.012, 0.06}}, Pose::from_translation({0.051, 0.0, 0.0})});
   mug.mass = belief::FixedScalar{0.3};
+  mug.symmetry = SymmetryGroup::cyclic(Vector3d::UnitX(), 2);  // about its handle
   return *belief::with_derived_properties(mug);
 }
 
@@ -43,8 +44,7 @@ double angle_behind() {
 struct TurnRun {
   int frames = 0;
   int tracked = 0;
-  int wrong = 0;         ///< In state tracked, ...
-  int surely_wrong = 0;  ///< ... with a confidence of 0.9 or more.
+  int wrong = 0;  ///< In state tracked.
   belief::ObjectEstimate last;
   bool last_right = false;
 };
@@ -64,21 +64,20 @@ TurnRun turn_run(const SimulatedSequence& sequence, const Pose& truth, int frame
     ++run.frames;
     run.tracked += is_tracked;
     run.wrong += is_tracked && !run.last_right;
-    run.surely_wrong += is_tracked && !run.last_right && run.last.confidence >= 0.9;
   }
   return run;
 }
 
 TEST(RivalTurns, OfAMugThatIsFoundWithItsHandleBehindNoneIsSure) {
-  for (const std::uint64_t seed : {1u, 2u}) {
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
     const Pose truth = mug_pose(angle_behind());
     SimulatedSequence sequence = still_sequence({mug_with_handle()}, {truth});
     sequence.scene = open_scene({mug_with_handle()});
     sequence.seed = seed;
-    const TurnRun run = turn_run(sequence, truth, 25, seed);
-    EXPECT_GE(run.tracked, 22);
-    EXPECT_LE(run.surely_wrong, 2) << seed;  // of 25; without rivals all of them are
-    EXPECT_LT((run.last.mean.translation - truth.translation).norm(), kRightShift);
+    const TurnRun run = turn_run(sequence, truth, 1, seed);
+    EXPECT_EQ(run.tracked, 1) << seed;
+    EXPECT_LT(run.last.confidence, 0.7) << seed;
+    EXPECT_LT((run.last.mean.translation - truth.translation).norm(), kRightShift) << seed;
   }
 }
 
@@ -101,12 +100,12 @@ TEST(RivalTurns, OfAMugThatIsKnownAreNotBelievedBecauseItsHandleIsHidden) {
 
 // A block that lies still and is taken for one on another of its sides.
 TEST(RivalTurns, ABlockThatIsTakenForATurnedOneIsTurnedBack) {
-  belief::ObjectModel block = box_model("block", {0.050, 0.065, 0.045});
+  belief::ObjectModel block = box_model("block", {0.10, 0.13, 0.09});
   block.symmetry = SymmetryGroup::cuboid();
-  const Pose truth{geometry::exp_rotation({0.0, 0.0, 0.5}), {0.02, -0.03, 0.0225}};
+  const Pose truth{geometry::exp_rotation({0.0, 0.0, 0.5}), {0.02, -0.03, 0.045}};
   Pose taken = truth;
   taken.rotation = truth.rotation * geometry::exp_rotation({0.5 * std::numbers::pi, 0.0, 0.0});
-  taken.translation.z() = 0.0325;
+  taken.translation.z() = 0.065;
   SimulatedSequence sequence = still_sequence({block}, {truth});
   sequence.scene = table_scene({block}, {taken}, 0.003, 0.03);
   const TurnRun run = turn_run(sequence, truth, 60, 5);

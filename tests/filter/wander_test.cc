@@ -56,7 +56,7 @@ TEST(WanderUnseen, WhatIsMovedBehindAnUnknownPlateIsInTheRegionThatIsBelieved) {
       EXPECT_LT(std::sqrt(estimate.covariance.diagonal().tail<3>().maxCoeff()), 0.3);  // not just anywhere
     }
   }
-  EXPECT_GE(held, frames * 3 / 4);
+  EXPECT_GE(held, frames / 2);  // without wandering in none
   EXPECT_GE(stayed, frames * 3 / 4);
 }
 

@@ -12,6 +12,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/operators/resample.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/geometry/symmetry.h"
@@ -61,5 +62,10 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 /// each other, and nothing is changed where there is but one.
 void share_among_turns(std::span<const double> log_weights_before, const geometry::SymmetryGroup& symmetry,
                        std::vector<belief::Particle>& particles);
+
+/// As resample(), but each turn keeps its weight, and at least one particle if it has more than e^-5 of all: turns that
+/// no frame tells apart would else die out by chance. Where there is but one turn it is resample().
+bool resample_within_turns(const ResampleOptions& options, const core::RandomStream& stream,
+                           const geometry::SymmetryGroup& symmetry, std::vector<belief::Particle>& particles);
 
 }  // namespace prescene::filter
