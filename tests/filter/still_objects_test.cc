@@ -143,7 +143,9 @@ struct Followed {
 };
 Followed follow(const Motion& motion, int frames, std::uint64_t seed) {
   Backends backends;
-  SimulatedSequence sequence = still_sequence({box_model("box", {0.06, 0.10, 0.18})}, {motion(0.0)});
+  belief::ObjectModel model = box_model("box", {0.06, 0.10, 0.18});
+  model.symmetry = geometry::SymmetryGroup::cuboid();  // else its turns share the weight
+  SimulatedSequence sequence = still_sequence({model}, {motion(0.0)});
   sequence.objects = {motion};
   sequence.seed = seed;
   const CountingLikelihood likelihood(*backends.likelihood);
@@ -153,7 +155,7 @@ Followed follow(const Motion& motion, int frames, std::uint64_t seed) {
   for (int frame = 0; frame < frames; ++frame) {
     StepResult result = filter.step(belief, sequence.observe(frame, *backends.renderer), {});
     belief = std::move(result.belief);
-    const belief::ObjectEstimate estimate = belief::estimate(belief.objects[0]);
+    const belief::ObjectEstimate estimate = belief::estimate(belief, belief.objects[0]);
     followed.published.push_back(estimate.mean);
     followed.motion.push_back(estimate.motion);
     followed.comparisons.push_back(likelihood.poses.exchange(0));
