@@ -7,6 +7,7 @@
 #include <set>
 
 #include "prescene/belief/json.h"
+#include "prescene/belief/robot_motion.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
@@ -21,6 +22,9 @@ constexpr std::size_t kMaxControls = 1000;
 
 // A stamp that is further ahead is by another clock than the frames', or the camera has stood still for so long.
 constexpr core::TimeNs kFarthestAheadNs = 60'000'000'000;
+
+// Seconds that an action may start after its control, and that a placement may take.
+constexpr double kLongestAhead = 3600.0;
 
 // The end of ROS's 32 bit seconds.
 constexpr core::TimeNs kLatestStamp = (core::TimeNs{1} << 31) * 1'000'000'000;
@@ -54,8 +58,10 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
   for (const auto& value : json["actions"]) {
     PRESCENE_TRY(belief::Action action, belief::action_from_json(value));
     // An hour bounds what is plausible, and keeps the sum in range.
-    if (!(std::abs(action.time) <= 3600.0))
+    if (!(std::abs(action.time) <= kLongestAhead))
       return core::invalid_input("time: actions start within an hour of their control");
+    if (std::holds_alternative<belief::Place>(action.what) && !(belief::duration_of(action) <= kLongestAhead))
+      return core::invalid_input("place: duration: an object is put down within an hour");
     control.actions.emplace_back(core::ns_of(action.time), std::move(action));
   }
   return control;
@@ -117,7 +123,17 @@ core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message
                                    : (newest_frame_ns ? sent_in_time_of_frames(sent_ns, *newest_frame_ns) : sent_ns);
   waiting_.reserve(waiting_.size() + control.actions.size());
   for (auto& [after_ns, action] : control.actions) {
-    waiting_.push_back({base_ns + after_ns, after_ns, control.stamp_ns, sent_ns, std::move(action)});
+    const bool is_place = std::holds_alternative<belief::Place>(action.what);
+    if (is_place) {
+      after_ns += core::ns_of(belief::duration_of(action));
+      action.what = belief::Release{belief::object_of(action)};
+    } else if (std::holds_alternative<belief::Release>(action.what)) {
+      // The robot says itself when what it puts down is let go of.
+      std::erase_if(waiting_, [&](const Waiting& waiting) {
+        return waiting.ends_place && belief::object_of(waiting.action) == belief::object_of(action);
+      });
+    }
+    waiting_.push_back({base_ns + after_ns, after_ns, control.stamp_ns, sent_ns, std::move(action), is_place});
   }
   sort();
   return core::ok_status();

@@ -47,6 +47,27 @@ TEST(WaitingControls, GiveWhatIsDueInItsOrderAndKeepTheRest) {
   EXPECT_NEAR(later.actions[0].time, 0.3, 1e-9);
 }
 
+TEST(WaitingControls, APlaceReleasesItsObjectAtItsEndAndOnce) {
+  const std::string place = R"({"actions": [{"time": 0.5, "place": {"object": "box",
+      "X_WO": {"position": [0, 0, 0.1]}, "duration": 1.5}}]})";
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(place, kNoon), kNoon).ok());
+  EXPECT_THAT(kinds(controls.due(kNoon, kNoon + kSecond)), ElementsAre());
+  const belief::Control end = controls.due(kNoon + kSecond, kNoon + 2 * kSecond);
+  EXPECT_THAT(kinds(end), ElementsAre("release"));
+  EXPECT_NEAR(end.actions[0].time, 1.0, 1e-9);
+  EXPECT_EQ(belief::object_of(end.actions[0]), "box");
+
+  // The robot says itself when it lets go.
+  ASSERT_TRUE(controls.take_in(message(kRelease, kNoon + kSecond), kNoon).ok());
+  EXPECT_THAT(kinds(controls.due(kNoon, kNoon + 9 * kSecond)), ElementsAre("release"));
+  EXPECT_EQ(controls.count(), 1u);
+
+  const std::string eternal = R"({"actions": [{"time": 0, "place": {"object": "box", "X_WO": {"position": [0, 0, 0]},
+      "duration": 1e300}}]})";
+  EXPECT_THAT(controls.take_in(message(eternal, kNoon), kNoon).message(), HasSubstr("within an hour"));
+}
+
 TEST(WaitingControls, BeforeTheFirstFrameCountFromItWhereTheClocksDiffer) {
   WaitingControls controls;
   ASSERT_TRUE(controls.take_in(message(kRelease, kNoon), std::nullopt).ok());

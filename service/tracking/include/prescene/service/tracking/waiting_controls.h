@@ -50,6 +50,9 @@ class WaitingControls {
   /// the newest frame; before there is one, from the first. kInvalidInput where it makes no sense or its stamp is more
   /// than a minute after the newest frame: by another clock, it would never be due. kResourceExhausted beyond 1000
   /// actions.
+  ///
+  /// The tracker follows a held object with its hand, so all that a `place` adds is when the object is let go of: it
+  /// becomes a release at its end, unless the robot sends a release of that object itself.
   core::Status take_in(const interfaces::ReceivedMessage& message, std::optional<core::TimeNs> newest_frame_ns);
   /// The clock of the frames is known: this is the first frame. Actions whose stamp is more than a minute after it are
   /// dropped.
@@ -79,6 +82,7 @@ class WaitingControls {
     std::optional<core::TimeNs> stamp_ns;  // as stated
     core::TimeNs sent_ns = 0;              // by the sender's clock
     belief::Action action;
+    bool ends_place = false;  // a release that was not sent, but follows from a `place`
   };
   void sort();
 
