@@ -22,6 +22,8 @@ using belief::Particle;
 
 constexpr double kSettleSpeed = 0.04;  // m/s; what is slower than this ...
 constexpr double kSettleRate = 0.5;    // rad/s; ... and this may come to rest
+constexpr double kStayedShift = 1e-3;  // m; what the simulator moves by less in a step ...
+constexpr double kStayedTurn = 0.01;   // rad; ... and turns by less has stayed where it is
 
 /// The scene of one step: robot bodies go from where they were to where they are, absent objects are left out.
 belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_WG, double dt,
@@ -168,8 +170,12 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     }
     const belief::ObjectState& end = runs[i].final().objects[place];
     Particle& particle = object.particles[falling[i].particle];
+    const geometry::Vector6d motion = geometry::box_minus(end.X_WO, particle.X_WO);
     particle.X_WO = geometry::normalized(end.X_WO);
     particle.V_WO = end.V_WO;
+    const bool stayed = motion.head<3>().norm() < kStayedTurn && motion.tail<3>().norm() < kStayedShift;
+    if (falling[i].covariance_at_rest && stayed && is_slow(particle))
+      particle.covariance = *falling[i].covariance_at_rest;
     particle.mode = MotionMode::kMoving;
     const double settles = falling[i].woken ? 1.0 : options.settle_probability;
     if (object.state != belief::TrackState::kTracked && settle_draws[i] < settles && is_slow(particle))

@@ -330,6 +330,12 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
           falling.push_back({i, k, left, particle.X_WO, particle.V_WO});
           particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike
           particle.V_WO = before.V_WO;
+          if (object.state == belief::TrackState::kUnseen && !released) {
+            Particle stays = before;
+            clear_twist(stays);
+            add_noise(options.resting, left, stays.covariance);
+            falling.back().covariance_at_rest = stays.covariance;
+          }
         }
       }
       limit_spread(particle.covariance);

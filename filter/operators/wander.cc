@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "hidden_places.h"
 
@@ -16,6 +18,43 @@ constexpr double kMovedAfter = 1.0;     // s; on average, by what hides it and i
 constexpr double kMostlyUnknown = 0.5;  // share of its pixels in view that something unknown hides
 constexpr double kWanderTurn = 0.3;     // rad; things are moved more often than turned over
 constexpr int kWanderDraws = 12;        // places that are tried for each
+constexpr double kLeftAlone = 0.75;     // the probability that it stays, however long it is hidden; chosen
+constexpr double kOnePlace = 0.05;      // m
+
+bool is_near(const SearchTarget& target, const Pose& A, const Pose& B) {
+  return (A * target.centre() - B * target.centre()).norm() < kOnePlace;
+}
+
+rendering::PoseEvidence evidence_of(const FilterFrame& frame, const rendering::FrameTerms& terms,
+                                    const SearchTarget& target, const Pose& X_WO, const FilterTools& tools) {
+  const std::vector<rendering::PoseHypothesis> hypotheses = {hypothesis(target, frame.X_CW * X_WO)};
+  std::vector<rendering::PoseEvidence> evidence(1);
+  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+  tools.search->batch().evaluate(terms, hypotheses, *workspace, evidence);
+  return evidence.front();
+}
+
+/// The particle about which most of the weight is.
+std::size_t leader_of(const SearchTarget& target, const std::vector<Particle>& particles) {
+  std::size_t leader = 0;
+  double most = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    double mass = 0.0;
+    for (const Particle& other : particles)
+      if (is_near(target, other.X_WO, particles[i].X_WO)) mass += std::exp(other.log_weight);
+    if (mass > most) most = mass, leader = i;
+  }
+  return leader;
+}
+
+/// A particle that lies where the object lay when it was seen last: one that there is, or a new one that physics lets
+/// down.
+Particle left_alone(const SearchTarget& target, const Pose& X_still, const InitialiseOptions& spread,
+                    const core::RandomStream& stream, const std::vector<Particle>& particles) {
+  for (const Particle& particle : particles)
+    if (particle.mode == belief::MotionMode::kResting && is_near(target, particle.X_WO, X_still)) return particle;
+  return particles_about(X_still, belief::MotionMode::kMoving, 1, spread, stream).front();
+}
 
 }  // namespace
 
@@ -24,19 +63,32 @@ int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, 
                   const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
                   ObjectBelief& object) {
   if (object.state != belief::TrackState::kUnseen || object.frames_unseen <= 0) return 0;
-  if (evidence.measured - evidence.visible < kMostlyUnknown * evidence.in_view) return 0;
-  const Particle last = belief::heaviest(object.particles);
-  if (last.mode == belief::MotionMode::kHeld) return 0;
+  const bool is_known = object.motion.still_frames > 0;
+  const Particle& leader = object.particles[leader_of(target, object.particles)];
+  if (leader.mode == belief::MotionMode::kHeld) return 0;
+  const Pose X_last = is_known ? object.motion.X_still : leader.X_WO;
+  const bool is_there = is_near(target, X_last, belief::heaviest(object.particles).X_WO);
+  const rendering::PoseEvidence there = is_there ? evidence : evidence_of(frame, terms, target, X_last, tools);
+  if (there.measured - there.visible < kMostlyUnknown * there.in_view) return 0;
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double probability = 1.0 - std::exp(-unseen / object.frames_unseen / kMovedAfter);
   core::RandomStream chances = stream.for_purpose(core::Purpose::kProcessNoise);
   std::vector<std::size_t> moved;
-  for (std::size_t i = 0; i < object.particles.size(); ++i)
-    if (chances.uniform() < probability && object.particles[i].mode == belief::MotionMode::kResting) moved.push_back(i);
-  if (moved.empty()) return 0;
+  for (std::size_t i = 0; i < object.particles.size(); ++i) {
+    const bool is_redrawn = chances.uniform() < probability, is_left_alone = chances.uniform() < kLeftAlone;
+    Particle& particle = object.particles[i];
+    if (!is_redrawn || particle.mode != belief::MotionMode::kResting) continue;
+    if (!is_left_alone) {
+      moved.push_back(i);
+    } else if (is_known) {
+      const double log_weight = particle.log_weight;
+      particle = left_alone(target, X_last, spread, stream, object.particles);
+      particle.log_weight = log_weight;
+    }
+  }
   const HiddenReach reach = {hidden_shift(unseen), kWanderTurn, Vector3d::Zero()};
   const std::vector<Pose> places =
-      hidden_places(frame, terms, target, last.X_WO, reach, kWanderDraws * static_cast<int>(moved.size()), weighting,
+      hidden_places(frame, terms, target, X_last, reach, kWanderDraws * static_cast<int>(moved.size()), weighting,
                     tools, stream.for_purpose(core::Purpose::kProposal));
   const std::size_t count = std::min(moved.size(), places.size());
   for (std::size_t i = 0; i < count; ++i) {

@@ -130,6 +130,28 @@ TEST_F(Predict, HiddenRestingIsForgottenNoFasterThanItMayCreep) {
     EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.0006 * 0.0006 * 60.0, 1e-9);
 }
 
+TEST_F(Predict, WhatIsHiddenAndStaysByPhysicsIsForgottenNoFasterThanWhatRests) {
+  for (const double shift : {0.0, 0.02}) {  // m, by which physics moves it in each step
+    const simulation::SimulatorFactory source = [&](const belief::Scene&, double) {
+      return by_formula([=](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+        belief::WorldState end = start;
+        end.objects[0].X_WO.translation.x() += shift;
+        return end;
+      });
+    };
+    belief::Belief belief = hand_and_object(MotionMode::kMoving, false);
+    belief.objects[0].state = belief::TrackState::kUnseen;
+    for (int i = 0; i < 20; ++i) run(belief, belief.robot[0], 0.1, without_mode_changes(), {}, source);
+    for (const Particle& particle : belief.objects[0].particles) {
+      if (shift > 0.0) {
+        EXPECT_GT(particle.covariance(3, 3), 1e-3);
+      } else {
+        EXPECT_NEAR(particle.covariance(3, 3), 1e-6 + 0.0006 * 0.0006 * 2.0, 1e-9);
+      }
+    }
+  }
+}
+
 TEST_F(Predict, AVelocityThatAgreesWithNoneSettlesAndIsNotSimulated) {
   int simulated = 0;
   const simulation::SimulatorFactory source = [&](const belief::Scene&, double) {

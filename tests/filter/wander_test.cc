@@ -60,6 +60,40 @@ TEST(WanderUnseen, WhatIsMovedBehindAnUnknownPlateIsInTheRegionThatIsBelieved) {
   EXPECT_GE(stayed, frames * 3 / 4);
 }
 
+// Moves do not add up, and what was left alone is where it was: over ten seconds, and at once when it is seen again.
+TEST(WanderUnseen, WhatIsLeftAloneBehindAnUnknownPlateMostlyStaysAndIsFoundAgain) {
+  Backends backends;
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    SimulatedSequence sequence = hidden_can(Vector3d::Zero(), seed);
+    sequence.occluders = {plate(sequence.X_WC, fixed(standing_can()), 0.15, 0.50, 0.40, 0.3, 10.0)};
+    sequence.frame_rate = 5.0;
+    ParticleFilter filter = backends.make_filter();
+    Belief belief = filter.start(sequence.scene, seed);
+    int frame = 0, seen_again = 0, hidden = 0, at_its_place = 0, mostly_stays = 0;
+    for (; frame < 58; ++frame) {
+      belief = filter.step(belief, sequence.observe(frame, *backends.renderer), {}).belief;
+      if (sequence.time_of(frame) < 1.0 || sequence.time_of(frame) > 9.9) continue;
+      EXPECT_EQ(belief.objects[0].state, belief::TrackState::kUnseen) << seed << " " << frame;
+      const belief::ObjectEstimate estimate = belief::estimate(belief, belief.objects[0]);
+      at_its_place += (estimate.mean.translation - standing_can().translation).norm() < 0.05;
+      double stays = 0.0;
+      for (const belief::Particle& particle : belief.objects[0].particles)
+        if ((particle.X_WO.translation - standing_can().translation).norm() < 0.05)
+          stays += std::exp(particle.log_weight);
+      EXPECT_GE(stays, 0.2) << seed << " " << frame;
+      mostly_stays += stays >= 0.5;
+      ++hidden;
+    }
+    EXPECT_GE(mostly_stays, hidden * 3 / 4) << seed;
+    EXPECT_GE(at_its_place, hidden * 9 / 10) << seed;
+    for (; frame < 64; ++frame) {
+      belief = filter.step(belief, sequence.observe(frame, *backends.renderer), {}).belief;
+      seen_again += belief.objects[0].state == belief::TrackState::kTracked;
+    }
+    EXPECT_GE(seen_again, 3) << seed;
+  }
+}
+
 TEST(WanderUnseen, NothingIsMovedThatIsSeenOrThatAKnownThingHides) {
   Backends backends;
   const SimulatedSequence sequence = hidden_can(Vector3d::Zero(), 5);
@@ -83,7 +117,7 @@ TEST(WanderUnseen, NothingIsMovedThatIsSeenOrThatAKnownThingHides) {
   object.state = belief::TrackState::kTracked;
   EXPECT_EQ(moved(), 0);
   object.state = belief::TrackState::kUnseen;
-  EXPECT_GE(moved(), 5);                      // a second: ten of sixteen on average
+  EXPECT_GE(moved(), 1);                      // a second: two or three of sixteen on average
   evidence.covered = evidence.measured = 10;  // the others are behind something known
   EXPECT_EQ(moved(), 0);
 }

@@ -11,9 +11,11 @@
 namespace prescene::filter {
 
 /// While an unseen object is mostly hidden by what nothing known explains (`evidence`: of its likeliest pose), each of
-/// its particles may be moved, once in a second on average: to a place that is hidden and free, about where it was, as
-/// far as it may have come since it was seen last, from where physics takes it on.
-/// Weights stay. Returns how many were moved. What a hand holds stays in it.
+/// its resting particles is drawn anew once in a second on average. In three quarters of the draws the object was left
+/// alone and is where it lay when it was seen last; in the others it was moved from there: to a place that is hidden
+/// and free, as far as it may have come since then, from where physics takes it on. So moves do not add up. Where it
+/// did not lie still, the place about which most of the weight is counts. Weights stay. Returns how many were moved.
+/// What a hand holds stays in it.
 int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
                   const rendering::PoseEvidence& evidence, const WeightOptions& weighting,
                   const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
