@@ -154,6 +154,11 @@ interfaces::SceneFileOptions carried_options(const std::filesystem::path& scene,
   return options;
 }
 
+interfaces::SceneFileOptions with(interfaces::SceneFileOptions options, Symmetries symmetries) {
+  options.suggest_symmetries = symmetries == Symmetries::kSuggested;
+  return options;
+}
+
 void log_warnings(const interfaces::FileReport& report, const core::LogSink& log) {
   for (const interfaces::Problem& warning : report.warnings) core::log(log, core::LogLevel::kWarning, warning.text());
 }
@@ -166,6 +171,10 @@ core::Result<std::shared_ptr<const belief::Scene>> shared(core::Result<belief::S
   return std::shared_ptr<const belief::Scene>(std::make_shared<belief::Scene>(*std::move(scene)));
 }
 
+void log_remarks(const interfaces::FileReport& report, const core::LogSink& log) {
+  for (const interfaces::Problem& remark : report.remarks) core::log(log, core::LogLevel::kInfo, remark.text());
+}
+
 }  // namespace
 
 core::Result<std::string> read_scene_text(const std::filesystem::path& path) {
@@ -174,35 +183,41 @@ core::Result<std::string> read_scene_text(const std::filesystem::path& path) {
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
-                                                              const core::LogSink& log) {
+                                                              const core::LogSink& log, Symmetries symmetries) {
   PRESCENE_TRY(const std::string text, read_scene_text(path));
-  return load_scene_text(text, path, log);
+  return load_scene_text(text, path, log, nullptr, symmetries);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
                                                                    const std::filesystem::path& path,
-                                                                   const core::LogSink& log, FilesOfScene* files) {
+                                                                   const core::LogSink& log, FilesOfScene* files,
+                                                                   Symmetries symmetries) {
   interfaces::FileReport report;
   MeshRemarks remarks(log, Repairs::kCounted);
-  auto scene = interfaces::parse_scene(text, path.string(), options(remarks, path, files), &report);
+  auto scene = interfaces::parse_scene(text, path.string(), with(options(remarks, path, files), symmetries), &report);
   remarks.finish(path);
+  log_remarks(report, log);
   return shared(std::move(scene), report, log);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std::string& text,
                                                                        const std::filesystem::path& path,
                                                                        const core::LogSink& log,
-                                                                       interfaces::FileReport& report) {
+                                                                       interfaces::FileReport& report,
+                                                                       Symmetries symmetries) {
   MeshRemarks remarks(log, Repairs::kEach);
-  return shared(interfaces::parse_scene(text, path.string(), options(remarks, path), &report), report, log);
+  auto scene = interfaces::parse_scene(text, path.string(), with(options(remarks, path), symmetries), &report);
+  return shared(std::move(scene), report, log);
 }
 
 core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std::string& text,
                                                                       const std::filesystem::path& path,
                                                                       const CarriedFiles& files,
-                                                                      const core::LogSink& log) {
+                                                                      const core::LogSink& log, Symmetries symmetries) {
   interfaces::FileReport report;
-  return shared(interfaces::parse_scene(text, path.string(), carried_options(path, files), &report), report, log);
+  auto scene = interfaces::parse_scene(text, path.string(), with(carried_options(path, files), symmetries), &report);
+  log_remarks(report, log);
+  return shared(std::move(scene), report, log);
 }
 
 core::Result<std::shared_ptr<const interfaces::RobotKinematics>> load_robot(const std::string& text,
@@ -229,10 +244,10 @@ bool is_learned_file(const std::filesystem::path& path) {
 }
 
 core::Result<belief::ObjectModel> load_reported_model(const std::filesystem::path& path, const core::LogSink& log,
-                                                      interfaces::FileReport& report) {
+                                                      interfaces::FileReport& report, Symmetries symmetries) {
   MeshRemarks remarks(log, Repairs::kEach);
   core::Result<belief::ObjectModel> model =
-      interfaces::read_model(path, path.stem().string(), options(remarks), &report);
+      interfaces::read_model(path, path.stem().string(), with(options(remarks), symmetries), &report);
   log_warnings(report, log);
   return model;
 }

@@ -257,7 +257,7 @@ core::Result<LearnedFile> parse_learned(std::string_view text, const std::string
       });
     }
   }
-  if (report) *report = {problems.errors(), problems.warnings()};
+  if (report) *report = {problems.errors(), problems.warnings(), {}};
   if (!problems.empty()) return problems.status();
   return learned;
 }

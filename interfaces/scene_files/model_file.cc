@@ -16,33 +16,6 @@ namespace {
 
 using geometry::Vector3d;
 
-std::string rotation_text(const geometry::Quaterniond& q) {
-  return "{quaternion_wxyz: " +
-         flow_list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())}) + "}";
-}
-
-// The shortest form that reads back as the same group.
-std::string text_of(const geometry::SymmetryGroup& group) {
-  if (group.trivial()) return "none";
-  const std::string center = group.p_BoC.isZero(0.0) ? "" : ", center: " + value_text(group.p_BoC);
-  if (group.ball) return center.empty() ? "ball" : "{ball: true" + center + "}";
-  if (group.axis)
-    return "{axis: " + value_text(*group.axis) + ", continuous: true" +
-           (group.rotations.empty() ? "" : ", flip: true") + center + "}";
-  if (geometry::SymmetryGroup::cuboid(group.p_BoC) == group)
-    return center.empty() ? "cuboid" : "{cuboid: true" + center + "}";
-  if (geometry::SymmetryGroup::cube(group.p_BoC) == group)
-    return center.empty() ? "cube" : "{cube: true" + center + "}";
-  const auto order = static_cast<int>(group.rotations.size()) + 1;
-  for (const Vector3d& axis : {Vector3d(Vector3d::UnitX()), Vector3d(Vector3d::UnitY()), Vector3d(Vector3d::UnitZ())})
-    if (geometry::SymmetryGroup::cyclic(axis, order, group.p_BoC) == group)
-      return "{axis: " + value_text(axis) + ", order: " + std::to_string(order) + center + "}";
-  std::string rotations;
-  for (const geometry::Quaterniond& rotation : group.rotations)
-    rotations.append(rotations.empty() ? "" : ", ").append(rotation_text(rotation));
-  return "{rotations: [" + rotations + "]" + center + "}";
-}
-
 // In double quotes, with what YAML takes as something else escaped.
 std::string quoted_yaml(const std::string& text) {
   std::string result = "\"";
@@ -145,7 +118,7 @@ std::string model_yaml(const ModelFile& file) {
                    ", up: " + (file.y_up ? "y" : "z") + (file.use ? ", use: " + word_of(*file.use) : "") + "}");
   line("mass", value_text(model.mass) + "  # kg");
   text += fitted_lines(model);
-  line("symmetry", text_of(model.symmetry));
+  line("symmetry", value_text(model.symmetry));
   line("color", value_text(Vector3d(model.color.r, model.color.g, model.color.b)));
   if (model.surface != belief::SurfaceKind::kOpaque)
     line("surface", model.surface == belief::SurfaceKind::kMirror ? "mirror" : "transparent");
@@ -153,7 +126,7 @@ std::string model_yaml(const ModelFile& file) {
   if (model.hollow)
     line("hollow", "{size: " + value_text(model.hollow->size) +
                        ", position: " + value_text(model.hollow->X_OV.translation) +
-                       ", rotation: " + rotation_text(model.hollow->X_OV.rotation) + "}");
+                       ", rotation: " + value_text(model.hollow->X_OV.rotation) + "}");
   return text;
 }
 
@@ -223,7 +196,7 @@ core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& doc
   if (problems.empty())
     if (const core::Status status = belief::validate(model); !status.ok())
       problems.add({document->place.file, 0, 0}, "model", status.message(), "correct it");
-  if (report) *report = {problems.errors(), problems.warnings()};
+  if (report) *report = {problems.errors(), problems.warnings(), problems.remarks()};
   if (!problems.empty()) return problems.status();
   return model;
 }

@@ -52,6 +52,10 @@ void Problems::warn(const FilePlace& place, std::string_view key, std::string re
     warnings_.push_back(problem_at(place, key, std::move(reason), std::move(remedy)));
 }
 
+void Problems::remark(const FilePlace& place, std::string_view key, std::string reason, std::string remedy) {
+  if (remarks_.size() < kMostProblems) remarks_.push_back(problem_at(place, key, std::move(reason), std::move(remedy)));
+}
+
 core::Status Problems::status() const {
   if (errors_.empty()) return {};
   std::vector<Problem> sorted = errors_;

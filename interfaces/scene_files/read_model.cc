@@ -306,7 +306,8 @@ belief::ObjectModel read_object_model(const LocatedValue& value, const std::stri
   read_inertia(binder, shape, model);
   read_contact(binder, model.contact);
   check_edges(binder, shape, model.contact);
-  if (const LocatedValue* at = binder.find("symmetry")) model.symmetry = read_symmetry(*at, context.problems);
+  const LocatedValue* symmetry = binder.find("symmetry");
+  if (symmetry) model.symmetry = read_symmetry(*symmetry, context.problems);
   if (const LocatedValue* at = binder.find("color")) model.color = read_color(*at, context.problems);
   static const std::vector<std::pair<std::string, belief::SurfaceKind>> kSurfaces{
       {"opaque", belief::SurfaceKind::kOpaque},
@@ -315,6 +316,8 @@ belief::ObjectModel read_object_model(const LocatedValue& value, const std::stri
   binder.read_enum("surface", model.surface, kSurfaces);
   binder.read("learn_colors", model.learn_colors);
   if (!merged) binder.note_known("file");
+  if (!symmetry && context.options.suggest_symmetries && context.problems.empty())
+    suggest_symmetry(value, model, context.problems);
   return model;
 }
 

@@ -69,6 +69,9 @@ struct MassPlaces {
 };
 /// Reports what no body of that shape and mean mass has, and warns of what hardly any has.
 void check_mass_distribution(const MassPlaces& at, const belief::ObjectModel& model, Problems& problems);
+/// Remarks on a model without colours of its own, described at `value` without `symmetry`, that looks the same when it
+/// is turned.
+void suggest_symmetry(const LocatedValue& value, const belief::ObjectModel& model, Problems& problems);
 /// Warns of a scene that is valid and yet odd.
 void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
 

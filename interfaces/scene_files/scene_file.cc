@@ -299,8 +299,8 @@ belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context
 }
 
 FileReport unread_report(const std::string& file, const core::Status& status, const Problems& problems) {
-  if (!problems.empty()) return {problems.errors(), problems.warnings()};
-  return {{{file, 0, 0, "", status.message(), ""}}, {}};
+  if (!problems.empty()) return {problems.errors(), problems.warnings(), {}};
+  return {{{file, 0, 0, "", status.message(), ""}}, {}, {}};
 }
 
 core::Result<Scene> parse_scene(std::string_view text, const std::string& file, const SceneFileOptions& options,
@@ -322,7 +322,7 @@ core::Result<Scene> parse_scene(std::string_view text, const std::string& file, 
   if (problems.empty()) refuse_starts_off_joints(*document, scene, problems);
   if (problems.empty()) refuse_starts(*document, scene, problems);
   if (problems.empty()) warn_of_oddities(*document, scene, problems);
-  if (report) *report = {problems.errors(), problems.warnings()};
+  if (report) *report = {problems.errors(), problems.warnings(), problems.remarks()};
   if (!problems.empty()) return problems.status();
   return scene;
 }

@@ -43,4 +43,30 @@ std::string value_text(const belief::Vector3Distribution& v) {
   return flow_list({value_text(v.x), value_text(v.y), value_text(v.z)});
 }
 
+std::string value_text(const geometry::Quaterniond& q) {
+  return "{quaternion_wxyz: " +
+         flow_list({number_text(q.w()), number_text(q.x()), number_text(q.y()), number_text(q.z())}) + "}";
+}
+
+std::string value_text(const geometry::SymmetryGroup& group) {
+  if (group.trivial()) return "none";
+  const std::string center = group.p_BoC.isZero(0.0) ? "" : ", center: " + value_text(group.p_BoC);
+  if (group.ball) return center.empty() ? "ball" : "{ball: true" + center + "}";
+  if (group.axis)
+    return "{axis: " + value_text(*group.axis) + ", continuous: true" +
+           (group.rotations.empty() ? "" : ", flip: true") + center + "}";
+  if (geometry::SymmetryGroup::cuboid(group.p_BoC) == group)
+    return center.empty() ? "cuboid" : "{cuboid: true" + center + "}";
+  if (geometry::SymmetryGroup::cube(group.p_BoC) == group)
+    return center.empty() ? "cube" : "{cube: true" + center + "}";
+  const auto order = static_cast<int>(group.rotations.size()) + 1;
+  for (const Vector3d& axis : {Vector3d(Vector3d::UnitX()), Vector3d(Vector3d::UnitY()), Vector3d(Vector3d::UnitZ())})
+    if (geometry::SymmetryGroup::cyclic(axis, order, group.p_BoC) == group)
+      return "{axis: " + value_text(axis) + ", order: " + std::to_string(order) + center + "}";
+  std::string rotations;
+  for (const geometry::Quaterniond& rotation : group.rotations)
+    rotations.append(rotations.empty() ? "" : ", ").append(value_text(rotation));
+  return "{rotations: [" + rotations + "]" + center + "}";
+}
+
 }  // namespace prescene::interfaces

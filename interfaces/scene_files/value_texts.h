@@ -7,6 +7,7 @@
 
 #include "prescene/belief/distribution.h"
 #include "prescene/belief/object_model.h"
+#include "prescene/geometry/symmetry.h"
 
 namespace prescene::interfaces {
 
@@ -16,5 +17,8 @@ std::string value_text(const geometry::Vector3d& v);
 std::string value_text(const geometry::Matrix3d& m);
 std::string value_text(const belief::ScalarDistribution& distribution);
 std::string value_text(const belief::Vector3Distribution& v);
+std::string value_text(const geometry::Quaterniond& q);
+/// In the shortest form.
+std::string value_text(const geometry::SymmetryGroup& group);
 
 }  // namespace prescene::interfaces

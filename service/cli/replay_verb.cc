@@ -65,7 +65,7 @@ core::Result<TimedQuestion> timed_question(const std::string& text) {
 }
 
 ReplayInputOptions input_of(const ReplayOptions& options) {
-  return {options.input, options.scene, options.depth_scale, options.frame_rate, options.read};
+  return {options.input, options.scene, options.depth_scale, options.frame_rate, options.read, Symmetries::kSuggested};
 }
 
 /// What the recording was made with, but for what the command line says otherwise.

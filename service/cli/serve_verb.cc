@@ -46,8 +46,8 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.settings.dds));
   PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
   FilesOfScene files;
-  PRESCENE_TRY(const auto scene,
-               load_scene_text(text, options.scene, context.log(), options.record.empty() ? nullptr : &files));
+  PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log(),
+                                                 options.record.empty() ? nullptr : &files, Symmetries::kSuggested));
   PRESCENE_TRY(options.settings.tracker.assembler.robot, load_robot(text, options.scene));
   auto weights = interfaces::parse_event_weights(text, options.scene);
   if (!weights) return weights.status();

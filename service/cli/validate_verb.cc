@@ -38,6 +38,19 @@ class Warnings {
   std::vector<std::string> texts_;
 };
 
+std::vector<std::string> texts_of(const std::vector<interfaces::Problem>& problems) {
+  std::vector<std::string> texts;
+  for (const interfaces::Problem& problem : problems) texts.push_back(problem.text());
+  return texts;
+}
+
+/// Lines below the one that says that a file is valid.
+std::string lines_of(const std::vector<std::string>& remarks) {
+  std::string lines;
+  for (const std::string& remark : remarks) lines += "\nremark: " + remark;
+  return lines;
+}
+
 /// Each mistake by itself; a file that could not be read is one.
 Checked bad(const std::string& file, const core::Status& status, const interfaces::FileReport& report) {
   nlohmann::ordered_json errors = nlohmann::ordered_json::array();
@@ -62,9 +75,10 @@ Checked check_scene(const std::string& file, VerbContext& context) {
   interfaces::FileReport report;
   const auto text = read_scene_text(file);
   if (!text) return bad(file, text.status(), report);
-  const auto scene = load_reported_scene(*text, file, warnings.sink(), report);
+  const auto scene = load_reported_scene(*text, file, warnings.sink(), report, Symmetries::kSuggested);
   if (!scene) return bad(file, scene.status(), report);
   const int dimensions = start_dimensions(**scene);
+  const std::vector<std::string> remarks = texts_of(report.remarks);
   return {{},
           {{"file", file},
            {"valid", true},
@@ -73,19 +87,23 @@ Checked check_scene(const std::string& file, VerbContext& context) {
            {"objects", (*scene)->objects.size()},
            {"actions", (*scene)->actions.size()},
            {"uncertain_dimensions", dimensions},
-           {"warnings", warnings.texts()}},
+           {"warnings", warnings.texts()},
+           {"remarks", remarks}},
           file + ": valid: " + counted((*scene)->objects.size(), "object") + ", " +
-              counted(static_cast<std::size_t>(dimensions), "uncertain dimension") + warnings.count()};
+              counted(static_cast<std::size_t>(dimensions), "uncertain dimension") + warnings.count() +
+              lines_of(remarks)};
 }
 
 Checked check_model(const std::string& file, VerbContext& context) {
   Warnings warnings(context.log());
   interfaces::FileReport report;
-  const auto model = load_reported_model(file, warnings.sink(), report);
+  const auto model = load_reported_model(file, warnings.sink(), report, Symmetries::kSuggested);
   if (!model) return bad(file, model.status(), report);
-  return {{},
-          {{"file", file}, {"valid", true}, {"model", model->name}, {"warnings", warnings.texts()}},
-          file + ": valid: a model file" + warnings.count()};
+  const std::vector<std::string> remarks = texts_of(report.remarks);
+  return {
+      {},
+      {{"file", file}, {"valid", true}, {"model", model->name}, {"warnings", warnings.texts()}, {"remarks", remarks}},
+      file + ": valid: a model file" + warnings.count() + lines_of(remarks)};
 }
 
 Checked check_learned(const std::string& file) {
@@ -99,7 +117,8 @@ Checked check_learned(const std::string& file) {
            {"valid", true},
            {"learned_models", learned->models.size()},
            {"learned_objects", learned->objects.size()},
-           {"warnings", nlohmann::ordered_json::array()}},
+           {"warnings", nlohmann::ordered_json::array()},
+           {"remarks", nlohmann::ordered_json::array()}},
           file + ": valid: what was learned of " + counted(learned->models.size(), "model") + " and " +
               counted(learned->objects.size(), "object")};
 }

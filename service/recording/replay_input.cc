@@ -29,14 +29,16 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
   }
   if (input.scene_) return input;
   if (!options.scene_file.empty()) {
-    PRESCENE_TRY(input.scene_, load_scene(options.scene_file, log));
+    PRESCENE_TRY(input.scene_, load_scene(options.scene_file, log, options.symmetries));
     PRESCENE_TRY(input.scene_text_, read_scene_text(options.scene_file));
     PRESCENE_TRY(input.robot_, load_robot(input.scene_text_, options.scene_file));
   } else if (!input.info_.scene_text.empty()) {
     const auto attached = [&reader](const std::string& name) { return reader->read_attached(name); };
-    PRESCENE_TRY(input.scene_, reader->has_attached_scene()
-                                   ? load_carried_scene(input.info_.scene_text, input.info_.scene_file, attached, log)
-                                   : load_scene_text(input.info_.scene_text, input.info_.scene_file, log));
+    PRESCENE_TRY(
+        input.scene_,
+        reader->has_attached_scene()
+            ? load_carried_scene(input.info_.scene_text, input.info_.scene_file, attached, log, options.symmetries)
+            : load_scene_text(input.info_.scene_text, input.info_.scene_file, log, nullptr, options.symmetries));
     PRESCENE_TRY(input.robot_, reader->has_attached_scene()
                                    ? load_carried_robot(input.info_.scene_text, input.info_.scene_file, attached)
                                    : load_robot(input.info_.scene_text, input.info_.scene_file));

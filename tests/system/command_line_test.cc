@@ -612,7 +612,14 @@ TEST(CommandLine, WhatFallsIntoAnInspectedMugLandsInIt) {
   const Finished valid = run_program({"validate", file("scene.yaml"), "--json"});
   ASSERT_EQ(valid.exit_code, 0) << valid.err;
   EXPECT_TRUE(parsed(valid)["files"][0]["warnings"].empty()) << valid.out;
+  // The ball names no symmetry: a remark, no warning, and only where it may be tracked.
+  EXPECT_EQ(parsed(valid)["files"][0]["remarks"].size(), 1U) << valid.out;
+  const Finished said = run_program({"validate", file("scene.yaml")});
+  EXPECT_NE(said.out.find("models.ball: it looks the same when it is turned in any way"), std::string::npos)
+      << said.out;
+  EXPECT_NE(said.out.find("write 'symmetry: ball', or 'symmetry: none' if the turn counts"), std::string::npos);
   const Finished lands = run_program({"predict", file("scene.yaml"), "--json", "--max-instances", "32"});
+  EXPECT_EQ(lands.err.find("symmetry"), std::string::npos) << lands.err;
   ASSERT_EQ(lands.exit_code, 0) << lands.err;
   EXPECT_GT(parsed(lands)["outcomes"][0]["probability"].get<double>(), 0.9) << lands.out;
 

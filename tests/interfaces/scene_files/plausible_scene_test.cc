@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "prescene/belief/validation.h"
+#include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 
 namespace prescene::interfaces {
@@ -119,6 +120,82 @@ TEST(PlausibleScene, OutcomesThatNeverCountAreToldWithTheirLine) {
       HasSubstr("s.yaml:14: exclusive_outcomes.g.outcomes.again: 'again' never counts, as 'low' above it holds"));
   EXPECT_THAT(read(two("1") + "outcomes:\n  x:\n    object: b\n    below: 1\n    not: {below: 1}\n").errors,
               HasSubstr("s.yaml:11: outcomes.x: "));
+}
+
+// What is remarked on a model, and the model.
+struct Suggested {
+  std::vector<Problem> remarks;
+  belief::ObjectModel model;
+};
+
+Suggested suggested(const std::string& model_keys, bool asked = true) {
+  SceneFileOptions options;
+  options.suggest_symmetries = asked;
+  FileReport report;
+  const auto scene = parse_scene("models:\n  m:\n    mass: 1\n    " + model_keys +
+                                     "\nsupports:\n  t: {ground: {size: 4}}\n"
+                                     "objects:\n  o: {model: m, pose: {position: [0, 0, 0.2]}}\n",
+                                 "s.yaml", options, &report);
+  EXPECT_TRUE(scene.ok()) << scene.status().message();
+  return {report.remarks, scene ? scene->models[0] : belief::ObjectModel{}};
+}
+
+TEST(PlausibleScene, SuggestsTheSymmetryOfWhatLooksTheSameWhenTurned) {
+  struct Case {
+    const char* shape;
+    const char* turns;   // part of the remark
+    const char* remedy;  // what is to be written
+    int rotations;       // besides the identity; -1: any number
+  };
+  const std::vector<Case> cases = {
+      {"box: [0.07, 0.11, 0.2]", "turned by 180 degrees about x, y or z", "cuboid", 3},
+      {"box: [0.06, 0.06, 0.06]", "turned by 90 degrees about x, y or z", "cube", 23},
+      {"box: [0.06, 0.06, 0.2]", "turned in 7 ways", "{rotations: [", 7},
+      {"sphere: 0.05", "turned in any way", "ball", -1},
+      {"cylinder: {radius: 0.03, length: 0.1}", "turned by any angle about z, and upside down",
+       "{axis: z, continuous: true, flip: true}", -1},
+      {"parts: [{box: [0.2, 0.1, 0.04], position: [0, 0, 0.02]}, {box: [0.05, 0.05, 0.1], position: [0, 0, 0.09]}]",
+       "turned by 180 degrees about z", "{axis: z, order: 2", 1},
+      {"parts: [{box: [0.07, 0.11, 0.2], position: [0.05, 0, 0.1]}]", "turned by 180 degrees about x, y or z",
+       "{cuboid: true, center: [0.05, 0, 0.1]}", 3},
+  };
+  for (const Case& c : cases) {
+    const Suggested found = suggested(c.shape);
+    ASSERT_EQ(found.remarks.size(), 1U) << c.shape;
+    EXPECT_TRUE(found.model.symmetry.trivial()) << "nobody but the user decides";
+    EXPECT_EQ(found.remarks[0].line, 3) << c.shape;
+    EXPECT_EQ(found.remarks[0].key, "models.m") << c.shape;
+    EXPECT_THAT(found.remarks[0].text(), AllOf(HasSubstr(c.turns), HasSubstr("confidence is shared"))) << c.shape;
+    // The remedy, written into the file as it is, is read, turns the shape into itself, and ends the remark.
+    const std::string& remedy = found.remarks[0].remedy;
+    const std::size_t from = remedy.find("'symmetry: ");
+    ASSERT_NE(from, std::string::npos) << remedy;
+    const std::string line = remedy.substr(from + 1, remedy.find('\'', from + 1) - from - 1);
+    EXPECT_EQ(line.rfind(std::string("symmetry: ") + c.remedy, 0), 0U) << line;
+    const Suggested written = suggested(std::string(c.shape) + "\n    " + line);
+    EXPECT_TRUE(written.remarks.empty()) << line;
+    const geometry::SymmetryGroup& group = written.model.symmetry;
+    EXPECT_FALSE(group.trivial()) << line;
+    if (c.rotations >= 0) {
+      EXPECT_EQ(static_cast<int>(group.rotations.size()), c.rotations) << line;
+    }
+    const geometry::TriangleMesh shape = belief::collision_mesh(found.model.collision);
+    for (const geometry::Quaterniond& rotation : group.rotations) {
+      geometry::Box turned;
+      for (const geometry::Vector3d& p : shape.vertices) turned.extend(group.p_BoC + rotation * (p - group.p_BoC));
+      const geometry::Box box = geometry::bounding_box(shape);
+      EXPECT_TRUE(turned.min().isApprox(box.min(), 1e-3) && turned.max().isApprox(box.max(), 1e-3)) << line;
+    }
+  }
+}
+
+TEST(PlausibleScene, SuggestsNoSymmetryWhereATurnCountsOrNobodyAsks) {
+  const std::string box = "box: [0.07, 0.11, 0.2]";
+  EXPECT_TRUE(suggested(box, false).remarks.empty());
+  EXPECT_TRUE(suggested(box + "\n    symmetry: none").remarks.empty()) << "the user has decided";
+  EXPECT_TRUE(suggested(box + "\n    learn_colors: true").remarks.empty()) << "colours may tell the turns apart";
+  EXPECT_TRUE(suggested("parts: [{box: [0.2, 0.1, 0.04]}, {box: [0.05, 0.05, 0.1], position: [0.05, 0.02, 0.07]}]")
+                  .remarks.empty());
 }
 
 }  // namespace

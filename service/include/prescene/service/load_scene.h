@@ -20,11 +20,16 @@ struct RobotKinematics;
 
 namespace prescene::service {
 
+/// Whether the log gets a remark on each model that looks the same when it is turned, but names no `symmetry`
+/// (interfaces::SceneFileOptions::suggest_symmetries): for who tracks the scene.
+enum class Symmetries { kAsWritten, kSuggested };
+
 /// Reads a scene file and its meshes; warnings go to the log, and how many meshes were tidied up without changing their
 /// surface (load_reported_scene logs each). The status of a failure lists every mistake on a line of its own:
 /// file:line: key: reason: remedy.
 core::Result<std::shared_ptr<const belief::Scene>> load_scene(const std::filesystem::path& path,
-                                                              const core::LogSink& log);
+                                                              const core::LogSink& log,
+                                                              Symmetries symmetries = Symmetries::kAsWritten);
 
 /// The text of a scene file, to be recorded. Errors of interfaces::read_file.
 core::Result<std::string> read_scene_text(const std::filesystem::path& path);
@@ -39,7 +44,8 @@ using FilesOfScene = std::map<std::string, std::vector<std::uint8_t>>;
 core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::string& text,
                                                                    const std::filesystem::path& path,
                                                                    const core::LogSink& log,
-                                                                   FilesOfScene* files = nullptr);
+                                                                   FilesOfScene* files = nullptr,
+                                                                   Symmetries symmetries = Symmetries::kAsWritten);
 
 /// Content of a file of FilesOfScene by its name.
 using CarriedFiles = std::function<core::Result<std::vector<std::uint8_t>>(const std::string& name)>;
@@ -48,7 +54,8 @@ using CarriedFiles = std::function<core::Result<std::vector<std::uint8_t>>(const
 core::Result<std::shared_ptr<const belief::Scene>> load_carried_scene(const std::string& text,
                                                                       const std::filesystem::path& path,
                                                                       const CarriedFiles& files,
-                                                                      const core::LogSink& log);
+                                                                      const core::LogSink& log,
+                                                                      Symmetries symmetries = Symmetries::kAsWritten);
 
 /// How the robot moves that a scene's text describes under robot_description; null where it does not. `text` and `path`
 /// as for load_scene_text; errors of interfaces::parse_robot_kinematics.

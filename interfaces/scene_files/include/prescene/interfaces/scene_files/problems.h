@@ -34,18 +34,22 @@ struct Problem {
 class Problems {
  public:
   void add(const FilePlace& place, std::string_view key, std::string reason, std::string remedy);
-  /// Remarks that don't keep the file from being used.
+  /// Warnings don't keep the file from being used.
   void warn(const FilePlace& place, std::string_view key, std::string reason, std::string remedy);
+  /// Nothing is wrong, but something may be better.
+  void remark(const FilePlace& place, std::string_view key, std::string reason, std::string remedy);
 
   bool empty() const { return errors_.empty(); }
   const std::vector<Problem>& errors() const { return errors_; }
   const std::vector<Problem>& warnings() const { return warnings_; }
+  const std::vector<Problem>& remarks() const { return remarks_; }
   /// Ok when empty, else kInvalidInput with every error on a line of its own, in the order of the file.
   core::Status status() const;
 
  private:
   std::vector<Problem> errors_;
   std::vector<Problem> warnings_;
+  std::vector<Problem> remarks_;
   std::size_t left_off_ = 0;
 };
 

@@ -43,6 +43,9 @@ struct SceneFileOptions {
   LookReader read_look = {};  ///< Empty: meshes have no colours.
   FileReader read_file;       ///< Of model files; empty: from the disk.
   bool follow_files = true;   ///< Else `file:` of a model is an error: the text comes from somebody else.
+  /// Remark on models that look the same when they are turned, but name no `symmetry`: a tracker cannot tell the turns
+  /// apart. Takes some milliseconds a model.
+  bool suggest_symmetries = false;
   YamlLimits limits;
 };
 
@@ -50,10 +53,12 @@ struct SceneFileOptions {
 struct FileReport {
   std::vector<Problem> errors;
   std::vector<Problem> warnings;
+  std::vector<Problem> remarks;  ///< What may be better, where SceneFileOptions ask for it.
 };
 
 /// Reads and checks a scene; relative paths in it start at the folder of the file they stand in. The status of a
-/// failure holds every problem on a line of its own; `report`, if given, holds them one by one, and the warnings.
+/// failure holds every problem on a line of its own; `report`, if given, holds them one by one, and the warnings and
+/// remarks.
 core::Result<belief::Scene> read_scene(const std::filesystem::path& path, const SceneFileOptions& options = {},
                                        FileReport* report = nullptr);
 /// The same from text; `file` is its name in messages and where relative paths start.

@@ -13,6 +13,7 @@
 
 #include "prescene/core/log.h"
 #include "prescene/interfaces/images/frame_folder.h"
+#include "prescene/service/load_scene.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/recording/replay.h"
 
@@ -25,6 +26,7 @@ struct ReplayInputOptions {
   double metres_per_unit = 0.001;   ///< Of a folder's depth images.
   double frames_per_second = 30.0;  ///< Of a folder without stamps.
   RecordingReadOptions read = {};   ///< Of a recording.
+  Symmetries symmetries = Symmetries::kAsWritten;
 };
 
 class ReplayInput {
