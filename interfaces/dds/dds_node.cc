@@ -28,6 +28,7 @@
 #include "idl_messages.h"
 #include "prescene/core/check.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "security_files.h"
 #include "topic_table.h"
 
 namespace prescene::interfaces {
@@ -128,7 +129,7 @@ namespace {
 
 /// Of a CDR message: its header, the client and its request's number, and the request's own fields. Nothing where it is
 /// none of ours.
-std::optional<ServiceRequest> parse_request(const std::vector<std::uint8_t>& cdr, bool has_text) {
+std::optional<ServiceRequest> parse_request(const std::vector<std::uint8_t>& cdr, ServiceForm form) {
   constexpr std::size_t kHeader = 4, kIdentity = 16, kLongest = std::size_t{4} << 20;
   if (cdr.size() < kHeader + kIdentity || cdr.size() > kLongest || cdr[0] != 0 || cdr[1] > 1) return std::nullopt;
   const bool is_little = cdr[1] == 1;
@@ -140,10 +141,14 @@ std::optional<ServiceRequest> parse_request(const std::vector<std::uint8_t>& cdr
   ServiceRequest request;
   request.client = number_at(kHeader);
   request.sequence = static_cast<std::int64_t>(number_at(kHeader + 8));
-  if (!has_text) return request;
+  if (form == ServiceForm::kEmpty) return request;
   // The fields are aligned to 16 bytes, so that they are a message of their own.
   std::vector<std::uint8_t> body(cdr.begin(), cdr.begin() + kHeader);
   body.insert(body.end(), cdr.begin() + kHeader + kIdentity, cdr.end());
+  if (form == ServiceForm::kFields) {
+    request.fields = std::move(body);
+    return request;
+  }
   auto text = decode_cdr<RosString>(body, kSmallMessage);
   if (!text) return std::nullopt;
   request.text = std::move(text->data);
@@ -211,6 +216,10 @@ struct DdsNode::Impl {
   /// Has `reader` listened to; the lock is held.
   core::Status listen(const std::string& topic, const std::string& type, dds_entity_t topic_entity, const QosPtr& qos,
                       std::function<void(ReceivedMessage&&)> on_message);
+  /// A service of ours, once the client of a request can read its reply, or 100 ms have passed.
+  Service service_for(const ServiceRequest& request) const;
+  template <class CType, class Message>
+  core::Status reply(const ServiceRequest& request, std::string_view type, const Message& message) const;
   template <class CType, class Message>
   core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
   void announce();
@@ -333,6 +342,7 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   const std::string enclave = "enclave=/;";
   dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
   dds_qset_entity_name(qos.get(), options.node_name.c_str());
+  if (!options.security.empty()) PRESCENE_RETURN_IF_ERROR(use_security(options.security, qos.get()));
   impl->participant = dds_create_participant(domain_id, qos.get(), nullptr);
   PRESCENE_RETURN_IF_ERROR(
       dds_status(impl->participant, "DDS participant in domain " + std::to_string(options.domain)));
@@ -458,6 +468,10 @@ core::Status DdsNode::publish(DdsPublisher publisher, const RosDiagnosticArray& 
                                                                  message);
 }
 
+core::Status DdsNode::publish(DdsPublisher publisher, const RosParameterEvent& message) {
+  return impl_->write<rcl_interfaces_msg_dds__ParameterEvent_>(publisher, "rcl_interfaces/msg/ParameterEvent", message);
+}
+
 core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr) {
   const auto decoded = [&]<class Message>(const Message&) -> core::Status {
     PRESCENE_TRY(const Message message, decode_cdr<Message>(cdr));
@@ -506,20 +520,20 @@ core::Status DdsNode::offer_service(const std::string& name, const std::string& 
   const int index = static_cast<int>(impl_->services.size());
   id[15] = static_cast<std::uint8_t>(index + 1);
   const dds_entity_t writer =
-      dds_create_writer(impl_->participant, replies, make_service_qos(id, service_type->response_hash).get(), nullptr);
+      dds_create_writer(impl_->participant, replies, make_service_qos(id, response_hash(*service_type)).get(), nullptr);
   PRESCENE_RETURN_IF_ERROR(dds_status(writer, "writer of " + name));
   impl_->services.push_back({name, service_type, 0, writer});
-  core::Status listens = impl_->listen(name, type, requests, make_service_qos(id, service_type->request_hash),
-                                       [impl = impl_.get(), index, has_text = service_type->has_text,
-                                        on_request = std::move(on_request)](auto&& message) {
-                                         std::optional<ServiceRequest> request = parse_request(message.cdr, has_text);
-                                         if (!request) {
-                                           impl->dropped.fetch_add(1, std::memory_order_relaxed);
-                                           return;
-                                         }
-                                         request->service = index;
-                                         on_request(*std::move(request));
-                                       });
+  core::Status listens = impl_->listen(
+      name, type, requests, make_service_qos(id, request_hash(*service_type)),
+      [impl = impl_.get(), index, form = service_type->form, on_request = std::move(on_request)](auto&& message) {
+        std::optional<ServiceRequest> request = parse_request(message.cdr, form);
+        if (!request) {
+          impl->dropped.fetch_add(1, std::memory_order_relaxed);
+          return;
+        }
+        request->service = index;
+        on_request(*std::move(request));
+      });
   if (!listens.ok()) {
     impl_->services.pop_back();
     dds_delete(writer);
@@ -529,12 +543,12 @@ core::Status DdsNode::offer_service(const std::string& name, const std::string& 
   return core::ok_status();
 }
 
-core::Status DdsNode::reply(const ServiceRequest& request, bool success, const std::string& text) {
-  Impl::Service service;
+DdsNode::Impl::Service DdsNode::Impl::service_for(const ServiceRequest& request) const {
+  Service service;
   {
-    const std::lock_guard lock(impl_->mutex);
-    PRESCENE_CHECK(request.service >= 0 && request.service < static_cast<int>(impl_->services.size()));
-    service = impl_->services[static_cast<std::size_t>(request.service)];
+    const std::lock_guard lock(mutex);
+    PRESCENE_CHECK(request.service >= 0 && request.service < static_cast<int>(services.size()));
+    service = services[static_cast<std::size_t>(request.service)];
   }
   // Each client writes requests and reads replies. Whoever's writer was found first has a reader soon.
   const auto all_found = [&service] {
@@ -547,10 +561,53 @@ core::Status DdsNode::reply(const ServiceRequest& request, bool success, const s
   constexpr std::chrono::milliseconds kLook(2);
   const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
   while (!all_found() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(kLook);
+  return service;
+}
+
+template <class CType, class Message>
+core::Status DdsNode::Impl::reply(const ServiceRequest& request, std::string_view type, const Message& message) const {
+  const Service service = service_for(request);
+  PRESCENE_CHECK(service.type->name == type);
+  SampleArena arena;
+  CType response{};
+  response.client_guid = request.client;
+  response.sequence_number = request.sequence;
+  fill(response, message, arena);
+  return dds_status(dds_write(service.replies, &response), "reply of " + service.name);
+}
+
+core::Status DdsNode::reply(const ServiceRequest& request, const RosListParametersResponse& response) {
+  return impl_->reply<rcl_interfaces_srv_dds__ListParameters_Response_>(request, "rcl_interfaces/srv/ListParameters",
+                                                                        response);
+}
+core::Status DdsNode::reply(const ServiceRequest& request, const RosGetParametersResponse& response) {
+  return impl_->reply<rcl_interfaces_srv_dds__GetParameters_Response_>(request, "rcl_interfaces/srv/GetParameters",
+                                                                       response);
+}
+core::Status DdsNode::reply(const ServiceRequest& request, const RosGetParameterTypesResponse& response) {
+  return impl_->reply<rcl_interfaces_srv_dds__GetParameterTypes_Response_>(
+      request, "rcl_interfaces/srv/GetParameterTypes", response);
+}
+core::Status DdsNode::reply(const ServiceRequest& request, const RosDescribeParametersResponse& response) {
+  return impl_->reply<rcl_interfaces_srv_dds__DescribeParameters_Response_>(
+      request, "rcl_interfaces/srv/DescribeParameters", response);
+}
+core::Status DdsNode::reply(const ServiceRequest& request, const RosSetParametersResponse& response) {
+  return impl_->reply<rcl_interfaces_srv_dds__SetParameters_Response_>(request, "rcl_interfaces/srv/SetParameters",
+                                                                       response);
+}
+core::Status DdsNode::reply(const ServiceRequest& request, const RosSetParametersAtomicallyResponse& response) {
+  return impl_->reply<rcl_interfaces_srv_dds__SetParametersAtomically_Response_>(
+      request, "rcl_interfaces/srv/SetParametersAtomically", response);
+}
+
+core::Status DdsNode::reply(const ServiceRequest& request, bool success, const std::string& text) {
+  const Impl::Service service = impl_->service_for(request);
   // A C struct borrows its texts.
   char* borrowed = const_cast<char*>(text.c_str());
   const std::string writing = "reply of " + service.name;
-  if (service.type->has_text) {
+  PRESCENE_CHECK(service.type->form != ServiceForm::kFields);
+  if (service.type->form == ServiceForm::kText) {
     const prescene_msgs_srv_dds__Ask_Response_ response{request.client, request.sequence, success, borrowed};
     return dds_status(dds_write(service.replies, &response), writing);
   }

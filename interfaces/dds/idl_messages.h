@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/interfaces/ros_messages/parameter_messages.h"
 #include "ros_messages.h"
 
 namespace prescene::interfaces {
@@ -101,6 +102,27 @@ PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__KeyValue_, RosKeyValue, 2, key, va
 PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__DiagnosticStatus_, RosDiagnosticStatus, 5, level, name, message,
                      hardware_id, values)
 PRESCENE_FILL_STRUCT(diagnostic_msgs_msg_dds__DiagnosticArray_, RosDiagnosticArray, 2, header, status)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__ParameterValue_, RosParameterValue, 10, type, bool_value, integer_value,
+                     double_value, string_value, byte_array_value, bool_array_value, integer_array_value,
+                     double_array_value, string_array_value)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__Parameter_, RosParameter, 2, name, value)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__FloatingPointRange_, RosFloatingPointRange, 3, from_value, to_value, step)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__IntegerRange_, RosIntegerRange, 3, from_value, to_value, step)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__ParameterDescriptor_, RosParameterDescriptor, 8, name, type, description,
+                     additional_constraints, read_only, dynamic_typing, floating_point_range, integer_range)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__SetParametersResult_, RosSetParametersResult, 2, successful, reason)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__ListParametersResult_, RosListParametersResult, 2, names, prefixes)
+PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__ParameterEvent_, RosParameterEvent, 5, stamp, node, new_parameters,
+                     changed_parameters, deleted_parameters)
+// Of replies, all but the client and the number of its request.
+PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__ListParameters_Response_, RosListParametersResponse, 1, result)
+PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__GetParameters_Response_, RosGetParametersResponse, 1, values)
+PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__GetParameterTypes_Response_, RosGetParameterTypesResponse, 1, types)
+PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__DescribeParameters_Response_, RosDescribeParametersResponse, 1,
+                     descriptors)
+PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__SetParameters_Response_, RosSetParametersResponse, 1, results)
+PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__SetParametersAtomically_Response_, RosSetParametersAtomicallyResponse, 1,
+                     result)
 
 #undef PRESCENE_FILL_STRUCT
 #undef PRESCENE_FILL_19
@@ -123,7 +145,10 @@ void fill(Sequence& to, const std::vector<T>& from, SampleArena& arena) {
   to._length = static_cast<std::uint32_t>(from.size());
   to._maximum = to._length;
   to._release = false;
-  if constexpr (std::is_arithmetic_v<T>) {
+  if constexpr (std::is_same_v<Element, bool>) {  // they are bytes in ours
+    to._buffer = arena.array<bool>(from.size());
+    for (std::size_t i = 0; i < from.size(); ++i) to._buffer[i] = from[i] != 0;
+  } else if constexpr (std::is_arithmetic_v<T>) {
     static_assert(std::is_same_v<Element, T>);
     to._buffer = const_cast<Element*>(from.data());
   } else {

@@ -28,23 +28,46 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
       {"vision_msgs/msg/Detection3DArray", &vision_msgs_msg_dds__Detection3DArray__desc},
       {"visualization_msgs/msg/MarkerArray", &visualization_msgs_msg_dds__MarkerArray__desc},
       {"diagnostic_msgs/msg/DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
+      {"rcl_interfaces/msg/ParameterEvent", &rcl_interfaces_msg_dds__ParameterEvent__desc},
   };
   const auto* row = std::find_if(std::begin(kRows), std::end(kRows), [&](const Row& r) { return r.type == ros_type; });
   return row == std::end(kRows) ? nullptr : row->descriptor;
 }
 
 const ServiceType* find_service_type(const std::string& ros_type) {
+#define PRESCENE_PARAMETER_SERVICE(name)                                               \
+  {                                                                                    \
+    "rcl_interfaces/srv/" #name, &rcl_interfaces_srv_dds__##name##_Request__desc,      \
+        &rcl_interfaces_srv_dds__##name##_Response__desc, "", "", ServiceForm::kFields \
+  }
   static constexpr ServiceType kTypes[] = {
       {"std_srvs/srv/Trigger", &std_srvs_srv_dds__Trigger_Request__desc, &std_srvs_srv_dds__Trigger_Response__desc,
        "RIHS01_d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199",
-       "RIHS01_2d946c21e2fc3f1e9ca6986a8191d85fcc70097a8bb7771a053564bc47009cdf", false},
+       "RIHS01_2d946c21e2fc3f1e9ca6986a8191d85fcc70097a8bb7771a053564bc47009cdf", ServiceForm::kEmpty},
       {"prescene_msgs/srv/Ask", &prescene_msgs_srv_dds__Ask_Request__desc, &prescene_msgs_srv_dds__Ask_Response__desc,
        "RIHS01_c6d5bcfd7a1e216797019d28e201d3d1cfcd493afd7e05cf69d4f06895893905",
-       "RIHS01_849b94f7bb2b29b7aa41c925add18dd3fa3676acac8d6ccd84a141d063178db8", true},
+       "RIHS01_849b94f7bb2b29b7aa41c925add18dd3fa3676acac8d6ccd84a141d063178db8", ServiceForm::kText},
+      PRESCENE_PARAMETER_SERVICE(ListParameters),
+      PRESCENE_PARAMETER_SERVICE(GetParameters),
+      PRESCENE_PARAMETER_SERVICE(GetParameterTypes),
+      PRESCENE_PARAMETER_SERVICE(DescribeParameters),
+      PRESCENE_PARAMETER_SERVICE(SetParameters),
+      PRESCENE_PARAMETER_SERVICE(SetParametersAtomically),
   };
   const auto* type =
       std::find_if(std::begin(kTypes), std::end(kTypes), [&](const ServiceType& t) { return t.name == ros_type; });
+#undef PRESCENE_PARAMETER_SERVICE
   return type == std::end(kTypes) ? nullptr : type;
+}
+
+std::string_view request_hash(const ServiceType& type) {
+  if (!type.request_hash.empty()) return type.request_hash;
+  return find_ros_type(std::string(type.name) + "_Request")->type_hash;
+}
+
+std::string_view response_hash(const ServiceType& type) {
+  if (!type.response_hash.empty()) return type.response_hash;
+  return find_ros_type(std::string(type.name) + "_Response")->type_hash;
 }
 
 core::Result<std::string> dds_topic_name(const std::string& ros_topic) {
@@ -114,6 +137,10 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
     case TopicQos::kReliable:
       break;
     case TopicQos::kState:
+      longest_wait = 0;
+      break;
+    case TopicQos::kEvents:
+      depth = 1000;
       longest_wait = 0;
       break;
     case TopicQos::kCommands:

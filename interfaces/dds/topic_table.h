@@ -24,16 +24,26 @@ std::optional<std::string> ros_topic_name(const std::string& dds_topic);
 /// "std_msgs::msg::dds_::String_" -> "std_msgs/msg/String"; nothing for other forms.
 std::optional<std::string> ros_type_name(std::string_view dds_type);
 
+/// What the fields of a request become.
+enum class ServiceForm {
+  kEmpty,   ///< None: it has none.
+  kText,    ///< ServiceRequest::text: it has one, which is a text.
+  kFields,  ///< ServiceRequest::fields: a message.
+};
+
 /// A type of service: what its two topics carry.
 struct ServiceType {
   std::string_view name;  ///< "std_srvs/srv/Trigger"
   const dds_topic_descriptor_t* request;
   const dds_topic_descriptor_t* response;
-  std::string_view request_hash, response_hash;  ///< "RIHS01_..."
-  bool has_text;                                 ///< Whether its request holds a text.
+  std::string_view request_hash, response_hash;  ///< "RIHS01_..."; "" = that of the type in schemas.h.
+  ServiceForm form;
 };
 /// One of those that the program speaks, or nullptr.
 const ServiceType* find_service_type(const std::string& ros_type);
+/// "RIHS01_..." of its request, and of its reply.
+std::string_view request_hash(const ServiceType& type);
+std::string_view response_hash(const ServiceType& type);
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/interfaces/ros_messages/parameter_messages.h"
 
 namespace prescene::interfaces::message_fields {
 
@@ -90,6 +91,38 @@ PRESCENE_FIELDS(RosKeyValue, Field{"key", &M::key}, Field{"value", &M::value});
 PRESCENE_FIELDS(RosDiagnosticStatus, Field{"level", &M::level}, Field{"name", &M::name}, Field{"message", &M::message},
                 Field{"hardware_id", &M::hardware_id}, Field{"values", &M::values});
 PRESCENE_FIELDS(RosDiagnosticArray, Field{"header", &M::header}, Field{"status", &M::status});
+PRESCENE_FIELDS(RosFloatingPointRange, Field{"from_value", &M::from_value}, Field{"to_value", &M::to_value},
+                Field{"step", &M::step});
+PRESCENE_FIELDS(RosIntegerRange, Field{"from_value", &M::from_value}, Field{"to_value", &M::to_value},
+                Field{"step", &M::step});
+PRESCENE_FIELDS(RosListParametersResult, Field{"names", &M::names}, Field{"prefixes", &M::prefixes});
+PRESCENE_FIELDS(RosParameter, Field{"name", &M::name}, Field{"value", &M::value});
+PRESCENE_FIELDS(RosParameterDescriptor, Field{"name", &M::name}, Field{"type", &M::type},
+                Field{"description", &M::description}, Field{"additional_constraints", &M::additional_constraints},
+                Field{"read_only", &M::read_only}, Field{"dynamic_typing", &M::dynamic_typing},
+                Field{"floating_point_range", &M::floating_point_range}, Field{"integer_range", &M::integer_range});
+PRESCENE_FIELDS(RosParameterEvent, Field{"stamp", &M::stamp}, Field{"node", &M::node},
+                Field{"new_parameters", &M::new_parameters}, Field{"changed_parameters", &M::changed_parameters},
+                Field{"deleted_parameters", &M::deleted_parameters});
+PRESCENE_FIELDS(RosParameterValue, Field{"type", &M::type}, Field{"bool_value", &M::bool_value},
+                Field{"integer_value", &M::integer_value}, Field{"double_value", &M::double_value},
+                Field{"string_value", &M::string_value}, Field{"byte_array_value", &M::byte_array_value},
+                Field{"bool_array_value", &M::bool_array_value}, Field{"integer_array_value", &M::integer_array_value},
+                Field{"double_array_value", &M::double_array_value},
+                Field{"string_array_value", &M::string_array_value});
+PRESCENE_FIELDS(RosSetParametersResult, Field{"successful", &M::successful}, Field{"reason", &M::reason});
+PRESCENE_FIELDS(RosDescribeParametersRequest, Field{"names", &M::names});
+PRESCENE_FIELDS(RosDescribeParametersResponse, Field{"descriptors", &M::descriptors});
+PRESCENE_FIELDS(RosGetParameterTypesRequest, Field{"names", &M::names});
+PRESCENE_FIELDS(RosGetParameterTypesResponse, Field{"types", &M::types});
+PRESCENE_FIELDS(RosGetParametersRequest, Field{"names", &M::names});
+PRESCENE_FIELDS(RosGetParametersResponse, Field{"values", &M::values});
+PRESCENE_FIELDS(RosListParametersRequest, Field{"prefixes", &M::prefixes}, Field{"depth", &M::depth});
+PRESCENE_FIELDS(RosListParametersResponse, Field{"result", &M::result});
+PRESCENE_FIELDS(RosSetParametersAtomicallyRequest, Field{"parameters", &M::parameters});
+PRESCENE_FIELDS(RosSetParametersAtomicallyResponse, Field{"result", &M::result});
+PRESCENE_FIELDS(RosSetParametersRequest, Field{"parameters", &M::parameters});
+PRESCENE_FIELDS(RosSetParametersResponse, Field{"results", &M::results});
 
 #undef PRESCENE_FIELDS
 
@@ -122,7 +155,7 @@ struct MinWireSize<std::array<T, n>> {
 
 }  // namespace prescene::interfaces::message_fields
 
-/// Every message of messages.h, for explicit instantiation.
+/// Every message of messages.h and parameter_messages.h, for explicit instantiation.
 // clang-format off
 #define PRESCENE_FOR_EACH_MESSAGE(DO) \
   DO(RosTime) DO(RosDuration) DO(RosClock) DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) \
@@ -131,5 +164,11 @@ struct MinWireSize<std::array<T, n>> {
   DO(RosTwist) DO(RosTwistStamped) DO(RosImage) DO(RosCompressedImage) DO(RosRegionOfInterest) \
   DO(RosCameraInfo) DO(RosPointField) DO(RosPointCloud2) DO(RosJointState) DO(RosObjectHypothesis) DO(RosObjectHypothesisWithPose) \
   DO(RosBoundingBox3d) DO(RosDetection3d) DO(RosDetection3dArray) DO(RosUvCoordinate) DO(RosMeshFile) \
-  DO(RosMarker) DO(RosMarkerArray) DO(RosKeyValue) DO(RosDiagnosticStatus) DO(RosDiagnosticArray)
+  DO(RosMarker) DO(RosMarkerArray) DO(RosKeyValue) DO(RosDiagnosticStatus) DO(RosDiagnosticArray) \
+  DO(RosFloatingPointRange) DO(RosIntegerRange) DO(RosListParametersResult) DO(RosParameter) \
+  DO(RosParameterDescriptor) DO(RosParameterEvent) DO(RosParameterValue) DO(RosSetParametersResult) \
+  DO(RosDescribeParametersRequest) DO(RosDescribeParametersResponse) DO(RosGetParameterTypesRequest) \
+  DO(RosGetParameterTypesResponse) DO(RosGetParametersRequest) DO(RosGetParametersResponse) \
+  DO(RosListParametersRequest) DO(RosListParametersResponse) DO(RosSetParametersAtomicallyRequest) \
+  DO(RosSetParametersAtomicallyResponse) DO(RosSetParametersRequest) DO(RosSetParametersResponse)
 // clang-format on

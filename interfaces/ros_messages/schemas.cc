@@ -11,7 +11,7 @@
 namespace prescene::interfaces {
 namespace {
 
-constexpr std::array<RosType, 38> kTypes = {{
+constexpr std::array<RosType, 58> kTypes = {{
     {"builtin_interfaces/msg/Duration", "builtin_interfaces::msg::dds_::Duration_",
      "RIHS01_e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b",
      "int32 sec\n"
@@ -88,6 +88,85 @@ constexpr std::array<RosType, 38> kTypes = {{
      "float64 x\n"
      "float64 y\n"
      "float64 z\n"},
+    {"rcl_interfaces/msg/FloatingPointRange", "rcl_interfaces::msg::dds_::FloatingPointRange_",
+     "RIHS01_e6af23a23c177fee5f3075c8b1e435162a9b63c863d78c06017460b49684262d",
+     "float64 from_value\n"
+     "float64 to_value\n"
+     "float64 step\n"},
+    {"rcl_interfaces/msg/IntegerRange", "rcl_interfaces::msg::dds_::IntegerRange_",
+     "RIHS01_f7b7fdc0f65f07702e099218e13288c3963bcb9345bde78b560e6cd19800fc5a",
+     "int64 from_value\n"
+     "int64 to_value\n"
+     "uint64 step\n"},
+    {"rcl_interfaces/msg/ListParametersResult", "rcl_interfaces::msg::dds_::ListParametersResult_",
+     "RIHS01_237ae3428413dcbcfb452b510c42355f3a2b021dc091afa3e18526d57022f1cd",
+     "string[] names\n"
+     "string[] prefixes\n"},
+    {"rcl_interfaces/msg/Parameter", "rcl_interfaces::msg::dds_::Parameter_",
+     "RIHS01_ddfe6442cffc462317adb5c92536a7b6dd55858c5c3e1e328165a6b73c2831af",
+     "string name\n"
+     "ParameterValue value\n"},
+    {"rcl_interfaces/msg/ParameterDescriptor", "rcl_interfaces::msg::dds_::ParameterDescriptor_",
+     "RIHS01_52175dbfda6c51153101d33d2a9da05743f66f02d5ab2ca9ec4709b46b73d704",
+     "string name\n"
+     "uint8 type\n"
+     "string description\n"
+     "string additional_constraints\n"
+     "bool read_only\n"
+     "bool dynamic_typing\n"
+     "FloatingPointRange[<=1] floating_point_range\n"
+     "IntegerRange[<=1] integer_range\n"},
+    {"rcl_interfaces/msg/ParameterEvent", "rcl_interfaces::msg::dds_::ParameterEvent_",
+     "RIHS01_043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204",
+     "builtin_interfaces/Time stamp\n"
+     "string node\n"
+     "Parameter[] new_parameters\n"
+     "Parameter[] changed_parameters\n"
+     "Parameter[] deleted_parameters\n"},
+    {"rcl_interfaces/msg/ParameterValue", "rcl_interfaces::msg::dds_::ParameterValue_",
+     "RIHS01_115fc089a387e23c7ecd3525c9189c379109119d6ab82e8dfbde0fdf6a7f9b68",
+     "uint8 type\n"
+     "bool bool_value\n"
+     "int64 integer_value\n"
+     "float64 double_value\n"
+     "string string_value\n"
+     "byte[] byte_array_value\n"
+     "bool[] bool_array_value\n"
+     "int64[] integer_array_value\n"
+     "float64[] double_array_value\n"
+     "string[] string_array_value\n"},
+    {"rcl_interfaces/msg/SetParametersResult", "rcl_interfaces::msg::dds_::SetParametersResult_",
+     "RIHS01_cfcc0fb0371ee5159b403960ef4300f8f9d2f1fd6117c8666b7f9654d528a9b1",
+     "bool successful\n"
+     "string reason\n"},
+    {"rcl_interfaces/srv/DescribeParameters_Request", "rcl_interfaces::srv::dds_::DescribeParameters_Request_",
+     "RIHS01_05dd1c2bc87dec2627105c8070d6f9725c781a4f2ab852975bf105462b82b644", "string[] names\n"},
+    {"rcl_interfaces/srv/DescribeParameters_Response", "rcl_interfaces::srv::dds_::DescribeParameters_Response_",
+     "RIHS01_ad6747319613c6131589e062e095b469a46cc764f7d0f12a001a49e6cd893995", "ParameterDescriptor[] descriptors\n"},
+    {"rcl_interfaces/srv/GetParameterTypes_Request", "rcl_interfaces::srv::dds_::GetParameterTypes_Request_",
+     "RIHS01_87d7ec5ef545d4daa289d500025d31fb2437bc8b8365ca367161c4dac4be33fd", "string[] names\n"},
+    {"rcl_interfaces/srv/GetParameterTypes_Response", "rcl_interfaces::srv::dds_::GetParameterTypes_Response_",
+     "RIHS01_ac1335dce67c478e669434f6ac2fbff34fcd529580f272d3006785ba8b54e47f", "uint8[] types\n"},
+    {"rcl_interfaces/srv/GetParameters_Request", "rcl_interfaces::srv::dds_::GetParameters_Request_",
+     "RIHS01_135a9e1c3d7cebef792f6687d7ddf99949b21a0bd9a320d863a9110a3f5cf4d6", "string[] names\n"},
+    {"rcl_interfaces/srv/GetParameters_Response", "rcl_interfaces::srv::dds_::GetParameters_Response_",
+     "RIHS01_9fa773b46e39cc5d02db6224d8fd520bb9caeeffc2b27c96c1e59431baba9f2a", "ParameterValue[] values\n"},
+    {"rcl_interfaces/srv/ListParameters_Request", "rcl_interfaces::srv::dds_::ListParameters_Request_",
+     "RIHS01_a1b0b5d6b967a5b8ac5bc8563c3ea678f349e312a6a4967227c5a96bc5ce38df",
+     "string[] prefixes\n"
+     "uint64 depth\n"},
+    {"rcl_interfaces/srv/ListParameters_Response", "rcl_interfaces::srv::dds_::ListParameters_Response_",
+     "RIHS01_31b937b82de3612426be79f231e386259f97e8dc843e3f2845288b4bfa296bdd", "ListParametersResult result\n"},
+    {"rcl_interfaces/srv/SetParametersAtomically_Request",
+     "rcl_interfaces::srv::dds_::SetParametersAtomically_Request_",
+     "RIHS01_db0bd950ed5ed867a0e90b225e44dea382d762c0762ff3e0ee842190042a59e5", "Parameter[] parameters\n"},
+    {"rcl_interfaces/srv/SetParametersAtomically_Response",
+     "rcl_interfaces::srv::dds_::SetParametersAtomically_Response_",
+     "RIHS01_31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8", "SetParametersResult result\n"},
+    {"rcl_interfaces/srv/SetParameters_Request", "rcl_interfaces::srv::dds_::SetParameters_Request_",
+     "RIHS01_130d46386b7e84ea9ecf60608a4d83cbe5e5cb7c6cc5b712b7a4e3a6c254e932", "Parameter[] parameters\n"},
+    {"rcl_interfaces/srv/SetParameters_Response", "rcl_interfaces::srv::dds_::SetParameters_Response_",
+     "RIHS01_7a0e8140a0b8d98308fa81a5403a766e610af29a239caf54b7553227906fc266", "SetParametersResult[] results\n"},
     {"rosgraph_msgs/msg/Clock", "rosgraph_msgs::msg::dds_::Clock_",
      "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564", "builtin_interfaces/Time clock\n"},
     {"sensor_msgs/msg/CameraInfo", "sensor_msgs::msg::dds_::CameraInfo_",
@@ -300,6 +379,26 @@ PRESCENE_NAME(RosTransformStamped, "geometry_msgs/msg/TransformStamped")
 PRESCENE_NAME(RosTwist, "geometry_msgs/msg/Twist")
 PRESCENE_NAME(RosTwistStamped, "geometry_msgs/msg/TwistStamped")
 PRESCENE_NAME(RosVector3, "geometry_msgs/msg/Vector3")
+PRESCENE_NAME(RosFloatingPointRange, "rcl_interfaces/msg/FloatingPointRange")
+PRESCENE_NAME(RosIntegerRange, "rcl_interfaces/msg/IntegerRange")
+PRESCENE_NAME(RosListParametersResult, "rcl_interfaces/msg/ListParametersResult")
+PRESCENE_NAME(RosParameter, "rcl_interfaces/msg/Parameter")
+PRESCENE_NAME(RosParameterDescriptor, "rcl_interfaces/msg/ParameterDescriptor")
+PRESCENE_NAME(RosParameterEvent, "rcl_interfaces/msg/ParameterEvent")
+PRESCENE_NAME(RosParameterValue, "rcl_interfaces/msg/ParameterValue")
+PRESCENE_NAME(RosSetParametersResult, "rcl_interfaces/msg/SetParametersResult")
+PRESCENE_NAME(RosDescribeParametersRequest, "rcl_interfaces/srv/DescribeParameters_Request")
+PRESCENE_NAME(RosDescribeParametersResponse, "rcl_interfaces/srv/DescribeParameters_Response")
+PRESCENE_NAME(RosGetParameterTypesRequest, "rcl_interfaces/srv/GetParameterTypes_Request")
+PRESCENE_NAME(RosGetParameterTypesResponse, "rcl_interfaces/srv/GetParameterTypes_Response")
+PRESCENE_NAME(RosGetParametersRequest, "rcl_interfaces/srv/GetParameters_Request")
+PRESCENE_NAME(RosGetParametersResponse, "rcl_interfaces/srv/GetParameters_Response")
+PRESCENE_NAME(RosListParametersRequest, "rcl_interfaces/srv/ListParameters_Request")
+PRESCENE_NAME(RosListParametersResponse, "rcl_interfaces/srv/ListParameters_Response")
+PRESCENE_NAME(RosSetParametersAtomicallyRequest, "rcl_interfaces/srv/SetParametersAtomically_Request")
+PRESCENE_NAME(RosSetParametersAtomicallyResponse, "rcl_interfaces/srv/SetParametersAtomically_Response")
+PRESCENE_NAME(RosSetParametersRequest, "rcl_interfaces/srv/SetParameters_Request")
+PRESCENE_NAME(RosSetParametersResponse, "rcl_interfaces/srv/SetParameters_Response")
 PRESCENE_NAME(RosClock, "rosgraph_msgs/msg/Clock")
 PRESCENE_NAME(RosCameraInfo, "sensor_msgs/msg/CameraInfo")
 PRESCENE_NAME(RosCompressedImage, "sensor_msgs/msg/CompressedImage")

@@ -3,11 +3,20 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
+#include <dds/dds.h>
 #include "prescene/interfaces/dds/dds_node.h"
 #include "tests/interfaces/dds/service_client.h"
+
+// NOLINTBEGIN(readability-identifier-naming): idlc's names
+extern "C" {
+extern const dds_topic_descriptor_t rcl_interfaces_srv_dds__ListParameters_Request__desc;
+extern const dds_topic_descriptor_t rcl_interfaces_srv_dds__ListParameters_Response__desc;
+}
+// NOLINTEND(readability-identifier-naming)
 
 namespace prescene::interfaces::service_test {
 namespace {
@@ -113,6 +122,36 @@ TEST(Service, EndpointsSayByTheirUserDataThatTheyBelongTogether) {
     ids.push_back(data[0].substr(0, data[0].find(';')));
   }
   EXPECT_NE(ids[0], ids[1]);
+}
+
+// `ros2 node list`, `ros2 param` and `ros2 service list` know of a node, and of what is its own, from what each
+// participant says of itself on ros_discovery_info.
+TEST(Service, TheNodesAnnouncementHoldsItsNameAndTheServicesEndpoints) {
+  DdsOptions options;
+  options.domain = own_domain();
+  options.node_name = "announced";
+  options.ros_distro = RosDistro::kJazzy;
+  const auto server = DdsNode::create(options, {});
+  ASSERT_TRUE(server.ok()) << server.status().message();
+  ASSERT_TRUE(
+      (*server)
+          ->offer_service("/announced/list_parameters", "rcl_interfaces/srv/ListParameters", [](ServiceRequest&&) {})
+          .ok());
+  ServiceClient client(own_domain(), "/announced/list_parameters", rcl_interfaces_srv_dds__ListParameters_Request__desc,
+                       rcl_interfaces_srv_dds__ListParameters_Response__desc);
+  ASSERT_TRUE(client.wait_for_service());
+  const auto guids = client.guids();
+  ASSERT_EQ(guids.size(), 2U);
+  const std::vector<std::uint8_t> said = tests::newest_announcement(own_domain(), [&](const auto& bytes) {
+    return std::all_of(guids.begin(), guids.end(), [&](const auto& guid) {
+      return std::search(bytes.begin(), bytes.end(), guid.begin(), guid.end()) != bytes.end();
+    });
+  });
+  // Header, the participant's identity, one node: namespace, name.
+  const std::vector<std::uint8_t> node = {1, 0, 0, 0,   2,   0,   0,   0,   '/', 0,   0,   0,   10,
+                                          0, 0, 0, 'a', 'n', 'n', 'o', 'u', 'n', 'c', 'e', 'd', 0};
+  ASSERT_GT(said.size(), 20 + node.size());
+  EXPECT_TRUE(std::equal(node.begin(), node.end(), said.begin() + 20));
 }
 
 TEST(Service, NamesAndTypesThatMakeNoSenseAreRefused) {

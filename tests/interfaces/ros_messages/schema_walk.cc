@@ -24,8 +24,10 @@ SchemaField parse_field(const std::string& line, const std::string& package) {
   words >> field.type >> field.name;
   if (const std::size_t bracket = field.type.find('['); bracket != std::string::npos) {
     const std::string count = field.type.substr(bracket + 1, field.type.size() - bracket - 2);
-    field.sequence = count.empty();
-    if (!count.empty()) field.array = std::stoi(count);
+    const bool is_bounded = count.starts_with("<=");
+    field.sequence = count.empty() || is_bounded;
+    if (is_bounded) field.bound = std::stoi(count.substr(2));
+    if (!field.sequence) field.array = std::stoi(count);
     field.type.resize(bracket);
   }
   field.nested = kTypeIds.count(field.type) == 0;
@@ -36,14 +38,18 @@ SchemaField parse_field(const std::string& line, const std::string& package) {
 std::string long_name(const std::string& name) { return package_of(name) + "/msg/" + name.substr(name.find('/') + 1); }
 
 std::string description(const Schema& schema, const std::string& type) {
-  std::string out = "{\"type_name\": \"" + long_name(type) + "\", \"fields\": [";
+  std::string out =
+      "{\"type_name\": \"" + (type == schema.root ? schema.root_name : long_name(type)) + "\", \"fields\": [";
   std::string separator;
   for (const SchemaField& field : schema.types.at(type)) {
-    const int id =
-        (field.nested ? 1 : kTypeIds.at(field.type)) + (field.sequence ? 144 : 0) + (field.array > 0 ? 48 : 0);
+    const int id = (field.nested ? 1 : kTypeIds.at(field.type)) +
+                   (field.bound > 0  ? 96
+                    : field.sequence ? 144
+                                     : 0) +
+                   (field.array > 0 ? 48 : 0);
     out += separator + "{\"name\": \"" + field.name + "\", \"type\": {\"type_id\": " + std::to_string(id) +
-           ", \"capacity\": " + std::to_string(field.array) + ", \"string_capacity\": 0, \"nested_type_name\": \"" +
-           (field.nested ? long_name(field.type) : "") + "\"}}";
+           ", \"capacity\": " + std::to_string(std::max(field.array, field.bound)) +
+           ", \"string_capacity\": 0, \"nested_type_name\": \"" + (field.nested ? long_name(field.type) : "") + "\"}}";
     separator = ", ";
   }
   return out + "]}";
@@ -59,7 +65,8 @@ class RandomCdr {
       std::uint32_t count = 1;
       if (field.array > 0) count = static_cast<std::uint32_t>(field.array);
       if (field.sequence) {
-        count = static_cast<std::uint32_t>(stream_->uniform_below(4));
+        count = static_cast<std::uint32_t>(
+            stream_->uniform_below(field.bound > 0 ? static_cast<std::uint64_t>(field.bound) + 1 : 4));
         number(count);
       }
       for (std::uint32_t i = 0; i < count; ++i) element(field);
@@ -83,6 +90,8 @@ class RandomCdr {
       bytes.push_back(static_cast<std::uint8_t>(stream_->uniform_below(256)));
     } else if (field.type == "int32" || field.type == "uint32") {
       number(stream_->next_u32());
+    } else if (field.type == "int64" || field.type == "uint64") {
+      number(stream_->next_u64());
     } else if (field.type == "float32") {
       number(static_cast<float>(stream_->normal()));
     } else {
@@ -111,6 +120,7 @@ class RandomCdr {
 Schema parse_schema(std::string_view name, std::string_view text) {
   Schema schema;
   const std::string root(name);
+  schema.root_name = root;
   schema.root = package_of(root) + root.substr(root.rfind('/'));
   std::string current = schema.root;
   schema.types[current];

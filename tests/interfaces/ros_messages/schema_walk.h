@@ -20,15 +20,17 @@ struct SchemaField {
   bool nested = false;
   bool sequence = false;
   int array = 0;  ///< Length of a fixed array, 0 for none.
+  int bound = 0;  ///< Greatest length of a bounded sequence, 0 for none.
 };
 
 /// The types of a `ros2msg` schema by "pkg/Name", with the root's own name.
 struct Schema {
   std::string root;
+  std::string root_name;  ///< "pkg/msg/Name" or "pkg/srv/Name_Request"
   std::map<std::string, std::vector<SchemaField>> types;
 };
 
-/// `name` is that of the root, "pkg/msg/Name".
+/// `name` is that of the root, as in root_name.
 Schema parse_schema(std::string_view name, std::string_view text);
 
 /// "RIHS01_..." by ROS 2's rule: SHA-256 of the JSON type description.

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "prescene/core/log.h"
 #include "prescene/core/status.h"
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/interfaces/ros_messages/parameter_messages.h"
 
 namespace prescene::interfaces {
 
@@ -37,6 +39,11 @@ struct DdsOptions {
   /// Larger samples are dropped unread and counted; those of more than twice that Cyclone drops itself, with a warning
   /// of its own and uncounted.
   std::size_t max_message_bytes = std::size_t{64} << 20;
+  /// Folder with what DDS Security needs (docs/reference/security.md): certificates, key, governance and permissions by
+  /// the names of an SROS 2 enclave. Only participants with the same authorities then hear this one and are heard, and
+  /// each may do what its permissions say. A process has one identity: that of its first node in a domain. Empty =
+  /// none.
+  std::filesystem::path security;
   /// Find out which network interfaces the middleware uses, for interfaces(); only the first node of a process in a
   /// domain can.
   bool find_interfaces = false;
@@ -52,6 +59,7 @@ enum class TopicQos {
   kImages,    ///< Reliable, keep last 2: writers of images serve best-effort and reliable readers.
   kReliable,  ///< Reliable, keep last 10: queries and answers of clients.
   kState,     ///< As kReliable, but a writer never waits: for state that the next sample replaces (poses, markers).
+  kEvents,    ///< As kState, keep last 1000: changes of parameters.
   kCommands,  ///< As kReliable, keep last 100: readers of questions and controls, none of which replaces another.
   kTf,        ///< Reliable, keep last 100.
   kLatched,   ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
@@ -86,13 +94,15 @@ struct ServiceRequest {
   int service = -1;          ///< Of the node: in the order of offer_service().
   std::uint64_t client = 0;  ///< The client's own number, and that of its request: the reply repeats both.
   std::int64_t sequence = 0;
-  std::string text;  ///< The request's one field, for types that have one.
+  std::string text;                  ///< The one field of a prescene_msgs/srv/Ask.
+  std::vector<std::uint8_t> fields;  ///< Of a type of rcl_interfaces: for decode_cdr of its request.
 };
 
 class DdsNode {
  public:
   /// Joins the bus. Fails with kUnavailable and Cyclone's own words when the participant can't be made (a misspelt
-  /// CYCLONEDDS_URI, no network interface), kInvalidInput for options out of range.
+  /// CYCLONEDDS_URI, no network interface, a certificate that the authority did not sign), kInvalidInput for options
+  /// out of range and a security folder without one of its files.
   static core::Result<std::unique_ptr<DdsNode>> create(const DdsOptions& options, const core::LogSink& log);
   ~DdsNode();
   DdsNode(const DdsNode&) = delete;
@@ -121,18 +131,25 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosDetection3dArray& message);
   core::Status publish(DdsPublisher publisher, const RosMarkerArray& message);
   core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
+  core::Status publish(DdsPublisher publisher, const RosParameterEvent& message);
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
 
   /// Offers a service of ROS 2, which nodes that use Cyclone DDS, too, can call (`ros2 service call`): other
-  /// middlewares carry requests in a form of their own. Types: "std_srvs/srv/Trigger" and "prescene_msgs/srv/Ask";
-  /// another one is kUnsupported. `on_request` is called as that of subscribe(); requests that make no sense count as
-  /// dropped.
+  /// middlewares carry requests in a form of their own. Types: "std_srvs/srv/Trigger", "prescene_msgs/srv/Ask" and
+  /// those of parameters (parameter_messages.h); another one is kUnsupported. `on_request` is called as that of
+  /// subscribe(); requests that make no sense count as dropped.
   core::Status offer_service(const std::string& name, const std::string& type,
                              std::function<void(ServiceRequest&&)> on_request);
   /// Answers a request; from any thread, once. Waits up to 100 ms for a client whose reader was not found yet: without
-  /// it, it would miss the reply. Errors as publish().
+  /// it, it would miss the reply. Errors as publish(). The service must be of the reply's type.
   core::Status reply(const ServiceRequest& request, bool success, const std::string& text);
+  core::Status reply(const ServiceRequest& request, const RosListParametersResponse& response);
+  core::Status reply(const ServiceRequest& request, const RosGetParametersResponse& response);
+  core::Status reply(const ServiceRequest& request, const RosGetParameterTypesResponse& response);
+  core::Status reply(const ServiceRequest& request, const RosDescribeParametersResponse& response);
+  core::Status reply(const ServiceRequest& request, const RosSetParametersResponse& response);
+  core::Status reply(const ServiceRequest& request, const RosSetParametersAtomicallyResponse& response);
 
   /// No callback runs once this has returned, which takes no longer than the one that runs now; publishing goes on. Not
   /// to be called from a callback.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h, as ROS 2 Humble and Jazzy know them.
+// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h and parameter_messages.h, as ROS 2 Humble
+// and Jazzy know them.
 #pragma once
 
 #include <span>
@@ -7,6 +8,7 @@
 #include <string_view>
 
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/interfaces/ros_messages/parameter_messages.h"
 
 namespace prescene::interfaces {
 
@@ -18,16 +20,16 @@ struct RosType {
   std::string_view text;       ///< The .msg text without comments and constants; nested types not included.
 };
 
-/// All types of messages.h, ordered by name. Lives as long as the program.
+/// All types of these headers, ordered by name. Lives as long as the program.
 std::span<const RosType> ros_types();
-/// The type with this name ("pkg/msg/Name", also "pkg/Name"), or nullptr.
+/// The type with this name ("pkg/msg/Name" or, of a service, "pkg/srv/Name_Request"; also "pkg/Name"), or nullptr.
 const RosType* find_ros_type(std::string_view name);
 
 /// The schema text as rosbag2 writes it into recordings: the .msg text, then for each nested type (depth first, each
 /// once) a line of 80 '=', a line "MSG: pkg/Name" and its text.
 std::string ros2msg_schema(const RosType& type);
 
-/// The type of a struct of messages.h; defined for each of them.
+/// The type of a struct of these headers; defined for each of them.
 template <class Message>
 const RosType& ros_type();
 template <>
@@ -64,6 +66,46 @@ template <>
 const RosType& ros_type<RosTwistStamped>();
 template <>
 const RosType& ros_type<RosVector3>();
+template <>
+const RosType& ros_type<RosFloatingPointRange>();
+template <>
+const RosType& ros_type<RosIntegerRange>();
+template <>
+const RosType& ros_type<RosListParametersResult>();
+template <>
+const RosType& ros_type<RosParameter>();
+template <>
+const RosType& ros_type<RosParameterDescriptor>();
+template <>
+const RosType& ros_type<RosParameterEvent>();
+template <>
+const RosType& ros_type<RosParameterValue>();
+template <>
+const RosType& ros_type<RosSetParametersResult>();
+template <>
+const RosType& ros_type<RosDescribeParametersRequest>();
+template <>
+const RosType& ros_type<RosDescribeParametersResponse>();
+template <>
+const RosType& ros_type<RosGetParameterTypesRequest>();
+template <>
+const RosType& ros_type<RosGetParameterTypesResponse>();
+template <>
+const RosType& ros_type<RosGetParametersRequest>();
+template <>
+const RosType& ros_type<RosGetParametersResponse>();
+template <>
+const RosType& ros_type<RosListParametersRequest>();
+template <>
+const RosType& ros_type<RosListParametersResponse>();
+template <>
+const RosType& ros_type<RosSetParametersAtomicallyRequest>();
+template <>
+const RosType& ros_type<RosSetParametersAtomicallyResponse>();
+template <>
+const RosType& ros_type<RosSetParametersRequest>();
+template <>
+const RosType& ros_type<RosSetParametersResponse>();
 template <>
 const RosType& ros_type<RosClock>();
 template <>
