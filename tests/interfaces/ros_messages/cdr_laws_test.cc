@@ -22,7 +22,10 @@ using AllMessages =
                    RosPoseArray, RosTransform, RosTransformStamped, RosTfMessage, RosTwist, RosTwistStamped, RosImage,
                    RosCompressedImage, RosRegionOfInterest, RosCameraInfo, RosJointState, RosObjectHypothesis,
                    RosObjectHypothesisWithPose, RosBoundingBox3d, RosDetection3d, RosDetection3dArray, RosUvCoordinate,
-                   RosMeshFile, RosMarker, RosMarkerArray, RosKeyValue, RosDiagnosticStatus, RosDiagnosticArray>;
+                   RosMeshFile, RosMarker, RosMarkerArray, RosKeyValue, RosDiagnosticStatus, RosDiagnosticArray,
+                   RosParameterEvent, RosParameterDescriptor, RosListParametersRequest, RosListParametersResponse,
+                   RosGetParametersRequest, RosGetParametersResponse, RosGetParameterTypesResponse,
+                   RosDescribeParametersResponse, RosSetParametersRequest, RosSetParametersResponse>;
 TYPED_TEST_SUITE(CdrLaws, AllMessages);
 
 TYPED_TEST(CdrLaws, DecodingAndEncodingGivesTheBytesBackAndBothByteOrdersTheSameValues) {
