@@ -80,6 +80,11 @@ Result<LoadedMesh> finish(RawMesh raw, const MeshReadOptions& options) {
     return core::invalid_input("has no triangles (" + std::to_string(raw.mesh.vertices.size()) +
                                " vertices); export a surface, not a point cloud");
   }
+  if (!raw.colors.empty() && raw.colors.size() != raw.mesh.vertices.size()) {
+    return core::invalid_input("has " + std::to_string(raw.colors.size()) + " colours for " +
+                               std::to_string(raw.mesh.vertices.size()) +
+                               " vertices; export it with one colour for each vertex, or with none");
+  }
   const UpAxis up = options.up_axis == UpAxis::kDeclared ? raw.up_axis : options.up_axis;
   for (Vector3d& vertex : raw.mesh.vertices) vertex = options.metres_per_unit * turned_up(vertex, up);
 

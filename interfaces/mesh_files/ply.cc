@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // PLY [Turk 1994]: a text header that declares elements with properties, then their values as text or binary.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -18,6 +19,8 @@ using core::Status;
 
 // Headers in use have some dozens; each element and property is kept.
 constexpr std::size_t kMaxHeaderLines = 10'000;
+// Of the full range: rounding that a colour may have beyond it.
+constexpr double kColorExcess = 0.01;
 
 enum class Type { kI8, kU8, kI16, kU16, kI32, kU32, kF32, kF64 };
 
@@ -127,6 +130,12 @@ Status parse_header_line(std::string_view line, Header* header, bool* done) {
       return core::invalid_input("the element " + quote(element.name) + " has no count");
     }
     element.count = static_cast<std::uint64_t>(count);
+    const auto is_same = [&element](const Element& other) { return other.name == element.name; };
+    const bool is_read = element.name == "vertex" || element.name == "face";
+    if (is_read && std::any_of(header->elements.begin(), header->elements.end(), is_same)) {
+      return core::unsupported("a second element " + quote(element.name) +
+                               "; only one is read: merge the parts into one mesh and save it again");
+    }
     header->elements.push_back(std::move(element));
     return core::ok_status();
   }
@@ -325,18 +334,34 @@ class Body {
       note_vertex(out_.mesh.vertices.back(), in_.place_kind(), in_.place(), out_.mesh.vertices.size() - 1, &out_);
       if (!has_colors) continue;
       geometry::Rgb color{};
-      for (std::size_t c = 0; c < 3; ++c)
-        color[c] = channel(values[*where[3 + c]], element.properties[*where[3 + c]].type);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Type type = element.properties[*where[3 + c]].type;
+        const double value = values[*where[3 + c]], full = full_channel(type);
+        if (!(value >= -kColorExcess * full && value <= (1.0 + kColorExcess) * full)) return bad_color(value, full);
+        is_dark_ &= type == Type::kU16 && value <= 255.0;
+        color[c] = static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(value / full, 0.0, 1.0)));
+      }
       out_.colors.push_back(color);
+    }
+    if (is_dark_ && !out_.colors.empty()) {
+      out_.warnings.emplace_back(
+          "the colours are of type ushort, 0 to 65535, but none is above 255: all is drawn black; if they are meant as "
+          "0 to 255, save them as uchar");
     }
     return core::ok_status();
   }
 
-  /// Integers are 0 to 255, floating-point numbers 0 to 1.
-  static std::uint8_t channel(double value, Type type) {
-    if (type == Type::kF32 || type == Type::kF64) value *= 255.0;
-    if (!(value > 0.0)) return 0;
-    return value < 255.0 ? static_cast<std::uint8_t>(std::lround(value)) : std::uint8_t{255};
+  /// The number of a channel at full brightness: integers are 0 to 255, but ushort 0 to 65535; floating-point numbers
+  /// 0 to 1.
+  static double full_channel(Type type) {
+    if (type == Type::kF32 || type == Type::kF64) return 1.0;
+    return type == Type::kU16 ? 65535.0 : 255.0;
+  }
+
+  Status bad_color(double value, double full) const {
+    return core::invalid_input(in_.place_kind() + " " + std::to_string(in_.place()) + ": a colour of " +
+                               number_text(value) + "; numbers of this type are from 0 to " + number_text(full) +
+                               " in colours: save them as uchar, 0 to 255");
   }
 
   Status read_faces(const Element& element) {
@@ -414,6 +439,7 @@ class Body {
   std::vector<std::uint32_t> corners_;
   std::size_t small_faces_ = 0;
   bool has_strips_ = false;
+  bool is_dark_ = true;  ///< All colours are ushort and at most 255.
 };
 
 }  // namespace

@@ -114,6 +114,49 @@ TEST(Ply, NamesLineAndRemedy) {
               HasSubstr("triangle strips"));
 }
 
+/// The colours would be those of the first element only, and the faces' indices could mean either.
+TEST(Ply, RefusesASecondElementOfVerticesOrFaces) {
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
+  const std::string colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+  const std::string body = "9 9 9 255 0 0\n" + std::string(kCorners) + "3 0 1 2\n";
+  EXPECT_THAT(error_of(MeshFormat::kPly, "ply\nformat ascii 1.0\nelement vertex 1\n" + xyz + colors +
+                                             "element vertex 4\n" + xyz + faces + "end_header\n" + body),
+              HasSubstr("line 10: a second element 'vertex'; only one is read: merge the parts"));
+  EXPECT_THAT(error_of(MeshFormat::kPly, text_of(faces + faces + "end_header\n", kCorners)),
+              HasSubstr("line 10: a second element 'face'; only one is read"));
+}
+
+core::Result<LoadedMesh> mesh_with_colors(const std::string& type, const std::string& color) {
+  const std::string header = "property " + type + " red\nproperty " + type + " green\nproperty " + type + " blue\n";
+  return decode_text(MeshFormat::kPly,
+                     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+                         header + kFaces + "0 0 0 " + color + "\n1 0 0 " + color + "\n0 1 0 " + color + "\n3 0 1 2\n");
+}
+
+TEST(Ply, ScalesColoursByTheRangeOfTheirType) {
+  for (const auto& [type, color] :
+       {std::pair{"uchar", "0 51 255"}, std::pair{"int", "0 51 255"}, std::pair{"ushort", "0 13107 65535"},
+        std::pair{"float", "0 0.2 1"}, std::pair{"double", "-0.001 0.2 1.004"}}) {
+    const auto mesh = mesh_with_colors(type, color);
+    ASSERT_TRUE(mesh.ok()) << type << ": " << mesh.status().message();
+    EXPECT_EQ(mesh->colors.at(0), (geometry::Rgb{0, 51, 255})) << type;
+    EXPECT_TRUE(mesh->warnings.empty()) << mesh->warnings[0];
+  }
+  EXPECT_THAT(mesh_with_colors("ushort", "0 51 255")->warnings, ElementsAre(HasSubstr("none is above 255")));
+}
+
+TEST(Ply, RefusesColoursThatTheirTypeDoesNotMean) {
+  for (const auto& [type, color] :
+       {std::pair{"float", "128 128 128"}, std::pair{"double", "1 1 1.5"}, std::pair{"int", "256 0 0"},
+        std::pair{"short", "-1000 0 0"}, std::pair{"float", "nan 0 0"}}) {
+    const auto mesh = mesh_with_colors(type, color);
+    ASSERT_FALSE(mesh.ok()) << type;
+    EXPECT_THAT(mesh.status().message(), HasSubstr("line 13: a colour of ")) << type;
+    EXPECT_THAT(mesh.status().message(), HasSubstr("save them as uchar, 0 to 255")) << type;
+  }
+}
+
 TEST(Ply, TakesNoMemoryForCountsThatTheFileCannotHold) {
   const auto message =
       error_of(MeshFormat::kPly,
