@@ -7,6 +7,7 @@
 
 #include "prescene/belief/body_names.h"
 #include "prescene/simulation/own_actions.h"
+#include "remarks.h"
 
 namespace prescene::queries {
 namespace {
@@ -46,6 +47,7 @@ core::Result<std::unique_ptr<EventPaths>> EventPaths::create(const ExplainWindow
     return core::not_found(
         "the belief holds no object at the window's begin: begin the window after the first has been found");
   }
+  remark_on_loose_joints(*window.start, events->remarks_);
   events->take_actions();
   events->set_scene();
   events->follow_tracks();

@@ -13,6 +13,7 @@
 #include "prescene/core/check.h"
 #include "prescene/queries/relation_history.h"
 #include "prescene/queries/relations.h"
+#include "remarks.h"
 #include "stability.h"
 #include "view.h"
 #include "where.h"
@@ -91,6 +92,11 @@ belief::Answer answer(const belief::Belief& snapshot, const belief::Query& query
   dispatch(
       snapshot, query, context, [&] { return prior_of(snapshot); },
       [&](const belief::RelationsQuery& asked) { return relations(snapshot, asked, context); }, result);
+  std::visit(
+      [&](auto& what) {
+        if constexpr (requires { what.remarks; }) remark_on_loose_joints(snapshot, what.remarks);
+      },
+      result.what);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include "model_doubts.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
+#include "prior.h"
 #include "remarks.h"
 
 namespace prescene::queries {
@@ -168,6 +169,27 @@ void remark_on_actions(const belief::Scene& scene, double duration, std::vector<
       held.erase(object);
     else if (!object.empty())
       held.insert(object);
+  }
+}
+
+void remark_on_loose_joints(const belief::Belief& belief, std::vector<std::string>& remarks) {
+  if (belief.scene->joints.empty()) return;
+  belief::Scene scene;
+  scene.supports = belief.scene->supports;
+  scene.joints = belief.scene->joints;
+  for (const belief::ObjectBelief& object : belief.objects)
+    if (is_present(object)) scene.objects.emplace_back().name = object.name;
+  for (const std::string& name : belief::drop_loose_joints(scene)) {
+    const belief::Joint& joint =
+        belief.scene->joints[static_cast<std::size_t>(*belief::find_joint(*belief.scene, name))];
+    const auto is_there = [&](const std::string& object) {
+      return object.empty() || belief::find_object(scene, object) || belief::find_support(scene, object);
+    };
+    const std::string missing = is_there(joint.parent) ? joint.child : joint.parent;
+    remarks.push_back("The joint '" + name + "' is left out: '" + missing + "' is lost" +
+                      (missing == joint.parent && is_there(joint.child)
+                           ? ". What is said of '" + joint.child + "' takes it for free."
+                           : "."));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/belief/belief.h"
 #include "prescene/belief/prediction.h"
 #include "prescene/belief/query.h"
 #include "prescene/belief/scene.h"
@@ -17,5 +18,8 @@ std::vector<std::string> remarks_of(const belief::Basis& basis, const belief::Ef
 std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort);
 /// Actions that change nothing, or not what they seem to: of what nothing holds, or after the end.
 void remark_on_actions(const belief::Scene& scene, double duration, std::vector<std::string>& remarks);
+
+/// Joints that are left out, as what they hang on, or what hangs on them, is not there now.
+void remark_on_loose_joints(const belief::Belief& belief, std::vector<std::string>& remarks);
 
 }  // namespace prescene::queries
