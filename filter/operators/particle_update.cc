@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "particle_update.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "prescene/filter/proposals/facets.h"
+#include "prescene/geometry/dense_solvers.h"
+
+namespace prescene::filter {
+namespace {
+
+using belief::Particle;
+
+constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
+constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
+constexpr double kSharedShift = 0.003;       // m; an outline serves for poses so near to where it was taken ...
+constexpr double kSharedTurn = 0.03;         // rad
+constexpr double kFullOverlap = 0.25;        // share of a hidden pose's overlap with a support from which ...
+constexpr double kLogInSupport = -12.0;      // nats; ... it costs this; less in proportion
+
+/// What the outline is worth: 0 where nothing ends at it, 1 where enough does.
+double outline_worth(double outline, const WeightOptions& options) {
+  return std::clamp((outline - options.min_outline) / (options.full_outline - options.min_outline), 0.0, 1.0);
+}
+
+}  // namespace
+
+Gaussian gaussian(const Matrix6d& covariance) {
+  Gaussian g;
+  g.covariance = 0.5 * (covariance + covariance.transpose());
+  g.covariance.diagonal().array() += kSmallestVariance;
+  const geometry::Cholesky6 cholesky(g.covariance);
+  g.root = cholesky.factor();
+  g.information = cholesky.inverse();
+  g.log_determinant = 2.0 * g.root.diagonal().array().log().sum();
+  return g;
+}
+
+bool is_see_through(const SearchTarget& target) { return target.material.behind > target.material.hit; }
+
+bool is_near(const Vector6d& d, double shift, double turn) {
+  return d.head<3>().norm() < turn && d.tail<3>().norm() < shift;
+}
+
+double gate_at(double t) { return kFirstGate * std::pow(kLastGate / kFirstGate, t); }
+
+double limited(double length, double limit) { return length > limit ? limit / length : 1.0; }
+
+double worth(double log_ratio, double outline, const WeightOptions& options) {
+  return log_ratio > 0.0 ? outline_worth(outline, options) * log_ratio : log_ratio;
+}
+
+double shown_share(const rendering::PoseEvidence& evidence) {
+  return evidence.measured > 0 ? static_cast<double>(evidence.visible) / evidence.measured : 0.0;
+}
+
+void move_to(const Mode& mode, const Gaussian& predicted, Particle& particle) {
+  const Matrix6d gain = particle.covariance.bottomLeftCorner<6, 6>() * predicted.information;
+  const Vector6d dv = gain * mode.shift;
+  particle.X_WO = geometry::normalized(mode.X_WO);
+  particle.V_WO.angular += dv.head<3>();
+  particle.V_WO.linear += dv.tail<3>();
+  const Matrix6d twist = particle.covariance.bottomRightCorner<6, 6>() -
+                         gain * (predicted.covariance - mode.covariance) * gain.transpose();
+  particle.covariance.topLeftCorner<6, 6>() = mode.covariance;
+  particle.covariance.bottomLeftCorner<6, 6>() = gain * mode.covariance;
+  particle.covariance.topRightCorner<6, 6>() = particle.covariance.bottomLeftCorner<6, 6>().transpose();
+  particle.covariance.bottomRightCorner<6, 6>() = 0.5 * (twist + twist.transpose());
+}
+
+bool within_reach(const Mode& mode, const Gaussian& predicted, double dt, const WeightOptions& options) {
+  const double spread = std::sqrt(predicted.covariance.bottomRightCorner<3, 3>().trace());
+  return mode.shift.tail<3>().norm() <= options.max_jump_speed * dt + 3.0 * spread;
+}
+
+ParticleUpdate::ParticleUpdate(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CW,
+                               double pixels, const WeightOptions& options, const FilterTools& tools,
+                               const WeightContext& context, const TakenOutline* shared_outline,
+                               rendering::LikelihoodWorkspace& workspace)
+    : terms_(terms),
+      target_(target),
+      X_CW_(X_CW),
+      pixels_(pixels),
+      options_(options),
+      tools_(tools),
+      context_(context),
+      shared_outline_(shared_outline),
+      workspace_(workspace),
+      information_share_(rendering::tempering(terms.tempering.information, pixels, terms.step)),
+      weight_share_(rendering::tempering(terms.tempering.weight, pixels, terms.step)) {}
+
+Mode ParticleUpdate::climb(const Pose& X_WO_predicted, const Gaussian& predicted, const Vector6d& start) const {
+  Mode mode;
+  mode.X_WO = geometry::box_plus(X_WO_predicted, start);
+  mode.shift = start;
+  std::optional<Outline> own_outline;
+  const Outline* outline = outline_near(mode.X_WO, own_outline);
+  Matrix6d information = predicted.information;
+  for (int step = 0; step <= options_.steps; ++step) {
+    const double t = options_.steps > 1 ? std::min(1.0, static_cast<double>(step) / (options_.steps - 1)) : 1.0;
+    const FrameEquations equations = equations_at(mode.X_WO, gate_at(t), outline);
+    information = predicted.information + equations.information;
+    if (step == options_.steps) break;  // the last pass is for the information at the mode
+    const Vector6d gradient = equations.gradient - predicted.information * mode.shift;
+    Vector6d d = geometry::Cholesky6(information).solve(gradient);
+    if (!d.allFinite()) break;
+    d *= std::min(limited(d.head<3>().norm(), 0.25), limited(d.tail<3>().norm(), 0.03));
+    mode.X_WO = geometry::box_plus(mode.X_WO, d);
+    mode.shift = geometry::box_minus(mode.X_WO, X_WO_predicted);
+    if (d.head<3>().norm() < 1e-4 && d.tail<3>().norm() < 1e-5 && t == 1.0) break;
+  }
+  const geometry::Cholesky6 cholesky(information);
+  mode.covariance = cholesky.inverse();
+  mode.log_determinant = -2.0 * cholesky.factor().diagonal().array().log().sum();
+  return mode;
+}
+
+FrameEquations ParticleUpdate::equations_at(const Pose& X_WO, double gate, const Outline* outline,
+                                            bool with_evidence) const {
+  rendering::LineariseOptions linearise;
+  linearise.gate = gate;
+  linearise.with_evidence = with_evidence;
+  const Pose X_CO = X_CW_ * X_WO;
+  const rendering::PoseHypothesis h = hypothesis(target_, X_CO, pixels_);
+  rendering::PoseLinearisation residuals;
+  tools_.search->batch().linearise(terms_, std::span(&h, 1), linearise, workspace_, std::span(&residuals, 1));
+  Matrix6d H = information_share_ * residuals.H;
+  Vector6d g = information_share_ * residuals.g;
+  without_facets(target_.facet_lever, X_CO.rotation, target_.centre(), H, g);
+  FrameEquations equations;
+  if (outline != nullptr) {
+    const OutlineEquations edges = outline->linearise(X_CO, *context_.depth, terms_);
+    H += edges.H;
+    g += edges.g;
+  }
+  equations.information = information_in_world(H, X_CW_.rotation);
+  equations.gradient = g;
+  equations.gradient.tail<3>() = X_CW_.rotation.conjugate() * g.tail<3>();
+  equations.evidence = residuals.evidence;
+  return equations;
+}
+
+const Outline* ParticleUpdate::outline_near(const Pose& X_WO, std::optional<Outline>& own) const {
+  if (context_.depth == nullptr || is_see_through(target_)) return nullptr;
+  if (shared_outline_ != nullptr &&
+      is_near(geometry::box_minus(X_WO, shared_outline_->X_WO), kSharedShift, kSharedTurn))
+    return &shared_outline_->outline;
+  return &own.emplace(target_, X_CW_ * X_WO, context_.camera, *tools_.renderer);
+}
+
+rendering::PoseEvidence ParticleUpdate::evidence(const Pose& X_WO) const {
+  const rendering::PoseHypothesis h = hypothesis(target_, X_CW_ * X_WO, pixels_);
+  rendering::PoseEvidence e;
+  tools_.search->batch().evaluate(terms_, std::span(&h, 1), workspace_, std::span(&e, 1));
+  return e;
+}
+
+double ParticleUpdate::outline(const Pose& X_WO) const {
+  if (is_see_through(target_)) return 1.0;
+  return outline_support(terms_, depth_of(target_, X_CW_ * X_WO, terms_.camera, *tools_.renderer),
+                         options_.outline_step);
+}
+
+double ParticleUpdate::log_overlap(const Pose& X_WO) const {
+  if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
+  const double overlap = context_.supports->overlap(*target_.mesh, X_WO, options_.support_tolerance);
+  return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts that weight() is made of: a particle's Gaussian, its mode near the prediction, and what a frame says about
+// poses of one object.
+#pragma once
+
+#include <optional>
+
+#include "prescene/filter/operators/weight.h"
+#include "prescene/filter/proposals/outline.h"
+
+namespace prescene::filter {
+
+inline constexpr double kLastGate = 0.012;       // m; residuals beyond about half of it lose their weight at the end
+inline constexpr double kMostStartShift = 0.03;  // m; a start is never further off, however wide the prediction is, ...
+inline constexpr double kMostStartTurn = 0.35;   // rad; ... nor turned further
+
+struct Gaussian {
+  Matrix6d covariance;
+  Matrix6d information;
+  Matrix6d root;  ///< Lower Cholesky factor of the covariance.
+  double log_determinant = 0.0;
+};
+Gaussian gaussian(const Matrix6d& covariance);
+
+/// A mode near the prediction, with the covariance about it.
+struct Mode {
+  Pose X_WO;
+  Vector6d shift = Vector6d::Zero();  ///< From the prediction, box_plus coordinates.
+  Matrix6d covariance;
+  double log_determinant = 0.0;
+};
+
+/// What the frame says about a pose, in W.
+struct FrameEquations {
+  Matrix6d information;
+  Vector6d gradient;
+  rendering::PoseEvidence evidence;
+};
+
+/// Of such a thing, the measured surface is mostly the one behind, which goes on.
+bool is_see_through(const SearchTarget& target);
+bool is_near(const Vector6d& d, double shift, double turn);
+/// Of residuals at a share t of the steps.
+double gate_at(double t);
+/// The factor that brings a length down to its limit.
+double limited(double length, double limit);
+/// Evidence in favour of the pose counts as much as its outline is worth; evidence against it counts in full.
+double worth(double log_ratio, double outline, const WeightOptions& options);
+/// The share of the pixels that the pose should show that show it or something further away.
+double shown_share(const rendering::PoseEvidence& evidence);
+/// Moves the particle's Gaussian to the mode: the pose block becomes the mode's, the rest follows by the gain.
+void move_to(const Mode& mode, const Gaussian& predicted, belief::Particle& particle);
+/// How far the mode may be from the prediction: what the motion allows in the time, and its spread.
+bool within_reach(const Mode& mode, const Gaussian& predicted, double dt, const WeightOptions& options);
+
+/// An outline and the pose that it was taken at.
+struct TakenOutline {
+  Pose X_WO;
+  Outline outline;
+};
+
+class ParticleUpdate {
+ public:
+  ParticleUpdate(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CW, double pixels,
+                 const WeightOptions& options, const FilterTools& tools, const WeightContext& context,
+                 const TakenOutline* shared_outline, rendering::LikelihoodWorkspace& workspace);
+
+  /// Climbs from box_plus(predicted, start) on the tempered likelihood times the prediction.
+  Mode climb(const Pose& X_WO_predicted, const Gaussian& predicted, const Vector6d& start) const;
+  /// Depth residuals up to the gate, tempered, and the outline if there is one.
+  FrameEquations equations_at(const Pose& X_WO, double gate, const Outline* outline, bool with_evidence = false) const;
+  /// The shared outline where it serves, else one taken here; null where poses follow residuals alone.
+  const Outline* outline_near(const Pose& X_WO, std::optional<Outline>& own) const;
+  rendering::PoseEvidence evidence(const Pose& X_WO) const;
+  double outline(const Pose& X_WO) const;
+  /// What it costs to be where a support is.
+  double log_overlap(const Pose& X_WO) const;
+
+  bool was_unseen() const { return context_.was_unseen; }
+  double weight_share() const { return weight_share_; }
+
+ private:
+  const rendering::FrameTerms& terms_;
+  const SearchTarget& target_;
+  Pose X_CW_;
+  double pixels_;
+  const WeightOptions& options_;
+  const FilterTools& tools_;
+  const WeightContext& context_;
+  const TakenOutline* shared_outline_;
+  rendering::LikelihoodWorkspace& workspace_;
+  double information_share_;
+  double weight_share_;
+};
+
+}  // namespace prescene::filter
