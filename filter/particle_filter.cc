@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frame_step.h"
 #include "prescene/belief/robot_motion.h"
 #include "prescene/core/check.h"
 #include "prescene/filter/operators/hold_joints.h"
@@ -30,20 +31,11 @@ constexpr std::uint64_t kRivalsEvery = 5;
 constexpr double kMostlySeen = 0.5;
 constexpr double kOnePlace = 0.05;  // m
 
-const belief::ObjectModel& model_of(const Belief& belief, std::size_t object) {
-  return belief.scene->models[static_cast<std::size_t>(belief.objects[object].model)];
-}
-
 /// Whether two poses differ by how the object is turned rather than by where it is.
 bool is_turned_in_place(const Pose& a, const Pose& b, const SearchTarget& target,
                         const geometry::SymmetryGroup& symmetry) {
   return (a * target.centre() - b * target.centre()).norm() < kOnePlace &&
          geometry::symmetric_angle(a, b, symmetry) >= kRivalTurn;
-}
-
-/// Whether others may take the object's surface for granted.
-bool hides_others(const ObjectBelief& object) {
-  return object.existence >= 0.5 && (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful);
 }
 
 void note(const char* stage, StepResult& result) {
@@ -161,38 +153,6 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   }
 }
 
-struct ParticleFilter::FrameStep {
-  const FilterFrame& frame;
-  const belief::Observation& observation;
-  StepResult& result;
-  // By object.
-  std::vector<geometry::DepthImage> depths = {};  ///< What others may be hidden by.
-  std::vector<WeightReport> reports = {};
-
-  Belief& belief() const { return result.belief; }
-  const Particle& heaviest(std::size_t object) const {
-    return belief::heaviest(result.belief.objects[object].particles);
-  }
-};
-
-SearchTarget ParticleFilter::target_in(const FrameStep& step, std::size_t object) const {
-  return target_of(step.belief().objects[object], *step.belief().scene, step.frame, tools_);
-}
-
-geometry::DepthImage ParticleFilter::depth_in(const FrameStep& step, std::size_t object) const {
-  return depth_of(target_in(step, object), step.frame.X_CW * step.heaviest(object).X_WO, step.frame.terms.camera,
-                  *tools_.renderer);
-}
-
-rendering::FrameTerms ParticleFilter::terms_in(const FrameStep& step, std::size_t object,
-                                               const SearchTarget& target) const {
-  std::vector<const geometry::DepthImage*> others;
-  for (std::size_t j = 0; j < step.depths.size(); ++j)
-    if (j != object && hides_others(step.belief().objects[j])) others.push_back(&step.depths[j]);
-  const Pose X_CO = step.frame.X_CW * step.heaviest(object).X_WO;
-  return terms_for_object(step.frame, others, X_CO * target.centre(), static_cast<double>(target.mesh->radius));
-}
-
 void ParticleFilter::first_look(FrameStep& step) {
   StepResult& result = step.result;
   const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0);
@@ -202,72 +162,6 @@ void ParticleFilter::first_look(FrameStep& step) {
   result.counters.found = report.found;
   if (report.no_support) result.degraded |= kNoSupportFound;
   if (report.found < report.looked_for) result.degraded |= kObjectsMissing;
-}
-
-void ParticleFilter::weigh_all(FrameStep& step, double dt) {
-  const FilterFrame& frame = step.frame;
-  StepResult& result = step.result;
-  Belief& belief = step.belief();
-  const core::RandomStream stream(belief.seed, core::Purpose::kProposal);
-  step.depths.clear();
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) step.depths.push_back(depth_in(step, i));
-  step.reports.resize(belief.objects.size());
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    ObjectBelief& object = belief.objects[i];
-    const SearchTarget target = target_in(step, i);
-    const rendering::FrameTerms terms = terms_in(step, i, target);
-    WeightReport& report = step.reports[i];
-    std::vector<double> before;
-    for (const Particle& particle : object.particles) before.push_back(particle.log_weight);
-    report = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
-                    stream.at(belief.step, static_cast<std::uint32_t>(i)), object.particles,
-                    {.supports = frame.surfaces.get(),
-                     .was_unseen = object.state == TrackState::kUnseen,
-                     .depth = step.observation.frame.depth.get(),
-                     .camera = step.observation.frame.camera});
-    if (report.all_impossible) result.degraded |= kImpossibleWeights;
-    // What is hidden is not told apart by its turn.
-    if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share)
-      share_among_turns(before, model_of(belief, i).symmetry, object.particles);
-    for (const ParticleWeight& particle : report.particles) result.counters.hidden_particles += particle.hidden;
-    update_track(report, frame.stamp_ns, settings_.track, object);
-    step.depths[i] = depth_in(step, i);
-  }
-}
-
-void ParticleFilter::weigh_print_of(FrameStep& step, std::size_t object, bool found) {
-  if (!settings_.print.use) return;
-  ObjectBelief& seen = step.belief().objects[object];
-  const PrintedModel* printed = prints_.get(model_of(step.belief(), object), meshes_);
-  if (printed == nullptr) return;
-  const RivalLook look = rival_look(settings_.print, seen, step.belief().step + object, found);
-  const PrintReport report = weigh_print(*printed, step.frame, step.observation, settings_.print, look, seen);
-  step.result.counters.turned_by_print += report.turned ? 1 : 0;
-}
-
-void ParticleFilter::exchange_all(FrameStep& step) {
-  const FilterFrame& frame = step.frame;
-  Belief& belief = step.belief();
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    const SearchTarget target = target_in(step, i);
-    if (target.color_model < 0) continue;
-    for (std::size_t j = i + 1; j < belief.objects.size(); ++j) {
-      const SearchTarget other = target_in(step, j);
-      if (other.color_model < 0 || other.color_model == target.color_model || other.mesh != target.mesh) continue;
-      const Particle& first = step.heaviest(i);
-      const Particle& second = step.heaviest(j);
-      if (first.mode == belief::MotionMode::kHeld || second.mode == belief::MotionMode::kHeld) continue;
-      const rendering::FrameTerms terms = terms_in(step, i, target);
-      const rendering::FrameTerms other_terms = terms_in(step, j, other);
-      if (!are_exchanged({&terms, &other_terms}, {&target, &other}, {frame.X_CW * first.X_WO, frame.X_CW * second.X_WO},
-                         settings_.augment, tools_))
-        continue;
-      exchange(belief.objects[i], belief.objects[j]);
-      std::swap(step.depths[i], step.depths[j]);
-      std::swap(step.reports[i], step.reports[j]);
-      ++step.result.counters.exchanges;
-    }
-  }
 }
 
 void ParticleFilter::recover_all(FrameStep& step) {
@@ -327,6 +221,32 @@ void ParticleFilter::recover_all(FrameStep& step) {
   }
 }
 
+std::vector<Island> ParticleFilter::join_islands(Belief& belief, double dt, StepCounters& counters) {
+  if (!settings_.worlds.joint) return {};
+  std::vector<Island> islands = islands_that_change(belief, dt, settings_.worlds, touch_, search_.threads());
+  const core::RandomStream stream(belief.seed, core::Purpose::kStartBelief);
+  for (const Island& island : islands)
+    counters.worlds_joined += join_worlds(island, settings_.resample, stream, belief) ? 1 : 0;
+  return islands;
+}
+
+void ParticleFilter::resample_all(FrameStep& step) {
+  Belief& belief = step.belief();
+  const core::RandomStream stream(belief.seed, core::Purpose::kResample);
+  std::vector<bool> in_worlds(belief.objects.size(), false);
+  for (const Island& island : step.islands) {
+    if (!are_worlds(belief, island)) continue;  // a member was looked at by itself meanwhile
+    for (const std::size_t member : island) in_worlds[member] = true;
+    const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(island.front()));
+    step.result.counters.resampled += resample_worlds(island, settings_.resample, mine, belief);
+  }
+  for (std::size_t i = 0; i < belief.objects.size(); ++i)
+    if (!in_worlds[i])
+      step.result.counters.resampled +=
+          resample_within_turns(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
+                                model_of(belief, i).symmetry, belief.objects[i].particles);
+}
+
 void ParticleFilter::look_for_more(FrameStep& step) {
   const AugmentOptions& options = settings_.augment;
   Belief& belief = step.belief();
@@ -375,9 +295,13 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   if (has_depth && observation.X_WC.is_finite()) follow_supports(observation, result);
 
   const std::vector<Pose> X_WG = robot_poses(belief, observation, &result.degraded);
+  std::vector<Island> islands;
   if (!first) {
-    PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, simulators_,
-                                   core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads());
+    islands = join_islands(belief, dt, result.counters);
+    PredictReport report =
+        predict(belief, control, X_WG, dt, settings_.predict, simulators_,
+                core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads(), islands);
+    result.counters.pushed_particles = report.pushed;
     result.counters.simulated = report.simulated;
     result.counters.not_simulated = report.not_simulated;
     result.physics_failure = std::move(report.failure);
@@ -400,6 +324,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   }
   belief.X_WC = observation.X_WC;
   FrameStep current{frame, observation, result};
+  current.islands = std::move(islands);
   if (first) first_look(current);
   note("initialise", result);
 
@@ -418,11 +343,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   if (!learned.failure.empty()) result.degraded |= kLearningFailed;
   result.learning_failure = std::move(learned.failure);
 
-  const core::RandomStream stream(belief.seed, core::Purpose::kResample);
-  for (std::size_t i = 0; i < belief.objects.size(); ++i)
-    result.counters.resampled +=
-        resample_within_turns(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
-                              model_of(belief, i).symmetry, belief.objects[i].particles);
+  resample_all(current);
   note("filter", result);
 
   if (settings_.recover) {
@@ -434,46 +355,6 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note_failed_rendering(result);
   note("augment", result);
   return result;
-}
-
-void number_islands(double gap, MeshCache& meshes, Belief& belief) {
-  struct Body {
-    rendering::MeshHandle mesh;
-    Pose X_WO;
-    geometry::Box box;
-  };
-  std::vector<Body> bodies;
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    const belief::ObjectModel& model = model_of(belief, i);
-    Body body{meshes.get(model.visual, model.collision, MeshDetail::kLikelihood),
-              belief::heaviest(belief.objects[i].particles).X_WO,
-              {}};
-    for (const auto& vertex : body.mesh->vertices) body.box.extend(vertex.cast<double>());
-    body.box.extend((body.box.max().array() + gap).matrix());
-    body.box.extend((body.box.min().array() - gap).matrix());
-    bodies.push_back(std::move(body));
-  }
-  // Near enough for what shares a set of particles: a vertex of one inside the other's box.
-  const auto reaches_into = [](const Body& a, const Body& b) {
-    const Pose X_BA = b.X_WO.inverse() * a.X_WO;
-    return std::any_of(a.mesh->vertices.begin(), a.mesh->vertices.end(),
-                       [&](const auto& vertex) { return b.box.contains(X_BA * vertex.template cast<double>()); });
-  };
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) belief.objects[i].island = static_cast<int>(i);
-  for (std::size_t i = 0; i < bodies.size(); ++i)
-    for (std::size_t j = i + 1; j < bodies.size(); ++j) {
-      const double reach =
-          static_cast<double>(bodies[i].mesh->radius) + static_cast<double>(bodies[j].mesh->radius) + gap;
-      const Vector3d between = bodies[i].X_WO * bodies[i].mesh->centre.cast<double>() -
-                               bodies[j].X_WO * bodies[j].mesh->centre.cast<double>();
-      const bool jointed = !belief.scene->joints.empty() &&
-                           belief::are_jointed(*belief.scene, belief.objects[i].name, belief.objects[j].name);
-      if (!jointed && between.norm() > reach) continue;
-      if (!jointed && !reaches_into(bodies[i], bodies[j]) && !reaches_into(bodies[j], bodies[i])) continue;
-      const int a = belief.objects[i].island, b = belief.objects[j].island;
-      for (ObjectBelief& object : belief.objects)
-        if (object.island == std::max(a, b)) object.island = std::min(a, b);
-    }
 }
 
 }  // namespace prescene::filter

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,6 +25,8 @@ constexpr double kSettleSpeed = 0.04;  // m/s; what is slower than this ...
 constexpr double kSettleRate = 0.5;    // rad/s; ... and this may come to rest
 constexpr double kStayedShift = 1e-3;  // m; what the simulator moves by less in a step ...
 constexpr double kStayedTurn = 0.01;   // rad; ... and turns by less has stayed where it is
+constexpr double kPushedSpeed = 0.08;  // m/s, across gravity; what rests is pushed when a simulation makes it as fast
+constexpr double kPushedRate = 1.0;    // rad/s
 
 /// The scene of one step: robot bodies go from where they were to where they are, absent objects are left out.
 belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_WG, double dt,
@@ -108,13 +111,29 @@ std::optional<std::string> failure_of(const belief::Trajectory& run, std::size_t
   return finite ? std::nullopt : std::optional<std::string>("has no finite end");
 }
 
+/// What rests begins to move where something in its world has set it in motion. What falls onto its support from as
+/// little above it as poses are uncertain is not pushed.
+void take_if_pushed(const belief::ObjectState& end, const Vector3d& gravity_W, const PredictOptions& options,
+                    Particle& particle, PredictReport& report) {
+  if (particle.mode == MotionMode::kHeld) return;
+  const Vector3d up_W = gravity_W.norm() > 0.0 ? Vector3d(gravity_W.normalized()) : Vector3d::Zero();
+  const Vector3d across = end.V_WO.linear - up_W * up_W.dot(end.V_WO.linear);
+  if (across.norm() < kPushedSpeed && end.V_WO.angular.norm() < kPushedRate) return;
+  particle.X_WO = geometry::normalized(end.X_WO);
+  particle.V_WO = end.V_WO;
+  if (particle.mode == MotionMode::kResting) wake(options, particle);
+  ++report.pushed;
+}
+
 /// Moves falling particles of one duration by the simulator, each with the other objects (`objects`, by index in the
 /// belief) where they most likely are. Its physical parameters are drawn anew for each particle and step from what is
 /// believed of them, and so are those of the joints.
-void simulate(belief::Belief& belief, std::span<const Falling> falling, const std::vector<std::size_t>& objects,
-              const std::vector<belief::Joint>& joints, double dt, const PredictOptions& options,
-              const simulation::Simulator& simulator, const core::RandomStream& stream, core::ThreadPool& threads,
-              PredictReport& report) {
+///
+/// In worlds the other members are where they are in the particle's, and one simulation moves them all.
+void simulate(belief::Belief& belief, std::span<const Falling> falling, const Worlds& worlds,
+              const std::vector<std::size_t>& objects, const std::vector<belief::Joint>& joints, double dt,
+              const PredictOptions& options, const simulation::Simulator& simulator, const core::RandomStream& stream,
+              core::ThreadPool& threads, PredictReport& report) {
   belief::WorldState common;
   std::vector<belief::PhysicalSampler> physics;
   for (const std::size_t i : objects) {
@@ -124,21 +143,39 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, physics.back().mean()});
   }
   const core::RandomStream parameters = stream.for_purpose(core::Purpose::kParameters);
-  const auto place_of = [&](const Falling& f) {
-    return static_cast<std::size_t>(std::find(objects.begin(), objects.end(), f.object) - objects.begin());
+  const auto place_of = [&](std::size_t object) {
+    return static_cast<std::size_t>(std::find(objects.begin(), objects.end(), object) - objects.begin());
   };
   std::vector<belief::WorldState> starts;
   std::vector<double> settle_draws;
+  std::vector<std::size_t> run_of;
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> run_of_world;  // by an island's first member
   for (const Falling& f : falling) {
-    belief::WorldState start = common;
-    start.time = dt - f.duration;
+    const WorldsOfIsland* island = worlds.of(f.object);
+    if (island != nullptr && island->apart) island = nullptr;
+    const auto [entry, is_new] =
+        run_of_world.try_emplace({island != nullptr ? island->members.front() : f.object, f.particle}, starts.size());
+    run_of.push_back(entry->second);
+    if (is_new) {
+      starts.push_back(common);
+      starts.back().time = dt - f.duration;
+      for (std::size_t place = 0; island != nullptr && place < objects.size(); ++place)
+        if (const Particle* at = island->start_of(objects[place], f.particle)) {
+          belief::ObjectState& state = starts.back().objects[place];
+          state.X_WO = at->X_WO;
+          state.V_WO = at->V_WO;
+          state.mode = at->mode;
+        }
+    }
+    belief::WorldState& start = starts[entry->second];
     const Particle& particle = belief.objects[f.object].particles[f.particle];
-    const std::size_t place = place_of(f);
+    const std::size_t place = place_of(f.object);
     core::RandomStream draws = parameters.at(belief.step, static_cast<std::uint32_t>(f.object << 16 | f.particle));
     std::vector<double> uniforms(static_cast<std::size_t>(physics[place].dimensions()));
     for (double& u : uniforms) u = draws.uniform();
     settle_draws.push_back(draws.uniform());
-    for (const belief::Joint& joint : joints) {
+    for (std::size_t j = 0; is_new && j < joints.size(); ++j) {
+      const belief::Joint& joint = joints[j];
       const auto drawn = [&](const belief::ScalarDistribution& distribution) {
         std::vector<double> numbers(static_cast<std::size_t>(belief::dimensions(distribution)));
         for (double& u : numbers) u = draws.uniform();
@@ -150,7 +187,6 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
       to.damping = drawn(joint.damping);
     }
     start.objects[place] = {particle.X_WO, particle.V_WO, MotionMode::kMoving, physics[place].draw(uniforms)};
-    starts.push_back(std::move(start));
   }
   simulation::RunRequest request;
   request.stop.duration = falling.front().duration;
@@ -163,12 +199,13 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
   simulator.run(starts, request, stream, 0, threads, runs);
   for (std::size_t i = 0; i < falling.size(); ++i) {
     ObjectBelief& object = belief.objects[falling[i].object];
-    const std::size_t place = place_of(falling[i]);
-    if (const std::optional<std::string> failure = failure_of(runs[i], place)) {
+    const std::size_t place = place_of(falling[i].object);
+    const belief::Trajectory& run = runs[run_of[i]];
+    if (const std::optional<std::string> failure = failure_of(run, place)) {
       go_on_without_physics(falling[i], "the simulated motion of '" + object.name + "' " + *failure, belief, report);
       continue;
     }
-    const belief::ObjectState& end = runs[i].final().objects[place];
+    const belief::ObjectState& end = run.final().objects[place];
     Particle& particle = object.particles[falling[i].particle];
     const geometry::Vector6d motion = geometry::box_minus(end.X_WO, particle.X_WO);
     particle.X_WO = geometry::normalized(end.X_WO);
@@ -181,6 +218,18 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const st
     if (object.state != belief::TrackState::kTracked && settle_draws[i] < settles && is_slow(particle))
       settle(particle);
     ++report.simulated;
+  }
+  for (const auto& [key, run] : run_of_world) {
+    const WorldsOfIsland* island = worlds.of(key.first);
+    if (island == nullptr || island->apart) continue;
+    for (const std::size_t member : island->members) {
+      const bool falls = std::any_of(falling.begin(), falling.end(),
+                                     [&](const Falling& f) { return f.object == member && f.particle == key.second; });
+      const std::size_t place = place_of(member);
+      if (falls || place == objects.size() || failure_of(runs[run], place)) continue;
+      take_if_pushed(runs[run].final().objects[place], belief.scene->gravity_W, options,
+                     belief.objects[member].particles[key.second], report);
+    }
   }
 }
 
@@ -196,7 +245,7 @@ Ball ball_about(const belief::Belief& belief, const ObjectBelief& object, const 
 /// By falling object, the objects that may have to do with its motion in this step: those that one of its particles
 /// may reach, and their islands. Ascending.
 std::vector<std::vector<std::size_t>> neighbours_of(const belief::Belief& belief, std::span<const Falling> falling,
-                                                    double dt) {
+                                                    const Worlds& worlds, double dt) {
   constexpr double kMargin = 0.05;  // m: others are at their likeliest poses only
   std::vector<Ball> balls;
   for (const ObjectBelief& object : belief.objects)
@@ -214,6 +263,13 @@ std::vector<std::vector<std::size_t>> neighbours_of(const belief::Belief& belief
       if (is_present(belief.objects[j]) && (p_W - balls[j].p_W).norm() < reach) near[f.object].insert(j);
     }
   }
+  for (const WorldsOfIsland& island : worlds.islands) {
+    std::set<std::size_t> all;
+    for (const std::size_t member : island.members) all.insert(near[member].begin(), near[member].end());
+    if (all.empty() || island.apart) continue;
+    all.insert(island.members.begin(), island.members.end());
+    for (const std::size_t member : island.members) near[member] = all;
+  }
   std::vector<std::vector<std::size_t>> neighbours;
   for (const std::set<std::size_t>& mine : near) {
     std::set<int> islands;
@@ -227,7 +283,7 @@ std::vector<std::vector<std::size_t>> neighbours_of(const belief::Belief& belief
 }
 
 /// Moves falling particles whose surroundings are `objects`.
-void move_on_among(const std::vector<std::size_t>& objects, std::span<const Falling> falling,
+void move_on_among(const std::vector<std::size_t>& objects, std::span<const Falling> falling, const Worlds& worlds,
                    const std::optional<belief::Support>& floor, std::span<const Pose> X_WG, double dt,
                    const PredictOptions& options, const simulation::SimulatorFactory& simulators,
                    const core::RandomStream& stream, core::ThreadPool& threads, belief::Belief& belief,
@@ -244,8 +300,8 @@ void move_on_among(const std::vector<std::size_t>& objects, std::span<const Fall
   for (std::size_t begin = 0; begin < falling.size();) {
     std::size_t end = begin;
     while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
-    simulate(belief, falling.subspan(begin, end - begin), objects, scene.joints, dt, options, **simulator, stream,
-             threads, report);
+    simulate(belief, falling.subspan(begin, end - begin), worlds, objects, scene.joints, dt, options, **simulator,
+             stream, threads, report);
     begin = end;
   }
 }
@@ -279,19 +335,27 @@ void settle(Particle& particle) {
   clear_twist(particle);
 }
 
+void wake(const PredictOptions& options, Particle& particle, double share) {
+  const double rate = share * options.wake_rate, speed = share * options.wake_speed;
+  particle.mode = MotionMode::kMoving;
+  particle.covariance.diagonal().segment<3>(6).array() += rate * rate;
+  particle.covariance.diagonal().segment<3>(9).array() += speed * speed;
+}
+
 void keep_joints_of_present(belief::Scene& scene) {
   belief::drop_loose_joints(scene);
   for (belief::SceneObject& object : scene.objects)
     if (belief::joint_of(scene, object.name)) object.held_by.reset();
 }
 
-PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,
-                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads) {
+PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, const Worlds& worlds,
+                      std::span<const Pose> X_WG, double dt, const PredictOptions& options,
+                      const simulation::SimulatorFactory& simulators, const core::RandomStream& stream,
+                      core::ThreadPool& threads) {
   PredictReport report;
   if (falling.empty()) return report;
   const std::optional<belief::Support> floor = last_floor(falling, belief);
-  const std::vector<std::vector<std::size_t>> neighbours = neighbours_of(belief, falling, dt);
+  const std::vector<std::vector<std::size_t>> neighbours = neighbours_of(belief, falling, worlds, dt);
   // Particles of the same surroundings share a simulator, and runs of one call a duration.
   std::stable_sort(falling.begin(), falling.end(), [&](const Falling& a, const Falling& b) {
     return std::tie(neighbours[a.object], a.duration) < std::tie(neighbours[b.object], b.duration);
@@ -300,8 +364,8 @@ PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std:
     const std::vector<std::size_t>& objects = neighbours[falling[begin].object];
     std::size_t end = begin;
     while (end < falling.size() && neighbours[falling[end].object] == objects) ++end;
-    move_on_among(objects, std::span(falling).subspan(begin, end - begin), floor, X_WG, dt, options, simulators, stream,
-                  threads, belief, report);
+    move_on_among(objects, std::span(falling).subspan(begin, end - begin), worlds, floor, X_WG, dt, options, simulators,
+                  stream, threads, belief, report);
     begin = end;
   }
   return report;

@@ -25,6 +25,29 @@ struct Falling {
   std::optional<belief::Matrix12d> covariance_at_rest = std::nullopt;
 };
 
+/// The worlds of one island in a step.
+struct WorldsOfIsland {
+  Island members;
+  std::vector<double> log_weights;                    ///< Before the step.
+  std::vector<std::vector<belief::Particle>> starts;  ///< By member: particles with the modes of this step, unmoved.
+  std::vector<double> draws;                          ///< By world: whether it is simulated.
+  std::vector<Falling> may_fall;  ///< What moves in worlds of which it alone would not be simulated.
+  bool apart = false;             ///< A member is released: each is for itself.
+
+  void begin(std::size_t object, bool released, const belief::ObjectBelief& now);
+  double shared_draw(std::size_t world, double own);
+  /// Where one member of a world is simulated, all that move are.
+  void fall_together(belief::Belief& belief, std::vector<Falling>& falling);
+  /// Of a member in a world; null = it is none.
+  const belief::Particle* start_of(std::size_t object, std::size_t world) const;
+};
+struct Worlds {
+  std::vector<WorldsOfIsland> islands;
+  WorldsOfIsland* of(std::size_t object);
+  const WorldsOfIsland* of(std::size_t object) const;
+};
+Worlds worlds_of(const belief::Belief& belief, std::span<const Island> islands);
+
 /// The middle of an object, in O.
 Vector3d centre_of(const belief::Scene& scene, const belief::ObjectBelief& object);
 /// m, of the ball about that middle that holds it.
@@ -35,13 +58,16 @@ void clear_twist(belief::Particle& particle);
 bool is_slow(const belief::Particle& particle);
 /// Lies from now on.
 void settle(belief::Particle& particle);
+/// Starts to move: at its velocity, with room for more; for `share` of what the options say.
+void wake(const PredictOptions& options, belief::Particle& particle, double share = 1.0);
 
 /// Leaves of a scene's joints those whose things it still has. A hand pulls what is on a joint, and does not carry it.
 void keep_joints_of_present(belief::Scene& scene);
 
 /// Moves all falling particles on to the end of the step: by physics where that can be done, else at constant velocity.
-PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, std::span<const Pose> X_WG, double dt,
-                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads);
+PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, const Worlds& worlds,
+                      std::span<const Pose> X_WG, double dt, const PredictOptions& options,
+                      const simulation::SimulatorFactory& simulators, const core::RandomStream& stream,
+                      core::ThreadPool& threads);
 
 }  // namespace prescene::filter

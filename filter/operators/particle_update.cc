@@ -88,7 +88,8 @@ ParticleUpdate::ParticleUpdate(const rendering::FrameTerms& terms, const SearchT
       shared_outline_(shared_outline),
       workspace_(workspace),
       information_share_(rendering::tempering(terms.tempering.information, pixels, terms.step)),
-      weight_share_(rendering::tempering(terms.tempering.weight, pixels, terms.step)) {}
+      weight_share_(rendering::tempering(terms.tempering.weight,
+                                         context.weight_pixels > 0.0 ? context.weight_pixels : pixels, terms.step)) {}
 
 Mode ParticleUpdate::climb(const Pose& X_WO_predicted, const Gaussian& predicted, const Vector6d& start) const {
   Mode mode;

@@ -63,14 +63,6 @@ bool may_be_still(const Particle& particle) {
   return cholesky.positive_definite() && twist.dot(cholesky.solve(twist)) < kTwist95;
 }
 
-/// Starts to move: at its velocity, with room for more; for `share` of what the options say.
-void wake(const PredictOptions& options, Particle& particle, double share = 1.0) {
-  const double rate = share * options.wake_rate, speed = share * options.wake_speed;
-  particle.mode = MotionMode::kMoving;
-  particle.covariance.diagonal().segment<3>(6).array() += rate * rate;
-  particle.covariance.diagonal().segment<3>(9).array() += speed * speed;
-}
-
 MotionNoise scaled(const MotionNoise& noise, double share) {
   return {share * noise.shift, share * noise.turn, share * noise.speed, share * noise.rate};
 }
@@ -269,7 +261,7 @@ void drift(Particle& particle, const Vector3d& p_OQ, double dt, double velocity_
 
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads) {
+                      const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands) {
   PRESCENE_CHECK(belief.objects.size() == belief.scene->objects.size());
   PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
   PRESCENE_CHECK(dt > 0.0);
@@ -280,6 +272,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
   });
   const std::vector<Mover> movers = all_tracked ? std::vector<Mover>() : movers_of(belief, X_WG, dt);
 
+  Worlds worlds = worlds_of(belief, islands);
   std::vector<Falling> falling;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
@@ -290,6 +283,8 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     std::vector<bool> smooth(object.particles.size(), false);
     const bool seen = tracked || object.state == belief::TrackState::kDoubtful;
     change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, smooth, object);
+    WorldsOfIsland* const island = worlds.of(i);
+    if (island != nullptr) island->begin(i, released.has_value(), object);
     const Vector3d centre = centre_of(*belief.scene, object);
     // Nothing shows whether what is out of sight is touched: physics says it.
     const bool may_be_pushed = !tracked && simulators && is_present(object) && !movers.empty();
@@ -297,7 +292,8 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
       double left = dt;
-      const double physics_draw = draws.uniform();
+      const double own_draw = draws.uniform();
+      const double physics_draw = island != nullptr ? island->shared_draw(k, own_draw) : own_draw;
       const double smooth_draw = draws.uniform();
       double physics_share = tracked ? options.physics_share : kUnseenPhysicsShare;
       if (particle.mode == MotionMode::kHeld && hand) {
@@ -336,13 +332,19 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
             add_noise(options.resting, left, stays.covariance);
             falling.back().covariance_at_rest = stays.covariance;
           }
+        } else if (island != nullptr && !idle && is_present(object)) {
+          island->may_fall.push_back({i, k, left, particle.X_WO, particle.V_WO});
         }
       }
       limit_spread(particle.covariance);
     }
     if (released) set_holder(i, std::nullopt, belief);
   }
-  PredictReport report = move_on(belief, std::move(falling), X_WG, dt, options, simulators, stream, threads);
+  for (WorldsOfIsland& island : worlds.islands) {
+    combine_weights(island.members, island.log_weights, belief);
+    island.fall_together(belief, falling);
+  }
+  PredictReport report = move_on(belief, std::move(falling), worlds, X_WG, dt, options, simulators, stream, threads);
   end_pushes(dt, belief);
   belief.robot.assign(X_WG.begin(), X_WG.end());
   return report;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "prescene/geometry/dense_solvers.h"
 
@@ -29,13 +30,16 @@ void spread_copy(double share, core::RandomStream& stream, Particle& particle) {
 
 /// What rests needs few particles, and those that woke for nothing would have to make up for it once it does move: the
 /// negligible ones become copies of the best, which share its weight.
-void replace_negligible(std::size_t best, std::vector<Particle>& particles) {
+void replace_negligible(std::size_t best, std::vector<Particle>& particles, std::vector<std::size_t>* sources) {
   const Particle original = particles[best];
   std::vector<std::size_t> replaced;
   for (std::size_t i = 0; i < particles.size(); ++i)
     if (particles[i].log_weight < original.log_weight - kNegligible) replaced.push_back(i);
   if (replaced.empty()) return;
-  for (const std::size_t i : replaced) particles[i] = original;
+  for (const std::size_t i : replaced) {
+    particles[i] = original;
+    if (sources != nullptr) (*sources)[i] = best;
+  }
   replaced.push_back(best);
   const double each = original.log_weight - std::log(static_cast<double>(replaced.size()));
   for (const std::size_t i : replaced) particles[i].log_weight = each;
@@ -60,7 +64,12 @@ std::vector<int> systematic_indices(const std::vector<Particle>& particles, doub
   return chosen;
 }
 
-bool resample(const ResampleOptions& options, core::RandomStream stream, std::vector<Particle>& particles) {
+bool resample(const ResampleOptions& options, core::RandomStream stream, std::vector<Particle>& particles,
+              std::vector<std::size_t>* sources) {
+  if (sources != nullptr) {
+    sources->resize(particles.size());
+    std::iota(sources->begin(), sources->end(), std::size_t{0});
+  }
   if (particles.size() < 2) return false;
   const auto count = static_cast<double>(particles.size());
   const auto best = static_cast<int>(
@@ -68,7 +77,7 @@ bool resample(const ResampleOptions& options, core::RandomStream stream, std::ve
                        [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }) -
       particles.begin());
   if (particles[static_cast<std::size_t>(best)].mode == belief::MotionMode::kResting)
-    replace_negligible(static_cast<std::size_t>(best), particles);
+    replace_negligible(static_cast<std::size_t>(best), particles, sources);
   if (belief::effective_sample_size(particles) >= options.min_effective_share * count) return false;
   std::vector<int> chosen = systematic_indices(particles, stream.uniform());
   // The best comes first, once; its place among the chosen is taken from its own copies.
@@ -77,20 +86,28 @@ bool resample(const ResampleOptions& options, core::RandomStream stream, std::ve
     chosen.erase(place);
   else
     chosen.pop_back();
-  std::vector<Particle> resampled;
-  resampled.push_back(particles[static_cast<std::size_t>(best)]);
-  int previous = best;
-  for (const int i : chosen) {
-    resampled.push_back(particles[static_cast<std::size_t>(i)]);
-    // Copies of what rests stay alike: nothing would part them again, and one comparison with a frame serves all.
-    const bool is_copy = i == previous || i == best;
-    if (is_copy && resampled.back().mode != belief::MotionMode::kResting)
-      spread_copy(options.spread, stream, resampled.back());
-    previous = i;
-  }
-  for (Particle& particle : resampled) particle.log_weight = -std::log(count);
-  particles = std::move(resampled);
+  chosen.insert(chosen.begin(), best);
+  const std::vector<std::size_t> from(chosen.begin(), chosen.end());
+  copy_from(options, stream, from, particles);
+  for (Particle& particle : particles) particle.log_weight = -std::log(count);
+  if (sources == nullptr) return true;
+  std::vector<std::size_t> through;
+  for (const std::size_t i : from) through.push_back((*sources)[i]);
+  *sources = std::move(through);
   return true;
+}
+
+void copy_from(const ResampleOptions& options, core::RandomStream stream, const std::vector<std::size_t>& sources,
+               std::vector<Particle>& particles) {
+  std::vector<Particle> copies;
+  for (std::size_t k = 0; k < sources.size(); ++k) {
+    copies.push_back(particles[sources[k]]);
+    // Copies of what rests stay alike: nothing would part them again, and one comparison with a frame serves all.
+    const bool is_copy = k > 0 && (sources[k] == sources[k - 1] || sources[k] == sources.front());
+    if (is_copy && copies.back().mode != belief::MotionMode::kResting)
+      spread_copy(options.spread, stream, copies.back());
+  }
+  particles = std::move(copies);
 }
 
 }  // namespace prescene::filter

@@ -332,6 +332,11 @@ void share_among_turns(std::span<const double> log_weights_before, const Symmetr
   belief::normalize(particles);
 }
 
+std::vector<std::size_t> turn_numbers(const std::vector<Particle>& particles, const SymmetryGroup& symmetry) {
+  std::vector<Turn> turns;
+  return symmetry.ball ? std::vector<std::size_t>(particles.size(), 0) : turns_of(particles, symmetry, turns);
+}
+
 bool resample_within_turns(const ResampleOptions& options, const core::RandomStream& stream,
                            const SymmetryGroup& symmetry, std::vector<Particle>& particles) {
   std::vector<Turn> turns;

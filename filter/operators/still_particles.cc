@@ -101,7 +101,8 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
   return likelihood;
 }
 
-StillGroups still_groups_of(const std::vector<Particle>& particles) {
+StillGroups still_groups_of(const std::vector<Particle>& particles,
+                            std::span<const rendering::FrameTerms* const> terms_of) {
   StillGroups groups;
   std::vector<std::size_t> resting;
   for (std::size_t i = 0; i < particles.size(); ++i)
@@ -110,7 +111,8 @@ StillGroups still_groups_of(const std::vector<Particle>& particles) {
                    [&](std::size_t a, std::size_t b) { return particles[a].log_weight > particles[b].log_weight; });
   for (const std::size_t i : resting) {
     const auto group = std::find_if(groups.still.begin(), groups.still.end(), [&](const auto& members) {
-      return is_near(geometry::box_minus(particles[i].X_WO, particles[members.front()].X_WO), kAlikeShift, kAlikeTurn);
+      return (terms_of.empty() || terms_of[i] == terms_of[members.front()]) &&
+             is_near(geometry::box_minus(particles[i].X_WO, particles[members.front()].X_WO), kAlikeShift, kAlikeTurn);
     });
     if (group != groups.still.end())
       group->push_back(i);

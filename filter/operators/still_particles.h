@@ -47,6 +47,8 @@ struct StillGroups {
   std::vector<std::size_t> others;
 };
 
-StillGroups still_groups_of(const std::vector<belief::Particle>& particles);
+/// `terms_of`: as in WeightContext; those of a group are the same.
+StillGroups still_groups_of(const std::vector<belief::Particle>& particles,
+                            std::span<const rendering::FrameTerms* const> terms_of);
 
 }  // namespace prescene::filter

@@ -74,6 +74,24 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
   return moved;
 }
 
+void report_heaviest(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC,
+                     const WeightOptions& options, const FilterTools& tools, const std::vector<Particle>& particles,
+                     WeightReport& report) {
+  const auto by_weight = [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; };
+  report.heaviest =
+      static_cast<int>(std::max_element(particles.begin(), particles.end(), by_weight) - particles.begin());
+  report.hidden_weight = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    if (report.particles[i].hidden) report.hidden_weight += std::exp(particles[i].log_weight);
+  const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
+  report.evidence_per_pixel = supported_evidence(heaviest.evidence, heaviest.outline, options);
+  report.expected_evidence = expected_evidence_of(
+      terms, target, X_WC.inverse() * particles[static_cast<std::size_t>(report.heaviest)].X_WO, *tools.renderer);
+  report.visible_pixels = heaviest.evidence.visible;
+  report.visible_share =
+      heaviest.evidence.in_view > 0 ? static_cast<double>(heaviest.evidence.visible) / heaviest.evidence.in_view : 0.0;
+}
+
 }  // namespace
 
 geometry::Matrix6d information_in_world(const Matrix6d& H_C, const geometry::Quaterniond& R_CW) {
@@ -87,6 +105,32 @@ double supported_evidence(const rendering::PoseEvidence& evidence, double outlin
   return worth(evidence.log_ratio_per_visible_pixel(), outline, options);
 }
 
+double tempering_pixels(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
+                        const FilterTools& tools) {
+  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+  const auto h = hypothesis(target, X_CO);
+  rendering::PoseEvidence e;
+  tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&e, 1));
+  return std::max(kFewestPixels, static_cast<double>(e.measured));
+}
+
+void evidence_of_heaviest(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC,
+                          const WeightOptions& options, const FilterTools& tools,
+                          const std::vector<Particle>& particles, WeightReport& report) {
+  const auto best = static_cast<std::size_t>(&belief::heaviest(particles) - particles.data());
+  const Pose X_CO = X_WC.inverse() * particles[best].X_WO;
+  const rendering::PoseHypothesis h = hypothesis(target, X_CO, tempering_pixels(terms, target, X_CO, tools));
+  ParticleWeight& heaviest = report.particles[best];
+  {
+    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+    tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&heaviest.evidence, 1));
+  }
+  if (!heaviest.hidden && !is_see_through(target))
+    heaviest.outline =
+        outline_support(terms, depth_of(target, X_CO, terms.camera, *tools.renderer), options.outline_step);
+  report_heaviest(terms, target, X_WC, options, tools, particles, report);
+}
+
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
                     std::vector<Particle>& particles, const WeightContext& context) {
@@ -95,21 +139,17 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
   const Pose X_CW = X_WC.inverse();
   const auto by_weight = [](const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; };
   const auto best = std::max_element(particles.begin(), particles.end(), by_weight) - particles.begin();
+  const auto terms_of = [&](std::size_t i) -> const rendering::FrameTerms& {
+    return context.terms_of.empty() ? terms : *context.terms_of[i];
+  };
+  const Pose X_WO_best = particles[static_cast<std::size_t>(best)].X_WO;
   // One pixel count for all particles, so that their weights compare.
-  double pixels = 0.0;
-  {
-    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    const auto h = hypothesis(target, X_CW * particles[static_cast<std::size_t>(best)].X_WO);
-    rendering::PoseEvidence e;
-    tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&e, 1));
-    pixels = std::max(kFewestPixels, static_cast<double>(e.measured));
-  }
+  const double pixels = tempering_pixels(terms_of(static_cast<std::size_t>(best)), target, X_CW * X_WO_best, tools);
   std::optional<TakenOutline> outline;
   if (context.depth != nullptr && !is_see_through(target)) {
-    const Pose& X_WO = particles[static_cast<std::size_t>(best)].X_WO;
-    outline.emplace(TakenOutline{X_WO, Outline(target, X_CW * X_WO, context.camera, *tools.renderer)});
+    outline.emplace(TakenOutline{X_WO_best, Outline(target, X_CW * X_WO_best, context.camera, *tools.renderer)});
   }
-  const StillGroups groups = still_groups_of(particles);
+  const StillGroups groups = still_groups_of(particles, context.terms_of);
   // The likeliest group comes first: while the object lies still, all that is near is compared by what it finds.
   double resting_weight = 0.0;
   for (const auto& members : groups.still)
@@ -118,10 +158,13 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
   const std::size_t tasks = groups.still.size() + groups.others.size();
   const auto run = [&](std::size_t task) {
     const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    const ParticleUpdate frame(terms, target, X_CW, pixels, options, tools, context, outline ? &*outline : nullptr,
-                               *workspace);
-    const FrameLikelihood* others = task > 0 && near ? &*near : nullptr;
     const bool is_group = task < groups.still.size();
+    const std::size_t leader = is_group ? groups.still[task].front() : groups.others[task - groups.still.size()];
+    const ParticleUpdate frame(terms_of(leader), target, X_CW, pixels, options, tools, context,
+                               outline ? &*outline : nullptr, *workspace);
+    // What the frame says where something else is in front is another matter.
+    const bool compares = near && &terms_of(leader) == &terms_of(groups.still.front().front());
+    const FrameLikelihood* others = task > 0 && compares ? &*near : nullptr;
     if (is_group) {
       const auto found = update_still(frame, dt, groups.still[task], options, others, particles, report.particles);
       if (task == 0 && resting_weight > 0.5) near = found;
@@ -143,17 +186,9 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
   run(0);
   tools.search->threads().for_each_index(tasks - 1, [&](std::size_t i) { run(i + 1); });
   report.all_impossible = !belief::normalize(particles);
-  report.heaviest =
-      static_cast<int>(std::max_element(particles.begin(), particles.end(), by_weight) - particles.begin());
-  for (std::size_t i = 0; i < particles.size(); ++i)
-    if (report.particles[i].hidden) report.hidden_weight += std::exp(particles[i].log_weight);
-  const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
-  report.evidence_per_pixel = supported_evidence(heaviest.evidence, heaviest.outline, options);
-  report.expected_evidence = expected_evidence_of(
-      terms, target, X_CW * particles[static_cast<std::size_t>(report.heaviest)].X_WO, *tools.renderer);
-  report.visible_pixels = heaviest.evidence.visible;
-  report.visible_share =
-      heaviest.evidence.in_view > 0 ? static_cast<double>(heaviest.evidence.visible) / heaviest.evidence.in_view : 0.0;
+  report_heaviest(terms_of(static_cast<std::size_t>(std::max_element(particles.begin(), particles.end(), by_weight) -
+                                                    particles.begin())),
+                  target, X_WC, options, tools, particles, report);
   return report;
 }
 

@@ -21,6 +21,8 @@
 #include "prescene/filter/operators/still_update.h"
 #include "prescene/filter/operators/weigh_print.h"
 #include "prescene/filter/operators/weight.h"
+#include "prescene/filter/operators/world_terms.h"
+#include "prescene/filter/operators/worlds.h"
 #include "prescene/filter/proposals/detection.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/segmentation.h"
@@ -115,5 +117,23 @@ extern const WeighPrintOptions options;
 namespace weight_h {
 extern const WeightOptions options;
 }
+
+namespace world_terms_h {
+extern const std::vector<WorldMember> others;
+extern const std::vector<const geometry::DepthImage*> depths_of_all_else;
+extern std::vector<belief::Particle> particles;
+extern const WeightOptions options;
+}  // namespace world_terms_h
+
+namespace worlds_h {
+extern const WorldsOptions options;
+extern const ResampleOptions resampling;
+extern TouchTest touch;
+extern const belief::Control control;
+extern const std::vector<Pose> X_WG;
+extern const PredictOptions predicting;
+extern const simulation::SimulatorFactory simulators;
+extern const std::vector<double> log_weights_before;
+}  // namespace worlds_h
 
 }  // namespace prescene::filter::given_filter_operators

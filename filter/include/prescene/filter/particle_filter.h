@@ -31,10 +31,13 @@
 #include "prescene/filter/operators/watched_renderer.h"
 #include "prescene/filter/operators/weigh_print.h"
 #include "prescene/filter/operators/weight.h"
+#include "prescene/filter/operators/worlds.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/support_tracking.h"
 
 namespace prescene::filter {
+
+struct WorldTerms;
 
 using LearnedModels = std::shared_ptr<const LearnedProposals>;
 
@@ -48,6 +51,7 @@ struct FilterSettings {
   LearnPhysicsOptions learn_physics;
   ResampleOptions resample;
   TrackStateOptions track;
+  WorldsOptions worlds;
   /// What training learned of the scene's models (service/training); null = nothing. Finding uses it.
   LearnedModels learned;
   /// By model name. What an object's colours were learned to be (frame.colors) takes precedence.
@@ -89,6 +93,10 @@ struct StepCounters {
   int physics_unexplained = 0;  ///< ... and episodes that no value of theirs explains.
   int exchanges = 0;            ///< Pairs of one shape that had been taken for each other.
   int turned_by_print = 0;      ///< Objects moved to a pose that depth takes for the same.
+  int joint_islands = 0;        ///< Whose particles were worlds in this step, ...
+  int worlds_joined = 0;        ///< ... those that had none before it, ...
+  int world_views = 0;          ///< ... frames that were prepared for what hides what in them, ...
+  int pushed_particles = 0;     ///< ... and particles at rest that another member set in motion.
   int hidden_particles = 0;     ///< That stayed hidden.
   int hidden_proposed = 0;      ///< Put at places where a refuted object may hide.
   int looked_for = 0;           ///< At the start.
@@ -132,7 +140,11 @@ class ParticleFilter {
   void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result);
   void first_look(FrameStep& step);
+  std::vector<Island> join_islands(belief::Belief& belief, double dt, StepCounters& counters);
+  void weigh_one(FrameStep& step, std::size_t object, double dt, const WorldTerms* worlds);
+  void weigh_worlds(FrameStep& step, const Island& island, double dt);
   void weigh_all(FrameStep& step, double dt);
+  void resample_all(FrameStep& step);
   void weigh_print_of(FrameStep& step, std::size_t object, bool found);
   void recover_all(FrameStep& step);
   void exchange_all(FrameStep& step);
@@ -150,6 +162,7 @@ class ParticleFilter {
   FilterTools tools_;
   FrameCache frame_cache_;
   PrintCache prints_;
+  TouchTest touch_;
 };
 
 /// Numbers the islands: objects whose surfaces are nearer than `gap` share the number of the first of them.

@@ -12,6 +12,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
+#include "prescene/filter/operators/worlds.h"
 #include "prescene/simulation/simulator.h"
 
 namespace prescene::filter {
@@ -66,6 +67,7 @@ struct PredictOptions {
 struct PredictReport {
   int simulated = 0;      ///< Particles that it moved.
   int not_simulated = 0;  ///< Particles that it was to move and could not; they went on at constant velocity.
+  int pushed = 0;         ///< Particles at rest that another member of their world set in motion.
   /// Why it could not move the first of these; "" = it moved all.
   std::string failure;
 };
@@ -77,9 +79,14 @@ struct PredictReport {
 /// and shapes should come from a cache; empty = none, then everything that moves does so at constant velocity. A
 /// particle whose simulator can't be made, or whose run does not last for the whole step or ends where nothing can be,
 /// goes on at constant velocity like those that are not meant for physics.
+///
+/// `islands`: those whose particles are worlds (checked). What moves in a world is simulated together, from where every
+/// member is in it, or not at all; what rests there and is pushed begins to move. In a step in which a member is
+/// released each is for itself.
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads);
+                      const core::RandomStream& stream, core::ThreadPool& threads,
+                      std::span<const Island> islands = {});
 
 /// One particle at constant velocity about the centre p_OQ for dt, its covariance grown by the noise.
 void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise);

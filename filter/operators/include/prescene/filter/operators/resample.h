@@ -20,8 +20,15 @@ struct ResampleOptions {
 };
 
 /// Returns whether it resampled; then all weights are equal but that the best particle, unmoved, is first. Weights must
-/// be normalised. Systematic resampling [Kitagawa 1996], one uniform draw.
-bool resample(const ResampleOptions& options, core::RandomStream stream, std::vector<belief::Particle>& particles);
+/// be normalised. Systematic resampling [Kitagawa 1996], one uniform draw. `sources`: the index before, of each
+/// particle after; null = not wanted.
+bool resample(const ResampleOptions& options, core::RandomStream stream, std::vector<belief::Particle>& particles,
+              std::vector<std::size_t>* sources = nullptr);
+
+/// What resample() makes of particles from these sources, but for their weights: copies of what does not rest are
+/// spread. The first is the best, and stays where it is.
+void copy_from(const ResampleOptions& options, core::RandomStream stream, const std::vector<std::size_t>& sources,
+               std::vector<belief::Particle>& particles);
 
 /// Indices of the particles chosen by systematic resampling from normalised weights, ascending, as many as there are
 /// particles; `u` in (0, 1).

@@ -63,6 +63,10 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 void share_among_turns(std::span<const double> log_weights_before, const geometry::SymmetryGroup& symmetry,
                        std::vector<belief::Particle>& particles);
 
+/// For each particle the number of its turn, the heaviest particle's first.
+std::vector<std::size_t> turn_numbers(const std::vector<belief::Particle>& particles,
+                                      const geometry::SymmetryGroup& symmetry);
+
 /// As resample(), but each turn keeps its weight, and at least one particle if it has more than e^-5 of all: turns that
 /// no frame tells apart would else die out by chance. Where there is but one turn it is resample().
 bool resample_within_turns(const ResampleOptions& options, const core::RandomStream& stream,

@@ -56,6 +56,10 @@ struct WeightContext {
   /// The full depth image and its camera, for where the object ends in it; null = poses follow depth residuals alone.
   const geometry::DepthImage* depth = nullptr;
   geometry::PinholeCamera camera = {};
+  /// By particle, the frame with what hides it in its world put in; empty = the same for all.
+  std::span<const rendering::FrameTerms* const> terms_of = {};
+  /// Number of pixels that weights are tempered by, for all members of worlds alike; 0 = the object's own.
+  double weight_pixels = 0.0;
 };
 
 struct WeightReport {
@@ -77,6 +81,16 @@ struct WeightReport {
 WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC, double dt,
                     const WeightOptions& options, const FilterTools& tools, const core::RandomStream& stream,
                     std::vector<belief::Particle>& particles, const WeightContext& context = {});
+
+/// Says of the heaviest particle, as it stands once its weight in worlds is known, what the report says of it, with the
+/// evidence that `terms` hold for it.
+void evidence_of_heaviest(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC,
+                          const WeightOptions& options, const FilterTools& tools,
+                          const std::vector<belief::Particle>& particles, WeightReport& report);
+
+/// How many pixels of a pose are measured, and at least a few: what its weights are tempered by.
+double tempering_pixels(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
+                        const FilterTools& tools);
 
 /// Evidence per visible pixel, scaled by what the outline is worth.
 double supported_evidence(const rendering::PoseEvidence& evidence, double outline, const WeightOptions& options);

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the operators of one step share.
+#pragma once
+
+#include <vector>
+
+#include "prescene/filter/particle_filter.h"
+
+namespace prescene::filter {
+
+inline const belief::ObjectModel& model_of(const belief::Belief& belief, std::size_t object) {
+  return belief::model_of(belief, belief.objects[object]);
+}
+
+/// Whether others may take the object's surface for granted.
+inline bool hides_others(const belief::ObjectBelief& object) {
+  return object.existence >= 0.5 &&
+         (object.state == belief::TrackState::kTracked || object.state == belief::TrackState::kDoubtful);
+}
+
+struct ParticleFilter::FrameStep {
+  const FilterFrame& frame;
+  const belief::Observation& observation;
+  StepResult& result;
+  // By object.
+  std::vector<geometry::DepthImage> depths = {};  ///< What others may be hidden by.
+  std::vector<WeightReport> reports = {};
+  std::vector<Island> islands = {};  ///< Whose particles are worlds.
+
+  belief::Belief& belief() const { return result.belief; }
+  const belief::Particle& heaviest(std::size_t object) const {
+    return belief::heaviest(result.belief.objects[object].particles);
+  }
+};
+
+}  // namespace prescene::filter
