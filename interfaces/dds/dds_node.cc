@@ -176,8 +176,9 @@ struct DdsNode::Impl {
   struct Service {
     std::string name;
     const ServiceType* type = nullptr;
-    dds_entity_t requests = 0;  // reader
-    dds_entity_t replies = 0;   // writer
+    dds_entity_t requests = 0;   // reader
+    dds_entity_t replies = 0;    // writer
+    std::atomic<int> silent{0};  // clients that ask and read no replies; nobody waits for them
   };
 
   DdsOptions options;
@@ -193,6 +194,7 @@ struct DdsNode::Impl {
   std::deque<Service> services;
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<bool> stopping{false};
+  std::atomic<std::chrono::steady_clock::time_point> waits_from{};  // for the readers of clients; not before this
   std::thread thread;
 
   ~Impl() {
@@ -216,10 +218,11 @@ struct DdsNode::Impl {
   /// Has `reader` listened to; the lock is held.
   core::Status listen(const std::string& topic, const std::string& type, dds_entity_t topic_entity, const QosPtr& qos,
                       std::function<void(ReceivedMessage&&)> on_message);
-  /// A service of ours, once the client of a request can read its reply, or 100 ms have passed.
-  Service service_for(const ServiceRequest& request) const;
+  /// A service of ours, once the client of a request can read its reply, or 100 ms have passed. Waits so long at most
+  /// once a second, and for each client once: others want their frames and replies.
+  const Service& service_for(const ServiceRequest& request);
   template <class CType, class Message>
-  core::Status reply(const ServiceRequest& request, std::string_view type, const Message& message) const;
+  core::Status reply(const ServiceRequest& request, std::string_view type, const Message& message);
   template <class CType, class Message>
   core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
   void announce();
@@ -522,7 +525,10 @@ core::Status DdsNode::offer_service(const std::string& name, const std::string& 
   const dds_entity_t writer =
       dds_create_writer(impl_->participant, replies, make_service_qos(id, response_hash(*service_type)).get(), nullptr);
   PRESCENE_RETURN_IF_ERROR(dds_status(writer, "writer of " + name));
-  impl_->services.push_back({name, service_type, 0, writer});
+  Impl::Service& service = impl_->services.emplace_back();
+  service.name = name;
+  service.type = service_type;
+  service.replies = writer;
   core::Status listens = impl_->listen(
       name, type, requests, make_service_qos(id, request_hash(*service_type)),
       [impl = impl_.get(), index, form = service_type->form, on_request = std::move(on_request)](auto&& message) {
@@ -539,34 +545,47 @@ core::Status DdsNode::offer_service(const std::string& name, const std::string& 
     dds_delete(writer);
     return listens;
   }
-  impl_->services.back().requests = impl_->subscriptions.back().reader;
+  service.requests = impl_->subscriptions.back().reader;
   return core::ok_status();
 }
 
-DdsNode::Impl::Service DdsNode::Impl::service_for(const ServiceRequest& request) const {
-  Service service;
+const DdsNode::Impl::Service& DdsNode::Impl::service_for(const ServiceRequest& request) {
+  Service* found = nullptr;
   {
     const std::lock_guard lock(mutex);
     PRESCENE_CHECK(request.service >= 0 && request.service < static_cast<int>(services.size()));
-    service = services[static_cast<std::size_t>(request.service)];
+    found = &services[static_cast<std::size_t>(request.service)];
   }
-  // Each client writes requests and reads replies. Whoever's writer was found first has a reader soon.
-  const auto all_found = [&service] {
+  Service& service = *found;
+  // Each client writes requests and reads replies. Whoever's writer was found first has a reader soon, or never.
+  const auto without_reader = [&service] {
     dds_subscription_matched_status_t clients{};
     dds_publication_matched_status_t readers{};
-    return dds_get_subscription_matched_status(service.requests, &clients) != DDS_RETCODE_OK ||
-           dds_get_publication_matched_status(service.replies, &readers) != DDS_RETCODE_OK ||
-           readers.current_count >= clients.current_count;
+    if (dds_get_subscription_matched_status(service.requests, &clients) != DDS_RETCODE_OK ||
+        dds_get_publication_matched_status(service.replies, &readers) != DDS_RETCODE_OK)
+      return 0;
+    return std::max(0, static_cast<int>(clients.current_count) - static_cast<int>(readers.current_count));
   };
-  constexpr std::chrono::milliseconds kLook(2);
-  const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
-  while (!all_found() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(kLook);
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds kLook(2), kLongestWait(100);
+  int missing = without_reader();
+  if (missing < service.silent) service.silent = missing;  // some have left
+  const auto begin = Clock::now();
+  if (missing <= service.silent || begin < waits_from.load()) return service;
+  while (missing > service.silent && Clock::now() < begin + kLongestWait) {
+    std::this_thread::sleep_for(kLook);
+    missing = without_reader();
+  }
+  if (missing > service.silent) {
+    service.silent = missing;
+    waits_from = Clock::now() + std::chrono::seconds(1);
+  }
   return service;
 }
 
 template <class CType, class Message>
-core::Status DdsNode::Impl::reply(const ServiceRequest& request, std::string_view type, const Message& message) const {
-  const Service service = service_for(request);
+core::Status DdsNode::Impl::reply(const ServiceRequest& request, std::string_view type, const Message& message) {
+  const Service& service = service_for(request);
   PRESCENE_CHECK(service.type->name == type);
   SampleArena arena;
   CType response{};
@@ -602,7 +621,7 @@ core::Status DdsNode::reply(const ServiceRequest& request, const RosSetParameter
 }
 
 core::Status DdsNode::reply(const ServiceRequest& request, bool success, const std::string& text) {
-  const Impl::Service service = impl_->service_for(request);
+  const Impl::Service& service = impl_->service_for(request);
   // A C struct borrows its texts.
   char* borrowed = const_cast<char*>(text.c_str());
   const std::string writing = "reply of " + service.name;

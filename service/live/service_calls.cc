@@ -51,8 +51,14 @@ core::Status ServiceCalls::offer() {
       reply(request, false, "nothing is kept: start the service with --learned FILE");
       return;
     }
-    const std::lock_guard lock(mutex_);
-    if (saves_.size() < kMostSaves) saves_.push_back(std::move(request));
+    {
+      const std::lock_guard lock(mutex_);
+      if (saves_.size() < kMostSaves) {
+        saves_.push_back(std::move(request));
+        return;
+      }
+    }
+    reply(request, false, "not saved: too many calls came, call again later");
   }));
   return offered(kAskService, "prescene_msgs/srv/Ask",
                  [this](ServiceRequest&& request) { ask(request, request.text); });

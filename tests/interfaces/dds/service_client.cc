@@ -147,6 +147,8 @@ std::int64_t ServiceClient::send_sample(void* sample) {
   return sequence_;
 }
 
+void ServiceClient::stop_reading() { dds_delete(reader_); }
+
 std::int64_t ServiceClient::send(const std::string& text) {
   std::string copy = text;
   AskRequest ask{0, 0, copy.data()};

@@ -44,6 +44,8 @@ class ServiceClient {
   /// send() and take_reply(), with the reply's fields read.
   std::optional<Reply> call(const std::string& text = "");
   std::uint64_t guid() const { return guid_; }
+  /// Reads no replies from now on.
+  void stop_reading();
 
  private:
   bool asks_text_ = false;

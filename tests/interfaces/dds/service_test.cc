@@ -105,6 +105,29 @@ TEST(Service, AClientThatHasJustComeGetsItsReply) {
   }
 }
 
+// Others are not kept waiting by a client that never reads, before and after it has left.
+TEST(Service, AClientThatReadsNoRepliesTakesThemFromNobody) {
+  const auto server = node();
+  ASSERT_TRUE(server);
+  ASSERT_TRUE(server
+                  ->offer_service("/robot/deaf", "std_srvs/srv/Trigger",
+                                  [&](ServiceRequest&& request) { EXPECT_TRUE(server->reply(request, true, "").ok()); })
+                  .ok());
+  ServiceClient other(own_domain(), "/robot/deaf");
+  ASSERT_TRUE(other.wait_for_service());
+  ASSERT_TRUE(other.call().has_value());
+  {
+    ServiceClient deaf(own_domain(), "/robot/deaf");
+    ASSERT_TRUE(deaf.wait_for_service());
+    deaf.stop_reading();
+    for (int i = 0; i < 50; ++i) {
+      deaf.send();
+      ASSERT_TRUE(other.call().has_value()) << i;
+    }
+  }
+  ASSERT_TRUE(other.call().has_value());
+}
+
 TEST(Service, EndpointsSayByTheirUserDataThatTheyBelongTogether) {
   const auto server = node();
   ASSERT_TRUE(server);
