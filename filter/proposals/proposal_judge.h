@@ -12,6 +12,8 @@ namespace prescene::filter {
 
 /// Share of a pose's outline at which the measured surface ends (outline_support).
 inline constexpr double kLeastOutline = 0.7;
+/// Of a pose that is accepted for want of better ones, until it is known what ends its surface elsewhere. Chosen.
+inline constexpr double kLeastOutlineForNow = 0.35;
 
 /// Nats; a candidate with lower log odds is not accepted where a learned judge decides. Chosen.
 inline constexpr double kLeastLogOdds = -0.8;
@@ -22,13 +24,15 @@ struct Proposal {
   int cluster = 0;    ///< Of those that were looked at.
   double cost = 0.0;  ///< nats
   bool stands = false;
-  FitNumbers numbers{};  ///< Of `judged` ...
+  double outline = -1.0;  ///< outline_support; negative: not known as things are now.
+  FitNumbers numbers{};   ///< Of `judged` ...
   bool is_judged = false;
   rendering::PoseEvidence judged{};
   bool judged_standing = false;
   double log_odds = 0.0;  ///< ... and what the judge says of them.
 
-  /// A wrong model that explains much of a large thing badly must not go before a right one that explains little well.
+  /// nats. A wrong model that explains much of a large thing badly must not go before a right one that explains little
+  /// well. While the outline is not known, what it is at most.
   double score() const;
   /// What stands on nothing known costs.
   void weigh(bool on_something);
