@@ -315,19 +315,6 @@ EventDraw EventPaths::decode(const Hypothesis& hypothesis, const LatentPoint& z)
   return draw;
 }
 
-std::vector<std::size_t> EventPaths::start_pose_coordinates(const Hypothesis& hypothesis) const {
-  std::vector<std::size_t> coordinates;
-  if (!is_present(hypothesis.object)) return coordinates;
-  const belief::ObjectBelief& object = present_.objects[hypothesis.object];
-  // As BeliefSampler lays them out: which particle, physical parameters, then the pose, its widest direction first.
-  const int before = event_dimensions(hypothesis) + (object.particles.size() > 1 ? 1 : 0) +
-                     belief::PhysicalSampler(model(hypothesis.object), object.physics).dimensions();
-  for (int i = before; i < dimensions(hypothesis); ++i) coordinates.push_back(static_cast<std::size_t>(i));
-  constexpr std::size_t kPoseDirections = 6;
-  coordinates.resize(std::min(coordinates.size(), kPoseDirections));
-  return coordinates;
-}
-
 Pose EventPaths::start_at(const Hypothesis& hypothesis, const LatentPoint& z) const {
   return start_of(hypothesis.object, z, static_cast<std::size_t>(event_dimensions(hypothesis)))
       .objects[hypothesis.object]

@@ -89,6 +89,8 @@ class EventPaths {
   bool is_present(std::size_t object) const { return object < present(); }
   const belief::Scene& scene() const { return *scene_; }
   double duration() const { return duration_; }
+  /// Nothing moves by itself in the window, and nothing is known to be done in it.
+  bool is_still() const { return still_; }
   const SeenTrack& track(std::size_t object) const { return tracks_[object]; }
   bool is_held(std::size_t object) const;
   /// Probability that it is not there at the begin: one for what the tracker does not see there.
@@ -117,8 +119,6 @@ class EventPaths {
   /// A guess of the event's parameters from the track, into `target`.
   void guess(const Hypothesis& hypothesis, TemperedTarget& target) const;
   EventDraw decode(const Hypothesis& hypothesis, const LatentPoint& z) const;
-  /// Which coordinates of a point say where its object is at the begin, but for which particle is taken.
-  std::vector<std::size_t> start_pose_coordinates(const Hypothesis& hypothesis) const;
   /// Where its object is at the begin.
   belief::Pose start_at(const Hypothesis& hypothesis, const LatentPoint& z) const;
   /// Runs go on so long after the window's end, s: for who asks what comes of an event.
@@ -128,9 +128,11 @@ class EventPaths {
   const std::vector<std::string>& left_out() const { return prior_.left_out; }
 
   /// paths[i] at points[i]; `draws`, where given, get the touched places too, `runs` the simulated instances from the
-  /// event on (kinds that are simulated, and nothing; else empty ones).
+  /// event on (kinds that are simulated, and nothing; else empty ones). `moved`, where given: so far from where it is
+  /// drawn the object is at the begin, m in W; of what is held only where all is still, and then its hand is, too.
   void simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
-                std::span<EventDraw> draws = {}, std::span<belief::Trajectory> runs = {});
+                std::span<EventDraw> draws = {}, std::span<belief::Trajectory> runs = {},
+                std::span<const geometry::Vector3d> moved = {});
 
   int simulated() const { return simulated_; }
   int failed() const { return failed_; }
@@ -162,6 +164,7 @@ class EventPaths {
   bool touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const;
   void begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
                    std::vector<belief::Action>& actions, bool* possible) const;
+  std::vector<belief::Action> let_go_at(std::size_t object, const belief::Pose& X_WO, const EventDraw& draw) const;
   std::optional<belief::Pose> put_down(const Hypothesis& hypothesis, const EventDraw& draw,
                                        const belief::Pose& X_WO) const;
 

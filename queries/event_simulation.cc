@@ -19,6 +19,9 @@ constexpr double kMovedPlace = 0.003;   // m and ...
 constexpr double kMovedTurn = 0.015;    // ... rad: what is further from the base counts as moved
 constexpr double kStandingTilt = 0.03;  // rad; by which what is put down as it stood is tilted
 constexpr double kPusherGap = 1e-3;     // m between what pushes and the object, at first
+// s: what is let go elsewhere is there after the first, and free after the second.
+constexpr double kCarried = 1e-3, kLetGo = 0.02;
+constexpr double kOpening = 1e-3;  // m by which the hand then rises: simulators count it as done with after that only
 
 /// The state of a run at a time: the kept one before it.
 belief::WorldState state_in(const belief::Trajectory& run, double time) {
@@ -141,6 +144,20 @@ void EventPaths::begin_event(const Hypothesis& hypothesis, belief::WorldState& s
   object.V_WO.angular += rate;
 }
 
+/// The hand that holds it goes there at once, rests, and lets go: so that its bodies are where they would have been.
+std::vector<belief::Action> EventPaths::let_go_at(std::size_t object, const Pose& X_WO, const EventDraw& draw) const {
+  belief::Transport transport;
+  transport.object = objects_[object].name;
+  transport.X_WO = belief::FixedPose{X_WO};
+  transport.duration = kCarried;
+  belief::Release release;
+  release.object = objects_[object].name;
+  release.retreat = kOpening * belief::up_of(*scene_);
+  release.disturbance.linear = belief::Vector3Distribution::fixed(draw.added.linear);
+  release.disturbance.angular = belief::Vector3Distribution::fixed(draw.added.angular);
+  return {{0.0, transport}, {kLetGo, release}};
+}
+
 std::optional<Pose> EventPaths::put_down(const Hypothesis& hypothesis, const EventDraw& draw, const Pose& X_WO) const {
   const SeenTrack& track = tracks_[hypothesis.object];
   const Vector3d up = belief::up_of(*scene_);
@@ -183,7 +200,8 @@ double EventPaths::log_put_down(std::size_t object, const Pose& X_WO) const {
 }
 
 void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
-                          std::span<EventDraw> draws, std::span<belief::Trajectory> runs_out) {
+                          std::span<EventDraw> draws, std::span<belief::Trajectory> runs_out,
+                          std::span<const Vector3d> moved) {
   const std::size_t n = points.size(), target = hypothesis.object;
   const auto first = static_cast<std::size_t>(event_dimensions(hypothesis));
   std::vector<belief::WorldState> starts(n);
@@ -194,6 +212,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
     for (std::size_t i = begin; i < end; ++i) {
       events[i] = decode(hypothesis, points[i]);
       starts[i] = start_of(target, points[i], first);
+      if (!moved.empty() && !is_held(target)) starts[i].objects[target].X_WO.translation += moved[i];
     }
   });
   // What happens without the event, up to it.
@@ -213,11 +232,19 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
         if (still_) states[i].time = events[i].time;
         actions[i] = actions_from(states[i].time);
         bool can_be = true;
-        begin_event(hypothesis, states[i], events[i], actions[i], &can_be);
+        if (!moved.empty() && is_held(target) && hypothesis.kind == EventKind::kSlipped) {
+          Pose X_WO = states[i].objects[target].X_WO;
+          X_WO.translation += moved[i];
+          actions[i] = let_go_at(target, X_WO, events[i]);
+        } else {
+          begin_event(hypothesis, states[i], events[i], actions[i], &can_be);
+        }
         possible[i] = can_be ? 1 : 0;
       }
     });
-    after = run(states, actions, target);
+    // A hand that moves may come near anything.
+    const bool hand_moves = !moved.empty() && is_held(target);
+    after = hand_moves ? run(states, actions) : run(states, actions, target);
   }
   const std::size_t count = times_.size();
   const auto make_path = [&](std::size_t i) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "changed_events.h"
 #include "event_hypotheses.h"
 #include "event_paths.h"
 #include "explain_answer.h"
@@ -13,8 +14,8 @@
 #include "missing_objects.h"
 #include "other_motion.h"
 #include "prescene/core/spelling.h"
+#include "prescene/queries/smallest_change.h"
 #include "prescene/queries/tempered_smc.h"
-#include "smallest_change.h"
 #include "weigh_events.h"
 #include "window_likelihood.h"
 
@@ -32,7 +33,6 @@ constexpr int kFirstRuns = 1;
 constexpr int kMostRounds = 2;      // times the query's runs: of what stays uncertain
 constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
 constexpr int kFreshRuns = 1000;    // numbers of runs from here on are for what must not have been seen
-constexpr double kGoesOn = 2.0;     // s after the window's end in which what an event leads to is looked at
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
@@ -113,20 +113,18 @@ class Explainer {
                                "': what somebody does with the object is not simulated.");
       return;
     }
+    const auto events = changed_events(*events_, judged->hypothesis, wanted_, kChangeGoesOn);
     ChangeSearch search;
-    search.events = events_.get();
-    search.hypothesis = judged->hypothesis;
-    search.wanted = wanted_;
+    search.events = events.get();
+    search.wanted = wanted_ ? wanted_->name : "stays as it was";
     search.probability = query_.wanted_probability;
     search.confidence = query_.confidence;
     search.seed = query_.seed;
-    search.cancellation = context_.simulation.cancellation;
+    search.stopped = [&] { return cancelled() || out_of_time(); };
     search.draws = [&](int number) {
       return number == 0 ? equal_draws(judged->posterior) : fresh_draws(*judged, number);
     };
-    events_->go_on_for(kGoesOn);
     answer.change = smallest_change(search);
-    events_->go_on_for(0.0);
     answer.change->sentence = sentence_of(*answer.change);
     answer.text += " " + answer.change->sentence;
   }
@@ -155,11 +153,7 @@ class Explainer {
     options.runs = query_.runs;
     options.points = query_.points;
     options.first_run = kFreshRuns + number * query_.runs;
-    events_->go_on_for(0.0);
-    const TemperedResult found =
-        tempered_posterior(target, options, stream_of(judged), context_.simulation.cancellation);
-    events_->go_on_for(kGoesOn);
-    return equal_draws(found);
+    return equal_draws(tempered_posterior(target, options, stream_of(judged), context_.simulation.cancellation));
   }
 
   core::RandomStream stream_of(const Judged& judged) const {

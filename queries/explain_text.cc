@@ -77,19 +77,17 @@ std::string sentence_of(const SmallestChange& change) {
   if (change.size == 0.0)
     return change.found
                ? "Nothing would have to change: " + outcome + " comes about in " + interval + "."
-               : "No change of up to 4 standard deviations was found that leads to " + outcome + " with " +
+               : "No change of up to 4 standard deviations was found that surely leads to " + outcome + " with " +
                      probability_text(change.wanted_probability) + "; without one it comes about in " + interval + ".";
   std::string parts;
   for (const ChangedPart& part : change.parts) {
     parts += parts.empty() ? "" : ", ";
-    parts += part.from == 0.0 && part.name == "place at the begin"
-                 ? "another place at the begin, " + fixed_text(1e3 * part.to, 1) + " mm away"
-                 : part.name + " " + core::rounded_text(std::round(1e3 * part.to) / 1e3) + " instead of " +
-                       core::rounded_text(std::round(1e3 * part.from) / 1e3) + " " + part.unit;
+    parts += part.name + " " + core::rounded_text(std::round(1e3 * part.to) / 1e3) + " instead of " +
+             core::rounded_text(std::round(1e3 * part.from) / 1e3) + " " + part.unit;
   }
   const std::string how = parts + " (" + fixed_text(change.size, 1) + " standard deviations)";
   if (!change.found)
-    return "No change was found that leads to " + outcome + " with " + probability_text(change.wanted_probability) +
+    return "No change was found that surely leads to " + outcome + " with " + probability_text(change.wanted_probability) +
            "; the nearest is " + how + ", with " + interval + ".";
   return "The smallest change that was found to lead to " + outcome + ": " + how + "; it then comes about in " +
          interval + ", without the change in " + probability_text(change.unchanged_probability) + ".";

@@ -115,19 +115,19 @@ struct DecidingFrame {
 /// A parameter of the event, or the start, that is changed.
 struct ChangedPart {
   std::string name, unit;
-  double from = 0.0, to = 0.0;  ///< Means of the posterior; of the start: 0, and how far it moves.
-  double deviations = 0.0;      ///< Standard deviations of the prior; of the start, of the belief.
+  double from = 0.0, to = 0.0;  ///< Means of the posterior.
+  double deviations = 0.0;      ///< Standard deviations of the prior; of the place at the begin, of 5 cm each.
 };
 
 /// What would have led to a wanted outcome.
 struct SmallestChange {
   std::string wanted;  ///< Its name, or "stays as it was".
   double wanted_probability = 0.9;
-  bool found = false;  ///< The probability below has reached it; else the change below is the best that was tried.
+  bool found = false;  ///< The interval below is above it; else the change below is the best that was tried.
   double size = 0.0;   ///< Length of the change, standard deviations; 0 = nothing has to change.
   std::vector<ChangedPart> parts;
-  /// Share of instances with the outcome, and its interval: of `instances` that had no part in finding the change,
-  /// taken as independent.
+  /// Share of instances with the outcome, and its interval over all changes that were tested: of `instances` that had
+  /// no part in finding the change, taken as independent.
   double probability = 0.0, low = 0.0, high = 1.0;
   int instances = 0;
   double unchanged_probability = 0.0;  ///< The share without the change, of the same instances.
