@@ -203,6 +203,29 @@ TEST(Predict, AnOutcomeThatNeedsALostObjectIsLeftOutAndTheOthersAreAnswered) {
   EXPECT_GT(named(predicted, "slides").probability, 0.0);
 }
 
+TEST(Predict, AJointWhoseParentIsLostIsLeftOutAndSaidSo) {
+  belief::Belief belief = two_hypotheses();
+  auto scene = std::make_shared<belief::Scene>(*belief.scene);
+  belief::Joint joint;
+  joint.name = "lid";
+  joint.parent = "cup";
+  joint.child = "carton";
+  scene->joints = {joint};
+  belief.scene = scene;
+  const auto remarks_with = [&](belief::TrackState of_cup) {
+    belief.objects[1].state = of_cup;
+    core::ThreadPool pool(1);
+    const Answer answer = queries::answer(belief, {"", stability_of("carton")}, context_with(slide, pool));
+    EXPECT_TRUE(answer.error.ok()) << answer.error.message();
+    std::string all;
+    for (const std::string& remark : std::get<StabilityAnswer>(answer.what).remarks) all += remark;
+    return all;
+  };
+  EXPECT_THAT(remarks_with(belief::TrackState::kLost),
+              HasSubstr("The joint 'lid' is left out: 'cup' is lost. What is said of 'carton' takes it for free."));
+  EXPECT_THAT(remarks_with(belief::TrackState::kTracked), testing::Not(HasSubstr("is left out")));
+}
+
 TEST(Predict, AnswersOtherOutcomesThanTheScenes) {
   core::ThreadPool pool(1);
   PredictQuery query;
