@@ -2,6 +2,7 @@
 #include "prescene/queries/local_runs.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "prescene/simulation/own_actions.h"
 
@@ -14,6 +15,7 @@ using geometry::Vector3d;
 
 constexpr double kReachFactor = 1.001;  // for rounding
 constexpr double kApart = 0.01;         // m between boxes about things that are simulated without each other
+constexpr int kMostParts = 4;           // larger and larger ones, of an instance; the last is everything
 
 bool are_near(const Box& a, const Box& b) {
   return (a.min().array() < b.max().array() + kApart).all() && (b.min().array() < a.max().array() + kApart).all();
@@ -24,12 +26,7 @@ bool are_near(const Box& a, const Box& b) {
 LocalRuns::LocalRuns(const belief::Scene& scene, std::span<const geometry::TriangleMesh> shapes,
                      const belief::WorldState& likeliest, const simulation::Simulator& whole,
                      const simulation::SimulatorFactory& make_simulator)
-    : scene_(scene),
-      shapes_(shapes),
-      likeliest_(likeliest),
-      whole_(whole),
-      make_simulator_(make_simulator),
-      parts_(scene.objects.size()) {}
+    : scene_(scene), shapes_(shapes), likeliest_(likeliest), whole_(whole), make_simulator_(make_simulator) {}
 
 Box LocalRuns::box_of(std::size_t object, const Pose& X_WO) const {
   Box box;
@@ -43,52 +40,68 @@ double LocalRuns::reach_of(std::size_t object) const {
   return kReachFactor * reach;
 }
 
-core::Result<const LocalRuns::Part*> LocalRuns::part_of(std::size_t object) {
-  if (parts_[object]) return parts_[object].get();
-  auto part = std::make_unique<Part>();
-  std::vector<Box> boxes;
-  for (std::size_t i = 0; i < scene_.objects.size(); ++i) boxes.push_back(box_of(i, likeliest_.objects[i].X_WO));
+std::vector<std::size_t> LocalRuns::with_neighbours(std::vector<std::size_t> open) {
+  const std::size_t n = scene_.objects.size();
+  if (boxes_.empty())
+    for (std::size_t i = 0; i < n; ++i) boxes_.push_back(box_of(i, likeliest_.objects[i].X_WO));
   // What is jointed is told apart by no box: then all are simulated.
-  std::vector<std::uint8_t> kept(boxes.size(), scene_.joints.empty() ? 0 : 1);
-  std::vector<std::size_t> open = {object};
-  kept[object] = 1;
+  std::vector<std::uint8_t> kept(n, scene_.joints.empty() ? 0 : 1);
+  for (const std::size_t i : open) kept[i] = 1;
   // What it touches, what that touches, and so on.
   while (!open.empty()) {
     const std::size_t i = open.back();
     open.pop_back();
-    for (std::size_t j = 0; j < boxes.size(); ++j) {
-      if (kept[j] != 0 || !are_near(boxes[i], boxes[j])) continue;
+    for (std::size_t j = 0; j < n; ++j) {
+      if (kept[j] != 0 || !are_near(boxes_[i], boxes_[j])) continue;
       kept[j] = 1;
       open.push_back(j);
     }
   }
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < n; ++i)
+    // What a hand holds stays, so that the hand does.
+    if (kept[i] != 0 || likeliest_.objects[i].mode == belief::MotionMode::kHeld) all.push_back(i);
+  return all;
+}
+
+core::Result<const LocalRuns::Part*> LocalRuns::part_of(const std::vector<std::size_t>& kept) {
+  std::unique_ptr<Part>& known = parts_[kept];
+  if (known) return known.get();
+  auto part = std::make_unique<Part>();
+  part->kept = kept;
   belief::Scene local = scene_;
   local.objects.clear();
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    // What a hand holds stays, so that the hand does.
-    if (likeliest_.objects[i].mode == belief::MotionMode::kHeld) kept[i] = 1;
-    (kept[i] != 0 ? part->kept : part->left_out).push_back(i);
-    if (kept[i] != 0) local.objects.push_back(scene_.objects[i]);
+  for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+    if (std::binary_search(kept.begin(), kept.end(), i))
+      local.objects.push_back(scene_.objects[i]);
+    else
+      part->left_out.push_back(i);
   }
   if (!part->left_out.empty()) {
     PRESCENE_TRY(part->simulator, make_simulator_(local, 1.0));
   }
-  parts_[object] = std::move(part);
-  return parts_[object].get();
+  known = std::move(part);
+  return known.get();
 }
 
-bool LocalRuns::meets(const Part& part, const belief::WorldState& start, const std::vector<belief::Action>& actions,
-                      const belief::Trajectory& local) const {
+std::vector<std::size_t> LocalRuns::met_by(const Part& part, const belief::WorldState& start,
+                                           const std::vector<belief::Action>& actions,
+                                           const belief::Trajectory& local) const {
   std::vector<Box> lying;
   for (const std::size_t i : part.left_out) lying.push_back(box_of(i, start.objects[i].X_WO));
+  std::vector<std::uint8_t> met(lying.size(), 0);
   const auto near_any = [&](const Box& box) {
     return std::any_of(lying.begin(), lying.end(), [&](const Box& other) { return are_near(box, other); });
+  };
+  const auto note = [&](const Box& box) {
+    for (std::size_t i = 0; i < lying.size(); ++i)
+      if (are_near(box, lying[i])) met[i] = 1;
   };
   for (const belief::Action& action : actions) {
     const auto* push = std::get_if<belief::Push>(&action.what);
     if (push == nullptr) continue;
     const Vector3d radius = Vector3d::Constant(push->radius);
-    if (near_any({push->from.cwiseMin(push->to) - radius, push->from.cwiseMax(push->to) + radius})) return true;
+    note({push->from.cwiseMin(push->to) - radius, push->from.cwiseMax(push->to) + radius});
   }
   for (std::size_t k = 0; k < part.kept.size(); ++k) {
     // Most are nowhere near: a box about the sphere that holds it says so, without a look at its vertices.
@@ -101,13 +114,15 @@ bool LocalRuns::meets(const Part& part, const belief::WorldState& start, const s
       const Pose& X_WO = state.objects[k].X_WO;
       if (X_WO == *at) continue;
       // What it swept since the state before, straight.
-      if (near_any(around(*at).merged(around(X_WO))) &&
-          near_any(box_of(part.kept[k], *at).merged(box_of(part.kept[k], X_WO))))
-        return true;
+      if (near_any(around(*at).merged(around(X_WO))))
+        note(box_of(part.kept[k], *at).merged(box_of(part.kept[k], X_WO)));
       at = &X_WO;
     }
   }
-  return false;
+  std::vector<std::size_t> objects;
+  for (std::size_t i = 0; i < lying.size(); ++i)
+    if (met[i] != 0) objects.push_back(part.left_out[i]);
+  return objects;
 }
 
 void LocalRuns::complete(const Part& part, const belief::WorldState& start, belief::Trajectory& trajectory) const {
@@ -126,42 +141,64 @@ void LocalRuns::complete(const Part& part, const belief::WorldState& start, beli
   for (auto& [first, second] : trajectory.final_contacts) first = number(first), second = number(second);
 }
 
-core::Result<int> LocalRuns::run(std::size_t object, const OwnRuns& runs, std::span<belief::Trajectory> trajectories) {
-  PRESCENE_TRY(const Part* part, part_of(object));
-  const std::size_t n = runs.starts.size();
-  std::vector<belief::WorldState> starts(runs.starts.begin(), runs.starts.end());
-  if (part->simulator) {
-    for (belief::WorldState& start : starts) {
-      std::vector<belief::ObjectState> kept;
-      for (const std::size_t i : part->kept) kept.push_back(start.objects[i]);
-      start.objects = std::move(kept);
-    }
-  }
-  simulation::run_own_actions(part->simulator ? *part->simulator : whole_, starts, runs.actions, *runs.request,
-                              runs.stream, 0, *runs.pool, trajectories, runs.cancellation);
-  if (!part->simulator) return static_cast<int>(n);
-  std::vector<std::uint8_t> near(n, 0);
-  runs.pool->for_blocks(n, 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      near[i] = meets(*part, runs.starts[i], runs.actions[i], trajectories[i]) ? 1 : 0;
-      if (near[i] == 0) complete(*part, runs.starts[i], trajectories[i]);
-    }
-  });
-  std::vector<belief::WorldState> again;
+core::Result<int> LocalRuns::run_part(const Part& part, const OwnRuns& runs, std::span<const std::size_t> instances,
+                                      int round, std::span<belief::Trajectory> trajectories, Open* met) {
+  std::vector<belief::WorldState> starts;
   std::vector<std::vector<belief::Action>> actions;
   std::vector<std::uint32_t> numbers;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (near[i] == 0) continue;
-    again.push_back(runs.starts[i]);
+  for (const std::size_t i : instances) {
+    belief::WorldState& start = starts.emplace_back(runs.starts[i]);
+    if (part.simulator) {
+      std::vector<belief::ObjectState> kept;
+      for (const std::size_t object : part.kept) kept.push_back(start.objects[object]);
+      start.objects = std::move(kept);
+    }
     actions.push_back(runs.actions[i]);
     numbers.push_back(static_cast<std::uint32_t>(i));
   }
-  if (again.empty()) return static_cast<int>(n);
-  std::vector<belief::Trajectory> whole(again.size());
-  simulation::run_own_actions(whole_, again, actions, *runs.request, runs.stream,
-                              std::span<const std::uint32_t>(numbers), *runs.pool, whole, runs.cancellation);
-  for (std::size_t j = 0; j < again.size(); ++j) trajectories[numbers[j]] = std::move(whole[j]);
-  return static_cast<int>(n + again.size());
+  std::vector<belief::Trajectory> own(instances.size());
+  simulation::run_own_actions(part.simulator ? *part.simulator : whole_, starts, actions, *runs.request, runs.stream,
+                              std::span<const std::uint32_t>(numbers), *runs.pool, own, runs.cancellation);
+  std::vector<std::vector<std::size_t>> near(instances.size());
+  if (part.simulator)
+    runs.pool->for_blocks(instances.size(), 8, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t j = begin; j < end; ++j) {
+        near[j] = met_by(part, runs.starts[instances[j]], actions[j], own[j]);
+        if (near[j].empty()) complete(part, runs.starts[instances[j]], own[j]);
+      }
+    });
+  for (std::size_t j = 0; j < instances.size(); ++j) {
+    if (near[j].empty()) {
+      trajectories[instances[j]] = std::move(own[j]);
+      continue;
+    }
+    near[j].insert(near[j].end(), part.kept.begin(), part.kept.end());
+    (*met)[round + 1 < kMostParts ? with_neighbours(std::move(near[j])) : everything()].push_back(instances[j]);
+  }
+  return static_cast<int>(instances.size());
+}
+
+core::Result<int> LocalRuns::run(std::size_t object, const OwnRuns& runs, std::span<belief::Trajectory> trajectories) {
+  Open open;
+  std::vector<std::size_t>& all = open[with_neighbours({object})];
+  for (std::size_t i = 0; i < runs.starts.size(); ++i) all.push_back(i);
+  int simulated = 0;
+  for (int round = 0; !open.empty(); ++round) {
+    Open met;
+    for (const auto& [kept, instances] : open) {
+      PRESCENE_TRY(const Part* part, part_of(kept));
+      PRESCENE_TRY(const int count, run_part(*part, runs, instances, round, trajectories, &met));
+      simulated += count;
+    }
+    open = std::move(met);
+  }
+  return simulated;
+}
+
+std::vector<std::size_t> LocalRuns::everything() const {
+  std::vector<std::size_t> all(scene_.objects.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
 }
 
 }  // namespace prescene::queries
