@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Observation explanation: X*_t+1 ~ P(X_t+1 | U_t, X_t, Z_t+1, C_t+1), over events that nobody told of.
+// Observation explanation: X*_t+1 ~ P(X_t+1 | U_t, X_t, Z_t+1, C_t+1), over
+// events that nobody told of.
 #include "prescene/queries/explain.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "candidate_objects.h"
 #include "changed_events.h"
 #include "event_hypotheses.h"
 #include "event_paths.h"
 #include "explain_answer.h"
 #include "explain_text.h"
-#include "frame_peaks.h"
-#include "missing_objects.h"
 #include "other_motion.h"
 #include "prescene/core/spelling.h"
 #include "prescene/queries/smallest_change.h"
@@ -23,18 +23,13 @@ namespace prescene::queries {
 namespace {
 
 using belief::EventKind;
-using belief::Pose;
 
-constexpr std::size_t kMostCandidates = 4;
-constexpr double kElsewhere = 0.01,
-                 kTurned = 0.15;   // m and rad: tracked further from its start, an object is looked at
-constexpr double kRefuted = -1.0;  // nats: what speaks so much against where it was is looked at
 constexpr int kFirstRuns = 1;
-constexpr int kMostRounds = 2;      // times the query's runs: of what stays uncertain
-constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
-constexpr int kFreshRuns = 1000;    // numbers of runs from here on are for what must not have been seen
-constexpr double kLikelierThanSeen =
-    3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
+constexpr int kMostRounds = 2;             // times the query's runs: of what stays uncertain
+constexpr double kHopeless = 25.0;         // nats: what is so far behind the best is not searched further
+constexpr int kFreshRuns = 1000;           // numbers of runs from here on are for what must not have been seen
+constexpr double kLikelierThanSeen = 3.0;  // nats: by which frames may be likelier than the best of some dozens
+                                           // of poses
 
 class Explainer {
  public:
@@ -54,11 +49,14 @@ class Explainer {
       times_.push_back(core::seconds_of(likelihood_->stamp(k) - window_.start->stamp_ns));
     events_->set_times(times_);
     likelihood_->set_base(events_->base());
-    PRESCENE_RETURN_IF_ERROR(look_for_missing());
-    if (asked && !may_be_explained(*asked)) return lost_for_good();
-    const std::vector<std::size_t> candidates = asked ? std::vector{*asked} : candidates_to_look_at();
-    for (const std::size_t object : candidates) note_when_seen(object);
-    look_for_peaks(candidates);
+    CandidateObjects looked(*events_, *likelihood_, times_, query_);
+    PRESCENE_RETURN_IF_ERROR(looked.look_for_missing(frames_.back(), context_, tools_));
+    if (asked && !looked.may_be_explained(*asked)) return lost_for_good();
+    const std::vector<std::size_t> candidates = asked ? std::vector{*asked} : looked.to_look_at();
+    for (const std::size_t object : candidates) looked.note_when_seen(object);
+    looked.look_for_peaks(candidates);
+    evaluated_ += looked.evaluated();
+    remarks_.insert(remarks_.end(), looked.remarks().begin(), looked.remarks().end());
     const std::vector<Hypothesis> hypotheses = hypotheses_about(candidates, *events_, query_.weights, *tools_.meshes);
     PRESCENE_RETURN_IF_ERROR(search_all(candidates, hypotheses));
     PRESCENE_RETURN_IF_ERROR(search_rivals());
@@ -72,7 +70,8 @@ class Explainer {
     answer.cut_short = out_of_time_;
     answer.remarks.insert(answer.remarks.end(), remarks_.begin(), remarks_.end());
     answer.remarks.emplace_back(
-        "Intervals say how precisely the evidence was computed, not how well events are modelled: in 44 simulated "
+        "Intervals say how precisely the evidence was computed, not how well "
+        "events are modelled: in 44 simulated "
         "episodes the first event was right in 42.");
     return answer;
   }
@@ -160,78 +159,11 @@ class Explainer {
     return core::RandomStream(query_.seed + (judged.number + 1) * 0x9e3779b97f4a7c15ULL, core::Purpose::kParameters);
   }
 
-  bool may_be_explained(std::size_t object) const {
-    return events_->is_present(object) || !events_->track(object).times.empty();
-  }
   core::Status lost_for_good() const {
     return core::not_found("'" + query_.object +
-                           "' is lost in the whole window: there is nothing to explain; choose a window in which it is "
+                           "' is lost in the whole window: there is nothing to "
+                           "explain; choose a window in which it is "
                            "tracked at the begin or found later");
-  }
-
-  /// What was not there at the begin, and the tracker did not find.
-  core::Status look_for_missing() {
-    std::vector<std::size_t> missing;
-    for (std::size_t i = 0; i < events_->objects().size(); ++i)
-      if (!may_be_explained(i) && (query_.object.empty() || query_.object == events_->objects()[i].name))
-        missing.push_back(i);
-    if (missing.empty()) return core::ok_status();
-    PRESCENE_TRY(const auto found, find_missing(frames_.back(), context_, tools_, query_.seed));
-    for (const std::size_t i : missing) {
-      const auto index = belief::find_object(*frames_.back().belief, events_->objects()[i].name);
-      if (!index || !found[static_cast<std::size_t>(*index)]) continue;
-      const Pose& X_WO = *found[static_cast<std::size_t>(*index)];
-      std::vector<double> absent(times_.size());
-      const ScenePath gone = path_of(i, ObjectPath(times_.size()));
-      likelihood_->evaluate(std::span(&gone, 1), absent);
-      // From when on it is seen there.
-      std::vector<double> seen;
-      for (std::size_t k = times_.size(); k-- > 0;) {
-        double there = 0.0;
-        likelihood_->evaluate(k, i, std::span(&X_WO, 1), std::span(&there, 1));
-        if (there <= absent[k]) break;
-        seen.insert(seen.begin(), times_[k]);
-      }
-      if (!seen.empty()) events_->note_found(i, X_WO, std::move(seen));
-    }
-    return core::ok_status();
-  }
-
-  /// From which frames on it is not where it was, and where it was tracked last.
-  void note_when_seen(std::size_t object) {
-    const SeenTrack& track = events_->track(object);
-    const std::size_t n = times_.size();
-    std::vector<double> absent(n), here(n, -1e300), there(n, -1e300);
-    const ScenePath gone = path_of(object, ObjectPath(n));
-    likelihood_->evaluate(std::span(&gone, 1), absent);
-    for (std::size_t k = 0; k < n; ++k) {
-      if (const auto& base = likelihood_->base()[object][k])
-        likelihood_->evaluate(k, object, std::span(&*base, 1), std::span(&here[k], 1));
-      if (!track.estimates.empty())
-        likelihood_->evaluate(k, object, std::span(&track.estimates.back().mode, 1), std::span(&there[k], 1));
-    }
-    std::size_t left = n, came = n;
-    while (left > 0 && here[left - 1] < std::max(absent[left - 1], there[left - 1])) --left;
-    while (came > 0 && there[came - 1] > std::max(absent[came - 1], here[came - 1])) --came;
-    if (left == n && came == n) return;
-    const auto time = [&](std::size_t k) { return k < n ? times_[k] : events_->duration(); };
-    const auto before = [&](std::size_t k) { return k > 0 ? times_[k - 1] : 0.0; };
-    SeenTimes seen{before(left), time(left), before(came), time(came)};
-    if (came == n) seen.came_after = seen.came_before = events_->duration();
-    events_->note_seen(object, seen);
-  }
-
-  /// Of the candidates, and of all else that was tracked elsewhere: what moves may move others.
-  void look_for_peaks(const std::vector<std::size_t>& candidates) {
-    const core::RandomStream stream(query_.seed, core::Purpose::kProposal);
-    for (std::size_t i = 0; i < events_->objects().size(); ++i) {
-      const bool is_candidate = std::find(candidates.begin(), candidates.end(), i) != candidates.end();
-      if (!is_candidate && !(events_->is_present(i) && tracked_elsewhere(i).elsewhere)) continue;
-      FoundPeaks found = find_peaks(*events_, *likelihood_, i, times_, stream);
-      if (found.peaks.back().seen) events_->note_seen_in_the_end(i);
-      likelihood_->set_peaks(i, std::move(found.peaks));
-      evaluated_ += found.evaluations;
-    }
   }
 
   core::Result<std::optional<std::size_t>> asked_object() const {
@@ -243,66 +175,6 @@ class Explainer {
     const std::string near = core::did_you_mean(query_.object, names);
     return core::not_found("there is no object '" + query_.object +
                            "': " + (near.empty() ? "the objects are " + core::comma_list(names) : near));
-  }
-
-  struct Elsewhere {
-    double moved = 0.0;  // m, turns by a lever of 5 cm
-    bool elsewhere = false;
-  };
-  Elsewhere tracked_elsewhere(std::size_t object) const {
-    Elsewhere result;
-    const SeenTrack& track = events_->track(object);
-    for (std::size_t j = 0; j < track.times.size(); ++j) {
-      const Pose base = base_at(object, track.times[j]);
-      const double distance = (track.estimates[j].mean.translation - base.translation).norm();
-      const double angle = geometry::symmetric_angle(track.estimates[j].mean, base, events_->model(object).symmetry);
-      result.elsewhere = result.elsewhere || distance > kElsewhere || angle > kTurned;
-      result.moved = std::max(result.moved, distance + 0.05 * angle);
-    }
-    return result;
-  }
-
-  /// Objects that the frames show to be elsewhere, those that moved furthest first; the least certain one if none did.
-  std::vector<std::size_t> candidates_to_look_at() {
-    std::vector<std::pair<double, std::size_t>> order;
-    double least = 1e300;
-    std::size_t doubtful = 0;
-    for (std::size_t i = 0; i < events_->objects().size(); ++i) {
-      if (!events_->is_present(i)) {
-        if (may_be_explained(i)) order.emplace_back(-1.0, i);
-        continue;
-      }
-      const auto [moved, elsewhere] = tracked_elsewhere(i);
-      double worst = 1e300;
-      for (std::size_t k = 0; k < times_.size(); ++k) {
-        if (!likelihood_->base()[i][k]) continue;
-        double ratio = 0.0;
-        likelihood_->evaluate(k, i, std::span(&*likelihood_->base()[i][k], 1), std::span(&ratio, 1));
-        double absent = 0.0;
-        const ScenePath gone = path_of(i, ObjectPath(times_.size()));
-        std::vector<double> ratios(times_.size());
-        likelihood_->evaluate(std::span(&gone, 1), ratios);
-        absent = ratios[k];
-        worst = std::min(worst, ratio - absent);
-      }
-      if (worst < least) least = worst, doubtful = i;
-      if (elsewhere || worst < kRefuted) order.emplace_back(-moved, i);
-    }
-    std::sort(order.begin(), order.end());
-    std::vector<std::size_t> candidates;
-    for (const auto& [key, i] : order)
-      if (candidates.size() < kMostCandidates) candidates.push_back(i);
-    if (order.size() > candidates.size())
-      remarks_.push_back(std::to_string(order.size()) + " objects are elsewhere; only the " +
-                         std::to_string(kMostCandidates) + " that moved furthest were looked at.");
-    if (candidates.empty()) candidates.push_back(doubtful);
-    return candidates;
-  }
-
-  Pose base_at(std::size_t object, double time) const {
-    std::size_t k = 0;
-    while (k + 1 < times_.size() && times_[k] < time - 1e-6) ++k;
-    return likelihood_->base()[object][k].value_or(Pose{});
   }
 
   void evaluate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
@@ -368,8 +240,9 @@ class Explainer {
       search(nothing, query_.runs);
       best_ = std::max(best_, std::log(prior_of_nothing) + nothing.log_bayes);
       std::vector<const Hypothesis*> about;
-      // `other` first: it says how likely the frames can get at all. Then what takes no simulation: the better the best
-      // of these, the sooner searches of the others end.
+      // `other` first: it says how likely the frames can get at all. Then what
+      // takes no simulation: the better the best of these, the sooner searches
+      // of the others end.
       for (const int round : {0, 1, 2})
         for (const Hypothesis& hypothesis : hypotheses)
           if (hypothesis.object == object && round_of(hypothesis.kind) == round) about.push_back(&hypothesis);
@@ -378,7 +251,8 @@ class Explainer {
         if (cancelled()) return stopped();
         if (out_of_time())
           return core::unavailable(
-              "the time ran out before every event was searched once: give more of it, an object, or a shorter window");
+              "the time ran out before every event was searched once: give "
+              "more of it, an object, or a shorter window");
         Judged& judged = judged_.emplace_back();
         judged.hypothesis = *hypothesis;
         judged.object = object;
@@ -407,7 +281,8 @@ class Explainer {
     const auto log_posterior = [&](const Judged& judged) {
       return std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged);
     };
-    // That nothing explains what was seen may only mean that a search missed: then none is taken for hopeless.
+    // That nothing explains what was seen may only mean that a search missed:
+    // then none is taken for hopeless.
     const bool unexplained = std::any_of(judged_.begin(), judged_.end(), [&](const Judged& judged) {
       return judged.hypothesis.kind == EventKind::kOther && log_posterior(judged) >= best_ - 1e-9;
     });
@@ -440,12 +315,14 @@ class Explainer {
   void remark_what_was_cut_short() {
     if (out_of_time_)
       remarks_.emplace_back(
-          "The time ran out before the intervals were as narrow as asked for: give more of it (max_seconds).");
+          "The time ran out before the intervals were as narrow as asked for: "
+          "give more of it (max_seconds).");
     for (const Judged& judged : judged_)
       if (judged.posterior.cut_short)
         remarks_.push_back(std::string("The search for '") + belief::name_of(judged.hypothesis.kind) + "' of " +
                            events_->objects()[judged.object].name +
-                           " was cut short: its probability is less certain than its interval says.");
+                           " was cut short: its probability is less certain "
+                           "than its interval says.");
   }
 
   const ExplainWindow& window_;
@@ -498,9 +375,13 @@ core::Result<ExplainAnswer> explain(const ExplainWindow& window, const ExplainQu
                                     const ExplainContext& context) {
   PRESCENE_RETURN_IF_ERROR(validate(query));
   if (!window.start || !window.start->scene || window.start->step == 0)
-    return core::invalid_input("there is no belief at the window's begin: begin it after the first frame");
+    return core::invalid_input(
+        "there is no belief at the window's begin: "
+        "begin it after the first frame");
   if (window.frames.empty())
-    return core::invalid_input("there is no frame in the window: give a longer one, or one within the recording");
+    return core::invalid_input(
+        "there is no frame in the window: give a longer "
+        "one, or one within the recording");
   PRESCENE_CHECK(context.likelihood != nullptr && context.simulation.pool != nullptr &&
                  context.simulation.meshes != nullptr);
   if (!context.simulation.make_renderer) return core::unavailable("no renderer: this service was set up without one");
