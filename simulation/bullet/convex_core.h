@@ -63,6 +63,14 @@ class ConvexCore : public btConvexInternalShape {
   };
   /// Of a point in S. Not of triangles (checked).
   Nearest nearest(const Vector3d& p) const;
+  /// The same with only some faces of a polytope, those of faces_about() for a ball that holds the point. Of points
+  /// that are farther away than `limit` (m) the distance is merely beyond it.
+  Nearest nearest(const Vector3d& p, const std::vector<std::uint32_t>& faces, double limit) const;
+  /// Faces of a polytope that decide nearest() for points in a ball: those that may be the highest below one of them,
+  /// and those that one of them may be over; of `given`, which holds those of a ball about it. Ascending.
+  void faces_about(const Vector3d& center, double ball, const std::vector<std::uint32_t>& given,
+                   std::vector<std::uint32_t>& faces) const;
+  std::size_t face_count() const { return polytope_.faces.size(); }  ///< 0 unless it is a polytope.
 
   // btConvexShape
   btVector3 localGetSupportingVertexWithoutMargin(const btVector3& direction) const override;
@@ -81,7 +89,8 @@ class ConvexCore : public btConvexInternalShape {
   Vector3d support(const Vector3d& direction) const;
   void set_bounds(const Vector3d& low, const Vector3d& high);
   void cap(double z, const Vector3d& direction, Feature& feature) const;
-  Nearest nearest_of_polytope(const Vector3d& p) const;
+  template <class FaceAt>
+  Nearest nearest_of_polytope(const Vector3d& p, double limit, std::size_t count, const FaceAt& face_at) const;
 
   Kind kind_;
   double radius_ = 0.0;

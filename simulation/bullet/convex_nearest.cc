@@ -70,16 +70,19 @@ Nearest nearest_of_cone(const Vector3d& half, const Vector3d& p) {
 
 }  // namespace
 
-Nearest ConvexCore::nearest_of_polytope(const Vector3d& p) const {
-  const ConvexPolytope::Face* highest = &polytope_.faces[0];
+template <class FaceAt>
+Nearest ConvexCore::nearest_of_polytope(const Vector3d& p, double limit, std::size_t count,
+                                        const FaceAt& face_at) const {
+  const ConvexPolytope::Face* highest = &face_at(0);
   double most = highest->normal.dot(p) - highest->offset;
-  for (const ConvexPolytope::Face& face : polytope_.faces) {
+  for (std::size_t i = 1; i < count; ++i) {
+    const ConvexPolytope::Face& face = face_at(i);
     const double height = face.normal.dot(p) - face.offset;
     if (height <= most) continue;
     most = height;
     highest = &face;
   }
-  if (most <= 0.0) return {most, highest->normal, true};
+  if (most <= 0.0 || most > limit) return {most, highest->normal, true};
   Vector3d best = Vector3d::Zero();
   double least = std::numeric_limits<double>::infinity();
   // The face that sees the point from highest up is most often the one.
@@ -100,13 +103,35 @@ Nearest ConvexCore::nearest_of_polytope(const Vector3d& p) const {
     return above;
   };
   if (look_at(*highest)) return {most, highest->normal, true};
-  for (const ConvexPolytope::Face& face : polytope_.faces) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const ConvexPolytope::Face& face = face_at(i);
     if (&face == highest) continue;
     const double height = face.normal.dot(p) - face.offset;
     if (height <= 0.0) continue;
     if (look_at(face)) return {height, face.normal, true};
   }
   return towards(best, highest->normal);
+}
+
+void ConvexCore::faces_about(const Vector3d& center, double ball, const std::vector<std::uint32_t>& given,
+                             std::vector<std::uint32_t>& faces) const {
+  const auto height = [&](std::uint32_t index) {
+    const ConvexPolytope::Face& face = polytope_.faces[index];
+    return face.normal.dot(center) - face.offset;
+  };
+  double most = -std::numeric_limits<double>::infinity();
+  for (const std::uint32_t index : given) most = std::max(most, height(index));
+  constexpr double kSlack = 1e-9;  // m: more than rounding takes away
+  const double least = std::min(most - 2.0 * ball, -ball) - kSlack;
+  faces.clear();
+  for (const std::uint32_t index : given)
+    if (height(index) >= least) faces.push_back(index);
+}
+
+Nearest ConvexCore::nearest(const Vector3d& p, const std::vector<std::uint32_t>& faces, double limit) const {
+  PRESCENE_DCHECK(kind_ == Kind::kPolytope && !faces.empty());
+  return nearest_of_polytope(p, limit, faces.size(),
+                             [&](std::size_t i) -> const ConvexPolytope::Face& { return polytope_.faces[faces[i]]; });
 }
 
 Nearest ConvexCore::nearest(const Vector3d& p) const {
@@ -118,7 +143,8 @@ Nearest ConvexCore::nearest(const Vector3d& p) const {
     case Kind::kBox:
       return nearest_of_box(half_, p);
     case Kind::kPolytope:
-      return nearest_of_polytope(p);
+      return nearest_of_polytope(p, std::numeric_limits<double>::infinity(), polytope_.faces.size(),
+                                 [&](std::size_t i) -> const ConvexPolytope::Face& { return polytope_.faces[i]; });
     case Kind::kCylinder:
       return nearest_of_cylinder(half_, p);
     case Kind::kCone:

@@ -25,14 +25,16 @@ collision::PackedSphere lane(const SphereTree& tree, std::uint32_t node, std::si
 }
 
 /// Calls leaf(index of the patch, its sphere) for each sphere for which within(centre, radius) answers true, as it does
-/// for all bounding spheres above it.
-template <class Within, class Leaf>
-void for_near(const SphereTree& tree, std::vector<std::uint32_t>& stack, const Within& within, const Leaf& leaf) {
+/// for all bounding spheres above it; and visit(node, level) for each node on the way, before what is below it.
+template <class Within, class Visit, class Leaf>
+void for_near(const SphereTree& tree, std::vector<SphereContactFinder::OnTheWay>& stack, const Within& within,
+              const Visit& visit, const Leaf& leaf) {
   stack.clear();
-  stack.push_back(0);
+  stack.push_back({0, 1});
   while (!stack.empty()) {
-    const std::uint32_t index = stack.back();
+    const auto [index, level] = stack.back();
     stack.pop_back();
+    visit(index, level);
     const SphereTree::Node& node = tree.nodes()[index];
     for (std::uint32_t k = 0; k < node.count; ++k) {
       const collision::PackedSphere child = lane(tree, index, k);
@@ -40,7 +42,7 @@ void for_near(const SphereTree& tree, std::vector<std::uint32_t>& stack, const W
       if (node.is_bottom()) {
         leaf(tree.order()[node.first + k]);
       } else {
-        stack.push_back(node.first + k);
+        stack.push_back({node.first + k, level + 1});
       }
     }
   }
@@ -150,10 +152,12 @@ void SphereContactFinder::spheres_convex(const SurfaceSpheres& a, const MovingFr
     const double limit = radius + within;
     return beyond.squaredNorm() <= limit * limit;
   };
-  for_near(*a.tree, stack_, near, [&](std::uint32_t index) {
+  faces_.begin(a, b, X_BA);
+  const auto visit = [&](std::uint32_t node, std::uint32_t level) { faces_.look_at(node, level); };
+  for_near(*a.tree, stack_, near, visit, [&](std::uint32_t index) {
     // In B's frame until it is a contact.
     const PlacedPatch patch(a.patches[index], X_BA);
-    const ConvexCore::Nearest nearest = b.nearest(patch.centre);
+    const ConvexCore::Nearest nearest = faces_.nearest(b, patch.centre, b.radius() + patch.radius + within);
     const double gap = nearest.distance - b.radius() - patch.radius;
     if (gap > within) return;
     ContactPoint contact;
@@ -193,7 +197,8 @@ void SphereContactFinder::spheres_surface(const SurfaceSpheres& a, const MovingF
     return collision::is_within(b.tree(), X_BA * centre_A, radius + within);
   };
   const collision::Array<collision::PackedSphere>& spheres = a.tree->packing().spheres();
-  for_near(*a.tree, stack_, near, [&](std::uint32_t index) {
+  const auto visit = [](std::uint32_t, std::uint32_t) {};
+  for_near(*a.tree, stack_, near, visit, [&](std::uint32_t index) {
     // With the small sphere: the large one may be nearer to other parts of the surface.
     const Vector3d centre = X_BA * widened(spheres[index].centre);
     const auto radius = static_cast<double>(spheres[index].radius);

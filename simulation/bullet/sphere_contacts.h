@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "contact_finder.h"
+#include "near_faces.h"
 #include "prescene/collision/spheres/sphere_queries.h"
 #include "prescene/collision/spheres/surface_spheres.h"
 #include "prescene/simulation/rules/sphere_rules.h"
@@ -48,6 +49,11 @@ class SphereContactFinder {
   void spheres_spheres(const collision::SurfaceSpheres& a, const MovingFrame& A, const collision::SurfaceSpheres& b,
                        const MovingFrame& B, double range, double dt, std::vector<ContactPoint>& contacts);
 
+  /// A node of a tree and its level, 1 for the root.
+  struct OnTheWay {
+    std::uint32_t node = 0, level = 0;
+  };
+
  private:
   struct Found {
     ContactPoint point;
@@ -67,11 +73,12 @@ class SphereContactFinder {
   void take(std::size_t index, std::vector<ContactPoint>& contacts);
   struct Pairs;
 
-  std::vector<std::uint32_t> stack_;
+  std::vector<OnTheWay> stack_;
   std::vector<Found> found_;
   std::vector<Flat> flat_;
   collision::SphereScratch scratch_;
   std::unique_ptr<Pairs> pairs_;
+  NearFaces faces_;
 };
 
 }  // namespace prescene::simulation
