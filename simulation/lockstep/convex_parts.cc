@@ -95,6 +95,12 @@ ConvexPart hull_part(const ConvexPolytope& hull, const RoundedPolytope& rounded,
       part.face_corners.push_back(part.vertices[face.loop[std::min(k, corners - 1)]]);
     }
   }
+  constexpr std::size_t kWidth = kLaneMultiple;
+  const std::size_t rows = (part.planes.size() + kWidth - 1) / kWidth * kWidth;
+  for (std::size_t k = 0; k < 4; ++k) {
+    part.plane_rows[k].assign(rows, k < 3 ? Real(0) : Real(1e30));  // those beyond the last are below everything
+    for (std::size_t f = 0; f < part.planes.size(); ++f) part.plane_rows[k][f] = part.planes[f][k];
+  }
   return part;
 }
 

@@ -40,6 +40,23 @@ void put(const collision::SurfacePatch& patch, std::size_t lane, const Vector3d&
   }
 }
 
+void hold_centres(std::size_t count, SphereLanes::PatchRows& rows) {
+  const auto centre = [&](std::size_t k) {
+    return Vector3d(static_cast<double>(rows.centre[0][k]), static_cast<double>(rows.centre[1][k]),
+                    static_cast<double>(rows.centre[2][k]));
+  };
+  Vector3d low = centre(0), high = low;
+  for (std::size_t k = 1; k < count; ++k) {
+    low = low.cwiseMin(centre(k));
+    high = high.cwiseMax(centre(k));
+  }
+  const Vector3d middle = 0.5 * (low + high);
+  double ball = 0.0;
+  for (std::size_t k = 0; k < count; ++k) ball = std::max(ball, (centre(k) - middle).norm());
+  for (std::size_t i = 0; i < 3; ++i) rows.middle[i] = static_cast<Real>(middle[static_cast<Eigen::Index>(i)]);
+  rows.ball = static_cast<Real>(ball);
+}
+
 Vector3d vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 Matrix3d matrix_of(const std::array<double, 9>& m) {
   return (Matrix3d() << m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]).finished();
@@ -184,6 +201,7 @@ std::shared_ptr<const SphereLanes> lanes_of(const collision::SurfaceSpheres& sph
       SphereLanes::PatchRows rows{};
       for (std::size_t k = 0; k < given.count; ++k)
         put(spheres.patches[tree.order()[given.first + k]], k, origin, rows);
+      hold_centres(given.count, rows);
       lanes->patches.push_back(rows);
     }
     lanes->nodes.push_back(node);

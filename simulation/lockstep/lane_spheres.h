@@ -37,6 +37,8 @@ struct SphereLanes {
     std::array<std::array<Row, 3>, 2> out;  ///< Limits; 0, and distances of 1e30, where there is none.
     std::array<Row, 2> distance;
     bool bent = false, limited = false;  ///< Some of them.
+    std::array<Real, 3> middle{};        ///< A ball that holds their centres.
+    Real ball = 0;
   };
 
   std::vector<Node> nodes;  ///< The root first.
@@ -140,6 +142,8 @@ struct SphereScratch {
   FoundContacts found;
   SpherePairs pairs;
   std::vector<std::int32_t> stack;
+  std::vector<std::int32_t> faces;  ///< Of a hull: those that matter to the spheres of a node.
+  std::vector<Real> heights;        ///< Of a node over all of them.
 };
 
 /// The contacts of spheres with a convex core, into `scratch.found`.

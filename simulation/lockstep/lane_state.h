@@ -56,6 +56,7 @@ struct ConvexPart {
   std::vector<std::array<double, 3>> vertices;
   std::vector<std::array<double, 3>> normals;
   std::vector<std::array<Real, 4>> planes;          ///< By face: normal and offset.
+  std::array<std::vector<Real>, 4> plane_rows;      ///< The same by coordinate, up to a multiple of kLaneMultiple.
   std::vector<int> corner_counts;                   ///< By face.
   std::vector<std::array<double, 3>> face_corners;  ///< kMaxLoop by face, the last one repeated.
   int longest_loop = 0;

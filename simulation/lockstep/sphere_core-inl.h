@@ -8,8 +8,11 @@
 #define PRESCENE_SIMULATION_SPHERE_CORE_INL_H_
 #endif
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "lane_math-inl.h"
 #include "lane_spheres.h"
@@ -111,13 +114,16 @@ HWY_INLINE CorePlace on_cone(const ConvexPart& core, const Vec3<V>& p) {
   return place;
 }
 
-/// Of points that are at most `limit` away; of others the distance is beyond it.
-HWY_INLINE CorePlace on_hull(const ConvexPart& core, const Vec3<V>& p, V limit, M wanted) {
+/// Of points that are at most `limit` away; of others the distance is beyond it. `faces`: at least the one that each
+/// point is highest over, and all that any of them is over, ascending.
+HWY_INLINE CorePlace on_hull(const ConvexPart& core, std::span<const std::int32_t> faces, const Vec3<V>& p, V limit,
+                             M wanted) {
   const D d;
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   CorePlace place{set<V>(-1e30), set3<V>(0.0, 0.0, 1.0), hn::Eq(zero, zero)};
-  for (const std::array<Real, 4>& plane : core.planes) {
+  for (const std::int32_t face : faces) {
+    const std::array<Real, 4>& plane = core.planes[static_cast<std::size_t>(face)];
     const Vec3<V> normal{one_lane(plane[0]), one_lane(plane[1]), one_lane(plane[2])};
     const V height = dot(normal, p) - one_lane(plane[3]);
     const M higher = hn::Gt(height, place.distance);
@@ -130,7 +136,8 @@ HWY_INLINE CorePlace on_hull(const ConvexPart& core, const Vec3<V>& p, V limit, 
   M rim = open;
   V least = set<V>(1e30);
   Vec3<V> best = set3<V>(0.0, 0.0, 0.0);
-  for (std::size_t f = 0; f < core.planes.size(); ++f) {
+  for (const std::int32_t face : faces) {
+    const auto f = static_cast<std::size_t>(face);
     const std::array<Real, 4>& plane = core.planes[f];
     const Vec3<V> normal{one_lane(plane[0]), one_lane(plane[1]), one_lane(plane[2])};
     const V height = dot(normal, p) - one_lane(plane[3]);
@@ -171,9 +178,11 @@ HWY_INLINE CorePlace on_hull(const ConvexPart& core, const Vec3<V>& p, V limit, 
 /// The contacts of the spheres of a vector.
 class CoreMeeting {
  public:
-  CoreMeeting(const SphereQuery& query, FoundContacts& found)
+  CoreMeeting(const SphereQuery& query, SphereScratch& scratch)
       : query_(query),
-        found_(found),
+        found_(scratch.found),
+        faces_(scratch.faces),
+        heights_(scratch.heights),
         R_BS_(one_lane(query.R_BS)),
         p_BS_(one_lane(query.p_BS)),
         low_(one_lane(query.low)),
@@ -212,6 +221,7 @@ class CoreMeeting {
     const D d;
     const V half = set<V>(0.5);
     const V zero = set<V>(0.0);
+    if (query_.core->kind == CoreKind::kHull) choose_faces(rows);
     const PatchLanes patch(rows, at);
     const CorePlace place = place_of(R_BS_ * patch.centre, patch.radius + radius_ + within_, wanted);
     const V gap = place.distance - radius_ - patch.radius;
@@ -250,6 +260,34 @@ class CoreMeeting {
   }
 
  private:
+  /// Faces of the hull that may be the highest below one of the centres, or that one of them may be over.
+  void choose_faces(const SphereLanes::PatchRows& rows) {
+    if (&rows == faces_of_) return;
+    faces_of_ = &rows;
+    const D d;
+    const auto& planes = query_.core->plane_rows;
+    const std::size_t count = planes[0].size();
+    heights_.resize(count);
+    const Vec3<V> p = R_BS_ * one_lane(rows.middle) + p_BS_;
+    V highest = set<V>(-1e30);
+    for (std::size_t f = 0; f < count; f += hn::Lanes(d)) {
+      const Vec3<V> normal{hn::LoadU(d, planes[0].data() + f), hn::LoadU(d, planes[1].data() + f),
+                           hn::LoadU(d, planes[2].data() + f)};
+      const V height = dot(normal, p) - hn::LoadU(d, planes[3].data() + f);
+      hn::StoreU(height, d, heights_.data() + f);
+      highest = hn::Max(highest, height);
+    }
+    const Real most = hn::GetLane(hn::MaxOfLanes(d, highest));
+    // 1e-5 m is more than single precision takes away.
+    const V least = one_lane(std::min(most - 2 * rows.ball, -rows.ball) - Real(1e-5));
+    faces_.clear();
+    for (std::size_t f = 0; f < count; f += hn::Lanes(d)) {
+      const std::uint32_t chosen = bits_of(hn::Ge(hn::LoadU(d, heights_.data() + f), least));
+      for (std::uint32_t bits = chosen; bits != 0; bits &= bits - 1)
+        faces_.push_back(static_cast<std::int32_t>(f) + static_cast<std::int32_t>(std::countr_zero(bits)));
+    }
+  }
+
   /// `q` is turned into B, from A's middle.
   HWY_INLINE CorePlace place_of(const Vec3<V>& q, V limit, M wanted) const {
     const ConvexPart& core = *query_.core;
@@ -269,7 +307,7 @@ class CoreMeeting {
       case CoreKind::kCone:
         return on_cone(core, q + p_BS_);
       case CoreKind::kHull:
-        return on_hull(core, q + p_BS_, limit, wanted);
+        return on_hull(core, faces_, q + p_BS_, limit, wanted);
       case CoreKind::kSpheres:
         break;
     }
@@ -278,6 +316,9 @@ class CoreMeeting {
 
   const SphereQuery& query_;
   FoundContacts& found_;
+  std::vector<std::int32_t>& faces_;
+  const SphereLanes::PatchRows* faces_of_ = nullptr;
+  std::vector<Real>& heights_;
   Mat3<V> R_BS_;
   Vec3<V> p_BS_, low_, high_;
   V radius_, range_, within_;
@@ -289,7 +330,7 @@ inline void meet_core_lanes(const SphereQuery* query, SphereScratch* scratch) {
   const std::size_t width = hn::Lanes(D());
   scratch->found.clear();
   scratch->found.reserve(spheres.count);
-  CoreMeeting meeting(*query, scratch->found);
+  CoreMeeting meeting(*query, *scratch);
   std::vector<std::int32_t>& stack = scratch->stack;
   stack.assign(1, 0);
   while (!stack.empty()) {
