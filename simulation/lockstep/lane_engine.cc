@@ -41,6 +41,11 @@ LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
   const auto of_objects = most * static_cast<std::size_t>(lanes.objects);
   moved_.resize(of_objects);
   present_.resize(most * lanes.bodies.size() - of_objects);
+  if (lanes.objects > 1) {
+    footing_counts_.resize(of_objects);
+    footings_.resize(of_objects * kMostFooting);
+    woken_.reserve(most);
+  }
   pairs_.planes.reserve(most * lanes.fixed.size());
   pairs_.boxes.reserve(2 * most * lanes.fixed.size());
   pairs_.shapes.resize(lanes.parts.size());
@@ -128,6 +133,7 @@ void LaneEngine::move(int from, int to) {
     const int warm = state_.warm_count[static_cast<std::size_t>(a)];
     state_.warm_count[static_cast<std::size_t>(b)] = warm;
     std::copy_n(state_.warm(a), warm, state_.warm(b));
+    if (motion(to, body) == LaneMotion::kAsleep) copy_footing(place_of(body, from), place_of(body, to));
   }
 }
 
@@ -146,6 +152,7 @@ void LaneEngine::save(int slot, SlotState& saved) const {
     out.parting = moved_[static_cast<std::size_t>(at)].parting;
     out.warm_count = state_.warm_count[static_cast<std::size_t>(at)];
     std::copy_n(const_cast<LaneState&>(state_).warm(at), out.warm_count, out.warm);
+    save_footing(place_of(object, slot), out);
   }
 }
 
@@ -163,6 +170,7 @@ void LaneEngine::restore(int slot, const SlotState& saved) {
     moved_[static_cast<std::size_t>(at)].parting = in.parting;
     state_.warm_count[static_cast<std::size_t>(at)] = in.warm_count;
     std::copy_n(in.warm, in.warm_count, state_.warm(at));
+    restore_footing(place_of(object, slot), in);
   }
 }
 
@@ -180,7 +188,7 @@ void LaneEngine::set_motion(int slot, int object, LaneMotion motion) {
   Moved& moved = moved_[static_cast<std::size_t>(at)];
   moved.motion = motion;
   state_.inverse_mass[at] = motion == LaneMotion::kFree ? moved.inverse_mass : Real(0);
-  if (motion != LaneMotion::kFrozen) return;
+  if (motion != LaneMotion::kFrozen && motion != LaneMotion::kAsleep) return;
   for (std::size_t i = 0; i < 3; ++i) moved.next_p[i] = state_.p[i][at];
   for (std::size_t i = 0; i < 4; ++i) moved.next_q[i] = state_.q[i][at];
 }
@@ -385,8 +393,7 @@ void LaneEngine::find_contacts(std::span<const std::uint8_t> wanted) {
     std::fill_n(state_.contact_count.begin() + state_.at(object, 0), wanted.size(), 0);
     std::fill_n(state_.dropped_count.begin() + state_.at(object, 0), wanted.size(), 0);
   }
-  fly_all(wanted);
-  touch_all(wanted);
+  fly_and_touch(wanted);
 }
 
 void LaneEngine::end_part(std::span<const std::uint8_t> wanted) {
@@ -421,6 +428,7 @@ void LaneEngine::end_part(std::span<const std::uint8_t> wanted) {
   }
   solve(scene_->lanes, touching_, state_, scratch_);
   land(flying_, state_);
+  keep_places(wanted);
 }
 
 bool LaneEngine::diverged(int slot) const {

@@ -12,8 +12,11 @@
 
 namespace prescene::simulation {
 
-/// How an object moves: by itself, as something else says, or not at all, beyond the world.
-enum class LaneMotion : std::uint8_t { kFree, kHeld, kFrozen };
+/// How an object moves: by itself, as something else says, or not at all: beyond the world, or at rest on fixed bodies.
+enum class LaneMotion : std::uint8_t { kFree, kHeld, kFrozen, kAsleep };
+
+/// Most contacts with which an object falls asleep.
+inline constexpr int kMostFooting = 16;
 
 /// What the next step depends on of an object in a slot: plain numbers.
 struct ObjectSlot {
@@ -23,6 +26,8 @@ struct ObjectSlot {
   std::uint64_t parting;  ///< See LaneEngine::release.
   int warm_count;
   WarmContact warm[kMaxContacts];
+  int footing_count;  ///< Of what is asleep.
+  LaneContact footing[kMostFooting];
 };
 using SlotState = std::vector<ObjectSlot>;  // by object
 
@@ -53,6 +58,10 @@ class LaneEngine {
   void release(int slot, int object, const geometry::Pose& X_WO, const geometry::Twist& V_WO);
   /// Has left the world: stays where it is and touches nothing.
   void freeze(int slot, int object);
+  /// At rest: stays where it is, with the contacts of this step, and nothing of it is computed until another object
+  /// comes so near that it may touch it (lane_sleep.cc). Not if it has more than kMostFooting contacts. What moves it
+  /// otherwise must be over.
+  void fall_asleep(int slot, int object);
   /// Where a kinematic body (of lanes.bodies) is in the next step.
   void place(int slot, int body, const geometry::Pose& X_now, const geometry::Pose& X_next);
   void remove(int slot, int body) { present_[kinematic_of(body, slot)] = 0; }
@@ -73,10 +82,11 @@ class LaneEngine {
   }
   /// Some number of the slot is not finite or some speed beyond 1e4.
   bool diverged(int slot) const;
-  /// With the objects after it and with what is not an object.
+  /// With the objects after it and with what is not an object; of what is asleep those that it fell asleep with.
   std::span<const LaneContact> contacts(int slot, int object) {
-    return {state_.contacts(state_.at(object, slot)),
-            static_cast<std::size_t>(state_.contact_count[place_of(object, slot)])};
+    if (motion(slot, object) != LaneMotion::kAsleep) return found(slot, object);
+    const std::size_t place = place_of(object, slot);
+    return {footings_.data() + place * kMostFooting, static_cast<std::size_t>(footing_counts_[place])};
   }
 
   /// Contacts of an object that the step had no room for.
@@ -103,11 +113,23 @@ class LaneEngine {
   std::size_t kinematic_of(int body, int slot) const {
     return static_cast<std::size_t>(state_.at(body - objects(), slot));
   }
+  /// The contacts of this step.
+  std::span<const LaneContact> found(int slot, int object) {
+    return {state_.contacts(state_.at(object, slot)),
+            static_cast<std::size_t>(state_.contact_count[place_of(object, slot)])};
+  }
   void set_pose(int slot, int object, const geometry::Pose& X_WO);
   void set_motion(int slot, int object, LaneMotion motion);
   void guide(std::span<const std::uint8_t> wanted);
   void fly_all(std::span<const std::uint8_t> wanted);
   void touch_all(std::span<const std::uint8_t> wanted);
+  void fly_and_touch(std::span<const std::uint8_t> wanted);
+  void forget_contacts(int slot);
+  bool wake(std::span<const std::uint8_t> wanted);
+  void keep_places(std::span<const std::uint8_t> wanted);
+  void copy_footing(std::size_t from, std::size_t to);
+  void save_footing(std::size_t place, ObjectSlot& out) const;
+  void restore_footing(std::size_t place, const ObjectSlot& in);
   void end_part(std::span<const std::uint8_t> wanted);
   // Split steps: lane_impacts.cc.
   bool may_split(int slot) const;
@@ -127,6 +149,9 @@ class LaneEngine {
   LaneState state_;
   std::vector<Moved> moved_;           // by object
   std::vector<std::uint8_t> present_;  // of kinematic bodies
+  std::vector<int> footing_counts_;    // by object, of several
+  std::vector<LaneContact> footings_;  // kMostFooting by object
+  std::vector<std::uint8_t> woken_;
   LanePairs pairs_;
   SolverScratch scratch_;
   SphereScratch spheres_;

@@ -33,7 +33,7 @@ int LaneEngine::parts_to_impact(int slot, int left) {
   double first = std::numeric_limits<double>::infinity();
   for (int object = 0; object < objects(); ++object) {
     const int at = state_.at(object, slot);
-    const auto contacts = this->contacts(slot, object);
+    const auto contacts = found(slot, object);
     if (contacts.empty()) continue;
     const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
     const Vector3d v = row_at(state_.v, at), w = row_at(state_.w, at);
@@ -102,7 +102,7 @@ void LaneEngine::split(std::span<const std::uint8_t> wanted) {
 void LaneEngine::keep_pressed(int slot) {
   for (int object = 0; object < objects(); ++object) {
     const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
-    for (const LaneContact& c : contacts(slot, object))
+    for (const LaneContact& c : found(slot, object))
       if (c.impulse > 0) pressed_.push_back({slot, object, c, R * vector_of(c.position), R * vector_of(c.normal)});
   }
 }
@@ -149,11 +149,10 @@ void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
       any = true;
       keep_pressed(slot);
       set_share(slot, left_[i]);
-      for (int object = 0; object < objects(); ++object) state_.contact_count[place_of(object, slot)] = 0;
+      forget_contacts(slot);
     }
     if (!any) break;
-    fly_all(going_);
-    touch_all(going_);
+    fly_and_touch(going_);
   }
   give_back_pressed();
   for (int object = 0; object < objects(); ++object) measure(scene_->lanes, object, count, state_);

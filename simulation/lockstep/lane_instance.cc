@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "lane_rest.h"
+
 namespace prescene::simulation {
 
 using geometry::Pose;
@@ -80,11 +82,17 @@ void LaneInstance::before_step(LaneEngine& engine, int slot) {
   settled_ = over();
 }
 
-void LaneInstance::after_step(const LaneEngine& engine, int slot) {
+void LaneInstance::after_step(LaneEngine& engine, int slot) {
   ++steps_;
+  const bool may_sleep = engine.objects() > 1 && over();
   for (int i = 0; i < engine.objects(); ++i) {
     int& calm = calm_steps_[static_cast<std::size_t>(i)];
+    if (engine.motion(slot, i) == LaneMotion::kAsleep) {
+      ++calm;
+      continue;
+    }
     calm = engine.free(slot, i) && engine.energy(slot, i) < scene_->options.rest.energy ? calm + 1 : 0;
+    if (may_sleep && calm > 0 && calm >= rest_steps_ && lies_still(engine, slot, i)) engine.fall_asleep(slot, i);
   }
 }
 

@@ -20,8 +20,8 @@ class LaneInstance {
              const core::RandomStream& stream);
   /// What is to be done before LaneEngine::find_contacts: actions, and what they and timelines move.
   void before_step(LaneEngine& engine, int slot);
-  /// After LaneEngine::advance.
-  void after_step(const LaneEngine& engine, int slot);
+  /// After LaneEngine::advance. Of several objects, those that are at rest fall asleep.
+  void after_step(LaneEngine& engine, int slot);
   /// Goes on by up to `most` steps at once in which everything is held and nothing is due; returns how many.
   std::int64_t skip_held(LaneEngine& engine, int slot, std::int64_t most);
 

@@ -44,6 +44,18 @@ LaneFooting footing_of(LaneEngine& engine, int slot, int object) {
   return footing;
 }
 
+bool lies_still(LaneEngine& engine, int slot, int object) {
+  if (engine.velocity(slot, object).norm() > kCreepSpeed) return false;
+  // What is near another object would be woken in the next step.
+  for (int first = 0; first <= object; ++first) {
+    for (const LaneContact& c : engine.contacts(slot, first)) {
+      const int other = engine.scene().lanes.parts[static_cast<std::size_t>(c.part)].body;
+      if (first == object ? other >= 0 && other < engine.objects() : other == object) return false;
+    }
+  }
+  return footing_of(engine, slot, object).firm;
+}
+
 bool NudgeTest::slides(LaneEngine& engine, int slot) const {
   for (int object = 0; object < engine.objects(); ++object)
     if (engine.free(slot, object) && engine.velocity(slot, object).norm() > kCreepSpeed &&

@@ -13,6 +13,9 @@ struct LaneFooting {
   double height = 0.0;  ///< Of the centre of mass above the lowest contact.
 };
 LaneFooting footing_of(LaneEngine& engine, int slot, int object);
+/// Whether a free object that has been calm for long enough is at rest whatever the others do: it stands firmly on
+/// fixed bodies and does not slide. After LaneEngine::advance.
+bool lies_still(LaneEngine& engine, int slot, int object);
 
 /// Turns the objects of a slot that do not stand firmly, one after the other, a little about four horizontal axes, and
 /// watches each time whether something turns on.

@@ -16,7 +16,7 @@
 namespace prescene::simulation {
 namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 0x4c4b0003;
+constexpr std::uint32_t kSnapshotVersion = 0x4c4b0004;
 
 core::Status wrong_snapshot() {
   return core::invalid_input(
@@ -113,6 +113,8 @@ class LockstepInstance : public Instance {
     bool sound = true;
     const auto parts = static_cast<std::int32_t>(scene_->lanes.parts.size());
     for (ObjectSlot& object : slot) sound = sound && read(in, parts, scene_->lanes.room(), object);
+    // A single object never falls asleep.
+    sound = sound && (slot.size() > 1 || slot.empty() || slot.front().motion != LaneMotion::kAsleep);
     if (!sound || !in.ok()) return wrong_snapshot();
     const Snapshot now = save();
     std::swap(start_, start);
@@ -146,6 +148,15 @@ class LockstepInstance : public Instance {
       out.value(object.warm[i].upward);
       out.value(object.warm[i].part);
     }
+    out.value(object.footing_count);
+    for (int i = 0; i < object.footing_count; ++i) {
+      all(object.footing[i].position);
+      all(object.footing[i].normal);
+      out.value(object.footing[i].gap);
+      out.value(object.footing[i].part);
+      out.value(object.footing[i].impulse);
+      out.value(object.footing[i].hit);
+    }
   }
 
   static bool read(ByteReader& in, std::int32_t parts, int room, ObjectSlot& object) {
@@ -159,7 +170,7 @@ class LockstepInstance : public Instance {
     object.motion = in.value<LaneMotion>();
     object.parting = in.value<std::uint64_t>();
     object.warm_count = in.value<int>();
-    if (object.motion > LaneMotion::kFrozen || object.warm_count < 0 || object.warm_count > room) return false;
+    if (object.motion > LaneMotion::kAsleep || object.warm_count < 0 || object.warm_count > room) return false;
     for (int i = 0; i < object.warm_count; ++i) {
       all(object.warm[i].position);
       object.warm[i].impulse = in.value<Real>();
@@ -167,6 +178,19 @@ class LockstepInstance : public Instance {
       object.warm[i].upward = in.value<Real>();
       object.warm[i].part = in.value<std::int32_t>();
       if (object.warm[i].part < 0 || object.warm[i].part >= parts) return false;
+    }
+    object.footing_count = in.value<int>();
+    if (object.footing_count < 0 || object.footing_count > kMostFooting) return false;
+    for (int i = 0; i < object.footing_count; ++i) {
+      LaneContact& c = object.footing[i];
+      c = LaneContact{};
+      all(c.position);
+      all(c.normal);
+      c.gap = in.value<Real>();
+      c.part = in.value<std::int32_t>();
+      c.impulse = in.value<Real>();
+      c.hit = in.value<std::int32_t>();
+      if (c.part < 0 || c.part >= parts) return false;
     }
     return true;
   }
