@@ -19,7 +19,7 @@ using core::Status;
 
 // Headers in use have some dozens; each element and property is kept.
 constexpr std::size_t kMaxHeaderLines = 10'000;
-// Of the full range: rounding that a colour may have beyond it.
+// Rounding that a floating-point colour may have beyond its range of 0 to 1.
 constexpr double kColorExcess = 0.01;
 
 enum class Type { kI8, kU8, kI16, kU16, kI32, kU32, kF32, kF64 };
@@ -337,7 +337,8 @@ class Body {
       for (std::size_t c = 0; c < 3; ++c) {
         const Type type = element.properties[*where[3 + c]].type;
         const double value = values[*where[3 + c]], full = full_channel(type);
-        if (!(value >= -kColorExcess * full && value <= (1.0 + kColorExcess) * full)) return bad_color(value, full);
+        const double excess = full == 1.0 ? kColorExcess : 0.0;
+        if (!(value >= -excess && value <= full + excess)) return bad_color(value, full);
         is_dark_ &= type == Type::kU16 && value <= 255.0;
         color[c] = static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(value / full, 0.0, 1.0)));
       }

@@ -187,7 +187,7 @@ TEST(Ply, KeepsColoursThroughRepair) {
       "red\n"
       "property float green\nproperty float blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
   const auto mesh = decode_text(MeshFormat::kPly,
-                                head + "9 9 9 0 0 0\n0 0 0 1 0 0\n1 0 0 0 0.5 0\n0 0 0 0 0 1\n0 1 0 0 0 2\n3 1 2 4\n");
+                                head + "9 9 9 0 0 0\n0 0 0 1 0 0\n1 0 0 0 0.5 0\n0 0 0 0 0 1\n0 1 0 0 0 1\n3 1 2 4\n");
   ASSERT_TRUE(mesh.ok()) << mesh.status().message();
   ASSERT_EQ(mesh->mesh.vertices.size(), 3U);
   ASSERT_EQ(mesh->colors.size(), 3U);
