@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "db3_rows.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -78,7 +79,9 @@ struct Db3Reader::Impl {
   int checks = 0;  // of the work for the present row
 
   Database database;
-  Statement order;    ///< Rows of the messages in the order of time; only their keys are sorted.
+  Statement order;  ///< Rows of the messages in the order of time; only their keys are sorted. Not to salvage.
+  Db3Rows found;    ///< To salvage: the same, of what can be read.
+  std::size_t next_found = 0;
   Statement message;  ///< One of them.
   std::vector<McapChannel> channels;
   std::map<std::int64_t, int> channel_of_topic;
@@ -86,7 +89,6 @@ struct Db3Reader::Impl {
   std::set<std::string> other_formats;
   std::uint64_t damaged = 0, stray = 0, in_other_formats = 0;
   bool ended = false;
-  bool ended_early = false;
 
   Status open_database();
   Status check_table(const char* name, std::initializer_list<const char*> columns);
@@ -95,7 +97,9 @@ struct Db3Reader::Impl {
   /// True: there is a row; false: the end.
   Result<bool> step(sqlite3_stmt* statement);
   Status failure(const std::string& what) const;
-  Result<bool> read_message(std::int64_t row, std::int64_t time_ns, McapMessage* out);
+  /// The next in the order of time; nothing at the end.
+  Result<std::optional<Db3Row>> next_row();
+  Result<bool> read_message(const Db3Row& at, McapMessage* out);
 
   static int is_too_much(void* impl) { return ++static_cast<Impl*>(impl)->checks > kMostChecks ? 1 : 0; }
 };
@@ -224,10 +228,22 @@ Status Db3Reader::Impl::read_topics() {
   }
 }
 
+Result<std::optional<Db3Row>> Db3Reader::Impl::next_row() {
+  if (salvage) {
+    if (next_found == found.rows.size()) return std::optional<Db3Row>();
+    return std::optional<Db3Row>(found.rows[next_found++]);
+  }
+  PRESCENE_TRY(const bool more, step(order.get()));
+  if (!more) return std::optional<Db3Row>();
+  const bool has_time = sqlite3_column_type(order.get(), 1) == SQLITE_INTEGER;
+  return std::optional<Db3Row>(
+      {has_time ? sqlite3_column_int64(order.get(), 1) : -1, sqlite3_column_int64(order.get(), 0)});
+}
+
 /// False where it is left out.
-Result<bool> Db3Reader::Impl::read_message(std::int64_t row, std::int64_t time_ns, McapMessage* out) {
+Result<bool> Db3Reader::Impl::read_message(const Db3Row& at, McapMessage* out) {
   sqlite3_reset(message.get());
-  sqlite3_bind_int64(message.get(), 1, row);
+  sqlite3_bind_int64(message.get(), 1, at.row);
   PRESCENE_TRY(const bool is_there, step(message.get()));
   if (!is_there) return core::data_loss(path.string() + ": its index is damaged" + kDb3Remedy);
   if (sqlite3_column_type(message.get(), 0) != SQLITE_INTEGER) {
@@ -244,16 +260,16 @@ Result<bool> Db3Reader::Impl::read_message(std::int64_t row, std::int64_t time_n
     ++stray;
     return false;
   }
-  if (time_ns < 0) {
+  if (at.time_ns < 0) {
     return core::data_loss(path.string() + ": a message on " +
                            channels[static_cast<std::size_t>(channel->second)].topic + " has the time " +
-                           std::to_string(time_ns) + " ns; times begin with 1970" + kDb3Remedy);
+                           std::to_string(at.time_ns) + " ns; times begin with 1970" + kDb3Remedy);
   }
   const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(message.get(), 1));
   const int bytes = sqlite3_column_bytes(message.get(), 1);
   // Null for an empty blob, and where there was no memory for it.
   if (data == nullptr && sqlite3_errcode(database.get()) == SQLITE_NOMEM) return failure("a message");
-  *out = {channel->second, 0, time_ns, time_ns, {}};
+  *out = {channel->second, 0, at.time_ns, at.time_ns, {}};
   if (data != nullptr && bytes > 0) out->data.assign(data, data + bytes);
   return true;
 }
@@ -269,7 +285,12 @@ Result<std::unique_ptr<Db3Reader>> Db3Reader::open(const std::filesystem::path& 
   PRESCENE_RETURN_IF_ERROR(impl->check_table("topics", {"id", "name", "type", "serialization_format"}));
   PRESCENE_RETURN_IF_ERROR(impl->check_table("messages", {"topic_id", "timestamp", "data"}));
   PRESCENE_RETURN_IF_ERROR(impl->read_topics());
-  PRESCENE_TRY(impl->order, impl->prepare("SELECT rowid, timestamp FROM messages ORDER BY timestamp, rowid"));
+  // Sorting reads the whole table before the first row, and one damaged page would hide all.
+  if (salvage) {
+    impl->found = find_rows(impl->database.get(), &impl->checks);
+  } else {
+    PRESCENE_TRY(impl->order, impl->prepare("SELECT rowid, timestamp FROM messages ORDER BY timestamp, rowid"));
+  }
   PRESCENE_TRY(impl->message, impl->prepare("SELECT topic_id, data FROM messages WHERE rowid = ?1"));
   return std::unique_ptr<Db3Reader>(new Db3Reader(std::move(impl)));
 }
@@ -279,17 +300,11 @@ const std::vector<McapChannel>& Db3Reader::channels() const { return impl_->chan
 Result<std::optional<McapMessage>> Db3Reader::next() {
   Impl& impl = *impl_;
   while (!impl.ended) {
-    const Result<bool> more = impl.step(impl.order.get());
-    if (!more && !impl.salvage) return more.status();
-    if (!more) impl.ended_early = true;
-    if (!more || !*more) {
-      impl.ended = true;
-      break;
-    }
+    PRESCENE_TRY(const std::optional<Db3Row> row, impl.next_row());
+    impl.ended = !row;
+    if (!row) break;
     McapMessage message;
-    const bool has_time = sqlite3_column_type(impl.order.get(), 1) == SQLITE_INTEGER;
-    const Result<bool> read = impl.read_message(sqlite3_column_int64(impl.order.get(), 0),
-                                                has_time ? sqlite3_column_int64(impl.order.get(), 1) : -1, &message);
+    const Result<bool> read = impl.read_message(*row, &message);
     if (!read && !impl.salvage) return read.status();
     if (!read) ++impl.damaged;
     if (read && *read) return std::optional<McapMessage>(std::move(message));
@@ -301,7 +316,11 @@ std::string Db3Reader::loss_text() const {
   const Impl& impl = *impl_;
   std::string out;
   const auto say = [&](const std::string& sentence) { out += (out.empty() ? "" : "; ") + sentence; };
-  if (impl.ended_early) say("the file is cut or damaged: it was read to the first message that can't be found");
+  if (impl.found.damaged) {
+    say("the file is cut or damaged: pages that can't be read were passed over, with up to " +
+        std::to_string(impl.found.missing) + " messages before the last that was found");
+  }
+  if (impl.found.too_many) say("only the first " + std::to_string(impl.found.rows.size()) + " messages were looked at");
   if (impl.damaged > 0) say(std::to_string(impl.damaged) + " damaged messages were left out");
   if (impl.stray > 0) say(std::to_string(impl.stray) + " messages of unknown topics were left out");
   if (!impl.other_formats.empty()) {

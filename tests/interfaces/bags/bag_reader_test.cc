@@ -173,6 +173,42 @@ TEST_F(Bags, OddMessagesAreRefusedOrCounted) {
   EXPECT_THAT((*salvaging)->loss_text(), HasSubstr("2 damaged messages"));
 }
 
+/// Each leaf of the table of messages in turn is made unreadable by one byte, with an index of times and without one.
+TEST_F(Bags, OneDamagedPageCostsOnlyItsMessages) {
+  for (const bool has_index : {true, false}) {
+    const auto file = path(has_index ? "indexed.db3" : "plain.db3");
+    std::vector<Db3Message> messages;
+    for (int i = 0; i < 300; ++i) messages.push_back({1, 1000 + (7 * i) % 300, {static_cast<std::uint8_t>(i % 250)}});
+    tests::write_db3(file, kTopics, messages);
+    if (!has_index) tests::run_sql(file, "DROP INDEX timestamp_idx");
+    const auto whole = *read_file(file, 1 << 20);
+    int pages = 0;
+    for (std::size_t page = 512; page < whole.size(); page += 512) {
+      if (whole[page] != 0x0d) continue;  // no leaf of a table
+      auto bytes = whole;
+      bytes[page] = 0;
+      ASSERT_TRUE(write_file(file, bytes).ok());
+      if (!BagReader::open(file).ok() || failure_of(file).ok()) continue;  // of another table
+      ++pages;
+      const auto reader = BagReader::open(file, {.salvage = true});
+      ASSERT_TRUE(reader.ok()) << reader.status().message();
+      std::size_t count = 0;
+      std::int64_t before = 0;
+      for (;; ++count) {
+        const auto message = (*reader)->next();
+        ASSERT_TRUE(message.ok()) << message.status().message();
+        if (!*message) break;
+        EXPECT_GT((*message)->log_time_ns, before);
+        before = (*message)->log_time_ns;
+      }
+      EXPECT_GE(count, messages.size() - 60) << "page " << page / 512;
+      EXPECT_LT(count, messages.size());
+      EXPECT_THAT((*reader)->loss_text(), HasSubstr("the file is cut or damaged"));
+    }
+    EXPECT_GE(pages, 5);
+  }
+}
+
 TEST_F(Bags, PathsMayHoldTheSignsOfAUri) {
   const auto file = path("a?b#c%41 d.db3");
   tests::write_db3(file, kTopics, {{1, 10, {1}}});
