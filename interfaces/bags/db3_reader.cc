@@ -25,6 +25,7 @@ constexpr int kMostMessageBytes = 256 << 20;
 constexpr std::size_t kMostTopics = 65'535;   // as many as MCAP has channels
 constexpr std::size_t kMostNameBytes = 4096;  // of a topic or type; ROS allows 255
 constexpr int kCacheKib = 8 << 10;
+constexpr std::uint64_t kMostCounted = 1'000'000;  // lost messages; more come of damaged row numbers
 // SQLite asks after so many instructions of its machine whether to go on. Reading a message takes some hundred; what
 // takes a billion before the next row (minutes) is no bag.
 constexpr int kInstructionsBetweenChecks = 1'000'000;
@@ -317,8 +318,10 @@ std::string Db3Reader::loss_text() const {
   std::string out;
   const auto say = [&](const std::string& sentence) { out += (out.empty() ? "" : "; ") + sentence; };
   if (impl.found.damaged) {
-    say("the file is cut or damaged: pages that can't be read were passed over, with up to " +
-        std::to_string(impl.found.missing) + " messages before the last that was found");
+    const bool is_known = impl.found.missing < kMostCounted;
+    say("the file is cut or damaged: pages that can't be read were passed over, with " +
+        (is_known ? "up to " + std::to_string(impl.found.missing) + " messages before the last that was found"
+                  : std::string("nobody knows how many messages")));
   }
   if (impl.found.too_many) say("only the first " + std::to_string(impl.found.rows.size()) + " messages were looked at");
   if (impl.damaged > 0) say(std::to_string(impl.damaged) + " damaged messages were left out");

@@ -120,7 +120,7 @@ class RowFinder {
     // At the end of the table every further number can be looked up; a number far off is a damaged one.
     if (first_step(good) == SQLITE_ROW) {
       const std::int64_t lost = sqlite3_column_int64(from_.get(), 0) - first_bad;
-      if (lost < kMostLost) out_.missing += static_cast<std::uint64_t>(lost);
+      if (lost > 0 && lost < kMostLost) out_.missing += static_cast<std::uint64_t>(lost);
     }
     return good;
   }
