@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
+#include <string_view>
 
 #include "prescene/belief/scene.h"
 #include "prescene/belief/validation.h"
@@ -144,17 +146,31 @@ bool are_jointed(const Scene& scene, const std::string& a, const std::string& b)
 }
 
 std::vector<int> joint_order(const Scene& scene) {
-  std::vector<int> order;
-  std::vector<bool> done(scene.joints.size(), false);
-  for (bool more = true; more;) {
-    more = false;
-    for (std::size_t j = 0; j < scene.joints.size(); ++j) {
-      const std::optional<int> before = joint_of(scene, scene.joints[j].parent);
-      if (done[j] || (before && !done[static_cast<std::size_t>(*before)])) continue;
-      order.push_back(static_cast<int>(j));
-      done[j] = more = true;
+  const std::size_t count = scene.joints.size();
+  std::map<std::string_view, std::size_t> joint_of_child;
+  for (std::size_t j = 0; j < count; ++j) joint_of_child.try_emplace(scene.joints[j].child, j);
+  // In which of several passes through the joints, each of which takes those whose parents are placed.
+  constexpr int kUnknown = -1, kOpen = -2, kInLoop = -3;
+  std::vector<int> passes(count, kUnknown);
+  std::vector<std::size_t> chain;  // from a joint up to the first whose pass is known
+  for (std::size_t j = 0; j < count; ++j) {
+    std::optional<std::size_t> before = j;
+    for (chain.clear(); before && passes[*before] == kUnknown;) {
+      passes[*before] = kOpen;
+      chain.push_back(*before);
+      const auto found = joint_of_child.find(scene.joints[*before].parent);
+      before = found == joint_of_child.end() ? std::nullopt : std::optional<std::size_t>(found->second);
     }
+    const bool loops = before && (passes[*before] == kOpen || passes[*before] == kInLoop);
+    for (auto joint = chain.rbegin(); joint != chain.rend(); before = *joint++)
+      passes[*joint] = loops ? kInLoop : before ? passes[*before] + (*before > *joint ? 1 : 0) : 0;
   }
+  std::vector<int> order;
+  for (std::size_t j = 0; j < count; ++j)
+    if (passes[j] >= 0) order.push_back(static_cast<int>(j));
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return passes[static_cast<std::size_t>(a)] < passes[static_cast<std::size_t>(b)];
+  });
   return order;
 }
 
