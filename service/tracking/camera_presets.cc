@@ -67,6 +67,10 @@ std::string nothing_came_text(const InputTopics& topics, std::span<const DomainT
   const auto offered = std::find_if(there.begin(), there.end(), [&](const DomainTopic& topic) {
     return topic.name == topics.depth && topic.writers > 0;
   });
+  if (offered != there.end() && is_image_type(offered->type))
+    return text + ": the topic is there (" + short_type(offered->type) +
+           "), but no message of it came that could be used; start what publishes it, or name another topic with "
+           "--depth-topic";
   if (offered != there.end()) text += ", which is offered as " + offered->type;
   const std::vector<DomainTopic> images = image_topics(there);
   if (images.empty())

@@ -41,7 +41,11 @@ TEST(NothingCame, SaysWhatIsThere) {
   there.push_back({"/zed/zed_node/depth/depth_registered", "sensor_msgs/msg/Image", 1, 0});
   EXPECT_THAT(nothing_came_text(topics, there, "here"), HasSubstr("--camera zed has these names"));
   there.push_back({topics.depth, "sensor_msgs/msg/Image", 1, 0});
-  EXPECT_THAT(nothing_came_text(topics, there, "here"), HasSubstr("which is offered as sensor_msgs/msg/Image"));
+  EXPECT_THAT(nothing_came_text(topics, there, "here"),
+              testing::AllOf(HasSubstr(topics.depth + ": the topic is there (Image), but no message of it came"),
+                             testing::Not(HasSubstr("name the camera's"))));
+  there.back().type = "std_msgs/msg/String";
+  EXPECT_THAT(nothing_came_text(topics, there, "here"), HasSubstr("which is offered as std_msgs/msg/String"));
   std::vector<DomainTopic> many;
   for (int i = 0; i < 30; ++i) many.push_back({"/c" + std::to_string(i), "sensor_msgs/msg/Image", 1, 0});
   EXPECT_THAT(nothing_came_text(topics, many, "here"), HasSubstr("/c11 (Image) and 18 more"));
