@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "prescene/belief/scene.h"
@@ -111,6 +112,9 @@ struct ActionCheck {
   }
 };
 
+// rad, and a little for ends that were given in degrees.
+constexpr double kHalfTurn = std::numbers::pi + 1e-9;
+
 /// "0 and 0.3 m", "-90 and 0 degrees".
 std::string ends_of(const Joint& joint) {
   const bool hinge = joint.type == JointType::kHinge;
@@ -161,6 +165,12 @@ struct PredicateCheck {
     if (std::isnan(within.low) || std::isnan(within.high) || !(within.low < within.high))
       return invalid_input("the interval of the joint's position is empty: give ends in order, or one of them");
     const Joint& joint = scene.joints[static_cast<std::size_t>(*index)];
+    if (within.type == JointType::kHinge && std::isinf(joint.low) &&
+        ((std::isfinite(within.low) && std::abs(within.low) > kHalfTurn) ||
+         (std::isfinite(within.high) && std::abs(within.high) > kHalfTurn)))
+      return invalid_input("the joint '" + within.joint +
+                           "' has no limits, so its position is between -180 and 180 degrees: give ends within these, "
+                           "of an interval across 180 degrees two outcomes or any_of, or give the joint limits");
     if (within.low > joint.high || within.high < joint.low)
       return invalid_input("the joint '" + within.joint + "' never gets there, its limits are " + ends_of(joint) +
                            ": give an interval that meets them");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a valid scene may still not be meant to say.
 #include <algorithm>
+#include <array>
 
 #include "prescene/belief/validation.h"
 #include "prescene/core/text.h"
@@ -26,7 +27,60 @@ void warn_of_mass_ratios(const LocatedValue& objects, const belief::Scene& scene
   }
 }
 
+/// The part of the file that makes a thing of which a message says "KIND 'NAME': ..."; null: none is named.
+const LocatedValue* named_place(const LocatedValue& document, const std::string& message) {
+  struct Section {
+    std::string_view kind, key;
+  };
+  static constexpr std::array<Section, 7> kSections = {{{"model '", "models"},
+                                                        {"support '", "supports"},
+                                                        {"robot body '", "robot"},
+                                                        {"robot body '", "robot_description"},
+                                                        {"object '", "objects"},
+                                                        {"joint '", "joints"},
+                                                        {"outcome '", "outcomes"}}};
+  for (const Section& section : kSections) {
+    if (!message.starts_with(section.kind)) continue;
+    const LocatedValue* at = document.find(section.key);
+    if (at == nullptr) continue;
+    const std::size_t begin = section.kind.size();
+    const LocatedValue* thing = at->find(message.substr(begin, message.find('\'', begin) - begin));
+    if (thing != nullptr || section.key == "robot_description") return thing ? thing : at;
+  }
+  return nullptr;
+}
+
+/// The first joint that hangs on itself; null: none does.
+const LocatedValue* looping_joint(const LocatedValue& document, const belief::Scene& scene) {
+  const LocatedValue* joints = document.find("joints");
+  const std::vector<int> order = belief::joint_order(scene);
+  if (joints == nullptr || order.size() == scene.joints.size()) return nullptr;
+  std::vector<bool> ordered(scene.joints.size(), false);
+  for (const int j : order) ordered[static_cast<std::size_t>(j)] = true;
+  const auto first = std::find(ordered.begin(), ordered.end(), false) - ordered.begin();
+  return joints->find(scene.joints[static_cast<std::size_t>(first)].name);
+}
+
 }  // namespace
+
+void add_invalid(const FilePlace& place, std::string_view key, const core::Status& invalid, Problems& problems) {
+  const std::string& message = invalid.message();
+  const std::size_t colon = message.rfind(": ");
+  if (colon == std::string::npos)
+    problems.add(place, key, message, "correct it");
+  else
+    problems.add(place, key, message.substr(0, colon), message.substr(colon + 2));
+}
+
+void add_invalid_scene(const LocatedValue& document, const belief::Scene& scene, const core::Status& invalid,
+                       Problems& problems) {
+  const LocatedValue* at = named_place(document, invalid.message());
+  if (at == nullptr) at = looping_joint(document, scene);
+  if (at == nullptr)
+    add_invalid({document.place.file, 0, 0}, "", invalid, problems);
+  else
+    add_invalid(at->place, at->path, invalid, problems);
+}
 
 void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
   if (scene.supports.empty())

@@ -195,7 +195,7 @@ core::Result<belief::ObjectModel> model_of(const core::Result<LocatedValue>& doc
   }
   if (problems.empty())
     if (const core::Status status = belief::validate(model); !status.ok())
-      problems.add({document->place.file, 0, 0}, "model", status.message(), "correct it");
+      add_invalid(document->find("model")->place, "model", status, problems);
   if (report) *report = {problems.errors(), problems.warnings(), problems.remarks()};
   if (!problems.empty()) return problems.status();
   return model;

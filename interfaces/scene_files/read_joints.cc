@@ -151,6 +151,12 @@ class JointReader {
                     "give one of the two");
       return;
     }
+    if (hinge && has_start && std::isinf(joint_.low) && std::abs(start) > 180.0) {
+      const LocatedValue& at = *value_.find(start_key);
+      problems_.add(at.place, at.path, "the position of a hinge without limits is between -180 and 180 degrees",
+                    "give " + core::rounded_text(std::remainder(start, 360.0)) + ", or min_deg and max_deg");
+      return;
+    }
     if (zero || !readable) return;
     const double position = hinge ? geometry::kDegree * start : start;
     const Pose X_PC =

@@ -268,7 +268,7 @@ belief::Outcome read_outcome(const LocatedValue& value, const std::string& name,
   }
   if (context.problems.errors().size() == before && !outcome.object.empty())
     if (const core::Status status = belief::validate(context.scene, outcome); !status.ok())
-      context.problems.add(value.place, value.path, status.message(), "correct it");
+      add_invalid(value.place, value.path, status, context.problems);
   return outcome;
 }
 

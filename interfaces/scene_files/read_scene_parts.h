@@ -61,6 +61,11 @@ void refuse_starts(const LocatedValue& document, const belief::Scene& scene, Pro
 /// Reports children that start where their joint does not allow them to be, and warns of starts that spread across it.
 /// The scene is valid.
 void refuse_starts_off_joints(const LocatedValue& document, const belief::Scene& scene, Problems& problems);
+/// What the contract of belief refuses: of its message the part behind the last ": " is the remedy.
+void add_invalid(const FilePlace& place, std::string_view key, const core::Status& invalid, Problems& problems);
+/// The same at the line of the thing that the message begins with, as in "robot body 'hook': ...".
+void add_invalid_scene(const LocatedValue& document, const belief::Scene& scene, const core::Status& invalid,
+                       Problems& problems);
 /// Where a model's file says how its mass is spread; null: nowhere.
 struct MassPlaces {
   const LocatedValue* center = nullptr;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "prescene/core/random.h"
@@ -218,19 +219,23 @@ Vector3d read_vector(const LocatedValue& value, Problems& problems, const Number
 }
 
 Vector3d read_axis(const LocatedValue& value, Problems& problems) {
+  constexpr double kMost = std::numeric_limits<double>::max();
   if (value.kind == LocatedValue::Kind::kScalar) {
     static const std::vector<std::string> kAxes{"x", "-x", "y", "-y", "z", "-z", "+x", "+y", "+z"};
     const std::size_t index = read_word(value, problems, kAxes).value_or(4);
     if (index >= 6) return Vector3d::Unit(static_cast<int>(index) - 6);
     return (index % 2 == 0 ? 1.0 : -1.0) * Vector3d::Unit(static_cast<int>(index) / 2);
   }
-  const Vector3d axis = read_vector(value, problems, {-1e6, 1e6, "give a direction as x, -x, y, ... or [x, y, z]"});
-  if (axis.norm() < 1e-9) {
+  const Vector3d axis = read_vector(value, problems, {-kMost, kMost, "give a direction as x, -x, y, ... or [x, y, z]"});
+  if (std::abs(axis.norm() - 1.0) < 1e-12) return axis;  // keeps its bits
+  // Lengths whose squares are too small or too large for a number are lengths, too.
+  const double greatest = axis.cwiseAbs().maxCoeff();
+  if (!(greatest > 0.0)) {
     problems.add(value.place, value.path, "the axis has no direction",
                  "give x, -x, y, ... or [x, y, z] of some length");
     return Vector3d::UnitZ();
   }
-  return std::abs(axis.norm() - 1.0) < 1e-12 ? axis : Vector3d(axis.normalized());
+  return (axis / greatest).normalized();
 }
 
 namespace {

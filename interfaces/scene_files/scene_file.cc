@@ -317,7 +317,7 @@ core::Result<Scene> parse_scene(std::string_view text, const std::string& file, 
   if (problems.empty()) {
     // Everything that a person can get wrong was found above, with its line; this is the contract of belief::Scene.
     if (const core::Status status = belief::validate(scene); !status.ok())
-      problems.add({document->place.file, 0, 0}, "", status.message(), "correct it");
+      add_invalid_scene(*document, scene, status, problems);
   }
   if (problems.empty()) refuse_starts_off_joints(*document, scene, problems);
   if (problems.empty()) refuse_starts(*document, scene, problems);

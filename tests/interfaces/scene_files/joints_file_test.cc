@@ -77,6 +77,31 @@ TEST(JointsFile, AHingeIsInDegrees) {
   EXPECT_EQ(scene->outcomes.at(0).object, "lid");
 }
 
+TEST(JointsFile, AnAxisHasAnyLength) {
+  for (const char* axis : {"[1e-200, 0, 0]", "[1e300, 0, 0]", "[7, 0, 0]"}) {
+    const auto scene = parse_scene(
+        text_of(std::string("    {type: slider, parent: cabinet, child: drawer, axis: ") + axis + ", start: 0.05}\n"),
+        "s.yaml");
+    ASSERT_TRUE(scene.ok()) << axis << ": " << scene.status().message();
+    EXPECT_EQ(scene->joints.at(0).axis_P, Vector3d::UnitX()) << axis;
+  }
+  const auto across =
+      parse_scene(text_of("    {type: slider, parent: cabinet, child: drawer, axis: [1e300, 1e300, 0]}\n"), "s.yaml");
+  ASSERT_TRUE(across.ok()) << across.status().message();
+  EXPECT_LT((across->joints.at(0).axis_P - Vector3d(1, 1, 0).normalized()).norm(), 1e-15);
+}
+
+/// Its position is told within half a turn: what lies beyond never comes.
+TEST(JointsFile, AHingeWithoutLimitsHasPositionsWithinHalfATurn) {
+  const std::string hinge = "    {type: hinge, parent: drawer, child: lid, axis: y, anchor: [-0.15, 0, 0.1]";
+  EXPECT_THAT(read(text_of(hinge + ", start_deg: 200}\n")).errors,
+              AllOf(HasSubstr("s.yaml:16: joints.slide.start_deg"), HasSubstr("give -160, or min_deg and max_deg")));
+  EXPECT_EQ(read(text_of(hinge + ", start_deg: 200, min_deg: 0, max_deg: 300}\n")).errors, "");
+  EXPECT_THAT(
+      read(text_of(hinge + "}\n", "outcomes:\n  o: {joint: {name: slide, min_deg: 200, max_deg: 300}}\n")).errors,
+      AllOf(HasSubstr("s.yaml:18: outcomes.o"), HasSubstr("between -180 and 180 degrees: give ends within these")));
+}
+
 TEST(JointsFile, WhatCanNotBeIsRefusedWithItsLine) {
   const std::string at = "s.yaml:16: joints.slide.";
   EXPECT_THAT(slide_with("color: red").errors, HasSubstr(at + "color: unknown key"));
@@ -109,7 +134,8 @@ TEST(JointsFile, WhatCanNotBeIsRefusedWithItsLine) {
   EXPECT_THAT(read(text_of("    {type: slider, parent: lid, child: drawer, axis: x}\n",
                            "  again: {type: slider, parent: drawer, child: lid, axis: y}\n"))
                   .errors,
-              HasSubstr("loop"));
+              AllOf(HasSubstr("s.yaml:16: joints.slide: the joints make a loop"), HasSubstr("leave one of them out"),
+                    testing::Not(HasSubstr("correct it"))));
   EXPECT_THAT(read(text_of(kSlide + std::string("}\n"), "outcomes:\n  o: {joint: {name: slid, min: 0.1}}\n")).errors,
               HasSubstr("did you mean 'slide'"));
   EXPECT_THAT(
