@@ -174,10 +174,12 @@ core::Status validate(const BusReplayOptions& options) {
   return core::ok_status();
 }
 
-/// Robot topics only: what the recording's own service said is not said again.
+/// Robot topics only: what the recording's own service said, and what it was set to, is not said again; nor are the
+/// parameters of the robot's nodes, which no service reads.
 bool is_robots(const RecordedEntry& entry) {
   const std::string& topic = entry.message.topic;
-  return !entry.is_json && topic != kQueryTopic && topic != kAnswerTopic;
+  return !entry.is_json && topic != kQueryTopic && topic != kAnswerTopic && topic != kSettingsTopic &&
+         entry.message.type != "rcl_interfaces/msg/ParameterEvent";
 }
 
 /// The publisher of a topic; none of a type that no service of ours reads, as bags of robots have many.

@@ -112,7 +112,7 @@ void FrameHistory::add(const belief::Observation& observation, std::shared_ptr<c
   const belief::RgbdFrame& frame = observation.frame;
   const bool usable =
       frame.depth && !frame.depth->empty() && fits(*frame.depth, frame.camera) && observation.X_WC.is_finite();
-  if (!(settings_.seconds > 0.0) || !usable) return;
+  if (!(seconds_ > 0.0) || !usable) return;
   const core::TimeNs stamp_ns = observation.stamp_ns;
   {
     const std::lock_guard lock(mutex_);
@@ -132,9 +132,10 @@ void FrameHistory::add(const belief::Observation& observation, std::shared_ptr<c
   Kept kept{sampled_frame(observation, std::move(belief), settings_.width)};
   kept.bytes = bytes_of(kept.frame);
   const std::lock_guard lock(mutex_);
+  if (!(seconds_ > 0.0)) return;
   bytes_ += kept.bytes;
   kept_.push_back(std::move(kept));
-  const core::TimeNs oldest_ns = stamp_ns - core::ns_of(settings_.seconds);
+  const core::TimeNs oldest_ns = stamp_ns - core::ns_of(seconds_);
   while (kept_.size() > 1 && (kept_.front().frame.observation.stamp_ns < oldest_ns || bytes_ > settings_.most_bytes)) {
     bytes_ -= kept_.front().bytes;
     kept_.pop_front();
@@ -143,14 +144,14 @@ void FrameHistory::add(const belief::Observation& observation, std::shared_ptr<c
 }
 
 void FrameHistory::add_control(const std::string& json, core::TimeNs sent_ns) {
-  if (!(settings_.seconds > 0.0)) return;
+  if (!(seconds_ > 0.0)) return;
   const std::lock_guard lock(mutex_);
   controls_.add(json, sent_ns);
   controls_.forget(std::numeric_limits<core::TimeNs>::min(), kMostControls);  // before there is a frame
 }
 
 core::Result<PastWindow> FrameHistory::window(const belief::ExplainQuestion& question) const {
-  if (!(settings_.seconds > 0.0))
+  if (!(seconds_ > 0.0))
     return core::unavailable("no frames are kept, so that nothing can be explained: start 'serve' with --history");
   const std::lock_guard lock(mutex_);
   if (kept_.empty()) return core::unavailable("no frame was seen yet: ask again when there is something to explain");
@@ -183,6 +184,15 @@ core::Result<PastWindow> FrameHistory::window(const belief::ExplainQuestion& que
   past.to = seconds(past.window.frames.back().observation.stamp_ns);
   controls_.put_into(past.window, past.remarks);
   return past;
+}
+
+void FrameHistory::keep(double seconds) {
+  const std::lock_guard lock(mutex_);
+  seconds_ = seconds;
+  if (seconds > 0.0) return;
+  kept_.clear();
+  controls_.clear();
+  bytes_ = 0;
 }
 
 std::size_t FrameHistory::frames() const {

@@ -236,7 +236,7 @@ bool RecordingReader::is_needed_later(const interfaces::McapChannel& channel, do
   if (channel.schema.name == "tf2_msgs/msg/TFMessage")
     return before <= kTransformSeconds || channel.topic.ends_with("static");
   if (channel.schema.name == "sensor_msgs/msg/JointState") return before <= kTransformSeconds;
-  return channel.schema.name == "sensor_msgs/msg/CameraInfo";
+  return channel.schema.name == "sensor_msgs/msg/CameraInfo" || channel.topic == kSettingsTopic;
 }
 
 core::Result<std::optional<RecordedEntry>> RecordingReader::next() {

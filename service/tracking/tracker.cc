@@ -137,6 +137,13 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
       if (!is_simulated) return controls_.take_in(message, newest_ns);
       return controls_.take_in({message.topic, message.type, message.cdr, received_ns, received_ns}, newest_ns);
     }
+    if (message.topic == kSettingsTopic) {
+      PRESCENE_TRY(const auto text, decoded<interfaces::RosString>(message, "std_msgs/msg/String"));
+      PRESCENE_TRY(settings_, with_running(settings_, text.data));
+      assembler_.set_waits(settings_.assembler.max_wait_s, settings_.assembler.max_stamp_difference_s);
+      filter_.look_for_new_objects(filter_settings(settings_, *scene_).augment.new_objects);
+      return core::ok_status();
+    }
     return core::ok_status();
   };
   return take().at(message.topic);

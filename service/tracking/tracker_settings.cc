@@ -6,6 +6,7 @@
 #include <string>
 
 #include "prescene/belief/json.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
@@ -127,6 +128,22 @@ core::Result<TrackerSettings> with_recorded(TrackerSettings settings, const orde
   });
   PRESCENE_RETURN_IF_ERROR(first_bad);
   return settings;
+}
+
+std::string running_settings_text(const TrackerSettings& settings) {
+  return belief::json_text({{"max_wait_s", settings.assembler.max_wait_s},
+                            {"max_stamp_difference_s", settings.assembler.max_stamp_difference_s},
+                            {"new_objects", value_json(settings.new_objects)}});
+}
+
+core::Result<TrackerSettings> with_running(const TrackerSettings& settings, const std::string& text) {
+  constexpr std::size_t kLongest = 4096;
+  PRESCENE_TRY(const TrackerSettings read, with_recorded(settings, parse_or_discard(text, kLongest)));
+  TrackerSettings running = settings;
+  running.assembler.max_wait_s = read.assembler.max_wait_s;
+  running.assembler.max_stamp_difference_s = read.assembler.max_stamp_difference_s;
+  running.new_objects = read.new_objects;
+  return running;
 }
 
 }  // namespace prescene::service

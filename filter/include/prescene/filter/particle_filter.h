@@ -125,6 +125,9 @@ class ParticleFilter {
                  FilterSettings settings, simulation::SimulatorFactory simulators = {});
 
   const FilterSettings& settings() const { return settings_; }
+  /// Whether the next steps look for things that the scene does not name (AugmentOptions::new_objects). Those that were
+  /// found stay.
+  void look_for_new_objects(bool looks) { settings_.augment.new_objects = looks; }
   MeshCache& meshes() { return meshes_; }
 
   /// The belief before any frame: the scene's priors, step 0.

@@ -10,6 +10,7 @@
 // else has them. What is kept is bounded by time and by bytes.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <deque>
 #include <memory>
@@ -67,7 +68,7 @@ struct PastWindow {
 /// Any thread may call any of it.
 class FrameHistory {
  public:
-  explicit FrameHistory(const FrameHistorySettings& settings) : settings_(settings) {}
+  explicit FrameHistory(const FrameHistorySettings& settings) : settings_(settings), seconds_(settings.seconds) {}
 
   /// After a step; takes some ten microseconds. Where stamps go back, what was before is forgotten and a new session
   /// begins.
@@ -76,6 +77,9 @@ class FrameHistory {
   /// kUnavailable where nothing is kept, or no frame came yet; kInvalidInput for a window that is not in the history,
   /// naming what is.
   core::Result<PastWindow> window(const belief::ExplainQuestion& question) const;
+
+  /// Instead of FrameHistorySettings::seconds: what is older is forgotten with the next frame, with 0 at once.
+  void keep(double seconds);
 
   std::size_t frames() const;
   std::size_t bytes() const;
@@ -86,8 +90,9 @@ class FrameHistory {
     std::size_t bytes = 0;
   };
 
-  FrameHistorySettings settings_;
-  mutable std::mutex mutex_;  // guards all below
+  FrameHistorySettings settings_;  // but for its seconds
+  std::atomic<double> seconds_;    // changed under the lock
+  mutable std::mutex mutex_;       // guards all below
   std::deque<Kept> kept_;
   std::size_t bytes_ = 0;
   core::TimeNs first_ns_ = 0, newest_ns_ = 0;

@@ -104,8 +104,8 @@ struct RecordingReadOptions {
   bool salvage = false;    ///< As interfaces::BagReaderOptions.
   bool check_data = true;  ///< The same.
   /// Seconds since the recording's first message. Of what came before `from`, the transforms of the last 10 s, the
-  /// static ones and the camera infos are read, without which no later frame could be used; of what came after `to`,
-  /// nothing.
+  /// static ones, the camera infos and what was set while the service ran are read, without which no later frame could
+  /// be used, or not as it was; of what came after `to`, nothing.
   double from = 0.0;
   double to = std::numeric_limits<double>::infinity();
 };

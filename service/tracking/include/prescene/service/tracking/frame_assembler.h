@@ -82,6 +82,11 @@ class FrameAssembler {
   core::Status add_depth(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns);
   core::Status add_color(ColorMessage&& message, MessageIndex index, core::TimeNs received_ns);
   core::Status add_color(const interfaces::RosImage& image, MessageIndex index, core::TimeNs received_ns);
+  /// As in the settings; frames that wait now wait by it, too.
+  void set_waits(double max_wait_s, double max_stamp_difference_s) {
+    settings_.max_wait_s = max_wait_s;
+    settings_.max_stamp_difference_s = max_stamp_difference_s;
+  }
   /// How depth images are to be read.
   interfaces::ImageRules image_rules() const;
   bool uses_color() const { return settings_.use_color; }

@@ -43,8 +43,9 @@ class Tracker {
                                                        const TrackerSettings& settings, std::uint64_t seed,
                                                        Backends& backends);
 
-  /// Takes in one message of the robot; topics that nobody listens to are ignored. Numbers ascend. A message that says
-  /// something impossible is refused, and named with its topic; nothing else is lost by it.
+  /// Takes in one message of the robot, or one on kSettingsTopic, whose settings hold from the next step on; topics
+  /// that nobody listens to are ignored. Numbers ascend. A message that says something impossible is refused, and named
+  /// with its topic; nothing else is lost by it.
   core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
   /// One belief step with the newest frame that is complete at `now_ns`, or in simulated time now; empty if there is
   /// none. Where the sender's

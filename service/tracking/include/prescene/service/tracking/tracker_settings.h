@@ -38,4 +38,10 @@ nlohmann::ordered_json to_json(const TrackerSettings& settings);
 /// none, or a number that is not finite. Unknown keys are ignored: a later version may have written them.
 core::Result<TrackerSettings> with_recorded(TrackerSettings settings, const nlohmann::ordered_json& json);
 
+/// Those that may change while it tracks: max_wait_s and max_stamp_difference_s of the assembler, and new_objects, as
+/// JSON for kSettingsTopic. All of them, so that the newest such text holds alone.
+std::string running_settings_text(const TrackerSettings& settings);
+/// The settings with what such a text says of these; errors of with_recorded.
+core::Result<TrackerSettings> with_running(const TrackerSettings& settings, const std::string& text);
+
 }  // namespace prescene::service
