@@ -47,6 +47,7 @@ install(FILES packaging/prescene.service DESTINATION lib/systemd/system COMPONEN
 install(FILES packaging/service.conf DESTINATION "${CMAKE_INSTALL_DOCDIR}/examples" COMPONENT program_files)
 # The sources of a ROS package, for who calls the service /prescene/ask.
 install(DIRECTORY packaging/prescene_msgs DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
+install(PROGRAMS tools/security_keys DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
 install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files FILES_MATCHING PATTERN "*.yaml")
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation)
 install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.bib")

@@ -123,7 +123,7 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
 
 /// Of a scene file, of which nothing has been seen.
 core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& question, VerbContext& context) {
-  for (const char* name : {"--domain", "--ros-distro", "--timeout"})
+  for (const char* name : {"--domain", "--ros-distro", "--security", "--timeout"})
     if (options.verb->count(name) > 0)
       return core::invalid_input(std::string(name) + " is for asking a `serve`: leave it out, or --scene");
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));

@@ -37,6 +37,11 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
           "--ros-distro", [&dds, distros](const std::string& name) { dds.ros_distro = distros.at(name); },
           "Show up in `ros2 node list` of this release (humble or jazzy); topics work without")
       ->check(one_of({"humble", "jazzy"}));
+  group
+      ->add_option_function<std::string>(
+          "--security", [&dds](const std::string& folder) { dds.security = folder; },
+          "Folder with keys and permissions for DDS Security (docs/reference/security.md)")
+      ->check(file_name());
 }
 
 core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds) {

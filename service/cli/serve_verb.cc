@@ -68,6 +68,14 @@ core::Status run(ServeOptions& options, VerbContext& context) {
                                           belief::json_text(to_json(options.settings.tracker)), std::move(files)},
                                          kLiveRecording));
   }
+  const auto started_with = [&options](const char* name, ParameterValue value, const char* description) {
+    options.settings.started_with.push_back({name, description, std::move(value)});
+  };
+  started_with("scene", options.scene, "Scene file.");
+  started_with("record", options.record, "Recording that is written; empty = none.");
+  started_with("proposals", options.proposals, "File of `prescene train` that is used; empty = none.");
+  started_with("seed", static_cast<std::int64_t>(context.options().seed), "Seed of all random numbers.");
+  started_with("threads", std::int64_t{context.pool().threads()}, "Threads that track.");
   Backends backends(context.pool(), options.backends);
   PRESCENE_TRY(const auto view, open_view(options, scene, context));
   PRESCENE_TRY(const auto service, LiveService::create(scene, options.settings, context.options().seed, backends,

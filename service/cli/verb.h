@@ -102,7 +102,7 @@ Verb add_achieve_verb(CLI::App& app);
 Verb add_doctor_verb(CLI::App& app);
 Verb add_demo_verb(CLI::App& app);
 
-/// --domain and --ros-distro.
+/// --domain, --ros-distro and --security.
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 /// The domain that ROS_DOMAIN_ID names, unless one was given; to be called by what joins the bus. kInvalidInput where
 /// the variable holds none.

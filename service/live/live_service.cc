@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "parameter_services.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/bytes/kept_file.h"
@@ -21,6 +22,7 @@
 #include "prescene/service/live/service_health.h"
 #include "prescene/service/tracking/camera_presets.h"
 #include "service_calls.h"
+#include "service_parameters.h"
 
 namespace prescene::service {
 namespace {
@@ -53,19 +55,20 @@ std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
           {topics.clock, {.messages = 4, .bytes = kMiB}}};
 }
 
-/// True at most `rate` times a second.
+/// True at most `rate` times a second; the rate may be set from any thread.
 class RateLimit {
  public:
-  explicit RateLimit(double rate) : interval_(std::chrono::duration<double>(1.0 / rate)) {}
+  explicit RateLimit(double rate) : interval_s_(1.0 / rate) {}
+  void set_rate(double rate) { interval_s_ = 1.0 / rate; }
   bool due() {
     const auto now = steady_clock::now();
-    if (last_ && now - *last_ < interval_) return false;
+    if (last_ && now - *last_ < std::chrono::duration<double>(interval_s_)) return false;
     last_ = now;
     return true;
   }
 
  private:
-  std::chrono::duration<double> interval_;
+  std::atomic<double> interval_s_;
   std::optional<steady_clock::time_point> last_;
 };
 
@@ -84,7 +87,7 @@ struct LiveService::Impl {
         settings(a_settings),
         tracker(std::move(a_tracker)),
         recording(std::move(a_recording)),
-        log_limiter(std::move(a_log), {}),
+        log_limiter(of_level(std::move(a_log)), {}),
         log(log_limiter.sink()),
         meshes(marker_meshes(*scene)),
         inbox(inbox_limits(settings.tracker.topics)),
@@ -97,6 +100,13 @@ struct LiveService::Impl {
   }
 
   core::Status join_bus();
+  /// Passes on the lines that matter enough.
+  core::LogSink of_level(core::LogSink to) {
+    return [this, to = std::move(to)](core::LogLevel level, const std::string& text) {
+      if (level >= log_level) core::log(to, level, text);
+    };
+  }
+  ParameterHooks parameter_hooks();
   /// Takes in what came, in its order, and looks after frames in between.
   void take_in(std::vector<ReceivedMessage> messages, const core::Cancellation& cancellation);
   void take_in(ReceivedMessage& message);
@@ -145,6 +155,7 @@ struct LiveService::Impl {
   std::unique_ptr<Tracker> tracker;
   std::unique_ptr<RecordingWriter> recording;
   core::Status recording_status;
+  std::atomic<core::LogLevel> log_level{core::LogLevel::kInfo};
   LogLimiter log_limiter;
   core::LogSink log;
   MarkerMeshes meshes;
@@ -196,8 +207,13 @@ struct LiveService::Impl {
   std::vector<interfaces::ServiceRequest> saves;  // that wait for the disk
   ServiceHealth last_reported;
 
+  TrackerSettings running;       // as the parameters say it is to be; guarded by their table's lock
+  bool running_changed = false;  // the same
+  std::unique_ptr<ParameterTable> parameters;
+
   // Last, so that their threads end before what they use.
   std::unique_ptr<interfaces::DdsNode> node;
+  std::unique_ptr<ParameterServices> parameter_services;
   std::unique_ptr<ServiceCalls> calls;
   std::unique_ptr<HistoryKeeper> history;
   std::unique_ptr<QueryWorker> worker;
@@ -248,8 +264,39 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   impl->worker = std::make_unique<QueryWorker>(
       backends, std::max(1, backends.pool().threads() - 1), impl->settings.worker,
       [raw] { return raw->tracker->belief(); }, on_answer);
+  impl->running = settings.tracker;
+  impl->parameters = std::make_unique<ParameterTable>(
+      service_parameters(*impl->scene, impl->settings, impl->parameter_hooks()), [raw] {
+        // In its place between the robot's messages, so that a recording is replayed to the same bits.
+        if (std::exchange(raw->running_changed, false))
+          raw->put_text(kSettingsTopic, running_settings_text(raw->running));
+      });
+  impl->parameter_services =
+      std::make_unique<ParameterServices>(*impl->node, *impl->parameters, settings.dds.node_name, impl->log);
   PRESCENE_RETURN_IF_ERROR(impl->join_bus());
   return std::unique_ptr<LiveService>(new LiveService(std::move(impl)));
+}
+
+ParameterHooks LiveService::Impl::parameter_hooks() {
+  ParameterHooks hooks;
+  hooks.question_seconds = [this](double seconds) { worker->set_default_seconds(seconds); };
+  hooks.most_question_seconds = [this](double seconds) { worker->set_most_seconds(seconds); };
+  hooks.history = [this](double seconds) { frames.keep(seconds); };
+  hooks.marker_rate = [this](double rate) { marker_limit.set_rate(rate); };
+  hooks.diagnostics_rate = [this](double rate) { diagnostics_limit.set_rate(rate); };
+  hooks.learned_interval = [this](double seconds) { learned_limit.set_rate(1.0 / seconds); };
+  hooks.log_level = [this](core::LogLevel level) { log_level = level; };
+  const auto of_tracker = [this](auto change) {
+    return [this, change](auto value) {
+      change(running, value);
+      running_changed = true;
+    };
+  };
+  hooks.max_wait = of_tracker([](TrackerSettings& to, double seconds) { to.assembler.max_wait_s = seconds; });
+  hooks.max_stamp_difference =
+      of_tracker([](TrackerSettings& to, double seconds) { to.assembler.max_stamp_difference_s = seconds; });
+  hooks.new_objects = of_tracker([](TrackerSettings& to, bool looks) { to.new_objects = looks; });
+  return hooks;
 }
 
 core::Status LiveService::Impl::join_bus() {
@@ -277,6 +324,7 @@ core::Status LiveService::Impl::join_bus() {
     inbox.put(std::move(message));  // for the recording; an exception of it is the node's to count
   };
   PRESCENE_RETURN_IF_ERROR(calls->offer());
+  PRESCENE_RETURN_IF_ERROR(parameter_services->offer());
   for (const BusTopic& topic : bus_topics(settings.tracker.topics)) {
     if (topic.name == kAnswerTopic) continue;  // ours
     const auto& take = topic.name == kQueryTopic ? deliver_question : deliver;

@@ -29,10 +29,10 @@ core::Cancellation::Clock::time_point deadline_after(double seconds) {
 }
 
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
-void bound_effort(belief::Query& query, const QueryWorkerSettings& settings) {
-  const auto bound = [&settings](belief::Effort& effort) {
+void bound_effort(belief::Query& query, double default_seconds, double most_seconds) {
+  const auto bound = [=](belief::Effort& effort) {
     if (!effort.exact_instances)
-      effort.max_seconds = std::min(effort.max_seconds.value_or(settings.default_seconds), settings.most_seconds);
+      effort.max_seconds = std::min(effort.max_seconds.value_or(default_seconds), most_seconds);
   };
   if (auto* predict = std::get_if<belief::PredictQuery>(&query.what)) bound(predict->effort);
   if (auto* stability = std::get_if<belief::StabilityQuery>(&query.what)) bound(stability->effort);
@@ -71,6 +71,8 @@ QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSetti
     : backends_(backends),
       pool_(threads),
       settings_(settings),
+      default_seconds_(settings.default_seconds),
+      most_seconds_(settings.most_seconds),
       snapshot_(std::move(snapshot)),
       on_answer_(std::move(on_answer)),
       reader_([this] { read_questions(); }) {
@@ -183,7 +185,7 @@ void QueryWorker::read(const std::string& question_json) {
       if (!read) return refuse(id_of(question_json), read.status());
       const bool at_once = std::holds_alternative<belief::WhereQuery>(read->what) ||
                            std::holds_alternative<belief::TimelineQuery>(read->what);
-      if (!at_once) bound_effort(*read, settings_);
+      if (!at_once) bound_effort(*read, default_seconds_, most_seconds_);
       question = std::make_shared<const Question>(*std::move(read));
       if (at_once) return answer(*question);
     }
@@ -252,9 +254,10 @@ void QueryWorker::answer(const Question& question) {
 
 QueryWorker::Reply QueryWorker::reply_to(const Question& question) {
   queries::QueryContext context = backends_.query_context(pool_);
-  const core::Cancellation end(stop_, deadline_after(settings_.most_seconds + kRestSeconds));
+  const double most_seconds = most_seconds_;
+  const core::Cancellation end(stop_, deadline_after(most_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
-  context.simulate_until = deadline_after(settings_.most_seconds);
+  context.simulate_until = deadline_after(most_seconds);
   context.most_bytes = settings_.most_bytes;
   context.timeline = settings_.timeline;
   return std::visit([&](const auto& one) { return reply_to(one, context); }, question);

@@ -2,7 +2,8 @@
 // The live service: listens on the bus, steps the belief, publishes it, answers questions, and records what happened.
 //
 // One thread owns the belief and steps it; the bus has its own; questions are answered by two more from snapshots, so
-// that a slow question never delays a frame. Only the newest frame is used, and skipped ones are counted. Whatever is
+// that a slow question never delays a frame. What may be set while it runs are parameters of its node, as ROS's nodes
+// have them. Only the newest frame is used, and skipped ones are counted. Whatever is
 // lost, refused or left out on the way is counted and stands in /diagnostics (ServiceHealth); the log is limited in its
 // rate.
 #pragma once
@@ -12,10 +13,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "prescene/core/progress.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/service/live/history_keeper.h"
+#include "prescene/service/live/node_parameters.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/recording/frame_history.h"
 #include "prescene/service/recording/recording.h"
@@ -43,6 +46,9 @@ struct LiveSettings {
   /// since, every `learned_interval` s. Empty = nowhere.
   std::filesystem::path learned_file;
   double learned_interval = 10.0;
+  /// What else the service was started with (scene file, seed, ...), to be read as parameters of its node beside those
+  /// that stand here.
+  std::vector<NodeParameter> started_with = {};
 };
 
 class LiveService {

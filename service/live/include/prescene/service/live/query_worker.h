@@ -85,6 +85,11 @@ class QueryWorker {
 
   QueryCounts counts() const;
 
+  /// Instead of QueryWorkerSettings::default_seconds and most_seconds, for questions that are read, or begun, from now
+  /// on. From any thread.
+  void set_default_seconds(double seconds) { default_seconds_ = seconds; }
+  void set_most_seconds(double seconds) { most_seconds_ = seconds; }
+
   /// The stamp of the session's first frame, from which answers to `where` count "learned_s"; they do without before.
   /// From any thread.
   void begin_session(core::TimeNs first_frame_ns) { session_begin_ns_ = first_frame_ns; }
@@ -118,7 +123,8 @@ class QueryWorker {
 
   Backends& backends_;
   core::ThreadPool pool_;
-  QueryWorkerSettings settings_;
+  QueryWorkerSettings settings_;  // but for its seconds
+  std::atomic<double> default_seconds_, most_seconds_;
   std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
   AnswerSink on_answer_;
   core::Cancellation stop_;
