@@ -5,7 +5,8 @@
 //   bench_filter [--all] [--only=PART] [--seed=N] [--sequences=N] [--benchmark_out=PATH]
 //
 // --all: as many seeds, frames and rooms as the targets ask for, which takes hours. --seed: the first seed (301).
-// --sequences: of each kind of the simulated suite (2). --only: memory, cost, physics, tracking or finding alone.
+// --sequences: of each kind of the simulated suite (2). --only: memory, cost, physics, tracking or finding alone, or
+// worlds, which is not among the others: particles that are worlds against independent ones where objects touch.
 #include <algorithm>
 #include <cstdio>
 #include <string>
@@ -14,6 +15,7 @@
 
 #include "benchmarks/arguments.h"
 #include "benchmarks/filter_targets.h"
+#include "benchmarks/filter_worlds.h"
 #include "prescene/core/clock.h"
 #include "tests/support/paths.h"
 
@@ -46,6 +48,11 @@ int run(const FilterOptions& arguments) {
       part("tracking",
            [&] { return add_tracking_targets(effort, tests::data_dir("carried_cube"), threads, &report); }) &&
       part("finding", [&] { return add_finding_targets(effort, tests::data_dir("ycb_video"), threads, &report); });
+  if (arguments.only == "worlds") {
+    const Table worlds = worlds_table(effort.seed, effort.sequences, threads);
+    std::fputs(text_of(worlds).c_str(), stdout);
+    report.add(worlds);
+  }
   std::fputs(report.text().c_str(), stdout);
   const int written = report.finish(arguments.out);
   return good ? written : 1;
@@ -59,7 +66,7 @@ int main(int count, char** words) {
   int seed = static_cast<int>(options.effort.seed);
   prescene::benchmarks::Arguments arguments;
   arguments.flag("all", [&] { options.effort = prescene::benchmarks::whole_filter_effort(); });
-  arguments.one_of("only", {"memory", "cost", "physics", "tracking", "finding"}, &options.only);
+  arguments.one_of("only", {"memory", "cost", "physics", "tracking", "finding", "worlds"}, &options.only);
   arguments.number("seed", 1, 1e9, &seed);
   arguments.number("sequences", 1, 1000, &options.effort.sequences);
   arguments.text("benchmark_out", "PATH", &options.out);

@@ -2,6 +2,7 @@
 #include "prescene/filter/operators/worlds.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -73,6 +74,29 @@ std::vector<std::size_t> kinds_of(const Belief& belief, const Island& island) {
   return kinds;
 }
 
+/// Scales the worlds' weights until each member's turns weigh what its own evidence says (iterative proportional
+/// fitting [Deming and Stephan 1940]). A turn that few worlds have would else weigh what chance says of the other
+/// members in those.
+void fit_turns(const std::vector<std::vector<std::size_t>>& turns, const std::vector<std::vector<double>>& own,
+               std::vector<double>& log_weights) {
+  constexpr int kSweeps = 3;
+  const auto sums_of = [](const std::vector<std::size_t>& turn_of, const std::vector<double>& logs) {
+    std::vector<std::vector<double>> parts(1 + *std::max_element(turn_of.begin(), turn_of.end()));
+    for (std::size_t i = 0; i < logs.size(); ++i) parts[turn_of[i]].push_back(logs[i]);
+    std::vector<double> sums;
+    for (const std::vector<double>& part : parts) sums.push_back(log_sum_of(part));
+    return sums;
+  };
+  for (int sweep = 0; sweep < kSweeps; ++sweep)
+    for (std::size_t m = 0; m < turns.size(); ++m) {
+      const std::vector<double> wanted = sums_of(turns[m], own[m]), is = sums_of(turns[m], log_weights);
+      for (std::size_t i = 0; i < log_weights.size(); ++i) {
+        const double change = wanted[turns[m][i]] - is[turns[m][i]];
+        if (std::isfinite(change)) log_weights[i] += change;
+      }
+    }
+}
+
 }  // namespace
 
 struct TouchTest::Memory {
@@ -109,11 +133,11 @@ const SphereTree* TouchTest::tree_of(const belief::ObjectModel& model, core::Thr
 }
 
 bool TouchTest::may_touch(const Belief& belief, std::size_t a, std::size_t b, double reach, core::ThreadPool& threads) {
-  const std::size_t objects[] = {a, b};
-  collision::UncertainPose poses[2];
-  Vector3d centres[2];
+  const std::array<std::size_t, 2> objects = {a, b};
+  std::array<collision::UncertainPose, 2> poses;
+  std::array<Vector3d, 2> centres;
   double apart = reach;
-  for (int i = 0; i < 2; ++i) {
+  for (std::size_t i = 0; i < 2; ++i) {
     const ObjectBelief& object = belief.objects[objects[i]];
     const belief::ObjectEstimate estimate = belief::estimate(belief, object);
     poses[i] = {estimate.mean, estimate.covariance.topLeftCorner<6, 6>()};
@@ -122,7 +146,8 @@ bool TouchTest::may_touch(const Belief& belief, std::size_t a, std::size_t b, do
              kFarOff * std::sqrt(std::max(0.0, poses[i].covariance.bottomRightCorner<3, 3>().trace()));
   }
   if ((centres[0] - centres[1]).norm() > apart) return false;
-  const SphereTree* trees[] = {tree_of(model_at(belief, a), threads), tree_of(model_at(belief, b), threads)};
+  const std::array<const SphereTree*, 2> trees = {tree_of(model_at(belief, a), threads),
+                                                  tree_of(model_at(belief, b), threads)};
   if (trees[0] == nullptr || trees[1] == nullptr) return true;
   // Spheres leave corners out, and within `reach` is near enough: as if places were known that much less well.
   auto between = RelativeUncertainty::make(poses[0], poses[1]);
@@ -202,13 +227,18 @@ std::vector<double> world_weights(const Belief& belief, const Island& island) {
 
 bool combine_weights(const Island& island, const std::vector<double>& before, Belief& belief) {
   std::vector<double> after = before;
+  std::vector<std::vector<std::size_t>> turns;
+  std::vector<std::vector<double>> own;
   for (const std::size_t member : island) {
     const std::vector<Particle>& particles = belief.objects[member].particles;
     PRESCENE_CHECK(particles.size() == before.size());
+    turns.push_back(turn_numbers(particles, model_at(belief, member).symmetry));
+    own.push_back(world_weights(belief, {member}));
     // What had no weight keeps none, whatever is said of it.
     for (std::size_t i = 0; i < after.size(); ++i)
       after[i] = std::isfinite(before[i]) ? after[i] + (particles[i].log_weight - before[i]) : before[i];
   }
+  fit_turns(turns, own, after);
   bool possible = true;
   for (const std::size_t member : island) {
     std::vector<Particle>& particles = belief.objects[member].particles;
