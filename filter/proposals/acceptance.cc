@@ -19,7 +19,8 @@ constexpr double kLowestPoints = 0.01;      // m above an object's lowest point:
 constexpr double kHopelessLogRatio = 20.0;  // nats
 constexpr double kHopelessHits = 0.5;
 constexpr double kHopelessVisible = 0.15;
-// Candidates of one cluster and model that are so near and explain so much the same are one.
+
+constexpr std::size_t kComparedCorners = 16;
 constexpr double kSamePlace = 0.012;  // m
 
 /// Whether an object at X_WO has a surface right under it, or reaches a little below one: somewhere between the middle
@@ -61,9 +62,21 @@ geometry::Box box_about(const SearchTarget& target, const Pose& X_CO) {
   return box;
 }
 
-bool is_same_box(const geometry::Box& a, const geometry::Box& b) {
-  return (a.min() - b.min()).cwiseAbs().maxCoeff() < kSamePlace &&
-         (a.max() - b.max()).cwiseAbs().maxCoeff() < kSamePlace;
+bool is_same_place(const SearchTarget& target, const Pose& a_CO, const Pose& b_CO, const geometry::Box& a_box,
+                   const geometry::Box& b_box) {
+  if ((a_box.min() - b_box.min()).cwiseAbs().maxCoeff() > kSamePlace ||
+      (a_box.max() - b_box.max()).cwiseAbs().maxCoeff() > kSamePlace)
+    return false;
+  const auto& vertices = target.mesh->vertices;
+  const std::size_t stride = 1 + vertices.size() / kComparedCorners;
+  const Pose X_BA = b_CO.inverse() * a_CO;
+  for (std::size_t i = 0; i < vertices.size(); i += stride) {
+    const Vector3d corner = X_BA * vertices[i].cast<double>();
+    if (std::none_of(vertices.begin(), vertices.end(),
+                     [&](const auto& v) { return (v.template cast<double>() - corner).norm() < kSamePlace; }))
+      return false;
+  }
+  return true;
 }
 
 bool hopeless(const rendering::PoseEvidence& e) {

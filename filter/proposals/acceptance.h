@@ -14,10 +14,12 @@ namespace prescene::filter {
 /// m that a pose may reach into a support: planes and meshes are off by 15 mm.
 inline constexpr double kMostSinking = 0.03;
 
+/// Whether two poses of a target show the same shape at the same place: corners of the one are near corners of the
+/// other, and the boxes along C's axes about them (box_about) are the same.
+bool is_same_place(const SearchTarget& target, const Pose& a_CO, const Pose& b_CO, const geometry::Box& a_box,
+                   const geometry::Box& b_box);
 /// The box along C's axes about an object at X_CO.
 geometry::Box box_about(const SearchTarget& target, const Pose& X_CO);
-/// Whether two poses that look alike are one: turns that a model does not show have one box.
-bool is_same_box(const geometry::Box& a, const geometry::Box& b);
 /// What need not be judged.
 bool hopeless(const rendering::PoseEvidence& e);
 

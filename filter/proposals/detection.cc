@@ -31,7 +31,7 @@ constexpr int kOtherStarts = 24;    // ... and random ones beside them
 constexpr RefineOptions kFineRefine = {.steps = 6, .first_gate = 0.02, .last_gate = 0.008};
 // Where a learned judge decides, only what is hopeless is not shown to it.
 constexpr int kKeptForJudge = 6;
-constexpr double kSameShare = 0.04;  // of the log ratio; a bowl upside down has the same box, too
+constexpr double kSameShare = 0.15;  // of the log ratio
 
 /// The best of each group of candidates that are one, best first: turns that look alike have one box about them.
 void keep_distinct(const SearchTarget& target, std::size_t most, std::vector<PoseCandidate>& candidates) {
@@ -42,8 +42,9 @@ void keep_distinct(const SearchTarget& target, std::size_t most, std::vector<Pos
     const geometry::Box box = box_about(target, candidate.X_CO);
     bool known = false;
     for (std::size_t i = 0; i < kept.size() && !known; ++i)
-      known = is_same_box(boxes[i], box) && std::abs(kept[i].evidence.log_ratio - candidate.evidence.log_ratio) <
-                                                kSameShare * std::abs(kept[i].evidence.log_ratio);
+      known = is_same_place(target, kept[i].X_CO, candidate.X_CO, boxes[i], box) &&
+              std::abs(kept[i].evidence.log_ratio - candidate.evidence.log_ratio) <
+                  kSameShare * std::abs(kept[i].evidence.log_ratio);
     if (known) continue;
     kept.push_back(candidate);
     boxes.push_back(box);
@@ -71,10 +72,12 @@ void drop_repeated(std::span<const WantedModel> wanted, std::vector<Proposal>& p
   std::vector<Proposal> kept;
   std::vector<geometry::Box> boxes;
   for (const Proposal& p : proposals) {
-    const geometry::Box box = box_about(wanted[static_cast<std::size_t>(p.model)].target, p.candidate.X_CO);
+    const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
+    const geometry::Box box = box_about(target, p.candidate.X_CO);
     bool known = false;
     for (std::size_t i = 0; i < kept.size() && !known; ++i)
-      known = kept[i].model == p.model && is_same_box(boxes[i], box) &&
+      known = kept[i].model == p.model &&
+              is_same_place(target, kept[i].candidate.X_CO, p.candidate.X_CO, boxes[i], box) &&
               p.candidate.evidence.log_ratio > (1.0 - kSameShare) * kept[i].candidate.evidence.log_ratio;
     if (known) continue;
     kept.push_back(p);
@@ -214,7 +217,8 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const re
       std::erase_if(pool, [&](const Proposal& p) {
         return std::any_of(taken.begin(), taken.end(), [&](const Detection& d) {
           const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
-          return d.model == p.model && is_same_box(box_about(target, d.X_CO), box_about(target, p.candidate.X_CO));
+          return d.model == p.model && is_same_place(target, d.X_CO, p.candidate.X_CO, box_about(target, d.X_CO),
+                                                     box_about(target, p.candidate.X_CO));
         });
       });
     explained_terms = terms;
