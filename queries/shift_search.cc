@@ -22,9 +22,9 @@ constexpr std::array<double, 6> kSpreads = {0.6, 0.6, 0.4, 0.4, 0.25, 0.25};
 constexpr double kShorter = 0.85, kLittleShorter = 0.93;
 constexpr std::size_t kShifts = 12;
 constexpr std::uint64_t kChanceRounds = kSpreads.size();
-constexpr std::size_t kAnywhere = 24;  // directions by chance, where no coordinate does it alone
-constexpr double kWorthMixing = 0.9;   // of a single coordinate's length, for several to be preferred
-constexpr double kLittlePart = 0.15;   // share of the length: what is less is left out where it does as well without
+constexpr std::size_t kChanceDirections = 24;  // directions by chance, where no coordinate does it alone
+constexpr double kWorthMixing = 0.9;           // of a single coordinate's length, for several to be preferred
+constexpr double kLittlePart = 0.15;  // share of the length: what is less is left out where it does as well without
 
 Shift unit(const Shift& shift) { return scaled(shift, 1.0 / length_of(shift)); }
 
@@ -186,7 +186,7 @@ class ShiftSearcher {
             directions.back()[i] = a * std::numbers::sqrt2 / 2.0;
             directions.back()[j] = b * std::numbers::sqrt2 / 2.0;
           }
-    for (std::size_t c = 0; c < kAnywhere && problem_.coordinates > 2; ++c) {
+    for (std::size_t c = 0; c < kChanceDirections && problem_.coordinates > 2; ++c) {
       core::RandomStream random = stream_.at(kChanceRounds, static_cast<std::uint32_t>(c));
       Shift& direction = directions.emplace_back();
       for (std::size_t i = 0; i < problem_.coordinates; ++i) direction.push_back(random.normal());
