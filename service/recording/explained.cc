@@ -22,7 +22,9 @@ constexpr double kRounding = 1e-6;  // s
 core::Status read_actions(const ExplainOptions& options, queries::ExplainWindow& window,
                           std::vector<std::string>& remarks) {
   if (!interfaces::is_bag(options.path)) return core::ok_status();
-  PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, options.read));
+  RecordingReadOptions read = options.read;
+  read.check_data = false;  // it was, when it was opened
+  PRESCENE_TRY(const auto reader, RecordingReader::open(options.path, read));
   ControlLog controls;
   for (;;) {
     PRESCENE_TRY(const auto entry, reader->next());

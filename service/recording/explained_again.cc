@@ -45,6 +45,9 @@ bool may_hold_explanations(const std::filesystem::path& path) {
   }
 }
 
+/// By so much, messages may stand in a recording before others that were received earlier.
+constexpr core::TimeNs kDisorderNs = 10 * core::TimeNs{1'000'000'000};
+
 /// What is compared: not how long it took.
 std::string text_to_compare(nlohmann::ordered_json answer) {
   nlohmann::ordered_json& explained = answer["explain"];
@@ -68,23 +71,30 @@ void ExplainedAgain::add(const belief::Observation& observation, std::shared_ptr
   if (keeps_frames_) history_.add(observation, std::move(belief));
 }
 
-core::Status ExplainedAgain::read_controls() {
-  if (std::exchange(controls_read_, true) || !interfaces::is_bag(path_)) return core::ok_status();
-  RecordingReadOptions options;
-  options.check_data = false;  // it was, when it was opened
-  PRESCENE_TRY(const auto reader, RecordingReader::open(path_, options));
-  for (;;) {
-    PRESCENE_TRY(const auto entry, reader->next());
-    if (!entry) return core::ok_status();
+core::Status ExplainedAgain::read_controls(core::TimeNs until_ns) {
+  if (controls_end_ || !interfaces::is_bag(path_)) return core::ok_status();
+  if (!reader_) {
+    RecordingReadOptions options;
+    options.check_data = false;  // it was, when it was opened
+    PRESCENE_TRY(reader_, RecordingReader::open(path_, options));
+  }
+  while (controls_until_ns_ <= until_ns + kDisorderNs) {
+    PRESCENE_TRY(const auto entry, reader_->next());
+    if (!entry) {
+      controls_end_ = true;
+      return core::ok_status();
+    }
+    controls_until_ns_ = entry->message.received_ns;
     if (entry->is_json || entry->message.topic != kControlTopic) continue;
     const auto text = interfaces::decode_cdr<interfaces::RosString>(entry->message.cdr, interfaces::kSmallMessage);
     if (text) controls_.push_back({text->data, entry->message.source_ns, entry->message.received_ns});
   }
+  return core::ok_status();
 }
 
 core::Result<std::string> ExplainedAgain::explained(const belief::ExplainQuestion& question, PastWindow past,
                                                     core::TimeNs recorded_ns) {
-  PRESCENE_RETURN_IF_ERROR(read_controls());
+  PRESCENE_RETURN_IF_ERROR(read_controls(recorded_ns));
   ControlLog controls;
   for (const SentControl& control : controls_)
     if (control.recorded_ns <= recorded_ns) controls.add(control.text, control.sent_ns);

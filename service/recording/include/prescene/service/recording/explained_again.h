@@ -42,7 +42,8 @@ class ExplainedAgain {
     std::string text;
     core::TimeNs sent_ns = 0, recorded_ns = 0;
   };
-  core::Status read_controls();
+  /// Reads on, up to what was received by then.
+  core::Status read_controls(core::TimeNs until_ns);
   core::Result<std::string> explained(const belief::ExplainQuestion& question, PastWindow past,
                                       core::TimeNs recorded_ns);
 
@@ -53,7 +54,9 @@ class ExplainedAgain {
   std::string scene_text_;
   bool keeps_frames_;
   FrameHistory history_;
-  bool controls_read_ = false;
+  std::unique_ptr<RecordingReader> reader_;  // of the controls; null = none was needed yet
+  core::TimeNs controls_until_ns_ = 0;       // received, of the last message that was read
+  bool controls_end_ = false;
   std::vector<SentControl> controls_;
   std::unique_ptr<rendering::LikelihoodBatch> likelihood_;
   std::uint64_t compared_ = 0, different_ = 0;
