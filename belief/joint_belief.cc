@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joint positions as the belief has them.
 #include <cmath>
+#include <numbers>
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/joint.h"
@@ -42,16 +43,25 @@ JointEstimate estimate_of(const Belief& belief, const Joint& joint, const Object
   }
   result.confidence = parent_confidence * estimate(belief, child).confidence;
 
-  // Of the mixture.
+  // Of the mixture; of a hinge without limits within half a turn of the heaviest particle's position.
+  const bool wraps = joint.type == JointType::kHinge && std::isinf(joint.low);
+  const Particle& heaviest_of_child = heaviest(child.particles);
+  const double about = joint_state(joint, X_WP, Twist{}, heaviest_of_child.X_WO, Twist{}).position;
+  const auto near = [&](double position, double reference) {
+    return wraps ? reference + std::remainder(position - reference, 2.0 * std::numbers::pi) : position;
+  };
   double weights = 0.0, first = 0.0, second = 0.0;
   for (const Particle& particle : child.particles) {
     const double weight = std::exp(particle.log_weight);
     const JointState at = joint_state(joint, X_WP, V_WP, particle.X_WO, particle.V_WO);
-    const auto position = [&](const Pose& X_WC) { return joint_state(joint, X_WP, Twist{}, X_WC, Twist{}).position; };
+    const double here = near(at.position, about);
+    const auto position = [&](const Pose& X_WC) {
+      return near(joint_state(joint, X_WP, Twist{}, X_WC, Twist{}).position, here);
+    };
     const double spread = carried_variance(position, particle.X_WO, pose_covariance(particle));
     weights += weight;
-    first += weight * at.position;
-    second += weight * (at.position * at.position + spread);
+    first += weight * here;
+    second += weight * (here * here + spread);
     result.velocity += weight * at.velocity;
   }
   if (!(weights > 0.0)) return result;
@@ -60,11 +70,13 @@ JointEstimate estimate_of(const Belief& belief, const Joint& joint, const Object
   double variance = std::max(0.0, second / weights - result.position * result.position);
   if (parent) {
     // The two poses count as independent, so the spread is rather too wide.
-    const Pose X_WC = heaviest(child.particles).X_WO;
-    const auto position = [&](const Pose& X) { return joint_state(joint, X, Twist{}, X_WC, Twist{}).position; };
+    const auto position = [&](const Pose& X) {
+      return near(joint_state(joint, X, Twist{}, heaviest_of_child.X_WO, Twist{}).position, about);
+    };
     variance += carried_variance(position, X_WP, pose_covariance(heaviest(parent->particles)));
   }
   result.standard_deviation = std::sqrt(variance);
+  result.position = near(result.position, 0.0);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -68,6 +69,18 @@ belief::FinalPoses final_poses_of(const Foresight& foresight, std::size_t object
   return final_poses(known.name, samples, names, scene.model_of(known).symmetry, {}, pool);
 }
 
+/// Angles with weights, rad: each is moved by whole turns to within half a turn of their mean direction, so that those
+/// on both sides of 180 degrees are near each other.
+void unwrap_about_mean_direction(std::vector<std::pair<double, double>>& angles) {
+  double sine = 0.0, cosine = 0.0;
+  for (const auto& [angle, weight] : angles) {
+    sine += weight * std::sin(angle);
+    cosine += weight * std::cos(angle);
+  }
+  const double middle = std::atan2(sine, cosine);
+  for (auto& [angle, weight] : angles) angle = middle + std::remainder(angle - middle, 2.0 * std::numbers::pi);
+}
+
 /// Of the joints at the end, over all instances that did not fail.
 std::vector<belief::JointForecast> joints_at_end(const Foresight& foresight) {
   const belief::Scene& scene = *foresight.scene;
@@ -80,6 +93,8 @@ std::vector<belief::JointForecast> joints_at_end(const Foresight& foresight) {
   }
   std::vector<belief::JointForecast> forecasts;
   for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+    if (scene.joints[j].type == belief::JointType::kHinge && std::isinf(scene.joints[j].low))
+      unwrap_about_mean_direction(positions[j]);
     std::sort(positions[j].begin(), positions[j].end());
     double mass = 0.0, first = 0.0, second = 0.0;
     for (const auto& [position, weight] : positions[j]) {

@@ -94,6 +94,48 @@ TEST(Joints, AHingeIsToldAboutTheMiddleOfItsLimits) {
   EXPECT_NEAR(state.position, 1.5 * kPi, 1e-9);
 }
 
+/// Two positions of equal weight on both sides of half a turn: their mean is half a turn, and not 0.
+TEST(Joints, AFreeHingeIsEstimatedAcrossHalfATurn) {
+  Scene scene = tests::small_scene();
+  Joint joint;
+  joint.name = "spin";
+  joint.child = "ball";
+  joint.axis_P = Vector3d::UnitZ();
+  scene.joints = {joint};
+  Belief belief;
+  ObjectBelief& ball = belief.objects.emplace_back();
+  ball.name = "ball";
+  for (const double degrees : {170.0, -178.0}) {
+    Particle particle;
+    particle.X_WO = child_pose(joint, {}, degrees * kPi / 180.0);
+    particle.log_weight = std::log(0.5);
+    ball.particles.push_back(particle);
+  }
+  belief.scene = std::make_shared<const Scene>(scene);
+  const std::vector<JointEstimate> estimates = joint_estimates(belief);
+  ASSERT_EQ(estimates.size(), 1u);
+  EXPECT_NEAR(estimates[0].position, 176.0 * kPi / 180.0, 1e-9);
+  EXPECT_NEAR(estimates[0].standard_deviation, 6.0 * kPi / 180.0, 1e-6);
+}
+
+TEST(Joints, AFreeHingeHasPositionsWithinHalfATurn) {
+  Scene scene = tests::small_scene();
+  Joint joint;
+  joint.name = "spin";
+  joint.child = "ball";
+  scene.joints = {joint};
+  const auto checked = [&](double low_deg, double high_deg) {
+    const JointWithin within{"spin", JointType::kHinge, low_deg * kPi / 180.0, high_deg * kPi / 180.0};
+    return validate(scene, Outcome{"o", "ball", {Condition{within}}});
+  };
+  EXPECT_TRUE(checked(-180.0, 180.0).ok());
+  EXPECT_THAT(checked(200.0, 300.0).message(), testing::HasSubstr("between -180 and 180 degrees"));
+  EXPECT_FALSE(checked(170.0, 190.0).ok());
+  scene.joints[0].low = 0.0;
+  scene.joints[0].high = 300.0 * kPi / 180.0;
+  EXPECT_TRUE(checked(200.0, 300.0).ok());
+}
+
 Scene jointed_scene() {
   Scene scene = tests::small_scene();
   Joint joint;
@@ -107,6 +149,55 @@ Scene jointed_scene() {
   joint.friction = NormalScalar{1.0, 0.2, 0.0};
   scene.joints.push_back(joint);
   return scene;
+}
+
+/// As passes through the joints find it that take each joint whose parent is placed; loops are left out.
+std::vector<int> order_by_passes(const Scene& scene) {
+  std::vector<int> order;
+  std::vector<bool> done(scene.joints.size(), false);
+  for (bool more = true; more;) {
+    more = false;
+    for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+      const std::optional<int> before = joint_of(scene, scene.joints[j].parent);
+      if (done[j] || (before && !done[static_cast<std::size_t>(*before)])) continue;
+      order.push_back(static_cast<int>(j));
+      done[j] = more = true;
+    }
+  }
+  return order;
+}
+
+TEST(JointLaws, TheOrderIsThatOfPassesThroughTheJoints) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    RandomStream stream(seed, core::Purpose::kTest);
+    const auto below = [&](std::size_t n) {
+      return static_cast<std::size_t>(stream.uniform() * static_cast<double>(n));
+    };
+    Scene scene;
+    const std::size_t count = 1 + below(12);
+    for (std::size_t j = 0; j < count; ++j) {
+      Joint joint;
+      joint.child = "o" + std::to_string(below(14));
+      joint.parent = "o" + std::to_string(below(14));
+      scene.joints.push_back(joint);
+    }
+    RC_ASSERT(joint_order(scene) == order_by_passes(scene));
+  }));
+}
+
+/// With the children listed first, passes would take the square of the number, and each look-up the number.
+TEST(Joints, ALongChainIsOrdered) {
+  constexpr int kCount = 20'000;
+  Scene scene;
+  for (int j = 0; j < kCount; ++j) {
+    Joint joint;
+    joint.child = std::to_string(j);
+    joint.parent = std::to_string(j + 1);
+    scene.joints.push_back(joint);
+  }
+  const std::vector<int> order = joint_order(scene);
+  ASSERT_EQ(order.size(), scene.joints.size());
+  for (int j = 0; j < kCount; ++j) ASSERT_EQ(order[static_cast<std::size_t>(j)], kCount - 1 - j);
 }
 
 TEST(Joints, AreObeyedParentsFirst) {
