@@ -15,21 +15,13 @@ namespace {
 
 using belief::ActionParameter;
 
-std::string suggestion_of(const std::string& name, const std::vector<std::string>& known, const std::string& what) {
-  if (known.empty()) return "there are none";
-  const std::string near = core::did_you_mean(name, known);
-  return near.empty() ? what + " " + core::comma_list(known) : near;
-}
-
 /// The object that the action is about, in the prior's scene.
 core::Result<std::size_t> object_of(const Prior& prior, const belief::AchieveQuery& query,
                                     const belief::ActionSchema& schema, const belief::Outcome& wanted) {
   const belief::Scene& scene = *prior.scene;
-  std::vector<std::string> names, held;
-  for (const belief::SceneObject& object : scene.objects) {
-    names.push_back(object.name);
+  std::vector<std::string> held;
+  for (const belief::SceneObject& object : scene.objects)
     if (object.held_by) held.push_back(object.name);
-  }
   std::string name = query.object;
   if (name.empty() && schema.of_held && held.size() == 1) name = held.front();
   if (name.empty() && schema.of_held && held.empty())
@@ -40,9 +32,7 @@ core::Result<std::size_t> object_of(const Prior& prior, const belief::AchieveQue
     return core::invalid_input("several objects are held: name the one to " + schema.name + " (object)");
   if (name.empty()) name = wanted.object;
   const std::optional<int> index = belief::find_object(scene, name);
-  if (!index)
-    return core::not_found("there is no object '" + name + "' now (it may be lost or not there at all): " +
-                           suggestion_of(name, names, "the objects are"));
+  if (!index) return no_such_object(prior, name);
   if (schema.of_held && !scene.objects[static_cast<std::size_t>(*index)].held_by)
     return core::invalid_input("'" + name + "' is not held by a robot body, so it can't be " +
                                (schema.name == "place" ? "placed" : "released") + ": name an object that is held" +

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "prescene/core/spelling.h"
 #include "seating.h"
 
 namespace prescene::queries {
@@ -132,6 +133,16 @@ core::Result<std::shared_ptr<const belief::Scene>> with_question(const belief::S
     for (belief::Outcome& outcome : group.outcomes) PRESCENE_RETURN_IF_ERROR(belief::complete_outcome(*asked, outcome));
   PRESCENE_RETURN_IF_ERROR(belief::validate(*asked));
   return std::shared_ptr<const belief::Scene>(std::move(asked));
+}
+
+core::Status no_such_object(const Prior& prior, const std::string& name) {
+  std::vector<std::string> known;
+  for (const belief::SceneObject& object : prior.scene->objects) known.push_back(object.name);
+  const std::string near = core::did_you_mean(name, known);
+  const std::string all = known.empty() ? "none is there" : "those that are: " + core::comma_list(known);
+  return core::not_found((prior.seen ? "there is no object '" + name + "' now (it may be lost or not there at all): "
+                                     : "the scene has no object '" + name + "': ") +
+                         (near.empty() ? all : near + " (" + all + ")"));
 }
 
 }  // namespace prescene::queries

@@ -34,6 +34,9 @@ using filter::is_present;
 Prior prior_of(const belief::Belief& belief);
 Prior prior_of(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed);
 
+/// That the prior has no object of this name: the nearest names, or all.
+core::Status no_such_object(const Prior& prior, const std::string& name);
+
 /// The prior's scene with other actions and outcomes; fails with the reason when a name or value in them is wrong.
 core::Result<std::shared_ptr<const belief::Scene>> with_question(const belief::Scene& scene,
                                                                  std::vector<belief::Action> actions,

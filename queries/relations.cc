@@ -59,11 +59,6 @@ std::string meant_by(const std::string& name, const std::vector<std::string>& kn
   return near.empty() ? near : near + " ";
 }
 
-core::Status no_such_object(const std::string& name, const std::vector<std::string>& known) {
-  return core::not_found("there is no object '" + name + "' now (it may be lost or not there at all): " +
-                         meant_by(name, known) + "Those that are: " + core::comma_list(known));
-}
-
 /// The names of the objects that take part.
 core::Result<std::vector<std::string>> present_names(const Prior& prior, const belief::RelationsQuery& query) {
   std::vector<std::string> names;
@@ -71,7 +66,7 @@ core::Result<std::vector<std::string>> present_names(const Prior& prior, const b
   if (names.empty())
     return core::not_found("no object is there now: all are lost or were not found yet. Ask 'where' for their states");
   if (query.object && std::ranges::find(names, *query.object) == names.end())
-    return no_such_object(*query.object, names);
+    return no_such_object(prior, *query.object);
   return names;
 }
 

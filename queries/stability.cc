@@ -39,10 +39,7 @@ core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief
   if (!(query.max_move > 0.0) || !(query.max_turn > 0.0))
     return core::invalid_input("max_move and max_turn have to be more than 0");
   const std::optional<int> object = belief::find_object(*prior.scene, query.object);
-  if (!object) {
-    return core::not_found("there is no object '" + query.object +
-                           "' now (it may be lost or not there at all): ask 'where' for those that are");
-  }
+  if (!object) return no_such_object(prior, query.object);
   const auto index = static_cast<std::size_t>(*object);
   std::vector<belief::Action> actions;
   if (prior.scene->objects[index].held_by) actions.push_back(release_now(prior, index));
