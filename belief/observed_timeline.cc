@@ -126,6 +126,9 @@ core::Result<IntervalPattern> pattern_from_text(const std::string& text) {
   if (parts.empty()) return core::invalid_input("it is empty: give a relation and names, as 'touches carton mug'");
   const auto found = std::find(known.begin(), known.end(), parts[0]);
   if (found == known.end()) {
+    if (parts[0] == "*")
+      return core::invalid_input("'*' stands for a name, not for a relation: begin with one of " +
+                                 core::comma_list(known));
     const std::string near = core::did_you_mean(parts[0], known);
     return core::invalid_input("'" + parts[0].substr(0, 40) + "' is no relation: " + near + (near.empty() ? "" : " ") +
                                "The relations are " + core::comma_list(known));

@@ -189,7 +189,9 @@ core::Result<belief::AchieveAnswer> achieve(const Prior& prior, const belief::Ac
     answer.first_certified_seconds = watch.seconds();
   });
   if (trials.basis().instances == 0 && found.stop == SearchStop::kStopped)
-    return core::cancelled("stopped before the first simulated instance was finished: give more time");
+    return core::cancelled(
+        "stopped before the first simulated instance was finished: give more time (max_seconds of a question, "
+        "--max-seconds)");
 
   answer.outcome = wanted.name;
   answer.action = query.action;

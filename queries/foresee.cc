@@ -99,7 +99,8 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
     return core::cancelled("stopped on request before the first simulated instance was finished");
   if (foresight.estimate.instances.empty())
     return core::cancelled(
-        "stopped before the first simulated instance was finished: give more time, or a shorter duration");
+        "stopped before the first simulated instance was finished: give more time (max_seconds of a question, "
+        "--max-seconds), or a shorter duration");
   if (foresight.estimate.failed == static_cast<int>(foresight.estimate.instances.size()))
     return core::invalid_input("every instance failed in the simulator: look at the scene's shapes, masses and speeds");
   return foresight;

@@ -145,7 +145,7 @@ void add_achieve_options(CLI::App& verb, AchieveOptions& options) {
   verb.add_option("--max-seconds", options.max_seconds,
                   "Wall time, s, after which no more instances begin; the answer then depends on the machine's speed")
       ->check(in_range(belief::kWallSeconds));
-  verb.add_option("--duration", options.duration, "Longest simulated time, s, instead of the scene's")
+  verb.add_option("--duration", options.duration, "Longest simulated time, s; default: the scene's, of ask stability 3")
       ->check(in_range(belief::kDurations));
   verb.add_flag("--first", options.first_only,
                 "End with the first certified choice: without the most robust one, the map and the reasons");

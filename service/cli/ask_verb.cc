@@ -7,6 +7,7 @@
 #include "prescene/belief/explain_question.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/core/text.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/live/question_client.h"
 #include "prescene/service/load_scene.h"
@@ -35,6 +36,12 @@ struct AskOptions {
   interfaces::DdsOptions dds;
 };
 
+/// How far to look ahead, and how long to work on it.
+void add_limits(const AchieveOptions& given, nlohmann::ordered_json& question) {
+  if (given.duration) question["duration"] = *given.duration;
+  if (given.max_seconds) question["effort"]["max_seconds"] = *given.max_seconds;
+}
+
 /// `seed`: of what asks for one.
 core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std::uint64_t seed) {
   if (!options.json.empty()) {
@@ -47,6 +54,10 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
   }
   AchieveOptions of_achieve = options.achieve;
   if (options.kind == "relations") of_achieve.object.clear();
+  if (options.kind == "stability" || options.kind == "release") of_achieve.duration = of_achieve.max_seconds = {};
+  if (options.kind != "achieve" && (of_achieve.duration || of_achieve.max_seconds))
+    return core::invalid_input(
+        "--duration and --max-seconds are of 'ask stability', 'ask release' and 'ask achieve': leave them out");
   if (options.kind != "achieve" && !(of_achieve == AchieveOptions{}))
     return core::invalid_input("--action, --free and what goes with them are of 'ask achieve': leave them out");
   if (options.kind != "stability" && (options.margin || options.removal))
@@ -103,12 +114,15 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
     nlohmann::ordered_json stability = {{"object", options.object}};
     if (options.margin) stability["detail"].push_back("margin");
     if (options.removal) stability["detail"].push_back("removal");
+    add_limits(options.achieve, stability);
     return nlohmann::ordered_json{{"stability", std::move(stability)}};
   }
   if (options.kind == "release") {
     PRESCENE_RETURN_IF_ERROR(needs_object());
     const nlohmann::ordered_json release = {{"time", 0.0}, {"release", {{"object", options.object}}}};
-    return nlohmann::ordered_json{{"predict", {{"actions", nlohmann::ordered_json::array({release})}}}};
+    nlohmann::ordered_json predict = {{"actions", nlohmann::ordered_json::array({release})}};
+    add_limits(options.achieve, predict);
+    return nlohmann::ordered_json{{"predict", std::move(predict)}};
   }
   if (options.kind == "achieve") {
     AchieveOptions achieve = options.achieve;
@@ -131,6 +145,9 @@ core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& 
   Backends backends(context.pool());
   queries::QueryContext asked = backends.query_context(context.pool());
   asked.cancellation = asked.abandoned = &context.cancellation();
+  if (options.kind == "release" && !options.achieve.duration)
+    core::log(context.log(), core::LogLevel::kInfo,
+              "looking " + core::rounded_text(scene->duration) + " s ahead, the scene's duration (--duration)");
   const belief::Answer answer = queries::answer(scene, context.options().seed, query, asked);
   PRESCENE_RETURN_IF_ERROR(answer.error);
   const nlohmann::ordered_json document = belief::to_json(answer);
