@@ -52,7 +52,8 @@ std::string lines_of(const std::vector<std::string>& remarks) {
 }
 
 /// Each mistake by itself; a file that could not be read is one.
-Checked bad(const std::string& file, const core::Status& status, const interfaces::FileReport& report) {
+Checked bad(const std::string& file, const core::Status& status, const interfaces::FileReport& report,
+            const std::vector<std::string>& warnings) {
   nlohmann::ordered_json errors = nlohmann::ordered_json::array();
   std::vector<interfaces::Problem> problems = report.errors;
   std::stable_sort(problems.begin(), problems.end(), [](const interfaces::Problem& a, const interfaces::Problem& b) {
@@ -67,16 +68,22 @@ Checked bad(const std::string& file, const core::Status& status, const interface
   }
   if (errors.empty())
     errors.push_back({{"file", file}, {"line", nullptr}, {"message", status.message()}, {"remedy", ""}});
-  return {status, {{"file", file}, {"valid", false}, {"errors", std::move(errors)}}, status.message()};
+  return {status,
+          {{"file", file},
+           {"valid", false},
+           {"errors", std::move(errors)},
+           {"warnings", warnings},
+           {"remarks", texts_of(report.remarks)}},
+          status.message()};
 }
 
 Checked check_scene(const std::string& file, VerbContext& context) {
   Warnings warnings(context.log());
   interfaces::FileReport report;
   const auto text = read_scene_text(file);
-  if (!text) return bad(file, text.status(), report);
+  if (!text) return bad(file, text.status(), report, {});
   const auto scene = load_reported_scene(*text, file, warnings.sink(), report, Symmetries::kSuggested);
-  if (!scene) return bad(file, scene.status(), report);
+  if (!scene) return bad(file, scene.status(), report, warnings.texts());
   const int dimensions = start_dimensions(**scene);
   const std::vector<std::string> remarks = texts_of(report.remarks);
   return {{},
@@ -87,6 +94,7 @@ Checked check_scene(const std::string& file, VerbContext& context) {
            {"objects", (*scene)->objects.size()},
            {"actions", (*scene)->actions.size()},
            {"uncertain_dimensions", dimensions},
+           {"errors", nlohmann::ordered_json::array()},
            {"warnings", warnings.texts()},
            {"remarks", remarks}},
           file + ": valid: " + counted((*scene)->objects.size(), "object") + ", " +
@@ -98,25 +106,30 @@ Checked check_model(const std::string& file, VerbContext& context) {
   Warnings warnings(context.log());
   interfaces::FileReport report;
   const auto model = load_reported_model(file, warnings.sink(), report, Symmetries::kSuggested);
-  if (!model) return bad(file, model.status(), report);
+  if (!model) return bad(file, model.status(), report, warnings.texts());
   const std::vector<std::string> remarks = texts_of(report.remarks);
-  return {
-      {},
-      {{"file", file}, {"valid", true}, {"model", model->name}, {"warnings", warnings.texts()}, {"remarks", remarks}},
-      file + ": valid: a model file" + warnings.count() + lines_of(remarks)};
+  return {{},
+          {{"file", file},
+           {"valid", true},
+           {"model", model->name},
+           {"errors", nlohmann::ordered_json::array()},
+           {"warnings", warnings.texts()},
+           {"remarks", remarks}},
+          file + ": valid: a model file" + warnings.count() + lines_of(remarks)};
 }
 
 Checked check_learned(const std::string& file) {
   interfaces::FileReport report;
   const auto text = read_scene_text(file);
-  if (!text) return bad(file, text.status(), report);
+  if (!text) return bad(file, text.status(), report, {});
   const auto learned = interfaces::parse_learned(*text, file, &report);
-  if (!learned) return bad(file, learned.status(), report);
+  if (!learned) return bad(file, learned.status(), report, {});
   return {{},
           {{"file", file},
            {"valid", true},
            {"learned_models", learned->models.size()},
            {"learned_objects", learned->objects.size()},
+           {"errors", nlohmann::ordered_json::array()},
            {"warnings", nlohmann::ordered_json::array()},
            {"remarks", nlohmann::ordered_json::array()}},
           file + ": valid: what was learned of " + counted(learned->models.size(), "model") + " and " +

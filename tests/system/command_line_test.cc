@@ -132,6 +132,7 @@ TEST(CommandLine, ValidateListsEachMistakeByItself) {
              "objects:\n  a: {model: b, pose: {position: [0, 0, 0]}}\n");
   const Finished finished = run_program({"validate", scene, "--json"});
   EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_TRUE(parsed(finished)["files"][0]["warnings"].is_array());
   const auto errors = parsed(finished)["files"][0]["errors"];
   ASSERT_EQ(errors.size(), 3u) << finished.out;
   for (std::size_t i = 0; i < errors.size(); ++i) {
