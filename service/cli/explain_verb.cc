@@ -102,14 +102,22 @@ core::Status write_explanation_report(const std::string& path, const std::string
   return interfaces::write_report(path, contents);
 }
 
-/// A picture of each strip in the folder, named by its time: explained_1.73.png.
-core::Status write_strips(const std::string& folder, const std::vector<ExplanationStrip>& strips, double from) {
+/// Before the work, so that a name that can't be a folder ends it at once.
+core::Status make_pictures_folder(const std::string& folder) {
+  if (folder.empty()) return core::ok_status();
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) return core::unavailable("--pictures: the folder " + folder + " can't be made: " + error.message());
+  if (error)
+    return core::unavailable("--pictures: the folder " + folder + " can't be made (" + error.message() +
+                             "); name one that can be written");
+  return core::ok_status();
+}
+
+/// A picture of each strip in the folder, named by its time: explained_1.733.png.
+core::Status write_strips(const std::string& folder, const std::vector<ExplanationStrip>& strips, double from) {
   for (const ExplanationStrip& strip : strips) {
     const geometry::ColorImage picture = side_by_side(strip);
-    const std::string name = "explained_" + fixed_text(strip.time + from, 2) + ".png";
+    const std::string name = "explained_" + fixed_text(strip.time + from, 3) + ".png";
     PRESCENE_RETURN_IF_ERROR(interfaces::write_png(std::filesystem::path(folder) / name, picture.view()));
   }
   return core::ok_status();
@@ -137,6 +145,7 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_wanted(options.wanted, options.explain.query));
   PRESCENE_RETURN_IF_ERROR(check_folder_options(*options.verb, options.input));
   PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, {options.input, options.scene}));
+  PRESCENE_RETURN_IF_ERROR(make_pictures_folder(options.pictures));
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},
                                                           context.log()));
