@@ -87,8 +87,8 @@ std::string sentence_of(const SmallestChange& change) {
   }
   const std::string how = parts + " (" + fixed_text(change.size, 1) + " standard deviations)";
   if (!change.found)
-    return "No change was found that surely leads to " + outcome + " with " + probability_text(change.wanted_probability) +
-           "; the nearest is " + how + ", with " + interval + ".";
+    return "No change was found that surely leads to " + outcome + " with " +
+           probability_text(change.wanted_probability) + "; the nearest is " + how + ", with " + interval + ".";
   return "The smallest change that was found to lead to " + outcome + ": " + how + "; it then comes about in " +
          interval + ", without the change in " + probability_text(change.unchanged_probability) + ".";
 }

@@ -80,8 +80,8 @@ bool join_worlds(const Island& island, const ResampleOptions& options, const cor
 /// The log weights of the members, which are all the same.
 std::vector<double> world_weights(const belief::Belief& belief, const Island& island);
 
-/// Each member's weights changed from `before` by what concerns it alone: those of worlds change by the product, and each
-/// member's turns weigh what its own evidence says. False when all were impossible and were made equal.
+/// Each member's weights changed from `before` by what concerns it alone: those of worlds change by the product, and
+/// each member's turns weigh what its own evidence says. False when all were impossible and were made equal.
 bool combine_weights(const Island& island, const std::vector<double>& before, belief::Belief& belief);
 
 /// resample_within_turns() for worlds: what differs in the turn of any member is kept apart.

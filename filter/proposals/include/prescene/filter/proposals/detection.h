@@ -43,15 +43,15 @@ struct WantedModel {
 struct Detection {
   int model = 0;  ///< Index into the wanted models.
   Pose X_CO;
-  /// With the other detections as known surfaces, in the image in which it was judged (fine_frame.h); the log ratio as it
-  /// would be in the coarse one.
+  /// With the other detections as known surfaces, in the image in which it was judged (fine_frame.h); the log ratio as
+  /// it would be in the coarse one.
   rendering::PoseEvidence evidence;
-  double outline = 1.0;              ///< outline_support, likewise.
-  bool stands = true;                ///< On a support or another detection.
-  double probability = 1.0;          ///< probability_right, or as the learned judge says.
-  int cluster = 0;                   ///< Of those that were looked at, in their order.
-  FitNumbers numbers{};              ///< What a learned judge saw when it was accepted, ...
-  double log_odds = 0.0;             ///< ... and made of it.
+  double outline = 1.0;      ///< outline_support, likewise.
+  bool stands = true;        ///< On a support or another detection.
+  double probability = 1.0;  ///< probability_right, or as the learned judge says.
+  int cluster = 0;           ///< Of those that were looked at, in their order.
+  FitNumbers numbers{};      ///< What a learned judge saw when it was accepted, ...
+  double log_odds = 0.0;     ///< ... and made of it.
 };
 
 /// What a judge is learned from: all that was judged.
