@@ -130,6 +130,8 @@ void EventPaths::set_scene() {
   scene->actions.clear();
   scene->outcomes.clear();
   scene->exclusive_outcomes.clear();
+  for (const belief::Support& support : scene->supports)
+    supports_.push_back(geometry::transformed(belief::collision_mesh(support.collision), support.X_WS));
   scene_ = std::move(scene);
 }
 

@@ -107,8 +107,12 @@ class EventPaths {
   void note_seen(std::size_t object, const SeenTimes& times) { seen_[object] = times; }
   /// The last frame sees where the object is put down, if it is: nothing to guess.
   void note_seen_in_the_end(std::size_t object) { seen_in_the_end_[object] = 1; }
-  /// Log density with which somebody puts it down there: of m^3, and rad of turns that change something.
-  double log_put_down(std::size_t object, const belief::Pose& X_WO) const;
+  /// m by which its lowest point is above what it would rest on there: the surface under its centre of mass that is
+  /// nearest to that height, of supports and of the other objects at the begin. Empty where none is.
+  std::optional<double> lift(std::size_t object, const belief::Pose& X_WO) const;
+  /// Log density with which somebody puts it down about there, so that it rests: of m^3, and rad of turns that change
+  /// something. The height is known to `height_variance`, m^2.
+  double log_put_down(std::size_t object, const belief::Pose& X_WO, double height_variance) const;
   /// What was not there at the begin was found in the last frame, and in those of `times` something is there, too.
   void note_found(std::size_t object, const belief::Pose& X_WO, std::vector<double> times);
   /// Where objects are in those frames if nothing happens, from the most probable start.
@@ -180,6 +184,7 @@ class EventPaths {
   std::vector<std::unique_ptr<belief::Belief>> alone_;            // each with one object
   std::vector<std::unique_ptr<belief::BeliefSampler>> samplers_;  // of these
   std::vector<geometry::TriangleMesh> shapes_;                    // of the objects, in O
+  std::vector<geometry::TriangleMesh> supports_;                  // in W
   std::vector<belief::SceneObject> objects_;
   std::vector<SeenTrack> tracks_;
   std::vector<std::optional<SeenTimes>> seen_;  // by object

@@ -18,7 +18,9 @@ using geometry::Vector3d;
 constexpr double kMovedPlace = 0.003;   // m and ...
 constexpr double kMovedTurn = 0.015;    // ... rad: what is further from the base counts as moved
 constexpr double kStandingTilt = 0.03;  // rad; by which what is put down as it stood is tilted
-constexpr double kPusherGap = 1e-3;     // m between what pushes and the object, at first
+constexpr double kHighestLift = 3.0;    // deviations of the height at which things are put down, that are looked at
+constexpr std::size_t kMostTrianglesBelow = 20'000;  // of a shape on which things may be put down
+constexpr double kPusherGap = 1e-3;                  // m between what pushes and the object, at first
 // s: what is let go elsewhere is there after the first, and free after the second.
 constexpr double kCarried = 1e-3, kLetGo = 0.02;
 constexpr double kOpening = 1e-3;  // m by which the hand then rises: simulators count it as done with after that only
@@ -168,10 +170,38 @@ std::optional<Pose> EventPaths::put_down(const Hypothesis& hypothesis, const Eve
   }
   X.rotation = (geometry::exp_rotation(draw.turn * up) * X.rotation).normalized();
   X.translation = X_WO.translation + draw.shift;
+  const std::optional<double> above = lift(hypothesis.object, X);
+  if (above && std::abs(*above) > kHighestLift * priors_.carry_height) return std::nullopt;
+  if (above) X.translation -= *above * up;
   return X;
 }
 
-double EventPaths::log_put_down(std::size_t object, const Pose& X_WO) const {
+std::optional<double> EventPaths::lift(std::size_t object, const Pose& X_WO) const {
+  const Vector3d up = belief::up_of(*scene_);
+  const Vector3d p_WCm = X_WO * belief::mean(model(object).center_of_mass);
+  double lowest = 1e300;
+  for (const Vector3d& vertex : shapes_[object].vertices) lowest = std::min(lowest, up.dot(X_WO * vertex));
+  const Vector3d from = p_WCm + kHighestLift * priors_.carry_height * up;
+  std::optional<double> nearest;
+  const auto look_at = [&](const geometry::TriangleMesh& mesh, const Pose& X_WM) {
+    const auto ray = collision::shear({X_WM.inverse() * from, X_WM.rotation.conjugate() * -up});
+    if (!ray || mesh.triangles.size() > kMostTrianglesBelow) return;
+    for (const auto& t : mesh.triangles) {
+      const Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+      const auto hit = collision::meet(*ray, {a.cast<float>(), b.cast<float>(), c.cast<float>()});
+      if (!hit || !hit->front) continue;
+      const Vector3d below = X_WM * Vector3d(hit->weights[0] * a + hit->weights[1] * b + hit->weights[2] * c);
+      const double above = lowest - up.dot(below);
+      if (!nearest || std::abs(above) < std::abs(*nearest)) nearest = above;
+    }
+  };
+  for (const geometry::TriangleMesh& support : supports_) look_at(support, Pose::identity());
+  for (std::size_t i = 0; i < present(); ++i)
+    if (i != object) look_at(shapes_[i], prior_.likeliest.objects[i].X_WO);
+  return nearest;
+}
+
+double EventPaths::log_put_down(std::size_t object, const Pose& X_WO, double height_variance) const {
   const Vector3d up = belief::up_of(*scene_);
   const Pose& from = put_in_at_[object];
   const geometry::SymmetryGroup& symmetry = model(object).symmetry;
@@ -181,8 +211,13 @@ double EventPaths::log_put_down(std::size_t object, const Pose& X_WO) const {
   };
   const Vector3d shift = X_WO.translation - from.translation;
   const double lift = up.dot(shift), away = (shift - up * lift).norm();
-  const double log_density = log_normal(away, priors_.carry_distance) - std::log(priors_.carry_distance) - log_root +
-                             log_normal(lift, priors_.carry_height);
+  double log_density = log_normal(away, priors_.carry_distance) - std::log(priors_.carry_distance) - log_root;
+  if (const std::optional<double> above = this->lift(object, X_WO)) {
+    const double rise = (lift - *above) / priors_.carry_height;
+    log_density += log_normal(*above, std::sqrt(height_variance + kRestHeight * kRestHeight)) - 0.5 * rise * rise;
+  } else {
+    log_density += log_normal(lift, priors_.carry_height);
+  }
   if (symmetry.ball) return log_density;
   // Half of what is put down stands as before, turned about the vertical; the rest lies anyhow.
   const double copies = static_cast<double>(symmetry.rotations.size() + 1);
@@ -268,6 +303,10 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
       path.moved.push_back(object);
       path.paths.push_back(std::move(poses));
     };
+    const auto put = [&](ObjectPath& poses, std::size_t k, const Pose& from) {
+      poses[k] = put_down(hypothesis, event, from);
+      path.impossible = path.impossible || !poses[k];
+    };
     const auto quiet = [&](std::size_t object, double time) -> std::optional<Pose> {
       if (!is_present(object)) return std::nullopt;
       return pose_in(before[i], object, time);
@@ -288,10 +327,9 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
           poses[k] = quiet(is_target ? *hypothesis.partner : target, event.time);
         } else if (is_target && hypothesis.kind == EventKind::kMoved) {
           poses[k].reset();
-          if (t >= event.time + event.duration)
-            poses[k] = put_down(hypothesis, event, pose_in(before[i], object, event.time));
+          if (t >= event.time + event.duration) put(poses, k, pose_in(before[i], object, event.time));
         } else if (is_target && hypothesis.kind == EventKind::kPutIn) {
-          poses[k] = put_down(hypothesis, event, put_in_at_[object]);
+          put(poses, k, put_in_at_[object]);
         }
       }
       add(object, std::move(poses), is_target);

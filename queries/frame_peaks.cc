@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "prescene/belief/body_names.h"
 #include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::queries {
@@ -20,8 +21,10 @@ constexpr double kFinestShift = 0.0005, kFinestTurn = 0.005;      // ... and of 
 constexpr double kWider = 1.3;         // by which draws are wider than what they are to measure
 constexpr double kEffective = 0.25;    // share of the draws that may count between rounds, at least
 constexpr double kUncorrelated = 0.3;  // Correlations that few draws show are shrunk by this share.
-constexpr double kSeen = 1.0;          // nats that a peak is above the frame without the object
-constexpr double kHiddenTurn = 10.0;   // rad; deviation of turns that change nothing
+// Nats by which what is typical of a peak is above the frame without the object. Less is no peak: draws find what is as
+// likely, and the image itself weighs them.
+constexpr double kSeen = 1.0;
+constexpr double kHiddenTurn = 10.0;  // rad; deviation of turns that change nothing
 
 /// Where to look in a frame.
 struct SearchPlace {
@@ -156,19 +159,22 @@ FoundPeaks find_peaks(const EventPaths& events, WindowLikelihood& likelihood, st
       peak.log_mass = top + std::log(sum / n);
       peak.error = std::sqrt(std::max(0.0, n * squares / (sum * sum) - 1.0) / n);
     }
-    peak.seen = highest > absent[k] + kSeen;
+    // Of a Gaussian, the log density is half its number of coordinates below the peak's on average.
+    peak.seen = highest > absent[k] + 0.5 * static_cast<double>(size) + kSeen;
     const Eigen::MatrixXd covariance = widened(now.covariance, 1.0, kFinestTurn, kFinestShift);
     const double log_volume = geometry::cholesky_factor(covariance).diagonal().array().log().sum() + log_unit;
     // Of few draws: no peak is much higher than the highest of them.
     peak.log_peak = std::min(peak.log_mass - log_volume, highest + 1.0) - absent[k];
     peak.log_mass -= absent[k];
     peak.X_WO = geometry::box_plus(place->X_WO, visible * now.mean);
-    peak.log_put_down = events.log_put_down(object, peak.X_WO);
     geometry::Matrix6d in_body = geometry::product(visible * covariance, visible.transpose());
     const geometry::Matrix6d hidden =
         geometry::Matrix6d::Identity() - geometry::Matrix6d(visible * visible.transpose());
     in_body += kHiddenTurn * kHiddenTurn * hidden;
     peak.covariance = turns_about_W(peak.X_WO, in_body);
+    peak.lift = events.lift(object, peak.X_WO);
+    const Vector3d up = belief::up_of(events.scene());
+    peak.log_put_down = events.log_put_down(object, peak.X_WO, up.dot(peak.covariance.bottomRightCorner<3, 3>() * up));
   }
   return found;
 }

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "prescene/belief/body_names.h"
+#include "prescene/queries/path_error.h"
+
 namespace prescene::queries {
 namespace {
 
@@ -25,6 +28,13 @@ OtherMotion other_motion(const EventPaths& events, WindowLikelihood& likelihood,
   const geometry::SymmetryGroup& symmetry = events.model(object).symmetry;
   const std::vector<FramePeak>& peaks = likelihood.peaks(object);
   std::optional<Pose> at = events.start_pose(object);
+  // What stays is weighed as the other explanations weigh it.
+  const Vector3d up = belief::up_of(events.scene());
+  PathError error(0.0, 1.0, up, symmetry);
+  if (at) {
+    error.loosen(likelihood.start_error(object));
+    error.move_to(*at);
+  }
   const Vector3d about = at ? at->translation : events.put_in_place(object).translation;
   std::vector<double> unseen(peaks.size());
   const ScenePath gone = path_of(object, ObjectPath(peaks.size()));
@@ -39,7 +49,7 @@ OtherMotion other_motion(const EventPaths& events, WindowLikelihood& likelihood,
     const FramePeak& peak = peaks[k];
     double log_stays = -1e300, log_moves = -1e300, best_ratio = -1e300;
     if (at) {
-      likelihood.evaluate(k, object, std::span(&*at, 1), std::span(&log_stays, 1));
+      log_stays = likelihood.stays(k, object, error);
       best_ratio = log_stays;
       log_stays += std::log(kStaysInFrame);
     }
@@ -57,10 +67,13 @@ OtherMotion other_motion(const EventPaths& events, WindowLikelihood& likelihood,
     result.frames.push_back(
         top + std::log(std::exp(log_stays - top) + std::exp(log_moves - top) + std::exp(log_unseen - top)));
     result.log_evidence += result.frames.back();
-    if (log_unseen == top)
+    if (log_unseen == top) {
       at.reset();
-    else if (log_moves == top)
+    } else if (log_moves == top) {
       at = peak.X_WO;
+      error = PathError(0.0, 1.0, up, symmetry);
+      error.put_at(peak, false);
+    }
     result.path.push_back(at);
   }
   result.error = std::sqrt(variance);

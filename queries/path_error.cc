@@ -25,11 +25,24 @@ PathError::PathError(double share, double radius, const Vector3d& up, const geom
   PRESCENE_CHECK(share >= 0.0 && radius > 0.0);
 }
 
-void PathError::put_at(const FramePeak& peak) {
+void PathError::put_at(const FramePeak& peak, bool rests) {
   X_WO_ = peak.X_WO;
   placed_ = true;
   mean_.setZero();
   covariance_ = peak.covariance;
+  if (!rests || !peak.lift) return;
+  // That it rests is a measurement of its height.
+  Vector6d upwards = Vector6d::Zero();
+  upwards.tail<3>() = up_;
+  const Vector6d with_height = covariance_ * upwards;
+  const Vector6d gain = with_height / (upwards.dot(with_height) + kRestHeight * kRestHeight);
+  mean_ = -*peak.lift * gain;
+  const Matrix6d left = covariance_ - gain * with_height.transpose();
+  covariance_ = 0.5 * (left + left.transpose());
+}
+
+geometry::Pose PathError::pose() const {
+  return {(geometry::exp_rotation(mean_.head<3>()) * X_WO_.rotation).normalized(), X_WO_.translation + mean_.tail<3>()};
 }
 
 void PathError::move_to(const geometry::Pose& X_WO) {
@@ -64,6 +77,7 @@ PathFit PathError::fit(const FramePeak& peak) const {
   const Vector6d off = innovation(peak);
   const geometry::Cholesky6 alone(peak.covariance), both(covariance_ + peak.covariance);
   PathFit fit;
+  fit.spread = alone.inverse().cwiseProduct(covariance_).sum();
   fit.mahalanobis = off.dot(both.solve(off));
   fit.log_likelihood =
       peak.log_peak + 0.5 * (log_determinant_6(alone) - log_determinant_6(both)) - 0.5 * fit.mahalanobis;

@@ -24,7 +24,11 @@ constexpr double kLastingError = 0.25;
 // A path is at a frame's peak up to this squared distance (95 % of chi-squared with six degrees of freedom): what the
 // image says of further ones is looked at.
 constexpr double kAtPeak = 12.6;
+// A path is known so much better than a frame tells, by this sum of ratios of variances, that the image itself weighs
+// it: what the spread of the path adds is less than a quarter of a nat then.
+constexpr double kKnownWell = 0.5;
 constexpr float kBehindSupport = 0.02F;  // m; so far behind a support's surface an object is hidden by it
+constexpr double kFarFromOutline = 1e3;  // px
 constexpr int kSampled = 8;              // pixels between two that changes are looked for at
 constexpr float kChanged = 0.02F;        // m; a depth that changes by more has changed
 constexpr int kColorChanged = 90;        // sum over red, green and blue
@@ -52,6 +56,27 @@ double change_between(const belief::RgbdFrame& a, const belief::RgbdFrame& b, in
       changed += differs ? 1 : 0;
     }
   return all > 0 ? static_cast<double>(changed) / all : 0.0;
+}
+
+/// A known surface that is seen at a slant returns as little as an object's would: the more holes are to be expected
+/// where the object is absent, the less they speak for an object.
+void expect_holes_at_slants(filter::FilterFrame& frame) {
+  rendering::FrameTerms& terms = frame.terms;
+  const rendering::SensorModelOptions& sensor = terms.model.options();
+  const auto point = [&](int x, int y) { return terms.camera.unproject(x, y, frame.supports(x, y)); };
+  for (int y = 1; y + 1 < terms.camera.height; ++y)
+    for (int x = 1; x + 1 < terms.camera.width; ++x) {
+      float& missing = terms.absent_missing(x, y);
+      const bool known = frame.supports(x - 1, y) > 0.0F && frame.supports(x + 1, y) > 0.0F &&
+                         frame.supports(x, y - 1) > 0.0F && frame.supports(x, y + 1) > 0.0F;
+      if (!(missing >= 0.0F) || !known) continue;
+      const geometry::Vector3d normal =
+          (point(x + 1, y) - point(x - 1, y)).cross(point(x, y + 1) - point(x, y - 1)).normalized();
+      const double cosine = std::abs(normal.dot(terms.camera.unproject(x, y, 1.0).normalized()));
+      if (cosine > sensor.incidence_cosine.back()) continue;
+      missing = std::max(missing, static_cast<float>(terms.model.missing_probability({}, cosine, kFarFromOutline)));
+      terms.inverse_returns(x, y) = 1.0F / (1.0F - missing);
+    }
 }
 
 }  // namespace
@@ -100,6 +125,7 @@ core::Status WindowLikelihood::prepare() {
     PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), seen.observation,
                                                    seen.belief->robot, colors, options, tools_, cache, &frame));
     frame.terms.step *= seen.sampled;
+    expect_holes_at_slants(frame);
     stamps_.push_back(seen.observation.stamp_ns);
     std::vector<filter::SearchTarget>& targets = targets_.emplace_back();
     for (const belief::SceneObject& object : objects_) {
@@ -193,6 +219,33 @@ double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame, std
   return evidence(frame, first ? known.terms : terms_with(frame, depth), path.moved[m], X_WO).log_ratio;
 }
 
+template <class Direct>
+double WindowLikelihood::weigh(const FramePeak* peak, PathError& error, const Direct& direct) {
+  if (peak == nullptr) return direct(error.pose());
+  const PathFit fit = error.fit(*peak);
+  const bool near = fit.mahalanobis < kAtPeak;
+  // A peak is a Gaussian of some dozens of draws. It stands for paths that are nearly there, not for those of which the
+  // image can be asked.
+  if (fit.spread < kKnownWell) {
+    const double image = direct(error.pose());
+    if (near) error.learn(*peak);
+    return image;
+  }
+  if (!near) {
+    const double image = direct(error.pose());
+    if (fit.log_likelihood <= image) return image;
+  }
+  error.learn(*peak);
+  return fit.log_likelihood;
+}
+
+double WindowLikelihood::stays(std::size_t frame, std::size_t object, PathError& error) {
+  const Background& known = background(frame, {object});
+  const std::vector<FramePeak>& peaks = peaks_[object];
+  const auto direct = [&](const Pose& X_WO) { return share_ * evidence(frame, known.terms, object, X_WO).log_ratio; };
+  return share_ * known.log_ratio + weigh(!peaks.empty() && peaks[frame].seen ? &peaks[frame] : nullptr, error, direct);
+}
+
 void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of,
                               std::vector<PathEnd>* ends) {
   // By how much simulated paths are off is not known: a filter for each share, and the frames weigh them.
@@ -225,24 +278,23 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
       if (put_down && path.put_anywhere && peak != nullptr && put_at_peak[m] == 0) {
         put_at_peak[m] = 1;
         for (std::size_t s = 0; s < shares; ++s) {
-          errors[s * moved + m].put_at(*peak);
+          errors[s * moved + m].put_at(*peak, true);
           in_frame[s] += peak->log_mass + peak->log_put_down;
         }
         continue;
       }
-      std::optional<double> direct;
+      std::optional<std::pair<Pose, double>> looked_at;  // Errors that are alike ask for the same.
+      const auto direct = [&](const Pose& X_WO) {
+        const bool again = looked_at && looked_at->first.translation == X_WO.translation &&
+                           looked_at->first.rotation.coeffs() == X_WO.rotation.coeffs();
+        if (!again) looked_at.emplace(X_WO, share_ * log_ratio(path, k, m, X_WO, known));
+        return looked_at->second;
+      };
       for (std::size_t s = 0; s < shares; ++s) {
         PathError& error = errors[s * moved + m];
         if (put_at_peak[m] == 0) error.move_to(*path.paths[m][k]);
         if (put_down && !path.put_anywhere && k == *path.put_down_from) error.loosen(put_error);
-        const PathFit fit = peak != nullptr ? error.fit(*peak) : PathFit{-1e300, 1e300};
-        bool at_peak = fit.mahalanobis < kAtPeak;
-        if (!at_peak) {
-          if (!direct) direct = share_ * log_ratio(path, k, m, error.path_pose(), known);
-          at_peak = fit.log_likelihood > *direct;
-        }
-        in_frame[s] += at_peak ? fit.log_likelihood : *direct;
-        if (at_peak) error.learn(*peak);
+        in_frame[s] += weigh(peak, error, direct);
       }
     }
     double top = -1e300, sum = 0.0;
@@ -278,11 +330,16 @@ void WindowLikelihood::evaluate(std::span<const ScenePath> paths, std::span<doub
 
 void WindowLikelihood::settle(ScenePath& path) const {
   if (!path.put_down_from || !path.put_anywhere) return;
+  const geometry::Vector3d up = belief::up_of(*start_.scene);
   for (std::size_t m = 0; m < path.moved.size(); ++m) {
     const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
     std::optional<Pose> at;
     for (std::size_t k = *path.put_down_from; k < frames_.size() && !peaks.empty(); ++k) {
-      if (!at && peaks[k].seen) at = peaks[k].X_WO;
+      if (!at && peaks[k].seen) {
+        PathError error(0.0, 1.0, up, start_.scene->model_of(objects_[path.moved[m]]).symmetry);
+        error.put_at(peaks[k], true);
+        at = error.pose();
+      }
       if (at) path.paths[m][k] = at;
     }
   }

@@ -80,6 +80,10 @@ class WindowLikelihood {
   /// The same of one object at many poses in one frame, all others as the base has them.
   void evaluate(std::size_t frame, std::size_t object, std::span<const belief::Pose> X_WO,
                 std::span<double> log_ratios);
+  /// Of a frame in which an object of its own is where `error` has it, all others as the base has them; `error` learns.
+  double stays(std::size_t frame, std::size_t object, PathError& error);
+  /// How well an object's pose at the begin is known, in the coordinates of PathError.
+  const geometry::Matrix6d& start_error(std::size_t object) const { return start_errors_[object]; }
   /// Sets the poses of what was put down anywhere to those that the frames see.
   void settle(ScenePath& path) const;
   /// Of an object that the path moves.
@@ -103,6 +107,10 @@ class WindowLikelihood {
   /// frame.
   double log_ratio(const ScenePath& path, std::size_t frame, std::size_t m, const belief::Pose& X_WO,
                    const Background& known) const;
+  /// What a frame says of a path that is off by `error`, which learns from it. `direct`: what the image says at a pose,
+  /// tempered.
+  template <class Direct>
+  static double weigh(const FramePeak* peak, PathError& error, const Direct& direct);
   /// `ends`, where given, get those of the object `of`.
   void follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of = 0,
               std::vector<PathEnd>* ends = nullptr);

@@ -101,5 +101,31 @@ TEST(PathError, TurnsThatChangeNothingDoNotCount) {
   EXPECT_NEAR(upright.fit(peak).log_likelihood, turned.fit(peak).log_likelihood, 1e-9);
 }
 
+// Two measurements of one height: the frame's, and that of what it rests on.
+TEST(PathError, OfWhatIsPutDownRestsOnWhatIsBelow) {
+  FramePeak peak = peak_at({0.1, 0.2, 0.5});
+  PathError in_the_air(0.0, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  in_the_air.put_at(peak, true);
+  EXPECT_NEAR(in_the_air.pose().translation.z(), 0.5, 1e-12);  // nothing is known to be below
+  peak.lift = 0.02;
+  in_the_air.put_at(peak, false);
+  EXPECT_NEAR(in_the_air.pose().translation.z(), 0.5, 1e-12);
+  PathError error(0.0, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  error.put_at(peak, true);
+  const double frame = 1e-4, rest = kRestHeight * kRestHeight, all = frame + rest;
+  EXPECT_NEAR(error.pose().translation.z(), (0.5 * rest + 0.48 * frame) / all, 1e-12);
+  EXPECT_NEAR((error.pose().translation - Vector3d(0.1, 0.2, 0.5)).head<2>().norm(), 0.0, 1e-12);
+  EXPECT_NEAR(error.covariance()(5, 5), frame * rest / all, 1e-15);
+  EXPECT_NEAR(error.covariance()(4, 4), frame, 1e-15);
+}
+
+TEST(PathError, IsComparedWithWhatAFrameTells) {
+  PathError error(0.0, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  error.move_to(Pose{});
+  EXPECT_EQ(error.fit(peak_at({0.0, 0.0, 0.0})).spread, 0.0);
+  error.loosen(0.25e-4 * geometry::Matrix6d::Identity());
+  EXPECT_NEAR(error.fit(peak_at({0.0, 0.0, 0.0})).spread, 6.0 * 0.25, 1e-9);
+}
+
 }  // namespace
 }  // namespace prescene::queries

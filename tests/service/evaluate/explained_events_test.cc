@@ -60,6 +60,81 @@ INSTANTIATE_TEST_SUITE_P(Kinds, ExplainedEpisodes,
                                          "exchanged"),
                          [](const auto& tested) { return tested.param; });
 
+EventEpisode still_until(const std::string& scene, double from, double to) {
+  EventEpisode episode;
+  episode.kind = "told";
+  episode.world = episode.known = scene;
+  episode.from = from;
+  episode.to = to;
+  return episode;
+}
+
+constexpr const char* kBottleBeforeTheDark = R"(
+stop_at_rest: false
+duration: 3
+models:
+  can: {cylinder: {radius: 0.033, length: 0.115}, mass: 0.35, symmetry: {axis: z, continuous: true, flip: true}, color: "#3070b0"}
+  bottle: {cylinder: {radius: 0.03, length: 0.155}, mass: 0.35, symmetry: {axis: z, continuous: true, flip: true}, color: "#c07020"}
+supports:
+  table: {box: [1.0, 0.8, 0.04], pose: {position: [0, 0, 0.38]}, friction: 1.0}
+  floor: {ground: {size: 4}}
+objects:
+  bottle: {model: bottle, pose: {position: [0.15, 0.2, 0.4785]}}
+  can: {model: can, pose: {position: [-0.1, -0.2, 0.4575]}}
+camera: {width: 240, height: 180, fov_deg: 58, look: {from: [0.9, -0.6, 0.9], at: [0.05, 0, 0.42]}}
+)";
+
+// Behind the bottle the camera returns little: the table at a slant, and a floor beyond its range.
+TEST(ExplainedEvents, WhatIsTakenAwayInPlainViewIsNotStillThere) {
+  EventEpisode episode = still_until(kBottleBeforeTheDark, 1.0, 2.8);
+  episode.truth = belief::EventKind::kTakenAway;
+  episode.object = "bottle";
+  episode.time = 1.5;
+  episode.changes = {{episode.time, "bottle", {}, {}}};
+  ExplainedEventsOptions options;
+  options.query.runs = 2;
+  const EpisodeResult result = explain_episode(episode, 1, options, testing::TempDir(), {});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
+  EXPECT_LT(result.time_error, 0.3);
+}
+
+constexpr const char* kDrawer = R"(
+stop_at_rest: false
+duration: 2
+models:
+  drawer:
+    parts:
+      - {box: [0.3, 0.28, 0.008], position: [0, 0, -0.056]}
+      - {box: [0.016, 0.34, 0.18], position: [0.158, 0, 0]}
+      - {capsule: {radius: 0.006, length: 0.12}, position: [0.21, 0, 0], rotation: {euler_deg: [90, 0, 0]}}
+    mass: 1.2
+    color: [0.75, 0.55, 0.35]
+supports:
+  floor: {ground: {size: 3}, color: [0.5, 0.5, 0.5]}
+  cabinet:
+    parts:
+      - {box: [0.34, 0.34, 0.01], position: [-0.02, 0, 0.005]}
+      - {box: [0.34, 0.34, 0.01], position: [-0.02, 0, 0.195]}
+      - {box: [0.34, 0.01, 0.18], position: [-0.02, 0.165, 0.1]}
+      - {box: [0.34, 0.01, 0.18], position: [-0.02, -0.165, 0.1]}
+    color: [0.45, 0.3, 0.2]
+objects:
+  drawer: {model: drawer, pose: {position: [0.2, 0, 0.1]}}
+joints:
+  slide: {type: slider, parent: cabinet, child: drawer, axis: x, min: 0, max: 0.26, friction: 1.5, damping: 1}
+camera: {width: 320, height: 240, fov_deg: 50, look: {from: [0.9, -0.5, 0.6], at: [0.1, 0, 0.1]}}
+)";
+
+// A large object of which a frame says more than a Gaussian of some dozens of draws does, and which its slider holds.
+TEST(ExplainedEvents, NothingHappensToADrawerThatStands) {
+  ExplainedEventsOptions options;
+  options.query.runs = 2;
+  const EpisodeResult result = explain_episode(still_until(kDrawer, 0.6, 1.4), 1, options, testing::TempDir(), {});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
+}
+
 EpisodeResult said(const std::string& kind, double probability, bool right) {
   EpisodeResult result;
   result.kind = kind;

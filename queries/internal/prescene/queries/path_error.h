@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "prescene/geometry/pose.h"
 #include "prescene/geometry/symmetry.h"
@@ -33,7 +34,12 @@ struct FramePeak {
   double log_mass = 0.0;      ///< Of its integral over translations (m^3) and turns that change something (rad).
   double error = 0.0;         ///< Standard error of log_mass.
   double log_put_down = 0.0;  ///< Log density with which somebody puts the object down there (EventPriors).
+  /// m by which the peak is above what the object would rest on there, negative = in it; empty = not known.
+  std::optional<double> lift;
 };
+
+/// m; deviation of the height at which things rest, from that at which shapes and surfaces have them rest.
+inline constexpr double kRestHeight = 0.003;
 
 /// The covariance of a pose in the coordinates of geometry::box_plus (turns along the axes of the object) in those of
 /// FramePeak.
@@ -42,6 +48,7 @@ geometry::Matrix6d turns_about_W(const geometry::Pose& X_WO, const geometry::Mat
 struct PathFit {
   double log_likelihood = 0.0;
   double mahalanobis = 0.0;  ///< Squared distance of the path from the peak, by the spread of both.
+  double spread = 0.0;       ///< Of the path, by that of the peak: the sum of the ratios of their variances.
 };
 
 class PathError {
@@ -52,8 +59,8 @@ class PathError {
 
   /// The true pose is off by this much more, whatever moves: coordinates as those of FramePeak.
   void loosen(const geometry::Matrix6d& covariance) { covariance_ += covariance; }
-  /// The path goes on from where a frame saw the object.
-  void put_at(const FramePeak& peak);
+  /// The path goes on from where a frame saw the object; if it `rests`, from where it rests near there.
+  void put_at(const FramePeak& peak, bool rests);
   /// The next pose of the simulated path.
   void move_to(const geometry::Pose& X_WO);
   /// `peak` must be seen, and there must be a pose.
@@ -64,6 +71,8 @@ class PathError {
   const geometry::Vector6d& mean() const { return mean_; }
   const geometry::Matrix6d& covariance() const { return covariance_; }
   const geometry::Pose& path_pose() const { return X_WO_; }
+  /// Where the true object is, most probably: the path's pose with the mean error.
+  geometry::Pose pose() const;
 
  private:
   geometry::Vector6d innovation(const FramePeak& peak) const;
