@@ -4,52 +4,84 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
-#include "acceptance.h"
-#include "prescene/filter/proposals/fine_frame.h"
+#include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/sampling.h"
+#include "proposal_judge.h"
 
 namespace prescene::filter {
 namespace {
 
-constexpr std::size_t kKept = 12;  // best poses of a cluster and model that compete
-constexpr int kLearnedRounds = 2;  // of a learned judge; the second looks at what the first left unexplained
-// Else finds whose surface goes on may stay until the next round has looked for what ends it, twice.
-constexpr int kRounds = 4;
-constexpr double kSameCluster = 0.9;     // share of the pixels of clusters that are not looked at again
+constexpr int kKept = 4;                 // best poses of a cluster and model that compete
+constexpr int kRounds = 2;               // the second looks at what the first left unexplained
+constexpr double kOutlineStep = 0.02;    // m; the measured surface ends by at least so much (kLeastOutline)
+constexpr double kMostSinking = 0.03;    // m that a pose may reach into a support: planes and meshes are off by 15 mm
+constexpr double kMostFloating = 0.03;   // m between the lowest points and what they stand on
+constexpr double kMostOverlap = 0.1;     // share of an object that others may cut off (SupportSurfaces::overlap), ...
+constexpr double kContact = 0.012;       // m; ... each side of it so much smaller
 constexpr double kStandingStarts = 0.3;  // share of the starts with a side of the model's box down
 constexpr int kFloatingClusters = 3;     // clusters that are over no support and yet looked at
 // m; a measurement so little in front of a known surface, or up to twice as much behind it, is explained.
 constexpr double kExplainedDepth = 0.015;
-/// What is asked of finds between rounds, and at the end.
-constexpr LeastOfFind kForNow = {.outline = kLeastOutlineForNow, .probability = 0.0};
-constexpr LeastOfFind kAtTheEnd = {.outline = kLeastOutline, .probability = 0.15};  // chosen on rooms 1 to 40
+// Log odds of a find, see probability_right: logistic regression on simulated rooms (docs/studies/tracking.md).
+constexpr double kOddsAtFull = 1.9;         // of an object with the usual log ratio that matches as well as expected
+constexpr double kUsualLogRatio = 200.0;    // nats
+constexpr double kOddsOfSize = 1.3;         // per factor e of the log ratio
+constexpr double kOddsOfLack = 13.8;        // per share of the expected evidence that is missing
+constexpr double kLeastSupportArea = 0.05;  // m^2; a smaller flat patch may be a face of an object
+constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much larger than the largest face of an object
 // Starts for each cluster and model where something was learned of it (FilterTools::learned), in place of
 // DetectionOptions::starts. Chosen.
 constexpr int kLearnedStarts = 36;  // poses that the learned places propose, ...
 constexpr int kOtherStarts = 24;    // ... and random ones beside them
-// What competes is refined once more at the resolution at which it is judged.
-constexpr RefineOptions kFineRefine = {.steps = 6, .first_gate = 0.02, .last_gate = 0.008};
+// Joint refinement of what is accepted.
+constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
+constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
 // Where a learned judge decides, only what is hopeless is not shown to it.
 constexpr int kKeptForJudge = 6;
-constexpr double kSameShare = 0.15;  // of the log ratio
+constexpr double kHopelessLogRatio = 20.0;  // nats
+constexpr double kHopelessHits = 0.5;
+constexpr double kHopelessVisible = 0.15;
+// Candidates of one cluster and model that are so near and explain so much the same are one.
+constexpr double kSamePlace = 0.01;  // m
+constexpr double kSameShare = 0.03;  // of the log ratio
 
-/// The best of each group of candidates that are one, best first: turns that look alike have one box about them.
-void keep_distinct(const SearchTarget& target, std::size_t most, std::vector<PoseCandidate>& candidates) {
+/// The best of each group of candidates that are one, best first.
+void keep_distinct(const Vector3d& centre, std::size_t most, std::vector<PoseCandidate>& candidates) {
   std::vector<PoseCandidate> kept;
-  std::vector<geometry::Box> boxes;
   for (const PoseCandidate& candidate : candidates) {
     if (kept.size() >= most) break;
-    const geometry::Box box = box_about(target, candidate.X_CO);
-    bool known = false;
-    for (std::size_t i = 0; i < kept.size() && !known; ++i)
-      known = is_same_place(target, kept[i].X_CO, candidate.X_CO, boxes[i], box) &&
-              std::abs(kept[i].evidence.log_ratio - candidate.evidence.log_ratio) <
-                  kSameShare * std::abs(kept[i].evidence.log_ratio);
-    if (known) continue;
-    kept.push_back(candidate);
-    boxes.push_back(box);
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const PoseCandidate& k) {
+      return (k.X_CO * centre - candidate.X_CO * centre).norm() < kSamePlace &&
+             std::abs(k.evidence.log_ratio - candidate.evidence.log_ratio) <
+                 kSameShare * std::abs(k.evidence.log_ratio);
+    });
+    if (!known) kept.push_back(candidate);
   }
   candidates = std::move(kept);
+}
+
+/// What need not be judged.
+bool hopeless(const rendering::PoseEvidence& e) {
+  return e.log_ratio < kHopelessLogRatio || e.hit_share() < kHopelessHits || e.visible < kHopelessVisible * e.in_view;
+}
+
+/// Whether one of the lowest points of an object at X_WO is right above a surface, or a little below.
+bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
+            std::span<const SupportSurfaces* const> surfaces) {
+  std::vector<Vector3d> points;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const auto& vertex : target.mesh->vertices) {
+    points.push_back(X_WO * vertex.cast<double>());
+    lowest = std::min(lowest, up_W.dot(points.back()));
+  }
+  return std::any_of(points.begin(), points.end(), [&](const Vector3d& p) {
+    if (up_W.dot(p) > lowest + kLowestPoints) return false;
+    return std::any_of(surfaces.begin(), surfaces.end(), [&](const SupportSurfaces* surface) {
+      return surface->crosses(p + kMostSinking * up_W, p - kMostFloating * up_W);
+    });
+  });
 }
 
 /// What a cluster and model are tried from: places that look like learned ones of the model, if there are any, and
@@ -64,32 +96,8 @@ std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled,
   return starts;
 }
 
-/// Poses that were found from several clusters count once.
-void drop_repeated(std::span<const WantedModel> wanted, std::vector<Proposal>& proposals) {
-  std::stable_sort(proposals.begin(), proposals.end(), [](const Proposal& a, const Proposal& b) {
-    return a.candidate.evidence.log_ratio > b.candidate.evidence.log_ratio;
-  });
-  std::vector<Proposal> kept;
-  std::vector<geometry::Box> boxes;
-  for (const Proposal& p : proposals) {
-    const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
-    const geometry::Box box = box_about(target, p.candidate.X_CO);
-    bool known = false;
-    for (std::size_t i = 0; i < kept.size() && !known; ++i)
-      known = kept[i].model == p.model &&
-              is_same_place(target, kept[i].candidate.X_CO, p.candidate.X_CO, boxes[i], box) &&
-              p.candidate.evidence.log_ratio > (1.0 - kSameShare) * kept[i].candidate.evidence.log_ratio;
-    if (known) continue;
-    kept.push_back(p);
-    boxes.push_back(box);
-  }
-  proposals = std::move(kept);
-}
-
-/// The best poses of each wanted model in each cluster from `first` on, ordered by cluster, model, rank: looked for in
-/// `terms`, then refined and weighed in `fine`.
-std::vector<Proposal> propose(const rendering::FrameTerms& terms, const rendering::FrameTerms& fine,
-                              const Weighing& weighing, const SampledDepth& sampled,
+/// The best poses of each wanted model in each cluster from `first` on, ordered by cluster, model, rank.
+std::vector<Proposal> propose(const rendering::FrameTerms& terms, const SampledDepth& sampled,
                               const std::vector<Cluster>& clusters, std::size_t first, const Surroundings& surroundings,
                               std::span<const WantedModel> wanted, std::span<const int> left,
                               const ProposalJudge& judge, const DetectionOptions& options, const FilterTools& tools,
@@ -116,72 +124,294 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, const renderin
     std::erase_if(task.found, [&](const PoseCandidate& c) {
       return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
     });
-    if (!judge.decides()) std::erase_if(task.found, [](const PoseCandidate& c) { return hopeless(c.evidence); });
-    keep_distinct(target, judge.decides() ? kKeptForJudge : kKept, task.found);
-    if (judge.decides()) return;
-    for (PoseCandidate& candidate : task.found) {
-      tools.search->refine(fine, target, kFineRefine, *workspace, std::span(&candidate.X_CO, 1));
-      candidate.evidence = weighing.of(fine, target, candidate.X_CO, *workspace);
-    }
+    if (judge.decides())
+      keep_distinct(target.centre(), kKeptForJudge, task.found);
+    else
+      task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
   });
   std::vector<Proposal> proposals;
   for (const Task& task : tasks)
-    for (const PoseCandidate& candidate : task.found) {
-      if (judge.decides() ? hopeless(candidate.evidence) : !acceptable(candidate.evidence, 0.0, options)) continue;
-      Proposal proposal;
-      proposal.model = task.model;
-      proposal.candidate = candidate;
-      proposal.cluster = task.cluster;
-      proposals.push_back(proposal);
-    }
-  if (!judge.decides()) drop_repeated(wanted, proposals);
+    for (const PoseCandidate& candidate : task.found)
+      if (judge.decides() ? !hopeless(candidate.evidence) : acceptable(candidate.evidence, 0.0, options)) {
+        Proposal proposal;
+        proposal.model = task.model;
+        proposal.candidate = candidate;
+        proposal.cluster = task.cluster;
+        proposals.push_back(proposal);
+      }
   return proposals;
 }
 
-/// Whether most of a cluster's pixels are those of one that was looked at before, and the other way round.
-bool is_looked_at(const Cluster& cluster, std::span<const Cluster> looked_at) {
-  return std::any_of(looked_at.begin(), looked_at.end(), [&](const Cluster& other) {
-    std::vector<int> common;
-    std::set_intersection(cluster.pixels.begin(), cluster.pixels.end(), other.pixels.begin(), other.pixels.end(),
-                          std::back_inserter(common));
-    return static_cast<double>(common.size()) >
-           kSameCluster * static_cast<double>(std::max(cluster.pixels.size(), other.pixels.size()));
-  });
+/// The things that were found, as surfaces.
+SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC) {
+  SupportSurfaces surfaces;
+  for (const Detection& detection : found)
+    surfaces.add(*wanted[static_cast<std::size_t>(detection.model)].target.mesh, X_WC * detection.X_CO);
+  return surfaces;
+}
+
+std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,
+                                            const geometry::PinholeCamera& camera, const FilterTools& tools) {
+  std::vector<geometry::DepthImage> depths;
+  for (const Detection& detection : found)
+    depths.push_back(
+        depth_of(wanted[static_cast<std::size_t>(detection.model)].target, detection.X_CO, camera, *tools.renderer));
+  return depths;
+}
+
+/// Accepts the strongest proposal, puts it into the frame, judges the others again, until none is acceptable.
+void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>& clusters,
+                     const Surroundings& surroundings, std::span<const WantedModel> wanted, const ProposalJudge& judge,
+                     const DetectionOptions& options, const FilterTools& tools, rendering::FrameTerms& terms,
+                     geometry::DepthImage& known, std::vector<int>& left, std::vector<Detection>& found) {
+  SupportSurfaces things = surfaces_of(found, wanted, surroundings.X_WC);
+  const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+  const auto weigh_standing = [&] {
+    tools.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
+      Proposal& p = proposals[i];
+      const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
+      const Pose X_WO = surroundings.X_WC * p.candidate.X_CO;
+      p.weigh(stands(target, X_WO, surroundings.up_W, ground));
+    });
+    // What stands on nothing now may stand on what is found next.
+    std::erase_if(proposals, [&](const Proposal& p) {
+      return judge.decides() ? hopeless(p.candidate.evidence) : !acceptable(p.candidate.evidence, 0.0, options);
+    });
+    if (judge.decides()) judge.judge(terms, clusters, proposals);
+  };
+  const auto worse = [&](const Proposal& a, const Proposal& b) {
+    return judge.decides() ? a.log_odds < b.log_odds : a.score() < b.score();
+  };
+  std::vector<Proposal> waiting;
+  weigh_standing();
+  while (!proposals.empty()) {
+    const auto best = std::max_element(proposals.begin(), proposals.end(), worse);
+    if (judge.decides() ? best->log_odds < kLeastLogOdds : !acceptable(best->candidate.evidence, best->cost, options)) {
+      proposals.erase(best);
+      continue;
+    }
+    const auto model = static_cast<std::size_t>(best->model);
+    const SearchTarget& target = wanted[model].target;
+    const Pose X_WO = surroundings.X_WC * best->candidate.X_CO;
+    const geometry::DepthImage depth = depth_of(target, best->candidate.X_CO, terms.camera, *tools.renderer);
+    if (things.overlap(*target.mesh, X_WO, kContact) > kMostOverlap) {
+      proposals.erase(best);
+      continue;
+    }
+    if (!judge.decides() && outline_support(terms, depth, kOutlineStep) < kLeastOutline) {
+      // Its surface may end where a neighbour is that is not found yet.
+      waiting.push_back(*best);
+      proposals.erase(best);
+      continue;
+    }
+    Detection detection;
+    detection.model = best->model;
+    detection.X_CO = best->candidate.X_CO;
+    detection.evidence = best->candidate.evidence;
+    detection.cluster = best->cluster;
+    detection.numbers = best->numbers;
+    detection.log_odds = best->log_odds;
+    found.push_back(detection);
+    --left[model];
+    merge_nearest(depth, &known);
+    with_known_surfaces(terms, depth, &terms);
+    things.add(*target.mesh, X_WO);
+    std::move(waiting.begin(), waiting.end(), std::back_inserter(proposals));
+    waiting.clear();
+    std::erase_if(proposals, [&](const Proposal& p) { return left[static_cast<std::size_t>(p.model)] == 0; });
+    tools.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
+      const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+      Proposal& p = proposals[i];
+      const auto h = hypothesis(wanted[static_cast<std::size_t>(p.model)].target, p.candidate.X_CO);
+      tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&p.candidate.evidence, 1));
+    });
+    weigh_standing();
+  }
+}
+
+/// Each accepted object once more, given the others where they are now.
+void settle(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const DetectionOptions& options,
+            const FilterTools& tools, const core::RandomStream& stream, std::vector<Detection>& found) {
+  std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
+  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    rendering::FrameTerms mine = terms;
+    for (std::size_t j = 0; j < found.size(); ++j)
+      if (j != i) with_known_surfaces(mine, depths[j], &mine);
+    const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
+    SearchOptions search = options.search;
+    search.refine = kSettling;
+    search.polish_candidates = 1;
+    const Pose starts[] = {found[i].X_CO};
+    const auto refined = tools.search->run_serial(mine, target, starts, search, stream.at(i), *workspace);
+    rendering::PoseEvidence before;
+    const auto h = hypothesis(target, found[i].X_CO);
+    tools.search->batch().evaluate(mine, std::span(&h, 1), *workspace, std::span(&before, 1));
+    const bool better = refined.front().evidence.log_ratio > before.log_ratio;
+    if (better) found[i].X_CO = refined.front().X_CO;
+    found[i].evidence = better ? refined.front().evidence : before;
+    depths[i] = depth_of(target, found[i].X_CO, terms.camera, *tools.renderer);
+    found[i].outline = outline_support(mine, depths[i], kOutlineStep);
+  }
+}
+
+/// Gives each find the probability that it is right; returns the judge's log odds of each with all others known.
+std::vector<double> believe(const rendering::FrameTerms& terms, const std::vector<Cluster>& clusters,
+                            std::span<const WantedModel> wanted, const ProposalJudge& judge, const FilterTools& tools,
+                            std::vector<Detection>& found) {
+  const std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
+  std::vector<double> log_odds(found.size(), 0.0);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    rendering::FrameTerms mine = terms;
+    for (std::size_t j = 0; j < found.size(); ++j)
+      if (j != i) with_known_surfaces(mine, depths[j], &mine);
+    const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
+    if (judge.decides()) {
+      const FitNumbers numbers = judge.numbers_of(mine, clusters[static_cast<std::size_t>(found[i].cluster)], found[i]);
+      log_odds[i] = tools.learned->fit.log_odds(numbers);
+      found[i].probability = judge.probability(found[i].log_odds, log_odds[i]);
+      continue;
+    }
+    found[i].probability =
+        probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer));
+  }
+  return log_odds;
+}
+
+/// Takes back what is no longer acceptable now that the others are where they are.
+void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const ProposalJudge& judge,
+               const DetectionOptions& options, std::span<const double> log_odds, std::vector<int>& left,
+               std::vector<Detection>& found) {
+  for (std::size_t i = found.size(); i-- > 0;) {
+    std::vector<Detection> others = found;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const SupportSurfaces things = surfaces_of(others, wanted, surroundings.X_WC);
+    const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+    Detection& detection = found[i];
+    const auto model = static_cast<std::size_t>(detection.model);
+    const Pose X_WO = surroundings.X_WC * detection.X_CO;
+    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground);
+    Proposal proposal;
+    proposal.model = detection.model;
+    proposal.candidate = {detection.X_CO, detection.evidence};
+    proposal.weigh(detection.stands);
+    if (judge.decides() ? !hopeless(detection.evidence) && judge.believes(log_odds[i])
+                        : acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kLeastOutline)
+      continue;
+    ++left[model];
+    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+  }
 }
 
 }  // namespace
 
-std::vector<Detection> detect(const rendering::FrameTerms& terms, const geometry::DepthImage& known,
+std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& target, const Vector3d& up_C,
+                                 double standing_share, int count, const core::RandomStream& stream) {
+  core::RandomStream draws = stream;
+  std::vector<Pose> starts;
+  for (int i = 0; i < count; ++i) {
+    const Vector3d& seen = cluster.points_C[draws.uniform_below(cluster.points_C.size())];
+    // The centre lies behind the seen surface by up to the radius.
+    const Vector3d centre =
+        seen + draws.uniform(0.0, 0.6) * static_cast<double>(target.mesh->radius) * seen.normalized();
+    Pose X_CO;
+    X_CO.rotation = geometry::uniform_rotation(draws);
+    if (draws.uniform() < standing_share) {
+      // Turned by the least angle that brings the axis nearest to up there: which axis, and the turn about up, stay
+      // uniform.
+      const geometry::Matrix3d R = X_CO.rotation.toRotationMatrix();
+      Eigen::Index axis = 0;
+      (R.transpose() * up_C).cwiseAbs().maxCoeff(&axis);
+      const Vector3d nearest = R.col(axis) * (R.col(axis).dot(up_C) < 0.0 ? -1.0 : 1.0);
+      X_CO.rotation = (geometry::rotation_between(nearest, up_C) * X_CO.rotation).normalized();
+    }
+    X_CO.translation = centre - X_CO.rotation * target.centre();
+    starts.push_back(X_CO);
+  }
+  return starts;
+}
+
+geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, const geometry::DepthImage& known,
+                                               const geometry::PinholeCamera& camera, double tolerance) {
+  geometry::Image<std::uint8_t> explained(sampled.camera.width, sampled.camera.height);
+  if (known.empty()) return explained;
+  for (int y = 0; y < explained.height(); ++y)
+    for (int x = 0; x < explained.width(); ++x) {
+      const double z = sampled.depth(x, y);
+      if (z == 0.0) continue;
+      const Eigen::Vector2d pixel =
+          camera.project(sampled.points_C[static_cast<std::size_t>(y * explained.width() + x)]);
+      const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+      const double near = tolerance * tolerance_growth(z);
+      // The neighbours' surfaces count too: outlines are no sharper than a reduced pixel.
+      for (int dv = -1; dv <= 1; ++dv)
+        for (int du = -1; du <= 1; ++du) {
+          if (u + du < 0 || v + dv < 0 || u + du >= known.width() || v + dv >= known.height()) continue;
+          const float surface = known(u + du, v + dv);
+          if (surface > 0.0f && z > surface - near && z < surface + 2.0 * near) explained(x, y) = 1;
+        }
+    }
+  return explained;
+}
+
+namespace {
+
+/// Walls and sides of supports as they are measured: they are no evidence of an object.
+geometry::DepthImage walls_in(const rendering::FrameTerms& terms, const SampledDepth& sampled,
+                              const Surroundings& surroundings) {
+  geometry::DepthImage walls(terms.camera.width, terms.camera.height);
+  for (int y = 0; y < walls.height(); ++y)
+    for (int x = 0; x < walls.width(); ++x) {
+      if (!(terms.depth(x, y) > 0.0f)) continue;
+      const Eigen::Vector2d pixel = sampled.camera.project(terms.camera.unproject(x, y, 1.0));
+      const int u = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, sampled.camera.width - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, sampled.camera.height - 1);
+      if (surroundings.background(u, v) == kWall) walls(x, y) = terms.depth(x, y);
+    }
+  return walls;
+}
+
+}  // namespace
+
+double probability_right(const rendering::PoseEvidence& evidence, double expected_evidence) {
+  if (!(evidence.log_ratio > 0.0) || !(expected_evidence > 0.0)) return 0.0;
+  // Infinite: what to expect is not known.
+  const double share =
+      std::isfinite(expected_evidence) ? evidence.log_ratio_per_visible_pixel() / expected_evidence : 1.0;
+  const double log_odds = kOddsAtFull + kOddsOfSize * std::log(evidence.log_ratio / kUsualLogRatio) -
+                          kOddsOfLack * std::max(0.0, 1.0 - share);
+  return 1.0 / (1.0 + std::exp(-log_odds));
+}
+
+double least_support_area(std::span<const WantedModel> wanted) {
+  double largest = 0.0;
+  for (const WantedModel& model : wanted) {
+    geometry::Box box;
+    for (const auto& vertex : model.target.mesh->vertices) box.extend(vertex.cast<double>());
+    if (box.isEmpty()) continue;
+    const Vector3d size = box.sizes();
+    largest = std::max(largest, size.prod() / std::max(size.minCoeff(), 1e-6));
+  }
+  return std::max(kLeastSupportArea, kFacesOfASupport * largest);
+}
+
+std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const geometry::DepthImage& known,
                               const SampledDepth& sampled, const Surroundings& surroundings,
                               std::span<const WantedModel> wanted, const DetectionOptions& options,
                               const FilterTools& tools, const core::RandomStream& stream, DetectionTrace* trace) {
-  return detect(terms, terms, known, sampled, surroundings, wanted, options, tools, stream, trace);
-}
-
-std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const rendering::FrameTerms& fine_terms,
-                              const geometry::DepthImage& known, const SampledDepth& sampled,
-                              const Surroundings& surroundings, std::span<const WantedModel> wanted,
-                              const DetectionOptions& options, const FilterTools& tools,
-                              const core::RandomStream& stream, DetectionTrace* trace) {
-  const rendering::FrameTerms terms = with_background(frame_terms, sampled, surroundings);
+  rendering::FrameTerms terms;
+  with_known_surfaces(frame_terms, walls_in(frame_terms, sampled, surroundings), &terms);
   const ProposalJudge judge(wanted, surroundings.X_WC.rotation.conjugate() * surroundings.up_W, options, tools, trace);
-  // What a learned judge knows of fits is of the coarse image.
-  const rendering::FrameTerms fine = judge.decides() ? terms : with_background(fine_terms, sampled, surroundings);
-  const Weighing weighing(terms, fine, tools);
   std::vector<int> left;
   for (const WantedModel& model : wanted) left.push_back(model.count);
-  rendering::FrameTerms explained_terms = terms, explained_fine = fine;
-  const geometry::DepthImage nothing(fine.camera.width, fine.camera.height);
-  geometry::DepthImage explained_depth = nothing;
+  rendering::FrameTerms explained_terms = terms;
+  geometry::DepthImage explained_depth =
+      known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
   std::vector<Detection> found;
   std::vector<Cluster> looked_at;
-  std::vector<Proposal> pool;
-  const int rounds = judge.decides() ? kLearnedRounds : kRounds;
-  for (int round = 0; round < rounds; ++round) {
-    auto mask = explained_pixels(sampled, explained_depth, fine.camera, kExplainedDepth);
-    const auto known_mask = explained_pixels(sampled, known, terms.camera, kExplainedDepth);
-    for (std::size_t i = 0; i < mask.size(); ++i)
-      mask.data()[i] |= surroundings.background.data()[i] | known_mask.data()[i];
+  for (int round = 0; round < kRounds; ++round) {
+    auto mask = explained_pixels(sampled, explained_depth, terms.camera, kExplainedDepth);
+    for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] |= surroundings.background.data()[i];
     // What is over the main support first, then over others; of the rest only some.
     std::vector<Cluster> clusters;
     for (const int where : {kMainSupport, kOtherSupport, kNoSupport}) {
@@ -195,43 +425,24 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const re
     if (static_cast<int>(clusters.size()) > options.max_clusters)
       clusters.resize(static_cast<std::size_t>(options.max_clusters));
     const std::size_t first = looked_at.size();
-    if (!judge.decides()) std::erase_if(clusters, [&](const Cluster& c) { return is_looked_at(c, looked_at); });
     std::move(clusters.begin(), clusters.end(), std::back_inserter(looked_at));
-    std::vector<Proposal> proposals =
-        propose(explained_terms, explained_fine, weighing, sampled, looked_at, first, surroundings, wanted, left, judge,
-                options, tools, stream, static_cast<std::uint64_t>(round));
-    if (judge.decides()) pool.clear();
-    std::move(proposals.begin(), proposals.end(), std::back_inserter(pool));
-    if (pool.empty()) continue;
-    proposals = pool;
-    reweigh(explained_fine, wanted, weighing, left, tools, proposals);
-    accept_greedily(std::move(proposals), looked_at, surroundings, wanted, judge, weighing, options, tools,
-                    explained_fine, explained_depth, left, found);
-    settle(fine, wanted, weighing, options, tools, stream, found);
-    const std::vector<double> log_odds = believe(fine, looked_at, wanted, judge, tools, found);
-    const bool is_strict = judge.decides() || round % 2 == 1;
-    const std::vector<Detection> taken =
-        take_back(surroundings, wanted, judge, options, is_strict ? kAtTheEnd : kForNow, log_odds, left, found);
-    // It would be accepted again, in place of what is right.
-    if (is_strict)
-      std::erase_if(pool, [&](const Proposal& p) {
-        return std::any_of(taken.begin(), taken.end(), [&](const Detection& d) {
-          const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
-          return d.model == p.model && is_same_place(target, d.X_CO, p.candidate.X_CO, box_about(target, d.X_CO),
-                                                     box_about(target, p.candidate.X_CO));
-        });
-      });
+    std::vector<Proposal> proposals = propose(explained_terms, sampled, looked_at, first, surroundings, wanted, left,
+                                              judge, options, tools, stream, static_cast<std::uint64_t>(round));
+    if (proposals.empty()) continue;
+    accept_greedily(std::move(proposals), looked_at, surroundings, wanted, judge, options, tools, explained_terms,
+                    explained_depth, left, found);
+    settle(terms, wanted, options, tools, stream, found);
+    std::vector<double> log_odds(found.size(), 0.0);
+    if (judge.decides()) log_odds = believe(terms, looked_at, wanted, judge, tools, found);
+    take_back(surroundings, wanted, judge, options, log_odds, left, found);
     explained_terms = terms;
-    explained_fine = fine;
-    explained_depth = nothing;
-    for (const geometry::DepthImage& depth : depths_of(found, wanted, terms.camera, tools))
-      with_known_surfaces(explained_terms, depth, &explained_terms);
-    for (const geometry::DepthImage& depth : depths_of(found, wanted, fine.camera, tools)) {
+    explained_depth = known.empty() ? geometry::DepthImage(terms.camera.width, terms.camera.height) : known;
+    for (const geometry::DepthImage& depth : depths_of(found, wanted, terms.camera, tools)) {
       merge_nearest(depth, &explained_depth);
-      with_known_surfaces(explained_fine, depth, &explained_fine);
+      with_known_surfaces(explained_terms, depth, &explained_terms);
     }
   }
-  const std::vector<double> log_odds = believe(fine, looked_at, wanted, judge, tools, found);
+  const std::vector<double> log_odds = believe(terms, looked_at, wanted, judge, tools, found);
   if (trace != nullptr)
     for (std::size_t i = 0; i < found.size(); ++i)
       trace->finds.push_back({found[i].model, found[i].X_CO, found[i].numbers, found[i].log_odds, log_odds[i]});

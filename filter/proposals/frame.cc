@@ -2,14 +2,12 @@
 #include "prescene/filter/proposals/frame.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace prescene::filter {
 namespace {
 
 constexpr double kMatch = 0.008;          // m: a measurement so near to the pose's surface is taken for it
-constexpr double kUnsurePixels = 12.0;    // of the full image, beside an edge: what a depth camera smears
 constexpr double kClearlyInFront = 0.02;  // m: a support nearer to the object than this may be what it stands on
 
 core::Status render_depth(const rendering::RenderScene& scene, const geometry::PinholeCamera& camera, const Pose& X_WC,
@@ -171,9 +169,7 @@ rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const
 
 double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step) {
   const int width = terms.camera.width, height = terms.camera.height;
-  // Pixels so near to an edge belong to either side as often as not, whatever the image was sampled from.
-  const int reach = std::max(2, static_cast<int>(std::lround(kUnsurePixels / terms.step)));
-  // What is further from the object is no matter of its outline.
+  // What is further than two pixels from the object is no matter of its outline.
   int left = width, right = -1, top = height, bottom = -1;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
@@ -182,8 +178,8 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
       top = std::min(top, y), bottom = std::max(bottom, y);
     }
   if (right < 0) return 1.0;
-  left = std::max(0, left - reach), right = std::min(width - 1, right + reach);
-  top = std::max(0, top - reach), bottom = std::min(height - 1, bottom + reach);
+  left = std::max(0, left - 2), right = std::min(width - 1, right + 2);
+  top = std::max(0, top - 2), bottom = std::min(height - 1, bottom + 2);
   geometry::Image<std::uint8_t> matched(width, height, 0);
   for (int y = top; y <= bottom; ++y)
     for (int x = left; x <= right; ++x) {
@@ -196,16 +192,17 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
     for (int x = left; x <= right; ++x) {
       const double z = terms.depth(x, y);
       if (z == 0.0 || matches(x, y)) continue;
-      // The matched surface nearest to this pixel, at most `reach` away: judge by the pixels that far away.
+      // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side
+      // as often as not: judge by those two away.
       double edge = 0.0;
-      int nearest = (reach + 1) * (reach + 1);
-      for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx) {
+      int nearest = 9;
+      for (int dy = -2; dy <= 2; ++dy)
+        for (int dx = -2; dx <= 2; ++dx) {
           if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height || !matches(x + dx, y + dy)) continue;
           const int distance = dx * dx + dy * dy;
           if (distance < nearest) nearest = distance, edge = terms.depth(x + dx, y + dy);
         }
-      if (edge == 0.0 || nearest < reach * reach || z < edge - step) continue;
+      if (edge == 0.0 || nearest < 4 || z < edge - step) continue;
       const double expected = terms.absent_peak(x, y);
       const bool known = expected > 0.0 && std::abs(z - expected) < 0.5 * step;
       (known || z > edge + step ? ends : goes_on)++;

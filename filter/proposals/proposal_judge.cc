@@ -8,19 +8,17 @@
 namespace prescene::filter {
 namespace {
 
-constexpr double kMinEvidence = 2.5;    // nats per visible pixel; thin things on a known surface say little
+constexpr double kMinEvidence = 4.0;    // nats per visible pixel
 constexpr double kMinVisible = 0.35;    // of the pixels that a pose shows, known things in front or not
-constexpr double kFloatingCost = 30.0;  // nats that a pose costs which stands on nothing known, ...
-constexpr double kFloatingShare = 0.4;  // ... and a share of its log ratio
+constexpr double kFloatingCost = 60.0;  // nats that a pose costs which stands on nothing known, ...
+constexpr double kFloatingShare = 0.7;  // ... and a share of its log ratio
 constexpr double kHitPower = 8.0;       // how much a pose's score suffers from pixels that do not match
-constexpr double kOutlinePower = 4.0;   // ... and from a surface that goes on past its outline
 constexpr double kMostLogOdds = 8.0;    // of a find that the judge is sure of
 
 }  // namespace
 
 double Proposal::score() const {
-  const double ends = outline < 0.0 ? 1.0 : std::pow(outline, kOutlinePower);
-  return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kHitPower) * ends - cost;
+  return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kHitPower) - cost;
 }
 
 void Proposal::weigh(bool on_something) {

@@ -12,8 +12,6 @@ namespace prescene::filter {
 
 /// Share of a pose's outline at which the measured surface ends (outline_support).
 inline constexpr double kLeastOutline = 0.7;
-/// Of a pose that is accepted for want of better ones, until it is known what ends its surface elsewhere. Chosen.
-inline constexpr double kLeastOutlineForNow = 0.35;
 
 /// Nats; a candidate with lower log odds is not accepted where a learned judge decides. Chosen.
 inline constexpr double kLeastLogOdds = -0.8;
@@ -24,15 +22,13 @@ struct Proposal {
   int cluster = 0;    ///< Of those that were looked at.
   double cost = 0.0;  ///< nats
   bool stands = false;
-  double outline = -1.0;  ///< outline_support; negative: not known as things are now.
-  FitNumbers numbers{};   ///< Of `judged` ...
+  FitNumbers numbers{};  ///< Of `judged` ...
   bool is_judged = false;
   rendering::PoseEvidence judged{};
   bool judged_standing = false;
   double log_odds = 0.0;  ///< ... and what the judge says of them.
 
-  /// nats. A wrong model that explains much of a large thing badly must not go before a right one that explains little
-  /// well. While the outline is not known, what it is at most.
+  /// A wrong model that explains much of a large thing badly must not go before a right one that explains little well.
   double score() const;
   /// What stands on nothing known costs.
   void weigh(bool on_something);

@@ -64,12 +64,6 @@ extern const std::vector<WantedModel> wanted;
 extern const DetectionOptions options;
 }  // namespace detection_h
 
-namespace fine_frame_h {
-extern const Surroundings surroundings;
-extern const std::vector<WantedModel> wanted;
-extern const DetectionOptions options;
-}  // namespace fine_frame_h
-
 namespace frame_h {
 extern const FrameColors colors;
 extern const FrameOptions options;

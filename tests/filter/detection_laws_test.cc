@@ -11,7 +11,6 @@
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/initialise.h"
-#include "prescene/filter/proposals/fine_frame.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -189,7 +188,7 @@ TEST_F(KnownObjects, EachIsFoundWhereItIsAndWhatIsNotThereIsNot) {
 
   // The evidence is that of the pose with the others as known surfaces. The one that was settled last saw all others
   // where they are now.
-  rendering::FrameTerms terms = with_background(frame_.terms, sampled_, surroundings_);
+  rendering::FrameTerms terms = frame_.terms;
   for (std::size_t i = 0; i + 1 < detections.size(); ++i) {
     const auto model = static_cast<std::size_t>(detections[i].model);
     with_known_surfaces(terms, depth_of(models[model].target, detections[i].X_CO, terms.camera, *backends_.renderer),
@@ -202,74 +201,6 @@ TEST_F(KnownObjects, EachIsFoundWhereItIsAndWhatIsNotThereIsNot) {
   backends_.likelihood->evaluate(terms, std::span(&pose, 1), *workspace, std::span(&evidence, 1));
   EXPECT_NEAR(evidence.log_ratio, last.evidence.log_ratio, 1e-6 * std::abs(evidence.log_ratio));
   EXPECT_EQ(evidence.visible, last.evidence.visible);
-}
-
-TEST_F(KnownObjects, FineTermsAreTheFrameAtAnotherResolution) {
-  const rendering::FrameTerms fine = fine_terms(frame_, *scene_, observation_, backends_.tools);
-  ASSERT_EQ(fine.camera.width, 320);
-  EXPECT_EQ(fine.step, observation_.frame.camera.width / 320);
-  EXPECT_GT(frame_.terms.step, fine.step);
-  // Each of its pixels is one of the observation, seen along the same ray.
-  for (int y = 3; y < fine.camera.height; y += 17)
-    for (int x = 3; x < fine.camera.width; x += 17) {
-      const Eigen::Vector2d pixel = observation_.frame.camera.project(fine.camera.unproject(x, y, 1.0));
-      const float z = (*observation_.frame.depth)(static_cast<int>(std::lround(pixel.x())),
-                                                  static_cast<int>(std::lround(pixel.y())));
-      EXPECT_LT((pixel.array() - pixel.array().round()).abs().maxCoeff(), 1e-6);
-      const auto& range = fine.model.options();
-      if (z > 0.0F) {
-        EXPECT_FLOAT_EQ(fine.depth(x, y),
-                        std::clamp(z, static_cast<float>(range.min_depth), static_cast<float>(range.max_depth)));
-      } else {
-        EXPECT_EQ(fine.depth(x, y), 0.0F);
-      }
-    }
-}
-
-TEST_F(KnownObjects, AnOutlineEndsAtASupportThatTheFrameAloneShows) {
-  const rendering::FrameTerms fine = fine_terms(frame_, *scene_, observation_, backends_.tools);
-  const rendering::FrameTerms known = with_background(fine, sampled_, surroundings_);
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const geometry::DepthImage depth =
-        depth_of(wanted(models_[i]).target, frame_.X_CW * poses_[i], fine.camera, *backends_.renderer);
-    const double before = outline_support(fine, depth, 0.02), after = outline_support(known, depth, 0.02);
-    EXPECT_GE(after, before) << models_[i].name;
-    EXPECT_GT(after, 0.9) << models_[i].name;
-  }
-}
-
-TEST_F(KnownObjects, APartOfALargerThingIsNotFound) {
-  // Nobody knows of the crate, whose faces explain those of the box.
-  const belief::ObjectModel crate = box_model("crate", {0.14, 0.18, 0.17});
-  see({crate}, {Pose{geometry::exp_rotation({0.0, 0.0, 0.3}), {0.0, 0.0, 0.085}}});
-  const std::vector<WantedModel> models = {wanted(box_model("box", {0.06, 0.10, 0.12}))};
-  const rendering::FrameTerms fine = fine_terms(frame_, *scene_, observation_, backends_.tools);
-  EXPECT_THAT(detect(frame_.terms, fine, {}, sampled_, surroundings_, models, {}, backends_.tools,
-                     {5, core::Purpose::kDetection}),
-              IsEmpty());
-  // The crate itself is found by its own model.
-  EXPECT_EQ(detect(frame_.terms, fine, {}, sampled_, surroundings_, {{wanted(crate)}}, {}, backends_.tools,
-                   {5, core::Purpose::kDetection})
-                .size(),
-            1U);
-}
-
-TEST_F(KnownObjects, AStackIsFoundWhole) {
-  // The tray's corners all lie beyond the edges of the box that it lies on, and neither ends but at the other.
-  const belief::ObjectModel box = box_model("box", {0.09, 0.11, 0.14}), tray = box_model("tray", {0.12, 0.14, 0.04});
-  const std::vector<Pose> poses = {Pose{geometry::exp_rotation({0.0, 0.0, 0.4}), {0.0, 0.0, 0.07}},
-                                   Pose{geometry::exp_rotation({0.0, 0.0, -0.2}), {0.01, 0.0, 0.16}}};
-  see({box, tray}, poses);
-  const std::vector<WantedModel> models = {wanted(box), wanted(tray)};
-  const rendering::FrameTerms fine = fine_terms(frame_, *scene_, observation_, backends_.tools);
-  const std::vector<Detection> detections = detect(frame_.terms, fine, {}, sampled_, surroundings_, models, {},
-                                                   backends_.tools, {5, core::Purpose::kDetection});
-  ASSERT_THAT(models_of(detections), UnorderedElementsAre(0, 1));
-  for (const Detection& detection : detections) {
-    const auto model = static_cast<std::size_t>(detection.model);
-    EXPECT_TRUE(detection.stands) << model;
-    EXPECT_LT(distance(detection, poses[model], models[model].target), 0.015) << model;
-  }
 }
 
 TEST_F(KnownObjects, BitsDoNotDependOnThreads) {

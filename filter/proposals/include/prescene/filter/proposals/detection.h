@@ -28,9 +28,8 @@ struct DetectionOptions {
   double min_hit_share = 0.85;
   /// nats. A find must explain the frame better by at least this log ratio (untempered, at the likelihood's
   /// resolution). Range 0 to 10000. Tuned: docs/studies/tracking.md.
-  double min_log_ratio = 30.0;
-  /// probability. Where a learned judge decides, finds that are less likely than this to be right are left out at the
-  /// end. Range 0 to 1. Chosen.
+  double min_log_ratio = 60.0;
+  /// probability. Finds that are less likely than this to be right are left out at the end. Range 0 to 1. Chosen.
   double least_probability = 0.5;
 };
 
@@ -43,15 +42,13 @@ struct WantedModel {
 struct Detection {
   int model = 0;  ///< Index into the wanted models.
   Pose X_CO;
-  /// With the other detections as known surfaces, in the image in which it was judged (fine_frame.h); the log ratio as
-  /// it would be in the coarse one.
-  rendering::PoseEvidence evidence;
-  double outline = 1.0;      ///< outline_support, likewise.
-  bool stands = true;        ///< On a support or another detection.
-  double probability = 1.0;  ///< probability_right, or as the learned judge says.
-  int cluster = 0;           ///< Of those that were looked at, in their order.
-  FitNumbers numbers{};      ///< What a learned judge saw when it was accepted, ...
-  double log_odds = 0.0;     ///< ... and made of it.
+  rendering::PoseEvidence evidence;  ///< With the other detections as known surfaces.
+  double outline = 1.0;              ///< outline_support, likewise.
+  bool stands = true;                ///< On a support or another detection.
+  double probability = 1.0;          ///< probability_right, or as the learned judge says.
+  int cluster = 0;                   ///< Of those that were looked at, in their order.
+  FitNumbers numbers{};              ///< What a learned judge saw when it was accepted, ...
+  double log_odds = 0.0;             ///< ... and made of it.
 };
 
 /// What a judge is learned from: all that was judged.
