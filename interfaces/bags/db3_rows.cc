@@ -39,6 +39,7 @@ class RowFinder {
 
   Db3Rows find() {
     from_ = prepared(database_, "SELECT rowid, timestamp FROM messages WHERE rowid >= ?1 ORDER BY rowid");
+    out_.damaged = !from_;
     std::optional<std::int64_t> next = std::numeric_limits<std::int64_t>::min();
     while (next && from_) {
       next = walk(*next);
@@ -138,12 +139,18 @@ class RowFinder {
     const RowStatement order = prepared(database_, "SELECT rowid, timestamp FROM messages ORDER BY timestamp, rowid");
     const std::size_t walked = out_.rows.size();
     const auto number_less = [](const Db3Row& a, const Db3Row& b) { return a.row < b.row; };
-    while (order && !out_.too_many) {
+    // Pages of a damaged index may stand in it again and again.
+    for (std::size_t seen = 0; order && !out_.too_many && seen < 2 * kMostRows; ++seen) {
       *checks_ = 0;
       if (sqlite3_step(order.get()) != SQLITE_ROW) break;
       const Db3Row row{0, sqlite3_column_int64(order.get(), 0)};
       const auto end = out_.rows.begin() + static_cast<std::ptrdiff_t>(walked);
-      if (!std::binary_search(out_.rows.begin(), end, row, number_less)) keep(order.get());
+      const auto known = std::lower_bound(out_.rows.begin(), end, row, number_less);
+      if (known == end || known->row != row.row) {
+        keep(order.get());
+      } else if (known->time_ns < 0) {
+        known->time_ns = sqlite3_column_int64(order.get(), 1);  // that of the row is damaged
+      }
     }
     const auto middle = out_.rows.begin() + static_cast<std::ptrdiff_t>(walked);
     std::stable_sort(middle, out_.rows.end(), number_less);
