@@ -218,8 +218,8 @@ struct DdsNode::Impl {
   /// Has `reader` listened to; the lock is held.
   core::Status listen(const std::string& topic, const std::string& type, dds_entity_t topic_entity, const QosPtr& qos,
                       std::function<void(ReceivedMessage&&)> on_message);
-  /// A service of ours, once the client of a request can read its reply, or 100 ms have passed. Waits so long at most
-  /// once a second, and for each client once: others want their frames and replies.
+  /// A service of ours, once the client of a request can read its reply, or 100 ms have passed. Waits once for a
+  /// client, and then not for 200 ms: others want their frames and replies.
   const Service& service_for(const ServiceRequest& request);
   template <class CType, class Message>
   core::Status reply(const ServiceRequest& request, std::string_view type, const Message& message);
@@ -576,10 +576,8 @@ const DdsNode::Impl::Service& DdsNode::Impl::service_for(const ServiceRequest& r
     std::this_thread::sleep_for(kLook);
     missing = without_reader();
   }
-  if (missing > service.silent) {
-    service.silent = missing;
-    waits_from = Clock::now() + std::chrono::seconds(1);
-  }
+  if (missing > service.silent) service.silent = missing;
+  waits_from = Clock::now() + std::chrono::milliseconds(200);
   return service;
 }
 

@@ -35,7 +35,9 @@ core::Status use_security(const std::filesystem::path& folder, dds_qos_t* qos) {
                            {"access.permissions", "permissions.p7s"}};
   for (const Row& row : kRows) {
     const std::filesystem::path path = folder / row.file;
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    std::error_code error;
+    const bool is_file = std::filesystem::is_regular_file(path, error);
+    const int file = is_file ? ::open(path.c_str(), O_RDONLY | O_CLOEXEC) : -1;
     if (file < 0)
       return core::invalid_input("security: " + quote(path.string(), 1000) +
                                  " can't be read: a folder of tools/security_keys, or an enclave of SROS 2, is needed");
