@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "prescene/belief/robot_motion.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
 #include "prescene/service/tracking/waiting_controls.h"
@@ -64,12 +65,16 @@ bool fits(const geometry::Image<Pixel>& image, const geometry::PinholeCamera& ca
 void ControlLog::add(const std::string& json, core::TimeNs sent_ns) {
   const auto control = parse_control(json);
   if (!control) return;  // the tracker refused it, and said so
-  for (const auto& [after_ns, action] : control->actions)
-    known_.push_back({control->stamp_ns.value_or(sent_ns) + after_ns, sent_ns, control->stamp_ns.has_value(), action});
+  for (const auto& [after_ns, action] : control->actions) {
+    const core::TimeNs due_ns = control->stamp_ns.value_or(sent_ns) + after_ns;
+    const bool is_place = std::holds_alternative<belief::Place>(action.what);
+    const core::TimeNs end_ns = due_ns + (is_place ? core::ns_of(belief::duration_of(action)) : 0);
+    known_.push_back({due_ns, sent_ns, control->stamp_ns.has_value(), action, end_ns});
+  }
 }
 
 void ControlLog::forget(core::TimeNs before_ns, std::size_t most) {
-  std::erase_if(known_, [&](const Known& known) { return known.due_ns < before_ns && known.sent_ns < before_ns; });
+  std::erase_if(known_, [&](const Known& known) { return known.end_ns < before_ns && known.sent_ns < before_ns; });
   while (known_.size() > most) known_.pop_front();
 }
 
@@ -81,6 +86,8 @@ void ControlLog::put_into(queries::ExplainWindow& window, std::vector<std::strin
       ++placeless;
     else if (known.due_ns > begin && known.due_ns <= end)
       window.actions.emplace_back(known.due_ns, known.action);
+    else if (known.end_ns > begin && known.end_ns <= end)  // a placement that had begun before
+      window.actions.emplace_back(known.end_ns, belief::Action{0.0, belief::Release{belief::object_of(known.action)}});
   }
   if (placeless > 0)
     remarks.push_back(std::to_string(placeless) +

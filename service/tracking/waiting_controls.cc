@@ -60,8 +60,11 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
     // An hour bounds what is plausible, and keeps the sum in range.
     if (!(std::abs(action.time) <= kLongestAhead))
       return core::invalid_input("time: actions start within an hour of their control");
-    if (std::holds_alternative<belief::Place>(action.what) && !(belief::duration_of(action) <= kLongestAhead))
-      return core::invalid_input("place: duration: an object is put down within an hour");
+    if (std::holds_alternative<belief::Place>(action.what)) {
+      const double takes = belief::duration_of(action);
+      if (!(takes > 0.0 && takes <= kLongestAhead))
+        return core::invalid_input("place: duration: a time above 0 s and of at most an hour is needed");
+    }
     control.actions.emplace_back(core::ns_of(action.time), std::move(action));
   }
   return control;
@@ -123,15 +126,15 @@ core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message
                                    : (newest_frame_ns ? sent_in_time_of_frames(sent_ns, *newest_frame_ns) : sent_ns);
   waiting_.reserve(waiting_.size() + control.actions.size());
   for (auto& [after_ns, action] : control.actions) {
+    const std::string object = belief::object_of(action);
+    // What the robot says next of the object, a release or something else, is in the place of how a placement ends.
+    std::erase_if(waiting_, [&](const Waiting& waiting) {
+      return waiting.ends_place && belief::object_of(waiting.action) == object;
+    });
     const bool is_place = std::holds_alternative<belief::Place>(action.what);
     if (is_place) {
       after_ns += core::ns_of(belief::duration_of(action));
-      action.what = belief::Release{belief::object_of(action)};
-    } else if (std::holds_alternative<belief::Release>(action.what)) {
-      // The robot says itself when what it puts down is let go of.
-      std::erase_if(waiting_, [&](const Waiting& waiting) {
-        return waiting.ends_place && belief::object_of(waiting.action) == belief::object_of(action);
-      });
+      action.what = belief::Release{object};
     }
     waiting_.push_back({base_ns + after_ns, after_ns, control.stamp_ns, sent_ns, std::move(action), is_place});
   }

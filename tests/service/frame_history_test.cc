@@ -162,6 +162,22 @@ TEST(ControlLog, PutsWhatIsDueIntoTheWindow) {
   EXPECT_THAT(remarks[0], HasSubstr("1 actions have no stamp"));
 }
 
+TEST(ControlLog, OfAPlacementThatBeganBeforeTheWindowKnowsTheRelease) {
+  ControlLog controls;
+  controls.add(
+      R"({"actions": [{"time": 0, "place": {"object": "cup", "pose": {"position": [0, 0, 0]}, "duration": 1.5}}]})",
+      kBegin - kSecond);
+  controls.forget(kBegin, 100);
+  queries::ExplainWindow window;
+  window.start = belief_with(kBegin);
+  window.frames.push_back({observation_at(kBegin + 2 * kSecond, 32, 24), belief_with(kBegin + 2 * kSecond)});
+  std::vector<std::string> remarks;
+  controls.put_into(window, remarks);
+  ASSERT_EQ(window.actions.size(), 1u);
+  EXPECT_EQ(window.actions[0].first, kBegin + kSecond / 2);
+  EXPECT_EQ(belief::kind_of(window.actions[0].second), "release");
+}
+
 /// A recording that was tracked, whose frames are asked about.
 class TrackedRecording {
  public:

@@ -49,7 +49,7 @@ TEST(WaitingControls, GiveWhatIsDueInItsOrderAndKeepTheRest) {
 
 TEST(WaitingControls, APlaceReleasesItsObjectAtItsEndAndOnce) {
   const std::string place = R"({"actions": [{"time": 0.5, "place": {"object": "box",
-      "X_WO": {"position": [0, 0, 0.1]}, "duration": 1.5}}]})";
+      "pose": {"position": [0, 0, 0.1]}, "duration": 1.5}}]})";
   WaitingControls controls;
   ASSERT_TRUE(controls.take_in(message(place, kNoon), kNoon).ok());
   EXPECT_THAT(kinds(controls.due(kNoon, kNoon + kSecond)), ElementsAre());
@@ -63,9 +63,17 @@ TEST(WaitingControls, APlaceReleasesItsObjectAtItsEndAndOnce) {
   EXPECT_THAT(kinds(controls.due(kNoon, kNoon + 9 * kSecond)), ElementsAre("release"));
   EXPECT_EQ(controls.count(), 1u);
 
-  const std::string eternal = R"({"actions": [{"time": 0, "place": {"object": "box", "X_WO": {"position": [0, 0, 0]},
+  const std::string eternal = R"({"actions": [{"time": 0, "place": {"object": "box", "pose": {"position": [0, 0, 0]},
       "duration": 1e300}}]})";
-  EXPECT_THAT(controls.take_in(message(eternal, kNoon), kNoon).message(), HasSubstr("within an hour"));
+  EXPECT_THAT(controls.take_in(message(eternal, kNoon), kNoon).message(), HasSubstr("at most an hour"));
+  const std::string backwards = R"({"actions": [{"time": 0, "place": {"object": "box",
+      "pose": {"position": [0, 0, 0]}, "duration": -1e300}}]})";
+  EXPECT_FALSE(controls.take_in(message(backwards, kNoon), kNoon).ok());
+
+  // Another placement is in the place of the first one.
+  ASSERT_TRUE(controls.take_in(message(place, kNoon), kNoon).ok());
+  ASSERT_TRUE(controls.take_in(message(place, kNoon + kSecond), kNoon).ok());
+  EXPECT_THAT(kinds(controls.due(kNoon, kNoon + 9 * kSecond)), ElementsAre("release", "release"));
 }
 
 TEST(WaitingControls, BeforeTheFirstFrameCountFromItWhereTheClocksDiffer) {

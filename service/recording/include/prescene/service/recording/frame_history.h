@@ -54,6 +54,7 @@ class ControlLog {
     core::TimeNs due_ns = 0, sent_ns = 0;
     bool has_stamp = false;
     belief::Action action;
+    core::TimeNs end_ns = 0;  // of a placement, when it lets go; of others due_ns
   };
   std::deque<Known> known_;
 };

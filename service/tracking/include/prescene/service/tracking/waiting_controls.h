@@ -52,7 +52,7 @@ class WaitingControls {
   /// actions.
   ///
   /// The tracker follows a held object with its hand, so all that a `place` adds is when the object is let go of: it
-  /// becomes a release at its end, unless the robot sends a release of that object itself.
+  /// becomes a release at its end, unless the robot sends another action of that object before.
   core::Status take_in(const interfaces::ReceivedMessage& message, std::optional<core::TimeNs> newest_frame_ns);
   /// The clock of the frames is known: this is the first frame. Actions whose stamp is more than a minute after it are
   /// dropped.
