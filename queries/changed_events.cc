@@ -65,6 +65,7 @@ class SimulatedChanges final : public ChangedEvents {
     events_.simulate(hypothesis_, points, paths, events, runs, moved);
     events_.go_on_for(0.0);
     std::vector<std::uint8_t> wanted(points.size(), 0);
+    if (!events_.failure().ok()) return wanted;  // a run that failed ends where it began
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (paths[i].impossible || runs[i].states.empty() || runs[i].deepest_overlap > kInEachOther) continue;
       wanted[i] = (wanted_ ? wanted_->holds(events_.scene(), runs[i]) : stays(runs[i])) ? 1 : 0;

@@ -64,15 +64,16 @@ class Explainer {
     remark_what_was_cut_short();
     JudgedEvents judged{window_, *events_, *likelihood_, times_, nothings_, judged_, chosen_};
     ExplainAnswer answer = explain_answer(judged);
-    if (query_.change) add_change(answer);
+    if (query_.change) {
+      add_change(answer);
+      PRESCENE_RETURN_IF_ERROR(events_->failure());
+    }
     if (cancelled()) return stopped();
     answer.evaluated += evaluated_;
     answer.cut_short = out_of_time_;
     answer.remarks.insert(answer.remarks.end(), remarks_.begin(), remarks_.end());
     answer.remarks.emplace_back(
-        "Intervals say how precisely the evidence was computed, not how well "
-        "events are modelled: in 44 simulated "
-        "episodes the first event was right in 42.");
+        "Intervals say how precisely the evidence was computed, not how well events are modelled.");
     return answer;
   }
 

@@ -16,6 +16,7 @@ using geometry::Vector3d;
 constexpr double kReachFactor = 1.001;  // for rounding
 constexpr double kApart = 0.01;         // m between boxes about things that are simulated without each other
 constexpr int kMostParts = 4;           // larger and larger ones, of an instance; the last is everything
+constexpr std::size_t kMostKept = 16;   // simulators that are kept for the next instances
 
 bool are_near(const Box& a, const Box& b) {
   return (a.min().array() < b.max().array() + kApart).all() && (b.min().array() < a.max().array() + kApart).all();
@@ -65,6 +66,7 @@ std::vector<std::size_t> LocalRuns::with_neighbours(std::vector<std::size_t> ope
 }
 
 core::Result<const LocalRuns::Part*> LocalRuns::part_of(const std::vector<std::size_t>& kept) {
+  if (parts_.size() >= kMostKept && !parts_.contains(kept)) parts_.clear();
   std::unique_ptr<Part>& known = parts_[kept];
   if (known) return known.get();
   auto part = std::make_unique<Part>();
