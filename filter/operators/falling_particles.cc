@@ -221,14 +221,16 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const Wo
   }
   for (const auto& [key, run] : run_of_world) {
     const WorldsOfIsland* island = worlds.of(key.first);
+    const std::size_t world = key.second;
     if (island == nullptr || island->apart) continue;
     for (const std::size_t member : island->members) {
-      const bool falls = std::any_of(falling.begin(), falling.end(),
-                                     [&](const Falling& f) { return f.object == member && f.particle == key.second; });
+      const bool falls = std::any_of(falling.begin(), falling.end(), [member, world](const Falling& f) {
+        return f.object == member && f.particle == world;
+      });
       const std::size_t place = place_of(member);
       if (falls || place == objects.size() || failure_of(runs[run], place)) continue;
       take_if_pushed(runs[run].final().objects[place], belief.scene->gravity_W, options,
-                     belief.objects[member].particles[key.second], report);
+                     belief.objects[member].particles[world], report);
     }
   }
 }

@@ -226,7 +226,7 @@ Vector3d read_axis(const LocatedValue& value, Problems& problems) {
     if (index >= 6) return Vector3d::Unit(static_cast<int>(index) - 6);
     return (index % 2 == 0 ? 1.0 : -1.0) * Vector3d::Unit(static_cast<int>(index) / 2);
   }
-  const Vector3d axis = read_vector(value, problems, {-kMost, kMost, "give a direction as x, -x, y, ... or [x, y, z]"});
+  Vector3d axis = read_vector(value, problems, {-kMost, kMost, "give a direction as x, -x, y, ... or [x, y, z]"});
   if (std::abs(axis.norm() - 1.0) < 1e-12) return axis;  // keeps its bits
   // Lengths whose squares are too small or too large for a number are lengths, too.
   const double greatest = axis.cwiseAbs().maxCoeff();
