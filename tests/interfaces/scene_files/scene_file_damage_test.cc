@@ -101,7 +101,9 @@ TEST_P(DamagedScene, EveryValueOfAnotherKindIsFoundAtItsPlaceOrStillMeansSomethi
         EXPECT_GT(problem.line, 0) << problem.text();
         EXPECT_FALSE(problem.reason.empty() || problem.remedy.empty()) << problem.text();
       }
-      const bool is_wrong = other == "{aa: 1}" || other == "[1, 2]" || (is_number && other != "-7");
+      const bool is_of_any_length = other == "1e300" && scalar.path.find(".axis[") != std::string::npos;
+      const bool is_wrong =
+          other == "{aa: 1}" || other == "[1, 2]" || (is_number && other != "-7" && !is_of_any_length);
       const bool named = std::any_of(report.errors.begin(), report.errors.end(), [&](const Problem& problem) {
         return scalar.path.rfind(problem.key, 0) == 0 || problem.key.rfind(scalar.path, 0) == 0;
       });
