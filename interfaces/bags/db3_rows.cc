@@ -126,11 +126,15 @@ class RowFinder {
     return good;
   }
 
+  /// Of the row at which the statement is; negative = it has none.
+  static std::int64_t time_of(sqlite3_stmt* statement) {
+    return sqlite3_column_type(statement, 1) == SQLITE_INTEGER ? sqlite3_column_int64(statement, 1) : -1;
+  }
+
   bool keep(sqlite3_stmt* statement) {
     out_.too_many = out_.rows.size() >= kMostRows;
     if (out_.too_many) return false;
-    const bool has_time = sqlite3_column_type(statement, 1) == SQLITE_INTEGER;
-    out_.rows.push_back({has_time ? sqlite3_column_int64(statement, 1) : -1, sqlite3_column_int64(statement, 0)});
+    out_.rows.push_back({time_of(statement), sqlite3_column_int64(statement, 0)});
     return true;
   }
 
@@ -149,7 +153,7 @@ class RowFinder {
       if (known == end || known->row != row.row) {
         keep(order.get());
       } else if (known->time_ns < 0) {
-        known->time_ns = sqlite3_column_int64(order.get(), 1);  // that of the row is damaged
+        known->time_ns = time_of(order.get());  // that of the row is damaged
       }
     }
     const auto middle = out_.rows.begin() + static_cast<std::ptrdiff_t>(walked);
