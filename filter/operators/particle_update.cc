@@ -74,6 +74,14 @@ bool within_reach(const Mode& mode, const Gaussian& predicted, double dt, const 
   return mode.shift.tail<3>().norm() <= options.max_jump_speed * dt + 3.0 * spread;
 }
 
+rendering::PoseEvidence evidence_of(const rendering::FrameTerms& terms, const rendering::PoseHypothesis& hypothesis,
+                                    const FilterTools& tools) {
+  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+  rendering::PoseEvidence evidence;
+  tools.search->batch().evaluate(terms, std::span(&hypothesis, 1), *workspace, std::span(&evidence, 1));
+  return evidence;
+}
+
 ParticleUpdate::ParticleUpdate(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CW,
                                double pixels, const WeightOptions& options, const FilterTools& tools,
                                const WeightContext& context, const TakenOutline* shared_outline,

@@ -53,6 +53,10 @@ void move_to(const Mode& mode, const Gaussian& predicted, belief::Particle& part
 /// How far the mode may be from the prediction: what the motion allows in the time, and its spread.
 bool within_reach(const Mode& mode, const Gaussian& predicted, double dt, const WeightOptions& options);
 
+/// What a frame says of one hypothesis, with a workspace of the pool.
+rendering::PoseEvidence evidence_of(const rendering::FrameTerms& terms, const rendering::PoseHypothesis& hypothesis,
+                                    const FilterTools& tools);
+
 /// An outline and the pose that it was taken at.
 struct TakenOutline {
   Pose X_WO;

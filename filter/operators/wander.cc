@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hidden_places.h"
+#include "particle_update.h"
 
 namespace prescene::filter {
 namespace {
@@ -23,15 +24,6 @@ constexpr double kOnePlace = 0.05;      // m
 
 bool is_near(const SearchTarget& target, const Pose& A, const Pose& B) {
   return (A * target.centre() - B * target.centre()).norm() < kOnePlace;
-}
-
-rendering::PoseEvidence evidence_of(const FilterFrame& frame, const rendering::FrameTerms& terms,
-                                    const SearchTarget& target, const Pose& X_WO, const FilterTools& tools) {
-  const std::vector<rendering::PoseHypothesis> hypotheses = {hypothesis(target, frame.X_CW * X_WO)};
-  std::vector<rendering::PoseEvidence> evidence(1);
-  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-  tools.search->batch().evaluate(terms, hypotheses, *workspace, evidence);
-  return evidence.front();
 }
 
 /// The particle about which most of the weight is.
@@ -68,7 +60,8 @@ int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, 
   if (leader.mode == belief::MotionMode::kHeld) return 0;
   const Pose X_last = is_known ? object.motion.X_still : leader.X_WO;
   const bool is_there = is_near(target, X_last, belief::heaviest(object.particles).X_WO);
-  const rendering::PoseEvidence there = is_there ? evidence : evidence_of(frame, terms, target, X_last, tools);
+  const rendering::PoseEvidence there =
+      is_there ? evidence : evidence_of(terms, hypothesis(target, frame.X_CW * X_last), tools);
   if (there.measured - there.visible < kMostlyUnknown * there.in_view) return 0;
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double probability = 1.0 - std::exp(-unseen / object.frames_unseen / kMovedAfter);

@@ -107,11 +107,8 @@ double supported_evidence(const rendering::PoseEvidence& evidence, double outlin
 
 double tempering_pixels(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
                         const FilterTools& tools) {
-  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-  const auto h = hypothesis(target, X_CO);
-  rendering::PoseEvidence e;
-  tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&e, 1));
-  return std::max(kFewestPixels, static_cast<double>(e.measured));
+  const rendering::PoseEvidence evidence = evidence_of(terms, hypothesis(target, X_CO), tools);
+  return std::max(kFewestPixels, static_cast<double>(evidence.measured));
 }
 
 void evidence_of_heaviest(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_WC,
@@ -119,12 +116,8 @@ void evidence_of_heaviest(const rendering::FrameTerms& terms, const SearchTarget
                           const std::vector<Particle>& particles, WeightReport& report) {
   const auto best = static_cast<std::size_t>(&belief::heaviest(particles) - particles.data());
   const Pose X_CO = X_WC.inverse() * particles[best].X_WO;
-  const rendering::PoseHypothesis h = hypothesis(target, X_CO, tempering_pixels(terms, target, X_CO, tools));
   ParticleWeight& heaviest = report.particles[best];
-  {
-    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    tools.search->batch().evaluate(terms, std::span(&h, 1), *workspace, std::span(&heaviest.evidence, 1));
-  }
+  heaviest.evidence = evidence_of(terms, hypothesis(target, X_CO, tempering_pixels(terms, target, X_CO, tools)), tools);
   if (!heaviest.hidden && !is_see_through(target))
     heaviest.outline =
         outline_support(terms, depth_of(target, X_CO, terms.camera, *tools.renderer), options.outline_step);
