@@ -191,8 +191,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
     counters.recoveries_tried += look ? 1 : 0;
-    const std::vector<Particle> before = object.particles;
-    const Pose X_before = step.heaviest(i).X_WO;
+    const std::vector<Particle> before = look ? object.particles : std::vector<Particle>();
     if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
                           tools_, mine, object)) {
       if (is_unseen) {
@@ -205,8 +204,8 @@ void ParticleFilter::recover_all(FrameStep& step) {
       }
       continue;
     }
-    if (object.state == TrackState::kTracked &&
-        is_turned_in_place(X_before, step.heaviest(i).X_WO, target, model_of(belief, i).symmetry)) {
+    if (object.state == TrackState::kTracked && is_turned_in_place(belief::heaviest(before).X_WO, step.heaviest(i).X_WO,
+                                                                   target, model_of(belief, i).symmetry)) {
       object.particles = before;  // rivals of what is followed are weighed over frames
       continue;
     }
