@@ -33,10 +33,8 @@ constexpr int kMostChecks = 1000;
 
 struct Closer {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
 using Database = std::unique_ptr<sqlite3, Closer>;
-using Statement = std::unique_ptr<sqlite3_stmt, Closer>;
 
 constexpr const char* kDb3Remedy =
     "; copy it again, read what is sound by `replay --salvage`, or mend it with `sqlite3 FILE .recover`";
@@ -80,10 +78,10 @@ struct Db3Reader::Impl {
   int checks = 0;  // of the work for the present row
 
   Database database;
-  Statement order;  ///< Rows of the messages in the order of time; only their keys are sorted. Not to salvage.
-  Db3Rows found;    ///< To salvage: the same, of what can be read.
+  Db3Statement order;  ///< Rows of the messages in the order of time; only their keys are sorted. Not to salvage.
+  Db3Rows found;       ///< To salvage: the same, of what can be read.
   std::size_t next_found = 0;
-  Statement message;  ///< One of them.
+  Db3Statement message;  ///< One of them.
   std::vector<McapChannel> channels;
   std::map<std::int64_t, int> channel_of_topic;
   std::set<std::int64_t> left_out_topics;
@@ -94,7 +92,7 @@ struct Db3Reader::Impl {
   Status open_database();
   Status check_table(const char* name, std::initializer_list<const char*> columns);
   Status read_topics();
-  Result<Statement> prepare(const char* sql);
+  Result<Db3Statement> prepare(const char* sql);
   /// True: there is a row; false: the end.
   Result<bool> step(sqlite3_stmt* statement);
   Status failure(const std::string& what) const;
@@ -160,11 +158,11 @@ Status Db3Reader::Impl::open_database() {
   return core::ok_status();
 }
 
-Result<Statement> Db3Reader::Impl::prepare(const char* sql) {
+Result<Db3Statement> Db3Reader::Impl::prepare(const char* sql) {
   checks = 0;
-  sqlite3_stmt* statement = nullptr;
-  if (sqlite3_prepare_v2(database.get(), sql, -1, &statement, nullptr) != SQLITE_OK) return failure("its schema");
-  return Statement(statement);
+  Db3Statement statement = prepare_statement(database.get(), sql);
+  if (!statement) return failure("its schema");
+  return statement;
 }
 
 Result<bool> Db3Reader::Impl::step(sqlite3_stmt* statement) {
@@ -177,7 +175,7 @@ Result<bool> Db3Reader::Impl::step(sqlite3_stmt* statement) {
 
 /// A table, not a view or a virtual table, with these columns.
 Status Db3Reader::Impl::check_table(const char* name, std::initializer_list<const char*> columns) {
-  PRESCENE_TRY(const Statement kind, prepare("SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?1"));
+  PRESCENE_TRY(const Db3Statement kind, prepare("SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?1"));
   sqlite3_bind_text(kind.get(), 1, name, -1, SQLITE_STATIC);
   PRESCENE_TRY(const bool is_table, step(kind.get()));
   std::string sql = is_table ? text_of(kind.get(), 0) : "";
@@ -188,7 +186,7 @@ Status Db3Reader::Impl::check_table(const char* name, std::initializer_list<cons
                                "', which every bag of rosbag2 has; give the .db3 of a bag");
   }
   std::set<std::string> there;
-  PRESCENE_TRY(const Statement info, prepare("SELECT name FROM pragma_table_xinfo(?1) WHERE hidden = 0"));
+  PRESCENE_TRY(const Db3Statement info, prepare("SELECT name FROM pragma_table_xinfo(?1) WHERE hidden = 0"));
   sqlite3_bind_text(info.get(), 1, name, -1, SQLITE_STATIC);
   for (;;) {
     PRESCENE_TRY(const bool more, step(info.get()));
@@ -204,7 +202,7 @@ Status Db3Reader::Impl::check_table(const char* name, std::initializer_list<cons
 }
 
 Status Db3Reader::Impl::read_topics() {
-  PRESCENE_TRY(const Statement rows, prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id"));
+  PRESCENE_TRY(const Db3Statement rows, prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id"));
   for (;;) {
     PRESCENE_TRY(const bool more, step(rows.get()));
     if (!more) return core::ok_status();

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "db3_rows.h"
 
-#include <sqlite3.h>
-
 #include <algorithm>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <tuple>
 
@@ -22,23 +19,12 @@ constexpr std::int64_t kMostLost = 1'000'000;  // between two rows
 constexpr int kMostFalse = 8;                  // damaged row numbers in a row
 constexpr std::int64_t kLast = std::numeric_limits<std::int64_t>::max();
 
-struct Finalizer {
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-};
-using RowStatement = std::unique_ptr<sqlite3_stmt, Finalizer>;
-
-RowStatement prepared(sqlite3* database, const char* sql) {
-  sqlite3_stmt* statement = nullptr;
-  sqlite3_prepare_v2(database, sql, -1, &statement, nullptr);
-  return RowStatement(statement);
-}
-
 class RowFinder {
  public:
   RowFinder(sqlite3* database, int* checks) : database_(database), checks_(checks) {}
 
   Db3Rows find() {
-    from_ = prepared(database_, "SELECT rowid, timestamp FROM messages WHERE rowid >= ?1 ORDER BY rowid");
+    from_ = prepare_statement(database_, "SELECT rowid, timestamp FROM messages WHERE rowid >= ?1 ORDER BY rowid");
     out_.damaged = !from_;
     std::optional<std::int64_t> next = std::numeric_limits<std::int64_t>::min();
     while (next && from_) {
@@ -140,7 +126,8 @@ class RowFinder {
 
   /// The rows so far are in the order of their numbers, and none is there twice.
   void add_indexed() {
-    const RowStatement order = prepared(database_, "SELECT rowid, timestamp FROM messages ORDER BY timestamp, rowid");
+    const Db3Statement order =
+        prepare_statement(database_, "SELECT rowid, timestamp FROM messages ORDER BY timestamp, rowid");
     const std::size_t walked = out_.rows.size();
     const auto number_less = [](const Db3Row& a, const Db3Row& b) { return a.row < b.row; };
     // Pages of a damaged index may stand in it again and again.
@@ -165,12 +152,18 @@ class RowFinder {
 
   sqlite3* database_;
   int* checks_;
-  RowStatement from_;  ///< Rows from a number on.
+  Db3Statement from_;  ///< Rows from a number on.
   Db3Rows out_;
   int failures_ = 0;
 };
 
 }  // namespace
+
+Db3Statement prepare_statement(sqlite3* database, const char* sql) {
+  sqlite3_stmt* statement = nullptr;
+  sqlite3_prepare_v2(database, sql, -1, &statement, nullptr);
+  return Db3Statement(statement);
+}
 
 Db3Rows find_rows(sqlite3* database, int* checks) { return RowFinder(database, checks).find(); }
 

@@ -2,12 +2,20 @@
 // Which messages of a damaged .db3 can still be found.
 #pragma once
 
+#include <sqlite3.h>
+
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-struct sqlite3;
-
 namespace prescene::interfaces {
+
+struct Db3StatementCloser {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Db3Statement = std::unique_ptr<sqlite3_stmt, Db3StatementCloser>;
+/// Null where SQLite refuses it; sqlite3_errcode says why.
+Db3Statement prepare_statement(sqlite3* database, const char* sql);
 
 struct Db3Row {
   std::int64_t time_ns = -1;  ///< -1 where it is no integer.
