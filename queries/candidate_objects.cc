@@ -13,10 +13,9 @@ namespace {
 using belief::Pose;
 
 constexpr std::size_t kMostCandidates = 4;
-constexpr double kElsewhere = 0.01,
-                 kTurned = 0.15;   // m and rad: tracked further from its start,
-                                   // an object is looked at
-constexpr double kRefuted = -1.0;  // nats: what speaks so much against where it was is looked at
+constexpr double kElsewhere = 0.01;  // m; tracked further from its start than this ...
+constexpr double kTurned = 0.15;     // rad; ... or turned by more, an object is looked at
+constexpr double kRefuted = -1.0;    // nats: what speaks so much against where it was is looked at
 
 }  // namespace
 
@@ -36,9 +35,7 @@ core::Status CandidateObjects::look_for_missing(const WindowFrame& last, const E
     const auto index = belief::find_object(*last.belief, events_->objects()[i].name);
     if (!index || !found[static_cast<std::size_t>(*index)]) continue;
     const Pose& X_WO = *found[static_cast<std::size_t>(*index)];
-    std::vector<double> absent(times_.size());
-    const ScenePath gone = path_of(i, ObjectPath(times_.size()));
-    likelihood_->evaluate(std::span(&gone, 1), absent);
+    const std::vector<double> absent = absent_ratios(i);
     // From when on it is seen there.
     std::vector<double> seen;
     for (std::size_t k = times_.size(); k-- > 0;) {
@@ -55,9 +52,8 @@ core::Status CandidateObjects::look_for_missing(const WindowFrame& last, const E
 void CandidateObjects::note_when_seen(std::size_t object) {
   const SeenTrack& track = events_->track(object);
   const std::size_t n = times_.size();
-  std::vector<double> absent(n), here(n, -1e300), there(n, -1e300);
-  const ScenePath gone = path_of(object, ObjectPath(n));
-  likelihood_->evaluate(std::span(&gone, 1), absent);
+  const std::vector<double> absent = absent_ratios(object);
+  std::vector<double> here(n, -1e300), there(n, -1e300);
   for (std::size_t k = 0; k < n; ++k) {
     if (const auto& base = likelihood_->base()[object][k])
       likelihood_->evaluate(k, object, std::span(&*base, 1), std::span(&here[k], 1));
@@ -110,17 +106,13 @@ std::vector<std::size_t> CandidateObjects::to_look_at() {
       continue;
     }
     const auto [moved, elsewhere] = tracked_elsewhere(i);
+    const std::vector<double> absent = absent_ratios(i);
     double worst = 1e300;
     for (std::size_t k = 0; k < times_.size(); ++k) {
       if (!likelihood_->base()[i][k]) continue;
       double ratio = 0.0;
       likelihood_->evaluate(k, i, std::span(&*likelihood_->base()[i][k], 1), std::span(&ratio, 1));
-      double absent = 0.0;
-      const ScenePath gone = path_of(i, ObjectPath(times_.size()));
-      std::vector<double> ratios(times_.size());
-      likelihood_->evaluate(std::span(&gone, 1), ratios);
-      absent = ratios[k];
-      worst = std::min(worst, ratio - absent);
+      worst = std::min(worst, ratio - absent[k]);
     }
     if (worst < least) least = worst, doubtful = i;
     if (elsewhere || worst < kRefuted) order.emplace_back(-moved, i);
@@ -134,6 +126,13 @@ std::vector<std::size_t> CandidateObjects::to_look_at() {
                        std::to_string(kMostCandidates) + " that moved furthest were looked at.");
   if (candidates.empty()) candidates.push_back(doubtful);
   return candidates;
+}
+
+std::vector<double> CandidateObjects::absent_ratios(std::size_t object) const {
+  std::vector<double> ratios(times_.size());
+  const ScenePath gone = path_of(object, ObjectPath(times_.size()));
+  likelihood_->evaluate(std::span(&gone, 1), ratios);
+  return ratios;
 }
 
 Pose CandidateObjects::base_at(std::size_t object, double time) const {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Observation explanation: X*_t+1 ~ P(X_t+1 | U_t, X_t, Z_t+1, C_t+1), over
-// events that nobody told of.
+// Observation explanation: X*_t+1 ~ P(X_t+1 | U_t, X_t, Z_t+1, C_t+1), over events that nobody reported.
 #include "prescene/queries/explain.h"
 
 #include <algorithm>
@@ -25,11 +24,11 @@ namespace {
 using belief::EventKind;
 
 constexpr int kFirstRuns = 1;
-constexpr int kMostRounds = 2;             // times the query's runs: of what stays uncertain
-constexpr double kHopeless = 25.0;         // nats: what is so far behind the best is not searched further
-constexpr int kFreshRuns = 1000;           // numbers of runs from here on are for what must not have been seen
-constexpr double kLikelierThanSeen = 3.0;  // nats: by which frames may be likelier than the best of some dozens
-                                           // of poses
+constexpr int kMostRounds = 2;      // times the query's runs: of what stays uncertain
+constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
+constexpr int kFreshRuns = 1000;    // numbers of runs from here on are for what must not have been seen
+constexpr double kLikelierThanSeen =
+    3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
 class Explainer {
  public:
