@@ -6,7 +6,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "prescene/belief/robot_motion.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
 #include "prescene/service/tracking/waiting_controls.h"
@@ -67,9 +66,7 @@ void ControlLog::add(const std::string& json, core::TimeNs sent_ns) {
   if (!control) return;  // the tracker refused it, and said so
   for (const auto& [after_ns, action] : control->actions) {
     const core::TimeNs due_ns = control->stamp_ns.value_or(sent_ns) + after_ns;
-    const bool is_place = std::holds_alternative<belief::Place>(action.what);
-    const core::TimeNs end_ns = due_ns + (is_place ? core::ns_of(belief::duration_of(action)) : 0);
-    known_.push_back({due_ns, sent_ns, control->stamp_ns.has_value(), action, end_ns});
+    known_.push_back({due_ns, sent_ns, control->stamp_ns.has_value(), action, due_ns + placement_time(action)});
   }
 }
 

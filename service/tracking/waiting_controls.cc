@@ -70,6 +70,10 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
   return control;
 }
 
+core::TimeNs placement_time(const belief::Action& action) {
+  return std::holds_alternative<belief::Place>(action.what) ? core::ns_of(belief::duration_of(action)) : 0;
+}
+
 IdleControls idle_controls(const belief::Scene& scene, const belief::Control& control) {
   std::set<std::string> held;
   for (const belief::SceneObject& object : scene.objects)
@@ -133,7 +137,7 @@ core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message
     });
     const bool is_place = std::holds_alternative<belief::Place>(action.what);
     if (is_place) {
-      after_ns += core::ns_of(belief::duration_of(action));
+      after_ns += placement_time(action);
       action.what = belief::Release{object};
     }
     waiting_.push_back({base_ns + after_ns, after_ns, control.stamp_ns, sent_ns, std::move(action), is_place});

@@ -31,6 +31,9 @@ struct ParsedControl {
 /// Of {"stamp_ns": n, "actions": [...]} or {"restart": true}; kInvalidInput naming the key that makes no sense.
 core::Result<ParsedControl> parse_control(const std::string& json);
 
+/// How long after its start an action lets go of its object, ns: a placement at its end, others have 0.
+core::TimeNs placement_time(const belief::Action& action);
+
 /// Actions that change nothing in what is tracked.
 struct IdleControls {
   std::uint64_t count = 0;
