@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
 #include "achieve_options.h"
 #include "prescene/belief/explain_question.h"
@@ -137,7 +138,9 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
 
 /// Of a scene file, of which nothing has been seen.
 core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& question, VerbContext& context) {
-  for (const char* name : {"--domain", "--ros-distro", "--security", "--timeout"})
+  std::vector<const char*> of_bus(kDomainOptions.begin(), kDomainOptions.end());
+  of_bus.push_back("--timeout");
+  for (const char* name : of_bus)
     if (options.verb->count(name) > 0)
       return core::invalid_input(std::string(name) + " is for asking a `serve`: leave it out, or --scene");
   PRESCENE_TRY(const auto scene, load_scene(options.scene, context.log()));

@@ -368,7 +368,7 @@ core::Status check_options(const ReplayOptions& options) {
   if (options.over_dds && given("--proposals"))
     return core::invalid_input("--proposals is for replaying here: give it to the running `serve` instead");
   if (!options.over_dds) {
-    for (const char* name : {"--domain", "--ros-distro", "--security"})
+    for (const char* name : kDomainOptions)
       if (given(name))
         return core::invalid_input(std::string(name) + " is for --over-dds: leave it out, or give that too");
   } else {

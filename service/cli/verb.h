@@ -2,6 +2,7 @@
 // What the verbs of the command line share: options that every verb has, output, progress, exit codes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -102,7 +103,8 @@ Verb add_achieve_verb(CLI::App& app);
 Verb add_doctor_verb(CLI::App& app);
 Verb add_demo_verb(CLI::App& app);
 
-/// --domain, --ros-distro and --security.
+/// What add_domain_option() adds.
+inline constexpr std::array kDomainOptions = {"--domain", "--ros-distro", "--security"};
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 /// The domain that ROS_DOMAIN_ID names, unless one was given; to be called by what joins the bus. kInvalidInput where
 /// the variable holds none.

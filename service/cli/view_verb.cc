@@ -108,7 +108,7 @@ core::Status check_options(const ViewVerbOptions& options) {
       if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out, or name one");
     return core::ok_status();
   }
-  for (const char* name : {"--domain", "--ros-distro", "--security"})
+  for (const char* name : kDomainOptions)
     if (given(name))
       return core::invalid_input(std::string(name) +
                                  " is for what is on the bus, and a recording needs none of it: "
