@@ -2,7 +2,6 @@
 #include "benchmarks/filter_worlds.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <memory>
 
@@ -17,6 +16,7 @@
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/rendering/simd/simd_likelihood.h"
+#include "tests/filter/counting_likelihood.h"
 #include "tests/filter/pushed_box.h"
 
 namespace prescene::benchmarks {
@@ -31,31 +31,6 @@ constexpr double kSettle = 0.6;           // s, before the first frame
 constexpr double kRightShift = 0.02;      // m
 constexpr double kRightTurn = 0.2618;     // rad
 constexpr double kChiSquared90 = 6.2514;  // three degrees of freedom
-
-/// Counts what it hands on.
-class CountingLikelihood : public rendering::LikelihoodBatch {
- public:
-  explicit CountingLikelihood(const rendering::LikelihoodBatch& batch) : batch_(batch) {}
-  rendering::LikelihoodBatchInfo info() const override { return batch_.info(); }
-  std::unique_ptr<rendering::LikelihoodWorkspace> make_workspace() const override { return batch_.make_workspace(); }
-  void evaluate(const rendering::FrameTerms& frame, std::span<const rendering::PoseHypothesis> hypotheses,
-                rendering::LikelihoodWorkspace& workspace,
-                std::span<rendering::PoseEvidence> evidences) const override {
-    count_ += hypotheses.size();
-    batch_.evaluate(frame, hypotheses, workspace, evidences);
-  }
-  void linearise(const rendering::FrameTerms& frame, std::span<const rendering::PoseHypothesis> hypotheses,
-                 const rendering::LineariseOptions& options, rendering::LikelihoodWorkspace& workspace,
-                 std::span<rendering::PoseLinearisation> linearisations) const override {
-    count_ += hypotheses.size();
-    batch_.linearise(frame, hypotheses, options, workspace, linearisations);
-  }
-  double count() const { return static_cast<double>(count_); }
-
- private:
-  const rendering::LikelihoodBatch& batch_;
-  mutable std::atomic<std::uint64_t> count_{0};
-};
 
 belief::ObjectModel model_of_shapes(const std::string& name, std::vector<belief::CollisionShape> shapes, double mass) {
   belief::ObjectModel model;
@@ -280,7 +255,7 @@ WorldsFigures track_contacts(const std::string& kind, std::uint64_t seed, bool j
   }
   const auto renderer = rendering::make_reference_renderer();
   const auto batch = rendering::make_simd_likelihood_batch();
-  const CountingLikelihood likelihood(*batch);
+  const filter_tests::CountingLikelihood likelihood(*batch);
   filter::FilterSettings settings;
   settings.worlds.joint = joint;
   settings.initialise.particles = particles;
@@ -310,10 +285,10 @@ WorldsFigures track_contacts(const std::string& kind, std::uint64_t seed, bool j
     observation.frame = {depth, color, intrinsics};
     observation.X_WC = contacts.X_WC;
     observation.robot["pusher"] = X_WG[0];
-    const double begin = core::process_cpu_seconds(), evaluated = likelihood.count();
+    const double begin = core::process_cpu_seconds();
     filter::StepResult result = filter.step(belief, observation, {});
     figures.cpu_seconds += core::process_cpu_seconds() - begin;
-    figures.evaluations += likelihood.count() - evaluated;
+    figures.evaluations += likelihood.poses.exchange(0);
     figures.joint_islands += result.counters.joint_islands;
     belief = std::move(result.belief);
     ++figures.frames;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -11,6 +10,7 @@
 #include "prescene/filter/operators/still_update.h"
 #include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
+#include "tests/filter/counting_likelihood.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -109,30 +109,6 @@ TEST(StillUpdate, WhatAFrameDoesNotTellStays) {
   EXPECT_EQ(poor.shift, Vector6d::Zero());
   EXPECT_LT((poor.covariance - P).norm(), 1e-12);
 }
-
-/// Counts the poses that frames are compared with.
-class CountingLikelihood final : public rendering::LikelihoodBatch {
- public:
-  explicit CountingLikelihood(const rendering::LikelihoodBatch& batch) : batch_(batch) {}
-  rendering::LikelihoodBatchInfo info() const override { return batch_.info(); }
-  std::unique_ptr<rendering::LikelihoodWorkspace> make_workspace() const override { return batch_.make_workspace(); }
-  void evaluate(const rendering::FrameTerms& frame, std::span<const rendering::PoseHypothesis> hypotheses,
-                rendering::LikelihoodWorkspace& workspace,
-                std::span<rendering::PoseEvidence> evidences) const override {
-    poses += static_cast<int>(hypotheses.size());
-    batch_.evaluate(frame, hypotheses, workspace, evidences);
-  }
-  void linearise(const rendering::FrameTerms& frame, std::span<const rendering::PoseHypothesis> hypotheses,
-                 const rendering::LineariseOptions& options, rendering::LikelihoodWorkspace& workspace,
-                 std::span<rendering::PoseLinearisation> linearisations) const override {
-    poses += static_cast<int>(hypotheses.size());
-    batch_.linearise(frame, hypotheses, options, workspace, linearisations);
-  }
-  mutable std::atomic<int> poses = 0;
-
- private:
-  const rendering::LikelihoodBatch& batch_;
-};
 
 /// A box whose motion begins after a second of rest; what is published of it.
 struct Followed {
