@@ -20,7 +20,7 @@ namespace prescene::simulation {
 using Real = float;
 
 inline constexpr int kLaneMultiple = 16;  ///< Slots come in multiples of the widest vector.
-inline constexpr int kMaxObjects = 4;
+inline constexpr int kMaxObjects = 16;
 /// Contacts of an object in a step with those after it and what is not an object; with bodies of spheres kMaxContacts.
 inline constexpr int kRoomForContacts = 32;
 inline constexpr int kMaxContacts = 64;

@@ -43,6 +43,45 @@ TEST(BulletAgreement, ReleasedMilkEndsAlike) { expect_same_distribution(scenario
 TEST(BulletAgreement, ShovedStackEndsAlike) { expect_same_distribution(shoved_stack(), 512, 0.9); }
 TEST(BulletAgreement, PushedStackEndsAlike) { expect_same_distribution(scenario("pushed_stack"), 512, 0.9); }
 
+TEST(BulletAgreement, FivePushedObjectsEndAlike) {
+  Scene scene = scenario("five_objects_pushed");
+  const auto below = [](const char* object) {
+    belief::Condition falls;
+    falls.predicate = belief::BelowHeight{-0.1};
+    return belief::Outcome{std::string(object) + "_falls", object, {falls}};
+  };
+  belief::Condition lies;
+  lies.predicate = belief::UprightWithin{Vector3d::UnitZ(), 0.5};
+  lies.negated = true;
+  scene.exclusive_outcomes = {{"ends", {below("can"), below("ball"), {"carton_lies", "carton", {lies}}}}};
+  expect_same_distribution(scene, 256, 0.85);
+}
+
+/// Ten dominoes at uncertain distances; the first one is tipped over.
+TEST(BulletAgreement, TenDominoesEndAlike) {
+  Scene scene;
+  scene.name = "dominoes";
+  scene.duration = 3.0;
+  scene.supports.push_back(floor_support());
+  ObjectModel model = primitive_model("domino", BoxShape{{0.008, 0.03, 0.05}}, 0.02);
+  model.contact.friction = belief::UniformScalar{0.1, 0.5};
+  for (int i = 0; i < 10; ++i) {
+    add_object(scene, model, "domino" + std::to_string(i));
+    scene.objects.back().model = i;
+    scene.models[static_cast<std::size_t>(i)].name += std::to_string(i);
+    belief::BoxPose pose;
+    pose.position = {belief::UniformScalar{0.034 * i - 0.009, 0.034 * i + 0.009}, belief::UniformScalar{-0.006, 0.006},
+                     belief::FixedScalar{0.025}};
+    scene.objects.back().pose = pose;
+  }
+  scene.objects[0].twist.angular.y = belief::FixedScalar{8.0};
+  belief::Condition lies;
+  lies.predicate = belief::UprightWithin{Vector3d::UnitZ(), 0.5};
+  lies.negated = true;
+  scene.exclusive_outcomes = {{"fall", {{"all", "domino9", {lies}}, {"half", "domino4", {lies}}}}};
+  expect_same_distribution(scene, 256, 0.7);
+}
+
 TEST(BulletAgreement, ReleasesOfTheSameSeedAreTheSame) {
   const Scene scene = scenario("milk_on_bin");
   const std::vector<WorldState> starts = drawn_starts(scene, 20, 3);

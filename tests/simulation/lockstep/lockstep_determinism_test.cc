@@ -329,11 +329,11 @@ TEST(LockstepRefusals, NameTheBodyAndTheReason) {
   joint.child = jointed.objects[0].name;
   jointed.joints.push_back(joint);
   expect_refused(jointed, "the joint slide");
-  Scene five = good;
-  for (int i = 1; i < 5; ++i) {
-    add_object(five, primitive_model("box" + std::to_string(i), BoxShape{{0.1, 0.1, 0.1}}), std::to_string(i));
+  Scene many = good;
+  for (int i = 1; i < 17; ++i) {
+    add_object(many, primitive_model("box" + std::to_string(i), BoxShape{{0.1, 0.1, 0.1}}), std::to_string(i));
   }
-  expect_refused(five, "one to 4 objects, and the scene has 5");
+  expect_refused(many, "one to 16 objects, and the scene has 17");
   Scene surface = good;
   const auto bin = std::make_shared<const geometry::TriangleMesh>(geometry::make_open_bin({0.3, 0.3, 0.2}, 0.01));
   surface.supports.push_back(support_of("bin", {belief::MeshShape{bin, Pose{}, belief::MeshUse::kSurface}}, Pose{}));

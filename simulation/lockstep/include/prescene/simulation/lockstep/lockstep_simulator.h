@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A simulator for many instances of one scene in which one to four rigid bodies meet each other, fixed surroundings and
+// A simulator for many instances of one scene in which one to 16 rigid bodies meet each other, fixed surroundings and
 // what a robot moves: 8 to 16 instances at once in the lanes of vectors. Physics as in prescene/simulation/bullet
 // (docs/reference/simulation.md), restated; what a scene has beyond it the factory refuses, so that callers take that
 // simulator.
@@ -33,7 +33,7 @@ core::Status validate(const LockstepOptions& options);
 
 /// Fails with kInvalidInput as make_bullet_simulator does, and with kUnsupported, naming body and reason, unless the
 /// scene has
-///   - one to four objects of boxes, spheres, cylinders, cones, capsules and hulls (convex_hull, convex_parts,
+///   - one to 16 objects of boxes, spheres, cylinders, cones, capsules and hulls (convex_hull, convex_parts,
 ///     decompose), and at most 16 parts each. Hulls of more than 64 vertices, or with sides of more than 16 corners,
 ///     are simplified (prescene/simulation/simplified_polytope.h); StepperUse::hull_error says by how much;
 ///   - supports of the same shapes, at most 256 parts together;
