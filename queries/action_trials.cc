@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "foresee.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/core/check.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "prescene/simulation/own_actions.h"
@@ -51,6 +52,7 @@ ActionTrials::ActionTrials(const Prior& prior, PlannedAction& plan, const Wanted
   request_.actions = scene_->actions;
   request_.stop.duration = duration;
   request_.stop.stop_at_rest = scene_->stop_at_rest;
+  request_.stop.world_radius = belief::world_radius(*scene_);
   request_.sample_interval = needs_states(wanted) ? kLookInterval : 0.0;
 }
 

@@ -42,8 +42,7 @@ std::string missing_text(const std::vector<std::string>& missing) {
          names + ". Give more time, or ask for less.";
 }
 
-void remark_on_leaving(const simulation::OutcomeEstimate& estimate, std::vector<std::string>& remarks) {
-  const double radius = simulation::StopRule{}.world_radius;
+void remark_on_leaving(const simulation::OutcomeEstimate& estimate, double radius, std::vector<std::string>& remarks) {
   double share = 0.0;
   for (const simulation::InstanceRecord& record : estimate.instances) {
     const auto& objects = record.final.objects;

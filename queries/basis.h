@@ -15,8 +15,8 @@ void account(const Foresight& foresight, belief::Basis& basis);
 
 /// The remark that names parts which were not worked out in time.
 std::string missing_text(const std::vector<std::string>& missing);
-/// What is too far away is not simulated any more: what is said of it then may not be what is meant.
-void remark_on_leaving(const simulation::OutcomeEstimate& estimate, std::vector<std::string>& remarks);
+/// What is farther than `radius` (m) away is not simulated any more: what is said of it then may not be what is meant.
+void remark_on_leaving(const simulation::OutcomeEstimate& estimate, double radius, std::vector<std::string>& remarks);
 /// Where there is but one way that it can go.
 void remark_on_certainty(const simulation::OutcomeEstimate& estimate, std::vector<std::string>& remarks);
 

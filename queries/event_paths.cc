@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "prescene/belief/body_names.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/simulation/own_actions.h"
 #include "remarks.h"
 
@@ -54,6 +55,7 @@ core::Result<std::unique_ptr<EventPaths>> EventPaths::create(const ExplainWindow
   events->note_directions();
   if (!context.simulation.make_simulator) return core::unavailable("no simulator: this service was set up without one");
   PRESCENE_TRY(events->simulator_, context.simulation.make_simulator(*events->scene_, 1.0));
+  events->world_radius_ = belief::world_radius(*events->scene_);
   events->local_ = std::make_unique<LocalRuns>(*events->scene_, events->shapes_, events->prior_.likeliest,
                                                *events->simulator_, context.simulation.make_simulator);
   return events;
@@ -212,6 +214,7 @@ std::vector<belief::Trajectory> EventPaths::run(std::span<const belief::WorldSta
   simulation::RunRequest request;
   request.stop.duration = until + kEventInterval;
   request.stop.stop_at_rest = actions_.empty();
+  request.stop.world_radius = world_radius_;
   request.sample_interval = kEventInterval;
   request.end_rule = &end;
   core::ThreadPool& pool = *context_.simulation.pool;

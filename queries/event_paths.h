@@ -194,8 +194,9 @@ class EventPaths {
   std::vector<belief::Action> actions_;  // known ones, times from the begin
   std::vector<double> times_;
   double duration_ = 0.0;
-  double horizon_ = 0.0;  // s; until then runs go on, if that is later
-  bool still_ = true;     // nothing moves by itself and nothing is done
+  double world_radius_ = 0.0;  // m
+  double horizon_ = 0.0;       // s; until then runs go on, if that is later
+  bool still_ = true;          // nothing moves by itself and nothing is done
   std::vector<ObjectPath> base_;
   core::RandomStream stream_;
   int simulated_ = 0;

@@ -5,6 +5,7 @@
 
 #include "foresee.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/core/text.h"
 #include "prescene/queries/typical_runs.h"
 
@@ -55,6 +56,7 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   PRESCENE_RETURN_IF_ERROR(foresight.simulator->supports(foresight.request));
   foresight.request.stop.duration = duration;
   foresight.request.stop.stop_at_rest = scene->stop_at_rest;
+  foresight.request.stop.world_radius = belief::world_radius(*scene);
   foresight.request.sample_interval = needs_states_along_the_way(*scene) ? kJudgingInterval : 0.0;
   foresight.variables = simulation::variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
   const std::size_t objects = scene->objects.size();

@@ -271,7 +271,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   answer.remarks = remarks_of(answer, query.effort);
   if (!missing.empty()) answer.remarks.push_back(missing_text(missing));
   remark_on_actions(*foresight.scene, foresight.request.stop.duration, answer.remarks);
-  remark_on_leaving(foresight.estimate, answer.remarks);
+  remark_on_leaving(foresight.estimate, foresight.request.stop.world_radius, answer.remarks);
   if (!flight.ok())
     answer.remarks.push_back("How long nothing can touch anything is not known: " + flight.message() + ".");
   remark_on_certainty(foresight.estimate, answer.remarks);

@@ -65,7 +65,7 @@ core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief
     else
       answer.remarks.push_back(missing_text({"likely_event"}));
   }
-  remark_on_leaving(foresight.estimate, answer.remarks);
+  remark_on_leaving(foresight.estimate, foresight.request.stop.world_radius, answer.remarks);
   remark_on_certainty(foresight.estimate, answer.remarks);
   PRESCENE_RETURN_IF_ERROR(add_stability_detail(prior, index, query, context, answer));
   return answer;

@@ -13,6 +13,7 @@
 #include "basis.h"
 #include "foresee.h"
 #include "prescene/belief/body_names.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/geometry/angles.h"
 #include "prescene/queries/confidence_sequence.h"
 
@@ -41,6 +42,7 @@ class Trials {
       : prior_(prior), context_(context), simulator_(simulator) {
     request_.stop.duration = query.duration;
     request_.stop.stop_at_rest = true;
+    request_.stop.world_radius = belief::world_radius(*prior.scene);
   }
 
   WorldState start(std::uint32_t number) const {

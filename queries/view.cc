@@ -98,7 +98,7 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
                              std::to_string(foresight.estimate.instances.size()) +
                              " foreseen states failed in the simulator; presence is that of the others. Look at the "
                              "scene's shapes, masses and speeds.");
-  remark_on_leaving(foresight.estimate, answer.remarks);
+  remark_on_leaving(foresight.estimate, foresight.request.stop.world_radius, answer.remarks);
   double followed = 0.0;  // of the weights
   for (const simulation::InstanceRecord& record : foresight.estimate.instances)
     if (!record.failed) followed += record.weight;

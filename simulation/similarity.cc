@@ -121,18 +121,8 @@ JointScale scale_of(belief::JointType type, const Similarity& similarity) {
 
 double Similarity::time() const { return std::sqrt(length); }
 
-double smallest_size(const belief::Scene& scene) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const belief::SceneObject& object : scene.objects) {
-    const double size =
-        std::cbrt(geometry::bounding_box(belief::collision_mesh(scene.model_of(object))).sizes().prod());
-    if (size > 0.0) smallest = std::min(smallest, size);
-  }
-  return std::isfinite(smallest) ? smallest : kReferenceSize;
-}
-
 Similarity similarity_of(const belief::Scene& scene) {
-  const double size = smallest_size(scene);
+  const double size = belief::smallest_size(scene);
   if (size >= kSmallestAsItIs && size <= kLargestAsItIs) return {};
   return {size / kReferenceSize};
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "prescene/belief/validation.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/core/text.h"
 #include "read_scene_parts.h"
 
@@ -86,17 +86,18 @@ void refuse_starts_inside(const LocatedValue& objects, const belief::Scene& scen
 // Simulators freeze what is there.
 void refuse_starts_outside(const LocatedValue& objects, const belief::Scene& scene, const belief::WorldState& start,
                            Problems& problems) {
+  const double radius = belief::world_radius(scene);
   for (std::size_t o = 0; o < scene.objects.size(); ++o) {
     const Vector3d& p = start.objects[o].X_WO.translation;
-    if (p.norm() <= belief::kWorldRadius) continue;
+    if (p.norm() <= radius) continue;
     const LocatedValue& pose = pose_of(*objects.find(scene.objects[o].name));
     const LocatedValue* position = pose.find("position");
     const LocatedValue& at = position ? *position : pose;
     const Vector3d meant = 1e-3 * p;
     problems.add(at.place, at.path,
                  "it starts " + core::rounded_text(p.norm()) + " m from the world's origin, and the world ends at " +
-                     core::rounded_text(belief::kWorldRadius) + " m",
-                 meant.norm() < 0.5 * belief::kWorldRadius
+                     core::rounded_text(radius) + " m",
+                 meant.norm() < 0.5 * radius
                      ? "millimetres? then write [" + core::rounded_text(meant.x()) + ", " +
                            core::rounded_text(meant.y()) + ", " + core::rounded_text(meant.z()) +
                            "]; else put the origin near the things"

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "prescene/belief/robot_motion.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/belief/trajectory.h"
 #include "prescene/core/random.h"
 #include "prescene/simulation/rules/action_draws.h"
@@ -229,6 +230,7 @@ core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector
     request.actions = part.scene.actions;
     request.stop.duration = until - time;
     request.stop.stop_at_rest = false;
+    request.stop.world_radius = belief::world_radius(part.scene);
     request.sample_interval = interval;
     std::vector<WorldState>& states = part.trajectory.states;
     if (until > time) {

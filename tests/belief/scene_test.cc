@@ -6,6 +6,8 @@
 #include <functional>
 
 #include "prescene/belief/body_names.h"
+#include "prescene/belief/scene_size.h"
+#include "prescene/belief/validation.h"
 #include "prescene/core/sobol.h"
 #include "tests/belief/random_values.h"
 #include "tests/support/laws.h"
@@ -25,6 +27,28 @@ TEST(PoseAt, HoldsTheEndsAndInterpolatesBetween) {
   EXPECT_EQ(pose_at(body, 5.0), X_b);
   const Pose expected{geometry::exp_rotation({0.0, 0.0, 0.25}), Vector3d(0.5, 0.0, 1.0)};
   EXPECT_THAT(pose_at(body, 1.5), tests::is_near(expected, 1e-12, 1e-12));
+}
+
+TEST(WorldRadius, GrowsWithThingsThatAreLargerThanAHouseholds) {
+  const auto radius_with = [](std::initializer_list<double> edges) {
+    Scene scene;
+    for (const double edge : edges) {
+      ObjectModel model;
+      model.name = "box" + std::to_string(scene.models.size());
+      model.collision.emplace_back(PrimitiveShape{geometry::BoxShape{{edge, 2.0 * edge, 0.5 * edge}}, {}});
+      scene.models.push_back(*with_derived_properties(model));
+      SceneObject object;
+      object.name = model.name;
+      object.model = static_cast<int>(scene.models.size()) - 1;
+      scene.objects.push_back(object);
+    }
+    return world_radius(scene);
+  };
+  EXPECT_EQ(radius_with({}), kWorldRadius);
+  EXPECT_EQ(radius_with({0.005}), kWorldRadius);
+  EXPECT_EQ(radius_with({0.3}), kWorldRadius);
+  EXPECT_NEAR(radius_with({6.0}), 20.0 * kWorldRadius, 1e-9);
+  EXPECT_EQ(radius_with({6.0, 0.1}), kWorldRadius);
 }
 
 TEST(SceneValidate, AcceptsTheSmallScene) { EXPECT_EQ(validate(tests::small_scene()), core::ok_status()); }

@@ -14,7 +14,9 @@
 namespace prescene::service {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kOneBox = R"(name: box
 models:
@@ -24,18 +26,20 @@ supports:
 objects:
   box: {model: box, pose: {position: [0, 0, 0.2], rotation: any}}
 )";
-constexpr const char* kFiveBoxes = R"(name: boxes
+/// More objects than the lockstep stepper takes, one of them in the air.
+std::string many_boxes() {
+  std::string text = R"(name: boxes
 models:
   box: {box: [0.1, 0.1, 0.1], mass: 0.4}
 supports:
-  floor: {ground: {size: 4}}
+  floor: {ground: {size: 8}}
 objects:
-  a: {model: box, pose: {position: [0, 0, 0.05]}}
-  b: {model: box, pose: {position: [0.4, 0, 0.3]}}
-  c: {model: box, pose: {position: [0.8, 0, 0.05]}}
-  d: {model: box, pose: {position: [1.2, 0, 0.05]}}
-  e: {model: box, pose: {position: [1.6, 0, 0.05]}}
 )";
+  for (int i = 0; i < 17; ++i)
+    text += "  box" + std::to_string(i) + ": {model: box, pose: {position: [" + std::to_string(0.4 * (i % 5)) + ", " +
+            std::to_string(0.4 * (i / 5)) + (i == 3 ? ", 0.3]}}\n" : ", 0.05]}}\n");
+  return text;
+}
 
 // A drawer of 1 kg that begins at 0.6 m/s: 0.18 J are rubbed off by 1 N on 0.18 m, by 2 N on 0.09 m.
 constexpr const char* kDrawer = R"(name: drawer
@@ -49,7 +53,7 @@ outcomes:
   opens_wide: {joint: {name: slide, min: 0.15}}
 )";
 
-std::shared_ptr<const belief::Scene> scene_of(const char* text) {
+std::shared_ptr<const belief::Scene> scene_of(const std::string& text) {
   const auto scene = load_scene_text(text, "test.yaml", {});
   EXPECT_TRUE(scene.ok()) << scene.status().message();
   return *scene;
@@ -144,24 +148,24 @@ TEST(Backends, AnswersTellWhoSimulatedAndWhyItWasNotLockstep) {
   belief::PredictQuery query;
   query.effort.exact_instances = 8;
   query.duration = 0.1;
-  const auto asked = [&](Stepper stepper, const char* scene) {
+  const auto asked = [&](Stepper stepper, const std::string& scene) {
     Backends backends(pool, settings_of(stepper));
     return queries::answer(scene_of(scene), 1, {"", query}, backends.query_context(pool));
   };
-  const auto predicted = [&](Stepper stepper, const char* scene) {
+  const auto predicted = [&](Stepper stepper, const std::string& scene) {
     const belief::Answer answer = asked(stepper, scene);
     EXPECT_TRUE(answer.error.ok()) << answer.error.message();
     return std::get<belief::PredictAnswer>(answer.what);
   };
   EXPECT_EQ(predicted(Stepper::kAutomatic, kOneBox).stepper, "lockstep");
   EXPECT_EQ(predicted(Stepper::kAutomatic, kOneBox).not_lockstep, "");
-  EXPECT_EQ(predicted(Stepper::kBullet, kFiveBoxes).stepper, "bullet");
-  EXPECT_EQ(predicted(Stepper::kBullet, kFiveBoxes).not_lockstep, "");
-  EXPECT_EQ(predicted(Stepper::kAutomatic, kFiveBoxes).stepper, "bullet");
-  EXPECT_THAT(predicted(Stepper::kAutomatic, kFiveBoxes).not_lockstep, HasSubstr("the scene has 5"));
-  const belief::Answer refused = asked(Stepper::kLockstep, kFiveBoxes);
+  EXPECT_EQ(predicted(Stepper::kBullet, many_boxes()).stepper, "bullet");
+  EXPECT_EQ(predicted(Stepper::kBullet, many_boxes()).not_lockstep, "");
+  EXPECT_EQ(predicted(Stepper::kAutomatic, many_boxes()).stepper, "bullet");
+  EXPECT_THAT(predicted(Stepper::kAutomatic, many_boxes()).not_lockstep, HasSubstr("the scene has 17"));
+  const belief::Answer refused = asked(Stepper::kLockstep, many_boxes());
   EXPECT_EQ(refused.error.code(), core::StatusCode::kUnsupported);
-  EXPECT_THAT(refused.error.message(), HasSubstr("the scene has 5"));
+  EXPECT_THAT(refused.error.message(), HasSubstr("the scene has 17"));
 }
 
 TEST(Backends, AnswersTellWhereJointsEnd) {
@@ -203,21 +207,50 @@ TEST(Backends, QueriesKnowHowTheirSimulatorsRoundEdges) {
 
 TEST(Backends, AutomaticStepperIsBulletWhereLockstepRefusesTheScene) {
   core::ThreadPool pool(1);
-  const auto five = scene_of(kFiveBoxes);
-  const auto bullet = Backends(pool, settings_of(Stepper::kBullet)).make_simulator(*five);
+  const auto many = scene_of(many_boxes());
+  const auto bullet = Backends(pool, settings_of(Stepper::kBullet)).make_simulator(*many);
   Backends either(pool, settings_of(Stepper::kAutomatic));
-  const auto automatic = either.make_simulator(*five);
+  const auto automatic = either.make_simulator(*many);
   ASSERT_TRUE(bullet.ok() && automatic.ok());
-  EXPECT_TRUE(same(runs(**automatic, *five, {}), runs(**bullet, *five, {})));
+  EXPECT_TRUE(same(runs(**automatic, *many, {}), runs(**bullet, *many, {})));
   EXPECT_EQ((*automatic)->stepper().name, "bullet");
-  EXPECT_THAT((*automatic)->stepper().not_lockstep, HasSubstr("the scene has 5"));
+  EXPECT_THAT((*automatic)->stepper().not_lockstep, HasSubstr("the scene has 17"));
   EXPECT_EQ(either.stepper_counts().lockstep, 0u);
   EXPECT_EQ(either.stepper_counts().bullet_instead, 1u);
-  EXPECT_THAT(either.stepper_counts().last_reason, HasSubstr("the scene has 5"));
+  EXPECT_THAT(either.stepper_counts().last_reason, HasSubstr("the scene has 17"));
 
-  const auto refused = Backends(pool, settings_of(Stepper::kLockstep)).make_simulator(*five);
+  const auto refused = Backends(pool, settings_of(Stepper::kLockstep)).make_simulator(*many);
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.status().message(), HasSubstr("lockstep"));
+}
+
+/// A box of `size` times 10 cm that is let go tilted, 40 of its lengths away from the origin.
+belief::PredictAnswer dropped(double size) {
+  core::ThreadPool pool(2);
+  Backends backends(pool, settings_of(Stepper::kAutomatic));
+  const auto metres = [&](double value) { return std::to_string(value * size); };
+  const auto scene = scene_of(
+      "name: box\nduration: " + std::to_string(3.0 * std::sqrt(size)) + "\nmodels:\n  box: {box: [" + metres(0.1) +
+      ", " + metres(0.1) + ", " + metres(0.2) + "], mass: " + std::to_string(size * size * size) +
+      "}\nsupports:\n  floor: {ground: {size: " + metres(12.0) +
+      "}}\nobjects:\n  box: {model: box, pose: {position: [" + metres(4.0) + ", 0, " + metres(0.14) +
+      "], rotation: {euler_deg: [0, 22, 0]}, normal: {rotation_deg: [0, 8, 0]}}}\n"
+      "outcomes:\n  stands: {object: box, upright: {within_deg: 10}}\n");
+  belief::PredictQuery query;
+  query.effort.exact_instances = 512;
+  const belief::Answer answer = queries::answer(scene, 1, {"", query}, backends.query_context(pool));
+  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
+  return std::get<belief::PredictAnswer>(answer.what);
+}
+
+// What is large is in the same world as what is small: it ends farther away.
+TEST(Backends, HugeThingsEndAsSmallOnesDo) {
+  const belief::PredictAnswer small = dropped(1.0), huge = dropped(40.0);
+  ASSERT_EQ(small.outcomes.size(), 1u);
+  EXPECT_GT(small.outcomes[0].probability, 0.2);
+  EXPECT_LT(small.outcomes[0].probability, 0.8);
+  EXPECT_NEAR(huge.outcomes[0].probability, small.outcomes[0].probability, 0.02);
+  EXPECT_THAT(huge.remarks, Not(Contains(HasSubstr("world's origin"))));
 }
 
 constexpr const char* kThrownBox = R"(name: box

@@ -28,7 +28,7 @@ inline constexpr ScalarRange kFrictionRange{
     0.0, 1e3, "give a Coulomb coefficient of at least 0 (steel on ice 0.03, rubber 1)", true};
 inline constexpr ScalarRange kRestitutionRange{0.0, 1.0, "give a coefficient between 0 (no bounce) and 1", true, true};
 
-/// m from W's origin: farther away things have left the world, and simulators freeze them.
+/// m from W's origin, of things of a household: see world_radius() in scene_size.h.
 inline constexpr double kWorldRadius = 20.0;
 /// An object that rests on one lighter by more than this factor is not held up: what one step of the contact solver's
 /// iterations passes on through the light one is too little.

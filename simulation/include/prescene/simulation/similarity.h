@@ -11,7 +11,7 @@
 
 #include <memory>
 
-#include "prescene/belief/scene.h"
+#include "prescene/belief/scene_size.h"
 #include "prescene/simulation/simulator.h"
 
 namespace prescene::simulation {
@@ -26,14 +26,11 @@ struct Similarity {
 };
 
 /// m: the size of a thing that the steppers' settings are made for.
-inline constexpr double kReferenceSize = 0.1;
+inline constexpr double kReferenceSize = belief::kHouseholdSize;
 /// m: things from the first to the second size are simulated as they are.
 inline constexpr double kSmallestAsItIs = 0.05, kLargestAsItIs = 0.3;
 
-/// m: of the smallest object, the cube root of the volume of its box in its own axes. Objects with no extent count as
-/// absent; kReferenceSize if there are none.
-double smallest_size(const belief::Scene& scene);
-/// By smallest_size() over kReferenceSize; 1 for things of household size.
+/// By belief::smallest_size() over kReferenceSize; 1 for things of household size.
 Similarity similarity_of(const belief::Scene& scene);
 
 /// All lengths are multiplied by `similarity.length`, all times by similarity.time(). Outcomes, camera and colours are
