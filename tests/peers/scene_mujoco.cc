@@ -23,6 +23,7 @@ using geometry::Vector3d;
 
 // A box larger than this (m) is written as the plane of its upper side, for which MuJoCo's contacts are exact.
 constexpr double kPlane = 3.0;
+constexpr double kStandstill = 2e-3;  // m/s
 
 std::string text(std::initializer_list<double> values) {
   std::string all;
@@ -101,6 +102,7 @@ struct MujocoScene::Impl {
   std::size_t objects = 0;
 
   void set_contacts(const belief::WorldState& start);
+  bool nothing_moves() const;
 };
 
 // The force -k x - c v of what arrives at x = 0 becomes 0 at phase pi - 2 asin(z) of the damped oscillation, when the
@@ -191,6 +193,18 @@ void MujocoScene::Impl::set_contacts(const belief::WorldState& start) {
   }
 }
 
+bool MujocoScene::Impl::nothing_moves() const {
+  for (std::size_t i = 0; i < objects; ++i) {
+    const double* v = data->qvel + 6 * i;
+    double reach = 0.0;  // m, of the object's points from its origin
+    for (int g = 0; g < model->ngeom; ++g)
+      if (body_of_geom[static_cast<std::size_t>(g)] == static_cast<int>(i))
+        reach = std::max(reach, model->geom_rbound[g] + mju_norm3(model->geom_pos + 3 * g));
+    if (mju_norm3(v) + reach * mju_norm3(v + 3) > kStandstill) return false;
+  }
+  return true;
+}
+
 belief::Trajectory MujocoScene::run(const belief::WorldState& start, double duration) {
   impl_->set_contacts(start);
   const mjModel* model = impl_->model;
@@ -210,10 +224,16 @@ belief::Trajectory MujocoScene::run(const belief::WorldState& start, double dura
       data->qvel[6 * i + 3 + static_cast<std::size_t>(k)] = w_B[k];
     }
   }
-  while (data->time < duration) mj_step(model, data);
+  double still_since = 0.0;
+  while (data->time < duration) {
+    mj_step(model, data);
+    if (impl_->options.rest_time <= 0.0) continue;
+    if (!impl_->nothing_moves()) still_since = data->time;
+    if (data->time - still_since > impl_->options.rest_time) break;
+  }
   belief::Trajectory run;
   run.states = {start, start};
-  run.simulated_seconds = run.states[1].time = duration;
+  run.simulated_seconds = run.states[1].time = data->time;
   // MuJoCo starts over by itself after it blew up.
   if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||
       data->warning[mjWARN_BADQVEL].number > 0)

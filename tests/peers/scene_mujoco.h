@@ -17,6 +17,7 @@ struct MujocoOptions {
   double contact_time = 0.002;  ///< Time constant of contacts (solref), s; at least two steps. Of bounces half.
   double impedance_ratio = 10;  ///< Of friction to normal directions: higher creeps less.
   bool elliptic_cone = true;    ///< Else friction pyramids.
+  double rest_time = 0.0;       ///< s: runs end when nothing moved for so long; 0: they are never cut short.
 };
 
 /// Objects and supports of primitives and convex hulls; no robot, no actions. Friction and restitution are those of the
@@ -27,7 +28,8 @@ class MujocoScene {
   ~MujocoScene();
   MujocoScene(MujocoScene&&) noexcept;
 
-  /// First and last state, no contacts; kDiverged where it blew up. One call at a time.
+  /// First and last state, no contacts; kDiverged where it blew up. Nothing moves where no point of an object is faster
+  /// than 2 mm/s. One call at a time.
   belief::Trajectory run(const belief::WorldState& start, double duration);
 
  private:
