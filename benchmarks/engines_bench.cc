@@ -2,9 +2,10 @@
 // Outcome probabilities of twenty small scenes (tests/support/engine_scenes.h) by both steppers and by MuJoCo,
 // from the same uncertain starts: where do engines disagree by more than sampling explains?
 //
-//   bench_engines [--quick] [--instances=N] [--benchmark_out=PATH]
+//   bench_engines [--quick] [--instances=N] [--dice=N] [--only=PART] [--benchmark_out=PATH]
 //
-// --instances: starts a scene (512; quick 64).
+// --instances: starts a scene (512; quick 64). --dice: dice of a kind that MuJoCo throws (128; quick 4). --only: scenes
+// or dice.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <string_view>
 
 #include "benchmarks/arguments.h"
+#include "benchmarks/dice_engines.h"
 #include "benchmarks/report.h"
 #include "prescene/core/check.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
@@ -96,10 +98,10 @@ double same(const std::vector<int>& a, const std::vector<int>& b) {
 
 bool disagree(double p, double q, double n) { return std::abs(p - q) > half_width(p, n) + half_width(q, n); }
 
-int run(int instances, const std::string& out) {
-  Report report("engines", best_simd_target());
-  report.note("Scenes of tests/support/engine_scenes.cc, " + std::to_string(instances) +
-              " starts each; a class disagrees where shares differ by more than both 90 % intervals.");
+/// Prints and reports the twenty scenes.
+void measure_scenes(int instances, Report* report) {
+  report->note("Scenes of tests/support/engine_scenes.cc, " + std::to_string(instances) +
+               " starts each; a class disagrees where shares differ by more than both 90 % intervals.");
   Table classes{"classes",
                 {"scene", "class", "bullet", "lockstep", "bullet 1/2000 s", "mujoco", "half width", "disagrees",
                  "disagrees at 1/2000 s"},
@@ -131,11 +133,33 @@ int run(int instances, const std::string& out) {
     runs.rows.push_back({named.name, same(bullet, lockstep), same(bullet, mujoco), same(fine, mujoco),
                          static_cast<std::int64_t>(std::count(mujoco.begin(), mujoco.end(), -1))});
   }
-  report.add(classes);
-  report.add(runs);
+  report->add({.work = "scenes in which a share differs from MuJoCo's at 1/2000 s beyond both intervals",
+               .better = Better::kLower,
+               .must = at_most(1.0),
+               .aim = at_most(0.0),
+               .reached = scenes_apart,
+               .unit = "of " + std::to_string(runs.rows.size()),
+               .n = static_cast<std::int64_t>(runs.rows.size()),
+               .baseline = "MuJoCo 2.2.2",
+               .why = std::to_string(scenes_apart_fine) + " with steps of 1/2000 s of ours"});
+  std::printf("%s\n%s\n", text_of(classes).c_str(), text_of(runs).c_str());
+  report->add(std::move(classes));
+  report->add(std::move(runs));
+}
+
+int run(int instances, int dice, const std::string& only, const std::string& out) {
+  if (!only.empty() && only != "scenes" && only != "dice") {
+    std::fprintf(stderr, "--only: give scenes or dice\n");
+    return 2;
+  }
+  Report report("engines", best_simd_target());
+  if (only != "scenes") {
+    Table table = measure_dice_in_mujoco(4096, dice, &report);
+    std::printf("%s\n", text_of(table).c_str());
+    report.add(std::move(table));
+  }
+  if (only != "dice") measure_scenes(instances, &report);
   std::fputs(report.text().c_str(), stdout);
-  std::printf("%s\n%s\n%d of %zu scenes disagree, %d at 1/2000 s\n", text_of(classes).c_str(), text_of(runs).c_str(),
-              scenes_apart, runs.rows.size(), scenes_apart_fine);
   return report.finish(out);
 }
 
@@ -143,11 +167,16 @@ int run(int instances, const std::string& out) {
 }  // namespace prescene::benchmarks
 
 int main(int count, char** words) {
-  int instances = 512;
-  std::string out;
+  int instances = 512, dice = 128;
+  std::string only, out;
   prescene::benchmarks::Arguments arguments;
-  arguments.flag("quick", [&] { instances = 64; });
+  arguments.flag("quick", [&] {
+    instances = 64;
+    dice = 4;
+  });
   arguments.number("instances", 1, 1e6, &instances);
+  arguments.number("dice", 2, 1e6, &dice);
+  arguments.text("only", "PART", &only);
   arguments.text("benchmark_out", "PATH", &out);
-  return arguments.parse(count, words) ? prescene::benchmarks::run(instances, out) : 2;
+  return arguments.parse(count, words) ? prescene::benchmarks::run(instances, dice, only, out) : 2;
 }
