@@ -120,7 +120,7 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
     deviation[i] = z_deviation(mean[i], spread);
   };
   const bool carried = hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn ||
-                       hypothesis.kind == EventKind::kTakenAway;
+                       hypothesis.kind == EventKind::kTakenAway || hypothesis.begins_otherwise;
   const bool was_there = is_present(hypothesis.object);
   SeenTimes seen = {motion.before, motion.after, was_there ? motion.after : motion.before,
                     was_there ? motion.back : motion.after};
@@ -129,7 +129,7 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
   const double before = !carried ? motion.before : comes ? seen.came_after : seen.left_after;
   const double after = !carried ? motion.after : comes ? seen.came_before : seen.left_before;
   const double when = carried ? 0.5 * (before + after) : motion.onset;
-  set_uniform(0, when / duration_, (0.02 + 0.4 * (after - before)) / duration_);
+  if (!hypothesis.begins_otherwise) set_uniform(0, when / duration_, (0.02 + 0.4 * (after - before)) / duration_);
   if ((hypothesis.kind == EventKind::kPushed || hypothesis.kind == EventKind::kBumped) && motion.moved) {
     set_uniform(1, 0.5, 0.06);
     const bool pushed = hypothesis.kind == EventKind::kPushed;
@@ -148,7 +148,8 @@ void EventPaths::guess(const Hypothesis& hypothesis, TemperedTarget& target) con
           std::log(std::max(0.05, motion.until - motion.onset) / priors_.push_duration) / priors_.push_duration_spread,
           0.6);
   }
-  if ((hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn) && motion.moved) {
+  const bool put_down = hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn;
+  if ((put_down || hypothesis.begins_otherwise) && motion.moved) {
     const bool moved = hypothesis.kind == EventKind::kMoved;
     const bool drawn = seen_in_the_end_[hypothesis.object] == 0;  // else the frames say where
     const geometry::Vector3d from =

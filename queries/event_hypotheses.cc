@@ -10,6 +10,15 @@ using belief::EventKind;
 namespace {
 
 constexpr double kLeastAbsent = 1e-3;  // probability that a thing is not there, from which on it may be put in
+// Of a belief that is wrong about whether a thing is there: no less, no more.
+constexpr double kLeastWrong = 1e-6;
+
+/// How much more probable than what the belief holds it is that the thing is there, or not there, otherwise.
+double odds_of_otherwise(const EventPaths& events, std::size_t object) {
+  const double absent = events.may_be_absent(object);
+  const double wrong = std::clamp(events.is_present(object) ? absent : 1.0 - absent, kLeastWrong, 1.0 - kLeastWrong);
+  return wrong / (1.0 - wrong);
+}
 
 }  // namespace
 
@@ -38,12 +47,17 @@ std::vector<Hypothesis> hypotheses_about(const std::vector<std::size_t>& candida
   for (const EventKind kind : {EventKind::kPushed, EventKind::kBumped, EventKind::kMoved, EventKind::kTakenAway})
     add(kind, free);
   add(EventKind::kSlipped, held);
+  // All others begin as the belief has them; so does what an event happens to, but for what is put in.
   double absent = 0.0;
   for (std::size_t i = 0; i < n; ++i) absent += events.may_be_absent(i);
   for (std::size_t i = 0; i < n; ++i) {
-    const double share_of_it = events.may_be_absent(i) / std::max(1.0, absent);
-    if (share_of_it > kLeastAbsent)
-      all.push_back({EventKind::kPutIn, i, {}, weights.of(EventKind::kPutIn) * share_of_it});
+    const double odds = odds_of_otherwise(events, i);
+    if (!held(i)) all.push_back({EventKind::kNothing, i, {}, weights.of(EventKind::kNothing) * odds, true});
+    if (events.may_be_absent(i) > kLeastAbsent)
+      all.push_back({EventKind::kPutIn,
+                     i,
+                     {},
+                     weights.of(EventKind::kPutIn) * (events.is_present(i) ? odds : 1.0) / std::max(1.0, absent)});
   }
   add(EventKind::kOther, [](std::size_t) { return true; });
   std::vector<Hypothesis> pairs;

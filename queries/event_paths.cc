@@ -19,6 +19,9 @@ using geometry::Vector3d;
 
 constexpr double kStillBody = 1e-3;                       // m, rad; a robot's body that moves by less stands still
 constexpr double kFoundShift = 0.004, kFoundTurn = 0.03;  // m and rad: spread of a pose that was found
+constexpr double kOpenAbsence = 0.5;     // probability that what the last frame leaves in doubt is not there, at least
+constexpr double kNeverRefuted = 0.999;  // existence of what was seen for a second, and never refuted since
+constexpr int kPutDimensions = 7;
 constexpr int kRestFrames = 5;  // in which an object lay still, so that it is taken to go on so
 
 double to_uniform(double z) { return std::clamp(core::normal_cdf(z), 1e-12, 1.0 - 1e-12); }
@@ -194,10 +197,15 @@ bool EventPaths::is_held(std::size_t object) const {
 }
 
 double EventPaths::may_be_absent(std::size_t object) const {
-  if (!is_present(object)) return 1.0;
   if (is_held(object)) return 0.0;
-  const belief::ObjectBelief& believed = present_.objects[object];
-  return believed.state == belief::TrackState::kTracked ? 1.0 - believed.existence : 1.0;
+  const auto index = belief::find_object(*window_.start, objects_[object].name);
+  const belief::ObjectBelief& believed = window_.start->objects[static_cast<std::size_t>(*index)];
+  // Of what is lost, existence tells of the place where it was, not of others; and it follows slowly: the state says
+  // what the last frame did. What was refuted is out of sight next to where it was, or gone.
+  if (!is_present(object)) return kOpenAbsence;
+  const bool refuted = believed.state == belief::TrackState::kUnseen && believed.existence < kNeverRefuted;
+  const bool open = refuted || believed.state == belief::TrackState::kDoubtful;
+  return open ? std::max(kOpenAbsence, 1.0 - believed.existence) : 1.0 - believed.existence;
 }
 
 std::optional<Pose> EventPaths::start_pose(std::size_t object) const {
@@ -249,8 +257,7 @@ std::vector<ObjectPath> EventPaths::base() {
   belief::Trajectory likeliest;
   likeliest.states = {prior_.likeliest};
   if (!still_) {
-    belief::WorldState start = prior_.likeliest;
-    start.time = 0.0;
+    const belief::WorldState start = likeliest_start();
     const std::vector<std::vector<belief::Action>> actions = {actions_from(0.0)};
     likeliest = run(std::span(&start, 1), actions).front();
   }
@@ -260,6 +267,8 @@ std::vector<ObjectPath> EventPaths::base() {
 }
 
 int EventPaths::event_dimensions(const Hypothesis& hypothesis) const {
+  // What was there already stands where it may be put in.
+  if (hypothesis.begins_otherwise && !is_present(hypothesis.object)) return kPutDimensions;
   switch (hypothesis.kind) {
     case EventKind::kPushed:
       return 6;
@@ -269,7 +278,7 @@ int EventPaths::event_dimensions(const Hypothesis& hypothesis) const {
       return 7;
     case EventKind::kMoved:
     case EventKind::kPutIn:
-      return 7;
+      return kPutDimensions;
     case EventKind::kTakenAway:
     case EventKind::kExchanged:
       return 1;
@@ -279,14 +288,15 @@ int EventPaths::event_dimensions(const Hypothesis& hypothesis) const {
 }
 
 int EventPaths::dimensions(const Hypothesis& hypothesis) const {
-  const int start = is_present(hypothesis.object) ? samplers_[hypothesis.object]->dimensions() : 0;
+  const bool starts = is_present(hypothesis.object) && !hypothesis.begins_otherwise;
+  const int start = starts ? samplers_[hypothesis.object]->dimensions() : 0;
   return event_dimensions(hypothesis) + start;
 }
 
 EventDraw EventPaths::decode(const Hypothesis& hypothesis, const LatentPoint& z) const {
   EventDraw draw;
   if (event_dimensions(hypothesis) == 0) return draw;
-  draw.time = duration_ * to_uniform(z[0]);
+  draw.time = hypothesis.begins_otherwise ? 0.0 : duration_ * to_uniform(z[0]);
   const auto log_normal = [](double median, double spread, double x) { return median * std::exp(spread * x); };
   switch (hypothesis.kind) {
     case EventKind::kPushed:
@@ -305,6 +315,7 @@ EventDraw EventPaths::decode(const Hypothesis& hypothesis, const LatentPoint& z)
       draw.added.linear = priors_.slip_speed * Vector3d(z[1], z[2], z[3]);
       draw.added.angular = priors_.slip_rate * Vector3d(z[4], z[5], z[6]);
       break;
+    case EventKind::kNothing:
     case EventKind::kMoved:
     case EventKind::kPutIn:
       draw.duration = hypothesis.kind == EventKind::kMoved
@@ -326,9 +337,14 @@ Pose EventPaths::start_at(const Hypothesis& hypothesis, const LatentPoint& z) co
       .X_WO;
 }
 
-belief::WorldState EventPaths::start_of(std::size_t object, const LatentPoint& z, std::size_t first) const {
+belief::WorldState EventPaths::likeliest_start() const {
   belief::WorldState state = prior_.likeliest;
   state.time = 0.0;
+  return state;
+}
+
+belief::WorldState EventPaths::start_of(std::size_t object, const LatentPoint& z, std::size_t first) const {
+  belief::WorldState state = likeliest_start();
   if (!is_present(object)) return state;
   std::vector<double> uniforms;
   for (std::size_t i = first; i < z.size(); ++i) uniforms.push_back(to_uniform(z[i]));

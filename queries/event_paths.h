@@ -25,6 +25,8 @@ struct Hypothesis {
   std::size_t object = 0;              ///< Of the objects of EventPaths.
   std::optional<std::size_t> partner;  ///< Of exchanged.
   double prior = 0.0;                  ///< Of all hypotheses they sum to one.
+  /// Of nothing: that the object is not there at the begin while the belief holds it to be, or the other way round.
+  bool begins_otherwise = false;
 };
 
 /// The parameters at a point; what a schema does not have is 0.
@@ -93,7 +95,8 @@ class EventPaths {
   bool is_still() const { return still_; }
   const SeenTrack& track(std::size_t object) const { return tracks_[object]; }
   bool is_held(std::size_t object) const;
-  /// Probability that it is not there at the begin: one for what the tracker does not see there.
+  /// Probability that it is not there at the begin: by its existence, but at least 1/2 of what the frame at the begin
+  /// leaves in doubt, and 1/2 of what the tracker has not found, or has lost.
   double may_be_absent(std::size_t object) const;
   /// Where it is at the begin, most probably; empty where it is not.
   std::optional<belief::Pose> start_pose(std::size_t object) const;
@@ -159,6 +162,7 @@ class EventPaths {
     double speed = 0.0;   // m/s; 0 = the motion does not say
   };
   Hit hit_of(std::size_t object, const TrackedMotion& motion) const;
+  belief::WorldState likeliest_start() const;
   belief::WorldState start_of(std::size_t object, const LatentPoint& z, std::size_t first) const;
   /// `moved`: the only object that moves at first, if all else lies still.
   std::vector<belief::Trajectory> run(std::span<const belief::WorldState> starts,

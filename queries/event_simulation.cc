@@ -238,6 +238,8 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
                           std::span<EventDraw> draws, std::span<belief::Trajectory> runs_out,
                           std::span<const Vector3d> moved) {
   const std::size_t n = points.size(), target = hypothesis.object;
+  const bool gone_before = hypothesis.begins_otherwise && is_present(target);
+  const bool put_in = hypothesis.kind == EventKind::kPutIn || (hypothesis.begins_otherwise && !is_present(target));
   const auto first = static_cast<std::size_t>(event_dimensions(hypothesis));
   std::vector<belief::WorldState> starts(n);
   std::vector<EventDraw> events(n);
@@ -246,7 +248,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
   context_.simulation.pool->for_blocks(n, 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       events[i] = decode(hypothesis, points[i]);
-      starts[i] = start_of(target, points[i], first);
+      starts[i] = gone_before ? likeliest_start() : start_of(target, points[i], first);
       if (!moved.empty() && !is_held(target)) starts[i].objects[target].X_WO.translation += moved[i];
     }
   });
@@ -290,7 +292,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
     path.simulated = simulated || (hypothesis.kind == EventKind::kNothing && !still_);
     path.impossible = possible[i] == 0 || before[i].end == belief::TrajectoryEnd::kDiverged ||
                       (simulated && after[i].end == belief::TrajectoryEnd::kDiverged);
-    const bool carried = hypothesis.kind == EventKind::kMoved || hypothesis.kind == EventKind::kPutIn;
+    const bool carried = hypothesis.kind == EventKind::kMoved || put_in;
     if (carried || hypothesis.kind == EventKind::kExchanged) {
       const auto down = std::lower_bound(times_.begin(), times_.end(), event.time + (carried ? event.duration : 0.0));
       if (down != times_.end()) path.put_down_from = static_cast<std::size_t>(down - times_.begin());
@@ -317,8 +319,8 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
       const bool is_partner = hypothesis.partner && object == *hypothesis.partner;
       for (std::size_t k = 0; k < count; ++k) {
         const double t = times_[k];
-        poses[k] = is_target && hypothesis.kind == EventKind::kPutIn ? std::nullopt : quiet(object, t);
-        if (t < event.time || hypothesis.kind == EventKind::kNothing) continue;
+        poses[k] = is_target && (put_in || gone_before) ? std::nullopt : quiet(object, t);
+        if (t < event.time || (hypothesis.kind == EventKind::kNothing && !put_in)) continue;
         if (simulated) {
           poses[k] = pose_in(after[i], object, t);
         } else if (hypothesis.kind == EventKind::kTakenAway && is_target) {
@@ -328,7 +330,7 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
         } else if (is_target && hypothesis.kind == EventKind::kMoved) {
           poses[k].reset();
           if (t >= event.time + event.duration) put(poses, k, pose_in(before[i], object, event.time));
-        } else if (is_target && hypothesis.kind == EventKind::kPutIn) {
+        } else if (is_target && put_in) {
           put(poses, k, put_in_at_[object]);
         }
       }

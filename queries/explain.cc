@@ -103,7 +103,8 @@ class Explainer {
   void add_change(ExplainAnswer& answer) {
     const Explanation& first = answer.explanations.front();
     const bool can_be = first.kind == EventKind::kPushed || first.kind == EventKind::kBumped ||
-                        first.kind == EventKind::kSlipped || first.kind == EventKind::kNothing;
+                        first.kind == EventKind::kSlipped ||
+                        (first.kind == EventKind::kNothing && !first.present_at_begin);
     Judged* judged = first.kind == EventKind::kNothing ? &nothings_.front() : nullptr;
     for (Judged& one : judged_)
       if (one.hypothesis.kind == first.kind && events_->objects()[one.object].name == first.object) judged = &one;
@@ -211,7 +212,7 @@ class Explainer {
     options.runs = runs;
     options.points = query_.points;
     options.first_run = static_cast<int>(judged.posterior.log_evidence.size());
-    if (options.first_run == 0 && hypothesis.kind != EventKind::kNothing) {
+    if (options.first_run == 0 && (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise)) {
       options.most_likely = most_likely_;
       options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);
     }
@@ -221,8 +222,9 @@ class Explainer {
   }
 
   /// When an event is searched; nothing is before all others.
-  static int round_of(EventKind kind) {
-    if (kind == EventKind::kNothing) return -1;
+  static int round_of(const Hypothesis& hypothesis) {
+    const EventKind kind = hypothesis.kind;
+    if (kind == EventKind::kNothing) return hypothesis.begins_otherwise ? 1 : -1;
     if (kind == EventKind::kOther) return 0;
     return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped ? 2 : 1;
   }
@@ -231,7 +233,7 @@ class Explainer {
   core::Status search_all(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses) {
     double prior_of_nothing = 0.0;
     for (const Hypothesis& h : hypotheses)
-      if (h.kind == EventKind::kNothing) prior_of_nothing = h.prior;
+      if (h.kind == EventKind::kNothing && !h.begins_otherwise) prior_of_nothing = h.prior;
     for (const std::size_t object : candidates) {
       Judged& nothing = nothings_.emplace_back();
       nothing.hypothesis = {EventKind::kNothing, object, {}, prior_of_nothing};
@@ -245,7 +247,7 @@ class Explainer {
       // of the others end.
       for (const int round : {0, 1, 2})
         for (const Hypothesis& hypothesis : hypotheses)
-          if (hypothesis.object == object && round_of(hypothesis.kind) == round) about.push_back(&hypothesis);
+          if (hypothesis.object == object && round_of(hypothesis) == round) about.push_back(&hypothesis);
       const std::uint64_t first = number_;
       for (const Hypothesis* hypothesis : about) {
         if (cancelled()) return stopped();

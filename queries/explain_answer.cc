@@ -84,9 +84,7 @@ class AnswerBuilder {
       double nothing = 0.0;
       for (const Judged& n : nothings_)
         if (n.object == judged->object) nothing = n.frame_means[k];
-      return judged->hypothesis.kind == EventKind::kNothing || judged->frame_means.empty()
-                 ? 0.0
-                 : judged->frame_means[k] - nothing;
+      return is_reference(*judged) || judged->frame_means.empty() ? 0.0 : judged->frame_means[k] - nothing;
     };
     const ScenePath best = most_probable_path(*all.front());
     for (std::size_t k = 0; k < times_.size(); ++k) {
@@ -109,6 +107,11 @@ class AnswerBuilder {
   }
 
  private:
+  /// Nothing, from where the belief begins: what others are compared with.
+  static bool is_reference(const Judged& judged) {
+    return judged.hypothesis.kind == EventKind::kNothing && !judged.hypothesis.begins_otherwise;
+  }
+
   /// At most kReportedPoints of equal weights, every so many of them by weight.
   static void thin_out(std::vector<TemperedPoint>& points) {
     if (points.size() <= kReportedPoints) return;
@@ -148,10 +151,11 @@ class AnswerBuilder {
     e.probability = judged.probability;
     e.low = judged.low;
     e.high = judged.high;
-    if (kind != EventKind::kNothing) {
+    if (!is_reference(judged)) {
       e.object = events_->objects()[judged.object].name;
       e.log_bayes_factor = judged.log_bayes;
     }
+    if (judged.hypothesis.begins_otherwise) e.present_at_begin = !events_->is_present(judged.object);
     if (judged.hypothesis.partner) e.partner = events_->objects()[*judged.hypothesis.partner].name;
     if (judged.draws.empty() || kind == EventKind::kNothing) {
       e.sentence = sentence_of(e, window_);

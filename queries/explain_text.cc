@@ -45,6 +45,9 @@ std::string probability_text(double probability) {
 std::string sentence_of(const Explanation& e, const ExplainWindow& window) {
   switch (e.kind) {
     case EventKind::kNothing:
+      if (e.present_at_begin)
+        return "Nothing happened in the window but what is known to have been done: " + e.object + " was " +
+               (*e.present_at_begin ? "there already" : "gone already") + " when it began.";
       return "Nothing happened but what is known to have been done.";
     case EventKind::kPushed:
       return e.object + " was pushed" + (e.towards ? " " + towards_text(e.towards->mean, window) : "") + at_time(e) +

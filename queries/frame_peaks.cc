@@ -61,7 +61,8 @@ std::optional<SearchPlace> place_in(const EventPaths& events, std::size_t object
   double left = 0.0, came = time;
   if (next > 0) before = track.estimates[next - 1].mode, left = track.times[next - 1];
   if (next < track.times.size()) after = track.estimates[next].mode, came = track.times[next];
-  if (!before) return std::nullopt;  // not there yet
+  if (!before && !after) return std::nullopt;
+  if (!before) return SearchPlace{*after, 0.01, 0.1};  // not found yet: it may stand there already
   if (!after) return SearchPlace{*before, 0.03, 0.2};
   const Pose X = geometry::closest_equivalent(*after, *before, events.model(object).symmetry);
   SearchPlace place;

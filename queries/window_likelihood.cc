@@ -88,6 +88,7 @@ std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int
     for (std::size_t i = 0; i < frames.size(); ++i) chosen.push_back(i);
     return chosen;
   }
+  chosen.push_back(0);
   // A quarter of the weight goes by time alone, so that stillness is seen, too.
   std::vector<double> passed(frames.size(), 0.0);
   for (std::size_t i = 1; i < frames.size(); ++i)
@@ -98,9 +99,10 @@ std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int
     const double time = static_cast<double>(i) / static_cast<double>(frames.size() - 1);
     return all > 0.0 ? 0.25 * time + 0.75 * passed[i] / all : time;
   };
-  for (std::size_t n = 1; n <= wanted; ++n) {
-    std::size_t i = chosen.empty() ? 0 : chosen.back() + 1;
-    while (i + 1 < frames.size() && at(i) + 1e-9 < static_cast<double>(n) / static_cast<double>(wanted)) ++i;
+  for (std::size_t n = 2; n <= wanted; ++n) {
+    std::size_t i = chosen.back() + 1;
+    const double share = static_cast<double>(n - 1) / static_cast<double>(wanted - 1);
+    while (i + 1 < frames.size() && at(i) + 1e-9 < share) ++i;
     // Room for those that are still to come.
     i = std::min(i, frames.size() - 1 - (wanted - n));
     chosen.push_back(i);
@@ -216,7 +218,9 @@ double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame, std
     first = false;
     filter::merge_nearest(depth_of(frame, path.moved[before], *X_WB), &depth);
   }
-  return evidence(frame, first ? known.terms : terms_with(frame, depth), path.moved[m], X_WO).log_ratio;
+  // Not by a conditional expression, whose value would be a copy of all of the frame's terms.
+  if (first) return evidence(frame, known.terms, path.moved[m], X_WO).log_ratio;
+  return evidence(frame, terms_with(frame, depth), path.moved[m], X_WO).log_ratio;
 }
 
 template <class Direct>

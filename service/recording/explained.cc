@@ -46,6 +46,7 @@ ordered_json explanation_json(const queries::Explanation& e, double from) {
   ordered_json json = {{"event", belief::name_of(e.kind)}};
   if (!e.object.empty()) json["object"] = e.object;
   if (!e.partner.empty()) json["partner"] = e.partner;
+  if (e.present_at_begin) json["present_at_begin"] = *e.present_at_begin;
   json["probability"] = e.probability;
   json["interval"] = {e.low, e.high};
   json["log_bayes_factor"] = e.log_bayes_factor;

@@ -99,6 +99,39 @@ TEST(ExplainedEvents, WhatIsTakenAwayInPlainViewIsNotStillThere) {
   EXPECT_LT(result.time_error, 0.3);
 }
 
+// The window begins when the bottle has gone already: the tracker still has it, is in doubt, or has just lost it. That
+// nothing happened in this window is right, whichever of these it is.
+class GoneBeforeTheWindow : public testing::TestWithParam<double> {};
+
+TEST_P(GoneBeforeTheWindow, NothingHappensInIt) {
+  EventEpisode episode = still_until(kBottleBeforeTheDark, 1.0, 2.4);
+  episode.changes = {{GetParam(), "bottle", {}, {}}};
+  ExplainedEventsOptions options;
+  options.query.runs = 2;
+  options.query.object = "bottle";
+  const EpisodeResult result = explain_episode(episode, 1, options, testing::TempDir(), {});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
+}
+
+INSTANTIATE_TEST_SUITE_P(Taken, GoneBeforeTheWindow, testing::Values(0.95, 0.83, 0.7));
+
+// The mirror: it came before the window begins, and the tracker has not found it yet.
+TEST(ExplainedEvents, NothingHappensInAWindowThatBeginsWhenTheThingIsThereAlready) {
+  std::string scene = kBottleBeforeTheDark;
+  const std::string fixed = "[0.15, 0.2, 0.4785]";
+  scene.replace(scene.find(fixed), fixed.size(), "{uniform: {from: [-0.3, -0.25, 0.4785], to: [0.3, 0.25, 0.4785]}}");
+  EventEpisode episode = still_until(scene, 1.0, 2.4);
+  episode.changes = {{0.0, "bottle", {}, {}},
+                     {0.95, "bottle", geometry::Pose::from_translation({0.15, 0.2, 0.4785}), {}}};
+  ExplainedEventsOptions options;
+  options.query.runs = 2;
+  options.query.object = "bottle";
+  const EpisodeResult result = explain_episode(episode, 1, options, testing::TempDir(), {});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
+}
+
 constexpr const char* kDrawer = R"(
 stop_at_rest: false
 duration: 2

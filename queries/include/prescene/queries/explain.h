@@ -77,7 +77,10 @@ struct EventValue {
 
 struct Explanation {
   belief::EventKind kind = belief::EventKind::kNothing;
-  std::string object;   ///< "" for nothing.
+  std::string object;  ///< "" for nothing, but for what follows.
+  /// Of nothing: `object` is there at the window's begin, or is not, other than the belief had it. It came, or went,
+  /// before.
+  std::optional<bool> present_at_begin;
   std::string partner;  ///< What it was exchanged with, else "".
   double probability = 0.0;
   double low = 0.0, high = 1.0;          ///< Interval of what more work would change.
