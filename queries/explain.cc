@@ -24,9 +24,10 @@ namespace {
 using belief::EventKind;
 
 constexpr int kFirstRuns = 1;
-constexpr int kMostRounds = 2;      // times the query's runs: of what stays uncertain
-constexpr double kHopeless = 25.0;  // nats: what is so far behind the best is not searched further
-constexpr int kFreshRuns = 1000;    // numbers of runs from here on are for what must not have been seen
+constexpr int kLaterFirstPoints = 2;  // times the points of a run, that are drawn where the runs before found it
+constexpr int kMostRounds = 2;        // times the query's runs: of what stays uncertain
+constexpr double kHopeless = 25.0;    // nats: what is so far behind the best is not searched further
+constexpr int kFreshRuns = 1000;      // numbers of runs from here on are for what must not have been seen
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
@@ -212,6 +213,10 @@ class Explainer {
     options.runs = runs;
     options.points = query_.points;
     options.first_run = static_cast<int>(judged.posterior.log_evidence.size());
+    if (options.first_run > 0) {
+      propose_from(judged.posterior, target);
+      options.first_points = kLaterFirstPoints;
+    }
     if (options.first_run == 0 && (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise)) {
       options.most_likely = most_likely_;
       options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);

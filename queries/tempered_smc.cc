@@ -9,7 +9,9 @@
 namespace prescene::queries {
 namespace {
 
-constexpr double kGuessShare = 0.5;
+constexpr double kGuessShare = 0.5;  // of what is not drawn where runs before found the posterior
+constexpr double kFoundShare = 0.5;
+constexpr double kFoundWider = 1.4;   // by which deviations of what was found are widened: few points tell them
 constexpr double kImpossible = -1e5;  // log L of what can't be: finite, so that paths go on
 constexpr double kNuisanceStep =
     0.35;  // of a move in nuisances, which leaves their prior as it is [Cotter et al. 2013]
@@ -29,15 +31,43 @@ double log_add(double a, double b) {
   return std::isinf(top) ? top : top + std::log(std::exp(a - top) + std::exp(b - top));
 }
 
+/// Shares of a run's first points.
+struct Shares {
+  explicit Shares(const TemperedTarget& target)
+      : found(target.found_mean.empty() ? 0.0 : kFoundShare),
+        guessed(target.guess_mean.empty() ? 0.0 : (1.0 - found) * kGuessShare),
+        prior(1.0 - found - guessed) {}
+  double found, guessed, prior;
+};
+
+/// Of a normal distribution by its mean and Cholesky's factor.
+double log_found(const TemperedTarget& target, std::span<const double> z) {
+  const std::size_t n = z.size();
+  std::vector<double> d(n);
+  double log_density = -0.5 * std::log(2.0 * std::numbers::pi) * static_cast<double>(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    d[i] = z[i] - target.found_mean[i];
+    for (std::size_t k = 0; k < i; ++k) d[i] -= target.found_factor[i * n + k] * d[k];
+    d[i] /= target.found_factor[i * n + i];
+    log_density -= 0.5 * d[i] * d[i] + std::log(target.found_factor[i * n + i]);
+  }
+  return log_density;
+}
+
 /// Of the moved coordinates.
 double log_proposal(const TemperedTarget& target, std::span<const double> z) {
-  if (target.guess_mean.empty()) return log_normal(z);
-  double guess = -0.5 * std::log(2.0 * std::numbers::pi) * static_cast<double>(z.size());
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const double d = (z[i] - target.guess_mean[i]) / target.guess_deviation[i];
-    guess -= 0.5 * d * d + std::log(target.guess_deviation[i]);
+  const Shares shares(target);
+  double log_density = std::log(shares.prior) + log_normal(z);
+  if (shares.guessed > 0.0) {
+    double guess = -0.5 * std::log(2.0 * std::numbers::pi) * static_cast<double>(z.size());
+    for (std::size_t i = 0; i < z.size(); ++i) {
+      const double d = (z[i] - target.guess_mean[i]) / target.guess_deviation[i];
+      guess -= 0.5 * d * d + std::log(target.guess_deviation[i]);
+    }
+    log_density = log_add(log_density, std::log(shares.guessed) + guess);
   }
-  return log_add(std::log(kGuessShare) + guess, std::log(1.0 - kGuessShare) + log_normal(z));
+  if (shares.found > 0.0) log_density = log_add(log_density, std::log(shares.found) + log_found(target, z));
+  return log_density;
 }
 
 struct Run {
@@ -60,6 +90,25 @@ void factorise(std::vector<double>& a, std::size_t n) {
       for (std::size_t k = 0; k < j; ++k) sum -= a[i * n + k] * a[j * n + k];
       a[i * n + j] = i == j ? std::sqrt(std::max(1e-12, sum)) : sum / a[j * n + j];
     }
+}
+
+/// Mean, and Cholesky's factor of the covariance, of the first `n` coordinates of weighted points.
+template <class PointAt>
+void measure_spread(std::size_t n, std::span<const double> weight, const PointAt& point, std::vector<double>& mean,
+                    std::vector<double>& factor) {
+  mean.assign(n, 0.0);
+  for (std::size_t i = 0; i < weight.size(); ++i)
+    for (std::size_t k = 0; k < n; ++k) mean[k] += weight[i] * point(i)[k];
+  factor.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    const LatentPoint& z = point(i);
+    for (std::size_t k = 0; k < n; ++k)
+      for (std::size_t l = 0; l <= k; ++l)
+        factor[k * n + l] += weight[i] * (z[k] - mean[k]) * (z[l] - mean[l]) * (k == l ? 1.0 : 1.0 - kShrunk);
+  }
+  for (std::size_t k = 0; k < n; ++k)
+    factor[k * n + k] = std::max(kLeastDeviation * kLeastDeviation, factor[k * n + k]);
+  factorise(factor, n);
 }
 
 /// Mean over the runs, its error, and the points by their runs' evidence; `points` hold shares of their runs.
@@ -127,6 +176,7 @@ class TemperedSampler {
   }
 
   void begin() {
+    const Shares shares(target_);
     // Without coordinates, all points are one.
     const auto count =
         static_cast<std::size_t>(options_.points * (target_.dimensions > 0 ? std::max(1, options_.first_points) : 1));
@@ -137,17 +187,26 @@ class TemperedSampler {
             stream_.at(0, static_cast<std::uint32_t>(number_of(static_cast<std::size_t>(r)) * count + i));
         LatentPoint z(static_cast<std::size_t>(target_.dimensions));
         // Stratified, so that no run is without points of either kind.
-        const bool guessed =
-            !target_.guess_mean.empty() && static_cast<double>(i) + 0.5 < kGuessShare * static_cast<double>(count);
-        for (std::size_t k = 0; k < z.size(); ++k) {
-          z[k] = draws.normal();
-          if (guessed && k < moved_) z[k] = target_.guess_mean[k] + target_.guess_deviation[k] * z[k];
+        const double place = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+        const bool guessed = place < shares.guessed, found = !guessed && place < shares.guessed + shares.found;
+        for (double& x : z) x = draws.normal();
+        for (std::size_t k = 0; guessed && k < moved_; ++k)
+          z[k] = target_.guess_mean[k] + target_.guess_deviation[k] * z[k];
+        for (std::size_t k = moved_; found && k-- > 0;) {
+          double x = target_.found_mean[k];
+          for (std::size_t l = 0; l <= k; ++l) x += target_.found_factor[k * moved_ + l] * z[l];
+          z[k] = x;
         }
         all.push_back(std::move(z));
       }
     }
     std::vector<double> log_l(all.size());
-    evaluate(all, log_l);
+    if (target_.dimensions > 0) {
+      evaluate(all, log_l);
+    } else {
+      evaluate(std::span(all).first(1), std::span(log_l).first(1));
+      std::fill(log_l.begin(), log_l.end(), log_l.front());
+    }
     for (int r = 0; r < options_.runs; ++r) {
       Run& run = runs_.emplace_back();
       const auto from = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(r) * count);
@@ -186,10 +245,9 @@ class TemperedSampler {
     for (const double w : weight) sum += w;
     run.log_evidence += step * top + std::log(sum / static_cast<double>(n));
     run.b = run.b + step >= 1.0 - 1e-9 ? 1.0 : run.b + step;
-    // What is to come is at most (1 - b) of the greatest gain, as N / q <= 1 / (1 - kGuessShare).
+    // What is to come is at most (1 - b) of the greatest gain, as N / q is at most one over the prior's share.
     const double reachable =
-        run.log_evidence +
-        (1.0 - run.b) * (options_.most_likely - std::log(1.0 - (target_.guess_mean.empty() ? 0.0 : kGuessShare)));
+        run.log_evidence + (1.0 - run.b) * (options_.most_likely - std::log(Shares(target_).prior));
     if (run.b < 1.0 && reachable < options_.give_up_below) {
       run.log_evidence = reachable;
       run.gave_up = true;
@@ -217,18 +275,9 @@ class TemperedSampler {
 
   /// The spread of the moved coordinates, along which random walks go.
   void measure(Run& run, const std::vector<double>& weight) const {
-    std::vector<double> mean(moved_, 0.0);
-    for (std::size_t i = 0; i < run.z.size(); ++i)
-      for (std::size_t k = 0; k < moved_; ++k) mean[k] += weight[i] * run.z[i][k];
-    run.factor.assign(moved_ * moved_, 0.0);
-    for (std::size_t i = 0; i < run.z.size(); ++i)
-      for (std::size_t k = 0; k < moved_; ++k)
-        for (std::size_t l = 0; l <= k; ++l)
-          run.factor[k * moved_ + l] +=
-              weight[i] * (run.z[i][k] - mean[k]) * (run.z[i][l] - mean[l]) * (k == l ? 1.0 : 1.0 - kShrunk);
-    for (std::size_t k = 0; k < moved_; ++k)
-      run.factor[k * moved_ + k] = std::max(kLeastDeviation * kLeastDeviation, run.factor[k * moved_ + k]);
-    factorise(run.factor, moved_);
+    std::vector<double> mean;
+    measure_spread(
+        moved_, weight, [&](std::size_t i) -> const LatentPoint& { return run.z[i]; }, mean, run.factor);
   }
 
   void move(std::uint64_t step) {
@@ -302,6 +351,16 @@ class TemperedSampler {
 };
 
 }  // namespace
+
+void propose_from(const TemperedResult& found, TemperedTarget& target) {
+  if (target.moved == 0 || found.points.empty()) return;
+  std::vector<double> weight;
+  for (const TemperedPoint& point : found.points) weight.push_back(point.weight);
+  measure_spread(
+      static_cast<std::size_t>(target.moved), weight,
+      [&](std::size_t i) -> const LatentPoint& { return found.points[i].z; }, target.found_mean, target.found_factor);
+  for (double& x : target.found_factor) x *= kFoundWider;
+}
 
 TemperedResult merge(const TemperedResult& a, const TemperedResult& b) {
   TemperedResult both;
