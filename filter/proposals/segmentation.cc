@@ -106,8 +106,14 @@ geometry::Plane fit_plane(std::span<const Vector3d> points) {
   Vector3d mean = Vector3d::Zero();
   for (const Vector3d& p : points) mean += p;
   mean /= static_cast<double>(points.size());
-  geometry::Matrix3d scatter = geometry::Matrix3d::Zero();
-  for (const Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
+  double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
+  for (const Vector3d& p : points) {
+    const double x = p.x() - mean.x(), y = p.y() - mean.y(), z = p.z() - mean.z();
+    xx += x * x, xy += x * y, xz += x * z;
+    yy += y * y, yz += y * z, zz += z * z;
+  }
+  geometry::Matrix3d scatter;
+  scatter << xx, xy, xz, xy, yy, yz, xz, yz, zz;
   geometry::Plane plane;
   plane.normal = geometry::symmetric_eigen_3(scatter).vectors.col(0);
   plane.offset = -plane.normal.dot(mean);
@@ -123,13 +129,14 @@ namespace {
 /// The measured pixel nearest to (x, y), at most `reach` away in either direction; nearest first, ties by row.
 std::optional<std::array<int, 2>> measured_near(const geometry::DepthImage& depth, int x, int y, int reach,
                                                 const SegmentationOptions& options) {
+  const auto in_range = [&](float z) { return z >= options.min_depth && z <= options.max_depth; };
+  if (in_range(depth(x, y))) return {{x, y}};
   std::optional<std::array<int, 2>> found;
   int nearest = 2 * reach * reach + 1;
   for (int v = std::max(0, y - reach); v <= std::min(depth.height() - 1, y + reach); ++v)
     for (int u = std::max(0, x - reach); u <= std::min(depth.width() - 1, x + reach); ++u) {
-      const float z = depth(u, v);
       const int distance = (u - x) * (u - x) + (v - y) * (v - y);
-      if (!(z >= options.min_depth && z <= options.max_depth) || distance >= nearest) continue;
+      if (!in_range(depth(u, v)) || distance >= nearest) continue;
       nearest = distance;
       found = {u, v};
     }
