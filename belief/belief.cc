@@ -256,7 +256,8 @@ std::string to_string(MotionMode mode) {
 bool operator==(const Belief& a, const Belief& b) {
   const bool same_scene = a.scene == b.scene || (a.scene && b.scene && *a.scene == *b.scene);
   return same_scene && a.step == b.step && a.seed == b.seed && a.stamp_ns == b.stamp_ns && a.objects == b.objects &&
-         a.robot == b.robot && a.X_WC == b.X_WC && a.lowest_seen == b.lowest_seen && a.pushes == b.pushes;
+         a.robot == b.robot && a.X_WC == b.X_WC && a.lowest_seen == b.lowest_seen && a.pushes == b.pushes &&
+         a.cameras == b.cameras;
 }
 
 ObjectEstimate estimate(const ObjectBelief& object, const geometry::SymmetryGroup& symmetry) {
@@ -433,12 +434,21 @@ std::uint64_t content_hash(const Belief& belief) {
     hash_motion(hasher, object.motion);
     hasher.value(object.grip.frames).value(object.grip.apart_frames);
     hash_pose(hasher, object.grip.X_GO);
+    for (const CameraView& view : object.views) {
+      hasher.value(view.sees).value(view.evidence_per_pixel).value(view.evidence_scale).value(view.visible_share);
+      hasher.value(view.visible_pixels);
+      hash_colors(hasher, view.colors);
+    }
   }
   hasher.value(belief.robot.size());
   for (const Pose& pose : belief.robot) hash_pose(hasher, pose);
   hash_pose(hasher, belief.X_WC);
   if (belief.lowest_seen) hasher.value(*belief.lowest_seen);
   for (const Action& push : belief.pushes) hasher.text(json_text(to_json(push)));
+  for (const CameraRecord& camera : belief.cameras) {
+    hasher.value(camera.frames).value(camera.stamp_ns).value(camera.period_ns);
+    hash_pose(hasher, camera.X_WC);
+  }
   return hasher.digest();
 }
 

@@ -70,6 +70,32 @@ LearnedColors colors_from(const JsonAt& at) {
   return colors;
 }
 
+Json view_json(const CameraView& view) {
+  Json json{{"sees", view.sees},
+            {"evidence_per_pixel", view.evidence_per_pixel},
+            {"evidence_scale", view.evidence_scale},
+            {"visible_share", view.visible_share},
+            {"visible_pixels", view.visible_pixels}};
+  if (view.colors.shares) json["colors"] = colors_json(view.colors);
+  return json;
+}
+
+CameraView view_from(const JsonAt& at) {
+  CameraView view;
+  JsonObject fields(at);
+  if (const auto sees = fields.require("sees")) view.sees = sees->boolean();
+  const auto read = [&](const char* key, double& to) {
+    if (const auto number = fields.require(key)) to = number->number();
+  };
+  read("evidence_per_pixel", view.evidence_per_pixel);
+  read("evidence_scale", view.evidence_scale);
+  read("visible_share", view.visible_share);
+  if (const auto pixels = fields.require("visible_pixels"))
+    view.visible_pixels = static_cast<int>(pixels->integer(0, std::numeric_limits<int>::max()));
+  if (const auto colors = fields.find("colors")) view.colors = colors_from(*colors);
+  return view;
+}
+
 ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
   ObjectBelief object;
   JsonObject fields(at);
@@ -103,7 +129,26 @@ ObjectBelief object_from(const JsonAt& at, const Scene& scene) {
   }
   if (const auto motion = fields.require("motion")) object.motion = motion_from(*motion);
   if (const auto grip = fields.find("grip")) object.grip = grip_from(*grip);
+  if (const auto views = fields.find("views"))
+    for (const JsonAt& item : views->items()) object.views.push_back(view_from(item));
   return object;
+}
+
+Json camera_json(const CameraRecord& camera) {
+  return {{"frames", camera.frames},
+          {"stamp_ns", camera.stamp_ns},
+          {"period_ns", camera.period_ns},
+          {"X_WC", to_json(camera.X_WC)}};
+}
+
+CameraRecord camera_from(const JsonAt& at) {
+  CameraRecord camera;
+  JsonObject fields(at);
+  if (const auto frames = fields.require("frames")) camera.frames = frames->unsigned_integer();
+  if (const auto stamp = fields.require("stamp_ns")) camera.stamp_ns = stamp->integer(INT64_MIN, INT64_MAX);
+  if (const auto period = fields.require("period_ns")) camera.period_ns = period->integer(0, INT64_MAX);
+  if (const auto pose = fields.require("X_WC")) camera.X_WC = pose_from(*pose);
+  return camera;
 }
 
 std::string end_word(TrajectoryEnd end) {
@@ -184,6 +229,7 @@ Json to_json(const ObjectBelief& object) {
   if (object.physics.draws) json["physics"] = physics_json(object.physics);
   json["motion"] = motion_json(object.motion);
   if (object.grip != GripRecord{}) json["grip"] = grip_json(object.grip);
+  for (const CameraView& view : object.views) json["views"].push_back(view_json(view));
   return json;
 }
 
@@ -210,6 +256,7 @@ Json to_json(const Belief& belief) {
             {"objects", std::move(objects)}, {"robot", std::move(robot)}, {"X_WC", to_json(belief.X_WC)}};
   if (belief.lowest_seen) json["lowest_seen"] = *belief.lowest_seen;
   for (const Action& push : belief.pushes) json["pushes"].push_back(to_json(push));
+  for (const CameraRecord& camera : belief.cameras) json["cameras"].push_back(camera_json(camera));
   return json;
 }
 
@@ -238,6 +285,8 @@ core::Result<Belief> belief_from_json(const Json& value, std::shared_ptr<const S
         if (!std::holds_alternative<Push>(belief.pushes.back().what)) item.fail("only a push goes on between frames");
       }
     }
+    if (const auto cameras = fields.find("cameras"))
+      for (const JsonAt& item : cameras->items()) belief.cameras.push_back(camera_from(item));
   }
   if (!errors.ok()) return errors.status();
   return belief;

@@ -38,6 +38,28 @@ Pose pose_at(const KinematicBody& body, double time) {
   return geometry::interpolate(before.X_WG, after->X_WG, (time - before.time) / (after->time - before.time));
 }
 
+int camera_count(const Scene& scene) { return 1 + static_cast<int>(scene.more_cameras.size()); }
+
+const SceneCamera* camera_at(const Scene& scene, int number) {
+  if (number == 0) return scene.camera ? &*scene.camera : nullptr;
+  const bool is_there = number > 0 && number < camera_count(scene);
+  return is_there ? &scene.more_cameras[static_cast<std::size_t>(number) - 1] : nullptr;
+}
+
+DepthNoiseSettings depth_noise_of(const Scene& scene, int camera) {
+  DepthNoiseSettings noise = scene.depth_noise;
+  const SceneCamera* of = camera_at(scene, camera);
+  if (of == nullptr) return noise;
+  const auto take = [](const auto& from, auto& to) {
+    if (from) to = from;
+  };
+  take(of->depth_noise.sigma_per_depth_squared, noise.sigma_per_depth_squared);
+  take(of->depth_noise.incidence_knee, noise.incidence_knee);
+  take(of->depth_noise.incidence_missing, noise.incidence_missing);
+  take(of->depth_noise.outline_missing, noise.outline_missing);
+  return noise;
+}
+
 std::optional<int> find_object(const Scene& scene, const std::string& name) { return find_name(scene.objects, name); }
 std::optional<int> find_support(const Scene& scene, const std::string& name) { return find_name(scene.supports, name); }
 std::optional<int> find_robot_body(const Scene& scene, const std::string& name) { return find_name(scene.robot, name); }

@@ -300,6 +300,22 @@ Status check_outcomes(const Scene& scene) {
   return {};
 }
 
+Status check_cameras(const Scene& scene) {
+  if (!scene.camera && !scene.more_cameras.empty()) return invalid_input("cameras: there are more, but no first one");
+  if (scene.more_cameras.size() >= kMostCameras)
+    return invalid_input("cameras: there are more than " + std::to_string(kMostCameras));
+  std::set<std::string> names;
+  for (int i = 0; scene.camera && i < camera_count(scene); ++i) {
+    const SceneCamera& camera = *camera_at(scene, i);
+    const std::string place = scene.more_cameras.empty() ? "camera" : quoted("camera", camera.name);
+    if (!names.insert(camera.name).second) return invalid_input("two have this name: rename one").at(place);
+    PRESCENE_RETURN_IF_ERROR(geometry::validate(camera.intrinsics).at(place));
+    PRESCENE_RETURN_IF_ERROR(check_pose(camera.X_WC).at(place));
+    PRESCENE_RETURN_IF_ERROR(check_depth_noise(camera.depth_noise).at("depth_noise").at(place));
+  }
+  return core::ok_status();
+}
+
 }  // namespace
 
 bool is_implied(const Outcome& earlier, const Outcome& later) {
@@ -325,10 +341,7 @@ Status validate(const Scene& scene) {
   for (const SceneObject& object : scene.objects)
     PRESCENE_RETURN_IF_ERROR(check_object(scene, object).at(quoted("object", object.name)));
   PRESCENE_RETURN_IF_ERROR(validate_joints(scene));
-  if (scene.camera) {
-    PRESCENE_RETURN_IF_ERROR(geometry::validate(scene.camera->intrinsics).at("camera"));
-    PRESCENE_RETURN_IF_ERROR(check_pose(scene.camera->X_WC).at("camera"));
-  }
+  PRESCENE_RETURN_IF_ERROR(check_cameras(scene));
   PRESCENE_RETURN_IF_ERROR(check_depth_noise(scene.depth_noise).at("depth_noise"));
   if (!scene.gravity_W.allFinite()) return invalid_input("gravity is not finite: give m/s^2");
   PRESCENE_RETURN_IF_ERROR(check_finite_positive(scene.duration, "a duration"));

@@ -62,6 +62,17 @@ struct LearnedColors {
 /// Tables compare by content.
 bool operator==(const LearnedColors& a, const LearnedColors& b);
 
+/// What the newest frame of one of several cameras showed of an object.
+struct CameraView {
+  bool sees = false;                ///< It was neither hidden nor out of view.
+  double evidence_per_pixel = 0.0;  ///< As ObjectBelief's, of that frame alone.
+  double evidence_scale = 1.0;      ///< Share of the limits of evidence that its pose has to reach, (0, 1].
+  double visible_share = 0.0;
+  int visible_pixels = 0;
+  LearnedColors colors;  ///< As this camera shows them; those of the first camera are ObjectBelief's.
+  friend bool operator==(const CameraView&, const CameraView&) = default;
+};
+
 struct ObjectBelief {
   std::string name;  ///< Unique within a belief.
   int model = 0;     ///< Index into the context's models.
@@ -69,17 +80,29 @@ struct ObjectBelief {
   double existence = 1.0;  ///< Probability that there is such an object at all.
   TrackState state = TrackState::kTracked;
   /// Evidence of the last frame: nats per visible pixel in favour of the pose against the object's absence.
+  /// (With several cameras: of the newest frames of those that see it.)
   double evidence_per_pixel = 0.0;
-  double visible_share = 0.0;  ///< Share of its pixels that were neither hidden by known occluders nor missing.
-  int frames_unseen = 0;       ///< Since it was tracked last.
-  int frames_refuted = 0;      ///< Since the evidence last did not speak against the pose.
+  /// Share of its pixels that were neither hidden by known occluders nor missing; of the camera that sees most of it.
+  double visible_share = 0.0;
+  int frames_unseen = 0;   ///< Since it was tracked last.
+  int frames_refuted = 0;  ///< Since the evidence last did not speak against the pose.
   core::TimeNs last_seen_ns = 0;
   int island = 0;  ///< Objects of equal number touch each other.
   LearnedColors colors;
   PhysicalBelief physics;  ///< Of its model's parameters, apart from the poses.
   MotionRecord motion;
   GripRecord grip;
+  std::vector<CameraView> views;  ///< By camera; empty where one camera sees the scene.
   friend bool operator==(const ObjectBelief&, const ObjectBelief&) = default;
+};
+
+/// The frames that one of several cameras has given.
+struct CameraRecord {
+  std::uint64_t frames = 0;    ///< That were used, since the belief began.
+  core::TimeNs stamp_ns = 0;   ///< Of the newest; 0 = there is none.
+  core::TimeNs period_ns = 0;  ///< Between the two newest; 0 = there are no two.
+  Pose X_WC;                   ///< At the newest.
+  friend bool operator==(const CameraRecord&, const CameraRecord&) = default;
 };
 
 struct Belief {
@@ -91,12 +114,13 @@ struct Belief {
   std::vector<ObjectBelief> objects;
   /// Robot body poses used by the last step, in the order of Scene::robot.
   std::vector<Pose> robot;
-  Pose X_WC;
+  Pose X_WC;  ///< Of the first camera, at its newest frame.
   /// Height, against gravity from W's origin, of the lowest surface that any frame showed, m: what falls out of sight
   /// falls no further if nothing else is known to be there.
   std::optional<double> lowest_seen;
   /// Pushes that controls began and that go on at `stamp_ns`, with times from then, s (so at most 0).
   std::vector<Action> pushes;
+  std::vector<CameraRecord> cameras;  ///< By camera; empty where one camera sees the scene.
 };
 /// Scenes compare by content.
 bool operator==(const Belief& a, const Belief& b);

@@ -26,6 +26,7 @@ bool operator==(const RgbdFrame& a, const RgbdFrame& b);
 /// Z: a frame, where its camera was, and where the robot's bodies were.
 struct Observation {
   core::TimeNs stamp_ns = 0;
+  int camera = 0;  ///< Which of the scene's cameras it is of (camera_at()).
   RgbdFrame frame;
   Pose X_WC;
   /// Poses X_WG of kinematic bodies by the name of Scene::robot; a body that is not named is where it was last.

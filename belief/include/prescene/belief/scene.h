@@ -60,14 +60,6 @@ struct SceneObject {
   friend bool operator==(const SceneObject&, const SceneObject&) = default;
 };
 
-/// A camera of the scene.
-struct SceneCamera {
-  std::string name = "camera";
-  geometry::PinholeCamera intrinsics;
-  Pose X_WC;
-  friend bool operator==(const SceneCamera&, const SceneCamera&) = default;
-};
-
 /// The depth camera's noise where it was measured; what is empty is the sensor model's default
 /// (docs/reference/sensor_model.md).
 struct DepthNoiseSettings {
@@ -78,6 +70,30 @@ struct DepthNoiseSettings {
   friend bool operator==(const DepthNoiseSettings&, const DepthNoiseSettings&) = default;
 };
 
+/// Under which names a camera's images come, and in which form.
+struct CameraTopics {
+  std::string depth;              ///< Registered to colour.
+  std::string color;              ///< Empty = none.
+  std::string camera_info;        ///< Of the registered images.
+  std::string depth_form;         ///< "image", "compressed", "points", or "" = as the topic's name says.
+  std::string color_form;         ///< "image", "compressed" or "".
+  std::optional<bool> rectified;  ///< The images are; empty = as the depth topic's name says.
+  friend bool operator==(const CameraTopics&, const CameraTopics&) = default;
+};
+
+/// A camera of the scene.
+struct SceneCamera {
+  std::string name = "camera";
+  geometry::PinholeCamera intrinsics;
+  Pose X_WC;
+  bool is_placed = false;  ///< The scene says where it is; else X_WC is the identity.
+  std::string frame;       ///< Its frame in tf; empty = the one that its depth images name.
+  /// Of a camera that the scene lists under `cameras`; empty: whoever listens is told otherwise.
+  std::optional<CameraTopics> topics;
+  DepthNoiseSettings depth_noise;  ///< What is empty is Scene::depth_noise.
+  friend bool operator==(const SceneCamera&, const SceneCamera&) = default;
+};
+
 struct Scene {
   std::string name;
   std::vector<ObjectModel> models;
@@ -85,7 +101,8 @@ struct Scene {
   std::vector<KinematicBody> robot;
   std::vector<SceneObject> objects;
   std::vector<Joint> joints;
-  std::optional<SceneCamera> camera;
+  std::optional<SceneCamera> camera;      ///< The first, which pictures and what is asked of views are of.
+  std::vector<SceneCamera> more_cameras;  ///< Others that see the same scene; empty without a first.
   DepthNoiseSettings depth_noise;
   /// A tracker also looks for things that the scene does not name.
   bool new_objects = false;
@@ -103,6 +120,15 @@ struct Scene {
   }
   friend bool operator==(const Scene&, const Scene&) = default;
 };
+
+/// So many may see one scene.
+inline constexpr std::size_t kMostCameras = 16;
+/// How many cameras see the scene; at least 1, as there is one that the scene does not describe.
+int camera_count(const Scene& scene);
+/// The camera of that number, the first of which is 0; null where the scene does not describe it.
+const SceneCamera* camera_at(const Scene& scene, int number);
+/// What is known of its depth noise, with that of the scene where it has none of its own.
+DepthNoiseSettings depth_noise_of(const Scene& scene, int camera);
 
 /// Index of the object, support or robot body of that name.
 std::optional<int> find_object(const Scene& scene, const std::string& name);
