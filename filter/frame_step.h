@@ -28,6 +28,11 @@ struct ParticleFilter::FrameStep {
   std::vector<Island> islands = {};  ///< Whose particles are worlds.
 
   belief::Belief& belief() const { return result.belief; }
+  TrackedBy by() const { return {result.belief.cameras, observation.camera, observation.stamp_ns}; }
+  /// Whether the frame shows the object, once it was weighed.
+  bool shows(std::size_t object) const { return is_shown_by(result.belief.objects[object], observation.camera); }
+  /// Of this camera.
+  std::uint64_t frame_number() const { return frames_of(result.belief, observation.camera); }
   const belief::Particle& heaviest(std::size_t object) const {
     return belief::heaviest(result.belief.objects[object].particles);
   }

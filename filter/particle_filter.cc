@@ -38,6 +38,13 @@ bool is_turned_in_place(const Pose& a, const Pose& b, const SearchTarget& target
          geometry::symmetric_angle(a, b, symmetry) >= kRivalTurn;
 }
 
+/// Share of the object's pixels that the frame shows; with one camera, of the newest frame that showed any.
+double share_in(const Belief& belief, std::size_t object, int camera) {
+  const ObjectBelief& seen = belief.objects[object];
+  const auto number = static_cast<std::size_t>(camera);
+  return number < seen.views.size() ? seen.views[number].visible_share : seen.visible_share;
+}
+
 void note(const char* stage, StepResult& result) {
   result.trace.emplace_back(stage, belief::content_hash(result.belief));
 }
@@ -153,11 +160,12 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   }
 }
 
-void ParticleFilter::first_look(FrameStep& step) {
+void ParticleFilter::first_look(FrameStep& step, FindWhich which) {
   StepResult& result = step.result;
-  const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0);
+  const core::RandomStream stream(result.belief.seed, core::Purpose::kDetection, 0,
+                                  static_cast<std::uint32_t>(step.observation.camera));
   const FindReport report =
-      find_in_frame(step.frame, step.observation, settings_.initialise, tools_, stream, result.belief);
+      find_in_frame(step.frame, step.observation, settings_.initialise, tools_, stream, result.belief, which);
   result.counters.looked_for = report.looked_for;
   result.counters.found = report.found;
   if (report.no_support) result.degraded |= kNoSupportFound;
@@ -176,13 +184,15 @@ void ParticleFilter::recover_all(FrameStep& step) {
   };
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
-    const bool is_seen = (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful) &&
-                         object.visible_share >= settings_.weight.hidden_share;
+    const bool is_believed = object.state == TrackState::kTracked || object.state == TrackState::kDoubtful;
+    if (is_believed && !step.shows(i)) continue;  // another camera sees it
+    const double share = share_in(belief, i, step.observation.camera);
+    const bool is_seen = is_believed && share >= settings_.weight.hidden_share;
     if (is_seen && belief.step == 1 && has_wide_prior(belief.scene->objects[i]))
       rival(i, RivalPrior::kFound);
-    else if (is_seen && object.visible_share >= kMostlySeen && (belief.step + i) % kRivalsEvery == 0)
+    else if (is_seen && share >= kMostlySeen && (step.frame_number() + i) % kRivalsEvery == 0)
       rival(i, RivalPrior::kTracked);
-    const bool look = wants_recovery(settings_.augment, object, belief.step + i);
+    const bool look = wants_recovery(settings_.augment, object, step.frame_number() + i);
     const bool is_unseen = object.state == TrackState::kUnseen;
     if (!look && !is_unseen && object.frames_refuted == 0) continue;
     const SearchTarget target = target_in(step, i);
@@ -214,6 +224,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     object.existence = std::max(object.existence, 0.5);
     object.frames_unseen = 0;
     object.frames_refuted = 0;
+    mark_found(step.by(), object);
     rival(i, RivalPrior::kFound);
     weigh_print_of(step, i, true);
     step.depths[i] = depth_in(step, i);
@@ -251,7 +262,7 @@ void ParticleFilter::look_for_more(FrameStep& step) {
   Belief& belief = step.belief();
   // In the first frame of all, and every so many after it.
   if (!options.new_objects) return;
-  if ((belief.step - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0) {
+  if ((step.frame_number() - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0) {
     step.result.counters.forgotten_objects = forget_unknown_objects(belief);
     return;
   }
@@ -271,12 +282,17 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
                                 const belief::Control& control) {
   PRESCENE_CHECK(previous.scene != nullptr);
   PRESCENE_CHECK(previous.objects.size() == previous.scene->objects.size());
+  PRESCENE_CHECK(observation.camera >= 0 && observation.camera < belief::camera_count(*previous.scene));
   StepResult result;
   result.belief = previous;
   Belief& belief = result.belief;
   const bool first = previous.step == 0;
   const double elapsed = first ? 0.0 : 1e-9 * static_cast<double>(observation.stamp_ns - previous.stamp_ns);
-  if (!first && !(elapsed > 0.0)) {
+  // Cameras that are triggered together take frames at one instant.
+  const bool is_at_once =
+      !first && elapsed == 0.0 && !belief.cameras.empty() &&
+      previous.cameras[static_cast<std::size_t>(observation.camera)].stamp_ns < observation.stamp_ns;
+  if (!first && !(elapsed > 0.0) && !is_at_once) {
     result.degraded |= kClockWentBack;
     return result;
   }
@@ -295,7 +311,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   const std::vector<Pose> X_WG = robot_poses(belief, observation, &result.degraded);
   std::vector<Island> islands;
-  if (!first) {
+  if (!first && !is_at_once) {
     islands = join_islands(belief, dt, result.counters);
     PredictReport report =
         predict(belief, control, X_WG, dt, settings_.predict, simulators_,
@@ -311,20 +327,24 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("predict", result);
 
   FilterFrame frame;
+  frame_caches_.resize(static_cast<std::size_t>(belief::camera_count(*belief.scene)));
   result.frame_status =
-      prepare_frame(belief.scene, observation, X_WG, {settings_.colors, learned_models(belief, settings_.frame.colors)},
-                    settings_.frame, tools_, frame_cache_, &frame);
+      prepare_frame(belief.scene, observation, X_WG,
+                    {settings_.colors, learned_models(belief, settings_.frame.colors, observation.camera)},
+                    settings_.frame, tools_, frame_caches_[static_cast<std::size_t>(observation.camera)], &frame);
   if (!result.frame_status.ok()) {
     result.degraded |= kFrameRejected;
     if (first) belief.step = 0;  // the first look is still to be taken
-    for (ObjectBelief& object : belief.objects) mark_unseen(observation.stamp_ns, settings_.track, object);
+    for (ObjectBelief& object : belief.objects)
+      mark_unseen({belief.cameras, observation.camera, observation.stamp_ns}, settings_.track, object);
     note_failed_rendering(result);
     return result;
   }
-  belief.X_WC = observation.X_WC;
+  if (observation.camera == 0) belief.X_WC = observation.X_WC;
+  note_frame(observation, belief);
   FrameStep current{frame, observation, result};
   current.islands = std::move(islands);
-  if (first) first_look(current);
+  if (first || current.frame_number() == 1) first_look(current, first ? FindWhich::kAll : FindWhich::kLost);
   note("initialise", result);
 
   weigh_all(current, first ? settings_.max_gap : dt);

@@ -43,7 +43,7 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   std::vector<double> before;
   for (const Particle& particle : seen.particles) before.push_back(particle.log_weight);
   WeightContext context{.supports = frame.surfaces.get(),
-                        .was_unseen = seen.state == belief::TrackState::kUnseen,
+                        .was_unseen = was_unseen_by(seen, step.observation.camera),
                         .depth = step.observation.frame.depth.get(),
                         .camera = step.observation.frame.camera};
   if (worlds != nullptr) {
@@ -55,7 +55,7 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   if (report.all_impossible) step.result.degraded |= kImpossibleWeights;
   // What is hidden is not told apart by its turn.
   if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share)
-    share_among_turns(before, model_of(belief, object).symmetry, seen.particles);
+    share_among_turns(before, model_of(belief, object).symmetry, seen.particles, seeing_cameras(step.by(), seen));
   for (const ParticleWeight& particle : report.particles) step.result.counters.hidden_particles += particle.hidden;
 }
 
@@ -109,21 +109,21 @@ void ParticleFilter::weigh_all(FrameStep& step, double dt) {
       if (island->front() != i) continue;
       weigh_worlds(step, *island, dt);
       for (const std::size_t member : *island)
-        update_track(step.reports[member], step.frame.stamp_ns, settings_.track, belief.objects[member]);
+        update_track(step.reports[member], step.by(), settings_.track, belief.objects[member]);
       continue;
     }
     weigh_one(step, i, dt, nullptr);
-    update_track(step.reports[i], step.frame.stamp_ns, settings_.track, belief.objects[i]);
+    update_track(step.reports[i], step.by(), settings_.track, belief.objects[i]);
     step.depths[i] = depth_in(step, i);
   }
 }
 
 void ParticleFilter::weigh_print_of(FrameStep& step, std::size_t object, bool found) {
-  if (!settings_.print.use) return;
+  if (!settings_.print.use || !step.shows(object)) return;
   ObjectBelief& seen = step.belief().objects[object];
   const PrintedModel* printed = prints_.get(model_of(step.belief(), object), meshes_);
   if (printed == nullptr) return;
-  const RivalLook look = rival_look(settings_.print, seen, step.belief().step + object, found);
+  const RivalLook look = rival_look(settings_.print, seen, step.frame_number() + object, found);
   const PrintReport report = weigh_print(*printed, step.frame, step.observation, settings_.print, look, seen);
   step.result.counters.turned_by_print += report.turned ? 1 : 0;
 }

@@ -39,7 +39,8 @@ core::Result<std::vector<std::optional<belief::Pose>>> find_missing(const Window
     in_scene.pose = belief::NormalPose{object.particles.front().X_WO, wide};
   }
   belief.scene = scene;
-  const filter::FrameColors colors{settings.colors, filter::learned_models(belief, settings.frame.colors)};
+  const filter::FrameColors colors{settings.colors,
+                                   filter::learned_models(belief, settings.frame.colors, last.observation.camera)};
   filter::FrameCache cache;
   filter::FilterFrame frame;
   PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), last.observation,

@@ -110,6 +110,15 @@ std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int
   return chosen;
 }
 
+namespace {
+
+/// Of a camera that has a noise of its own.
+void widen(belief::DepthNoiseSettings& noise) {
+  if (noise.sigma_per_depth_squared) *noise.sigma_per_depth_squared *= kHitSpread;
+}
+
+}  // namespace
+
 WindowLikelihood::WindowLikelihood(const belief::Belief& start, std::span<const belief::SceneObject> objects,
                                    std::span<const WindowFrame> frames, const ExplainContext& context,
                                    const filter::FilterTools& tools)
@@ -120,10 +129,13 @@ core::Status WindowLikelihood::prepare() {
   const filter::FrameOptions& options = context_.settings.frame;
   scene->depth_noise.sigma_per_depth_squared =
       kHitSpread * scene->depth_noise.sigma_per_depth_squared.value_or(options.sensor.sigma_per_depth_squared);
-  const filter::FrameColors colors{context_.settings.colors, filter::learned_models(start_, options.colors)};
+  if (scene->camera) widen(scene->camera->depth_noise);
+  for (belief::SceneCamera& camera : scene->more_cameras) widen(camera.depth_noise);
   filter::FrameCache cache;
   for (const WindowFrame& seen : window_) {
     filter::FilterFrame& frame = frames_.emplace_back();
+    const filter::FrameColors colors{context_.settings.colors,
+                                     filter::learned_models(start_, options.colors, seen.observation.camera)};
     PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), seen.observation,
                                                    seen.belief->robot, colors, options, tools_, cache, &frame));
     frame.terms.step *= seen.sampled;

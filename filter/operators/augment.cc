@@ -175,6 +175,9 @@ void exchange(ObjectBelief& first, ObjectBelief& second) {
   std::swap(first.frames_refuted, second.frames_refuted);
   std::swap(first.last_seen_ns, second.last_seen_ns);
   std::swap(first.island, second.island);
+  std::swap(first.views, second.views);
+  for (std::size_t i = 0; i < std::min(first.views.size(), second.views.size()); ++i)
+    std::swap(first.views[i].colors, second.views[i].colors);
   // How each moved was the other's motion: nothing is learned from it.
   first.motion = second.motion = {};
   first.grip = second.grip = {};

@@ -152,6 +152,7 @@ belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, st
   belief.stamp_ns = stamp_ns;
   for (const belief::KinematicBody& body : scene->robot) belief.robot.push_back(belief::pose_at(body, 0.0));
   if (scene->camera) belief.X_WC = scene->camera->X_WC;
+  if (!scene->more_cameras.empty()) belief.cameras.resize(static_cast<std::size_t>(belief::camera_count(*scene)));
   const core::RandomStream stream(seed, core::Purpose::kStartBelief);
   const belief::WorldState middle = belief::mean_start(*scene);
   for (const belief::SceneObject& object : scene->objects) {
@@ -225,20 +226,20 @@ std::vector<belief::Support> supports_from_frame(const SampledDepth& sampled, co
 
 FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& observation,
                          const InitialiseOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                         belief::Belief& belief) {
+                         belief::Belief& belief, FindWhich which) {
   FindReport report;
   const belief::Scene& scene = *belief.scene;
   std::vector<std::size_t> wide;
   geometry::DepthImage known = frame.robot;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const belief::ObjectModel& model = scene.model_of(scene.objects[i]);
-    if (has_wide_prior(scene.objects[i])) {
+    const ObjectBelief& object = belief.objects[i];
+    if (has_wide_prior(scene.objects[i]) && (which == FindWhich::kAll || object.state == belief::TrackState::kLost)) {
       wide.push_back(i);
     } else {
       const SearchTarget target = target_of(model, frame, tools);
-      merge_nearest(
-          depth_of(target, frame.X_CW * belief.objects[i].particles.front().X_WO, frame.terms.camera, *tools.renderer),
-          &known);
+      const Particle& there = which == FindWhich::kAll ? object.particles.front() : belief::heaviest(object.particles);
+      merge_nearest(depth_of(target, frame.X_CW * there.X_WO, frame.terms.camera, *tools.renderer), &known);
     }
   }
   report.looked_for = static_cast<int>(wide.size());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/proposals/render_scene.h"
 
 namespace prescene::filter {
@@ -82,7 +83,8 @@ void learn_colors(const FilterFrame& frame, const belief::Observation& observati
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     const belief::ObjectModel& model = belief.scene->models[static_cast<std::size_t>(belief.objects[i].model)];
-    if (learns(belief, belief.objects[i], options) && surely_seen(belief.objects[i], model, reports[i], options))
+    if (learns(belief, belief.objects[i], options) && is_shown_by(belief.objects[i], observation.camera) &&
+        surely_seen(belief.objects[i], model, reports[i], options))
       seen.push_back(i);
   }
   SampledView view;
@@ -105,8 +107,9 @@ void learn_colors(const FilterFrame& frame, const belief::Observation& observati
         (shows ? object : rest).add((*observation.frame.color)(full_x, full_y));
       }
     if (label == 0 || object.total() < kFewestColorPixels || !(rest.total() > 0.0)) continue;
-    if (mean_evidence(object, belief.objects[i].colors, options) < kLeastColorEvidence) continue;
-    blend(object, rest, options, belief.objects[i].colors);
+    belief::LearnedColors& colors = colors_by(observation.camera, belief.objects[i]);
+    if (mean_evidence(object, colors, options) < kLeastColorEvidence) continue;
+    blend(object, rest, options, colors);
   }
 }
 

@@ -309,7 +309,7 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 }
 
 void share_among_turns(std::span<const double> log_weights_before, const SymmetryGroup& symmetry,
-                       std::vector<Particle>& particles) {
+                       std::vector<Particle>& particles, int cameras) {
   if (symmetry.ball || log_weights_before.size() != particles.size()) return;
   std::vector<Turn> turns;
   const std::vector<std::size_t> turn_of = turns_of(particles, symmetry, turns);
@@ -324,7 +324,7 @@ void share_among_turns(std::span<const double> log_weights_before, const Symmetr
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const Turn& turn = turns[turn_of[i]];
     if (!std::isfinite(turn.log_before) || !std::isfinite(turn.log_after)) continue;
-    const double frame = turn.log_after - turn.log_before;
+    const double frame = cameras * (turn.log_after - turn.log_before);
     const double prior = turn.log_before < log_leading + kOpenLogOdds ? kSlipLogOdds : 0.0;
     const double shared = log_leading + (1.0 - kMemory) * (turn.log_before - log_leading) + kMemory * (prior + frame);
     particles[i].log_weight += shared - turn.log_after;

@@ -96,7 +96,9 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   if (!scene->supports.empty()) input.background = cache.supports.view();
   input.color_models = color_models;
   PRESCENE_RETURN_IF_ERROR(make_frame_terms(
-      input, options.terms, rendering::SensorModel(with_settings(options.sensor, scene->depth_noise)), &frame->terms));
+      input, options.terms,
+      rendering::SensorModel(with_settings(options.sensor, belief::depth_noise_of(*scene, observation.camera))),
+      &frame->terms));
   // Only where supports are known is a missing return there evidence; elsewhere the view is open.
   for (int y = 0; y < frame->terms.camera.height; ++y)
     for (int x = 0; x < frame->terms.camera.width; ++x)

@@ -54,11 +54,14 @@ bool learns(const belief::Belief& belief, const belief::ObjectBelief& object, co
 }
 
 std::map<std::string, rendering::ColorModel> learned_models(const belief::Belief& belief,
-                                                            const ColorLearningOptions& options) {
+                                                            const ColorLearningOptions& options, int camera) {
   std::map<std::string, rendering::ColorModel> models;
-  for (const belief::ObjectBelief& object : belief.objects)
-    if (learns(belief, object, options) && object.colors.shares && object.colors.frames >= options.frames)
-      models.emplace(object.name, model_of(object.colors, options.model));
+  const auto number = static_cast<std::size_t>(camera);
+  for (const belief::ObjectBelief& object : belief.objects) {
+    if (!learns(belief, object, options) || (camera != 0 && object.views.size() <= number)) continue;
+    const LearnedColors& colors = camera == 0 ? object.colors : object.views[number].colors;
+    if (colors.shares && colors.frames >= options.frames) models.emplace(object.name, model_of(colors, options.model));
+  }
   return models;
 }
 

@@ -103,8 +103,8 @@ core::Result<std::vector<ObjectEvidence>> evidence_of_pixels(const belief::Belie
   filter::FrameCache cache;
   filter::FilterFrame frame;
   PRESCENE_RETURN_IF_ERROR(prepare_frame(belief.scene, observation, belief.robot,
-                                         {colors, learned_models(belief, options.colors)}, all_pixels, tools, cache,
-                                         &frame));
+                                         {colors, learned_models(belief, options.colors, observation.camera)},
+                                         all_pixels, tools, cache, &frame));
 
   struct Seen {
     const belief::ObjectBelief* object;

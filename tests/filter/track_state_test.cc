@@ -19,17 +19,23 @@ WeightReport seen(double nats) {
 
 constexpr core::TimeNs kFrameNs = 33'333'333;
 
+/// A frame of the only camera.
+filter::TrackedBy at(core::TimeNs stamp_ns) {
+  static const std::vector<belief::CameraRecord> kNoOthers;
+  return {kNoOthers, 0, stamp_ns};
+}
+
 TEST(TrackState, FollowsTheEvidence) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
-  filter::update_track(seen(5.0), kFrameNs, options, object);
+  filter::update_track(seen(5.0), at(kFrameNs), options, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
   EXPECT_EQ(object.last_seen_ns, kFrameNs);
-  filter::update_track(seen(2.0), 2 * kFrameNs, options, object);
+  filter::update_track(seen(2.0), at(2 * kFrameNs), options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   EXPECT_EQ(object.frames_unseen, 1);
   EXPECT_EQ(object.last_seen_ns, kFrameNs);
-  filter::update_track(seen(5.0), 3 * kFrameNs, options, object);
+  filter::update_track(seen(5.0), at(3 * kFrameNs), options, object);
   EXPECT_EQ(object.frames_unseen, 0);
 }
 
@@ -38,10 +44,10 @@ TEST(TrackState, AsksOfAPoseWhatItCanSay) {
   belief::ObjectBelief object;
   WeightReport report = seen(1.2);
   report.expected_evidence = 2.0;
-  filter::update_track(report, kFrameNs, {}, object);
+  filter::update_track(report, at(kFrameNs), {}, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
   report.expected_evidence = 6.5;
-  filter::update_track(report, 2 * kFrameNs, {}, object);
+  filter::update_track(report, at(2 * kFrameNs), {}, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   EXPECT_EQ(filter::evidence_scale(6.5), 1.0);
   EXPECT_GT(filter::evidence_scale(0.0), 0.0);
@@ -52,10 +58,10 @@ TEST(TrackState, IsLostOnlyAfterSomeFramesOfContradiction) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
   for (int i = 1; i < options.lost_after_frames; ++i) {
-    filter::update_track(seen(-1.0), i * kFrameNs, options, object);
+    filter::update_track(seen(-1.0), at(i * kFrameNs), options, object);
     EXPECT_EQ(object.state, TrackState::kDoubtful) << i;
   }
-  filter::update_track(seen(-1.0), options.lost_after_frames * kFrameNs, options, object);
+  filter::update_track(seen(-1.0), at(options.lost_after_frames * kFrameNs), options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
 }
 
@@ -65,7 +71,7 @@ TEST(TrackState, HidingEndsTheContradiction) {
   WeightReport hidden;
   hidden.hidden_weight = 0.9;
   for (int i = 1; i < 40; ++i) {
-    filter::update_track(i % options.lost_after_frames == 0 ? hidden : seen(-1.0), i * kFrameNs, options, object);
+    filter::update_track(i % options.lost_after_frames == 0 ? hidden : seen(-1.0), at(i * kFrameNs), options, object);
     EXPECT_NE(object.state, TrackState::kLost) << i;
   }
 }
@@ -75,12 +81,12 @@ TEST(TrackState, AFewPixelsAreNotEnoughToBeSure) {
   const filter::TrackStateOptions options;
   WeightReport corner = seen(9.0);
   corner.visible_pixels = 4;
-  filter::update_track(corner, kFrameNs, options, object);
+  filter::update_track(corner, at(kFrameNs), options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
-  for (int i = 2; i < 20; ++i) filter::update_track(corner, i * kFrameNs, options, object);
+  for (int i = 2; i < 20; ++i) filter::update_track(corner, at(i * kFrameNs), options, object);
   EXPECT_EQ(object.state, TrackState::kDoubtful);
   corner.visible_pixels = 5;
-  filter::update_track(corner, 20 * kFrameNs, options, object);
+  filter::update_track(corner, at(20 * kFrameNs), options, object);
   EXPECT_EQ(object.state, TrackState::kTracked);
 }
 
@@ -104,12 +110,82 @@ TEST(TrackState, ExistenceFallsWithContradictionAndRecovers) {
   belief::ObjectBelief object;
   object.existence = 0.9;
   const filter::TrackStateOptions options;
-  for (int i = 1; i < 40; ++i) filter::update_track(seen(-3.0), i * kFrameNs, options, object);
+  for (int i = 1; i < 40; ++i) filter::update_track(seen(-3.0), at(i * kFrameNs), options, object);
   EXPECT_LT(object.existence, 0.01);
   EXPECT_GT(object.existence, 0.0);
-  for (int i = 40; i < 80; ++i) filter::update_track(seen(5.0), i * kFrameNs, options, object);
+  for (int i = 40; i < 80; ++i) filter::update_track(seen(5.0), at(i * kFrameNs), options, object);
   EXPECT_GT(object.existence, 0.99);
   EXPECT_LT(object.existence, 1.0);
+}
+
+/// Two cameras that take frames in turn, one object, and what each frame says of it.
+class TwoCameras : public testing::Test {
+ protected:
+  TwoCameras() { belief_.cameras.resize(2); }
+
+  /// The next frame, of `camera`, half a period after the one before.
+  TrackState frame(int camera, const WeightReport& report) {
+    belief::Observation observation;
+    observation.camera = camera;
+    observation.stamp_ns = now_ns_ += kFrameNs / 2;
+    filter::note_frame(observation, belief_);
+    filter::update_track(report, {belief_.cameras, camera, now_ns_}, {}, object_);
+    return object_.state;
+  }
+
+  belief::Belief belief_;
+  belief::ObjectBelief object_;
+  core::TimeNs now_ns_ = kFrameNs;
+};
+
+TEST_F(TwoCameras, KeepTrackedWhatEitherSees) {
+  WeightReport hidden;
+  hidden.hidden_weight = 1.0;
+  EXPECT_EQ(frame(0, hidden), TrackState::kUnseen);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(frame(1, seen(5.0)), TrackState::kTracked) << i;
+    EXPECT_EQ(frame(0, hidden), TrackState::kTracked) << i;
+    EXPECT_EQ(object_.visible_share, 0.8);
+    EXPECT_EQ(object_.frames_unseen, 0);
+    EXPECT_TRUE(filter::was_unseen_by(object_, 0));
+    EXPECT_FALSE(filter::was_unseen_by(object_, 1));
+  }
+  frame(1, hidden);
+  EXPECT_EQ(frame(0, hidden), TrackState::kUnseen) << "hidden in both";
+}
+
+TEST_F(TwoCameras, SayNothingAnyMoreWhenTheyStop) {
+  WeightReport out_of_view;
+  frame(1, seen(5.0));
+  frame(0, out_of_view);
+  frame(1, seen(5.0));
+  // The other goes on alone: after two and a half periods nothing speaks for the object.
+  int kept = 0;
+  while (kept < 20 && frame(0, out_of_view) == TrackState::kTracked) ++kept;
+  EXPECT_EQ(kept, 5) << "half periods";
+  EXPECT_EQ(object_.state, TrackState::kUnseen);
+}
+
+TEST_F(TwoCameras, AreHeardByTheirPixels) {
+  // One sees a corner of it that fits, the other all of it where nothing is.
+  WeightReport corner = seen(6.0);
+  corner.visible_pixels = 6;
+  WeightReport whole = seen(-4.0);
+  whole.visible_pixels = 200;
+  for (int i = 0; i < 4; ++i) {
+    frame(0, corner);
+    frame(1, whole);
+  }
+  EXPECT_EQ(object_.state, TrackState::kLost);
+  EXPECT_NEAR(object_.evidence_per_pixel, (6 * 6.0 - 200 * 4.0) / 206, 1e-12);
+}
+
+TEST_F(TwoCameras, LearnTheirOwnColours) {
+  frame(1, seen(5.0));
+  filter::colors_by(0, object_).frames = 3;
+  filter::colors_by(1, object_).frames = 7;
+  EXPECT_EQ(object_.colors.frames, 3);
+  EXPECT_EQ(object_.views.at(1).colors.frames, 7);
 }
 
 }  // namespace

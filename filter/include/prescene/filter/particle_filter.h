@@ -8,6 +8,10 @@
 //     belief = std::move(result.belief);
 //   }
 //
+// Frames may come from several cameras of the scene (Observation::camera), in the order of their stamps: each is
+// weighed with its camera's pose, intrinsics, depth noise and learned colours. Frames of different cameras may have one
+// stamp.
+//
 // A belief is all that is carried from frame to frame: a filter may be thrown away and made anew between two steps, and
 // any step may be repeated. The same belief, observation, control and settings give the same bits, for any number of
 // threads, if likelihood and renderer promise theirs.
@@ -66,7 +70,7 @@ struct FilterSettings {
 /// Bits of StepResult::degraded.
 enum Degraded : std::uint32_t {
   kFrameRejected = 1u << 0,      ///< The frame could not be used (see frame_status): predicted only.
-  kClockWentBack = 1u << 1,      ///< The stamp is not after the belief's: nothing was done.
+  kClockWentBack = 1u << 1,      ///< The stamp is not after the belief's (or that of its camera): nothing was done.
   kLongGap = 1u << 2,            ///< More than max_gap since the last frame.
   kNoSupportFound = 1u << 3,     ///< Objects had to be looked for, but nothing that they could stand on was seen.
   kObjectsMissing = 1u << 4,     ///< Some that were looked for at the start were not found.
@@ -133,7 +137,8 @@ class ParticleFilter {
   /// The belief before any frame: the scene's priors, step 0.
   belief::Belief start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const;
 
-  /// The next belief. The first step (belief.step == 0) looks for what the scene's priors leave open.
+  /// The next belief. The first step (belief.step == 0) looks for what the scene's priors leave open. The observation's
+  /// camera is one of the scene's (checked).
   StepResult step(const belief::Belief& belief, const belief::Observation& observation, const belief::Control& control);
 
  private:
@@ -142,7 +147,7 @@ class ParticleFilter {
 
   void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result);
-  void first_look(FrameStep& step);
+  void first_look(FrameStep& step, FindWhich which);
   std::vector<Island> join_islands(belief::Belief& belief, double dt, StepCounters& counters);
   void weigh_one(FrameStep& step, std::size_t object, double dt, const WorldTerms* worlds);
   void weigh_worlds(FrameStep& step, const Island& island, double dt);
@@ -163,7 +168,7 @@ class ParticleFilter {
   PoseSearch search_;
   WatchedRenderer renderer_;
   FilterTools tools_;
-  FrameCache frame_cache_;
+  std::vector<FrameCache> frame_caches_;  // by camera
   PrintCache prints_;
   TouchTest touch_;
 };

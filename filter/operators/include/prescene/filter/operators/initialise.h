@@ -58,10 +58,15 @@ struct FindReport {
   int found = 0;
   bool no_support = false;  ///< Nothing to stand on was seen, so nothing could be looked for.
 };
-/// Looks for the objects with wide priors. Those found get particles there, the others are lost until they are seen.
+/// Which of the objects with wide priors are looked for.
+enum class FindWhich {
+  kAll,  ///< In the first frame of all.
+  kLost  ///< Those that are lost, in the first frame of another camera; the others are what is known to be there.
+};
+/// Looks for objects with wide priors. Those found get particles there, the others are lost until they are seen.
 FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& observation,
                          const InitialiseOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                         belief::Belief& belief);
+                         belief::Belief& belief, FindWhich which = FindWhich::kAll);
 
 /// What objects can stand on in a frame: the scene's supports and what else the frame shows.
 Surroundings surroundings_in(const FilterFrame& frame, const SampledDepth& sampled, const belief::Scene& scene,

@@ -57,11 +57,12 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 /// coarse image, a mesh that is not quite right) mostly stays from frame to frame, so that many frames tell of two
 /// turns what one average frame does. Their log odds go to the mean of what single frames say, with a memory of twenty
 /// frames, and turns that no frame tells apart keep sharing the weight. A turn that is 3 nats or more behind the
-/// likeliest was decided against: its log odds go to 5 nats less.
+/// likeliest was decided against: its log odds go to 5 nats less. Where `cameras` see the object, what single frames
+/// say is summed over them: their errors are not the same.
 /// `log_weights_before`: those of the same particles before the frame. Weights within one turn are left as they are to
 /// each other, and nothing is changed where there is but one.
 void share_among_turns(std::span<const double> log_weights_before, const geometry::SymmetryGroup& symmetry,
-                       std::vector<belief::Particle>& particles);
+                       std::vector<belief::Particle>& particles, int cameras = 1);
 
 /// For each particle the number of its turn, the heaviest particle's first.
 std::vector<std::size_t> turn_numbers(const std::vector<belief::Particle>& particles,

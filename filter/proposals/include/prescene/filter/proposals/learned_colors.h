@@ -43,8 +43,9 @@ rendering::ColorModel model_of(const belief::LearnedColors& colors, const render
 /// Whether the object's colours are to be learned.
 bool learns(const belief::Belief& belief, const belief::ObjectBelief& object, const ColorLearningOptions& options);
 
-/// By object name, of those that learn and have learned from enough frames.
+/// By object name, of those that learn and have learned from enough frames of this camera: two cameras show one colour
+/// as two.
 std::map<std::string, rendering::ColorModel> learned_models(const belief::Belief& belief,
-                                                            const ColorLearningOptions& options);
+                                                            const ColorLearningOptions& options, int camera = 0);
 
 }  // namespace prescene::filter
