@@ -50,6 +50,9 @@ belief::SceneObject read_object(const LocatedValue& value, const std::string& na
 /// After the objects and supports, with all poses in the world.
 belief::Joint read_joint(const LocatedValue& value, const std::string& name, SceneContext& context);
 belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context);
+/// Into the scene, the first as its camera.
+void read_cameras(const LocatedValue& value, SceneContext& context);
+belief::DepthNoiseSettings read_depth_noise(const LocatedValue& value, Problems& problems);
 std::vector<belief::Action> read_actions(const LocatedValue& value, SceneContext& context);
 belief::Outcome read_outcome(const LocatedValue& value, const std::string& name, const std::string& default_object,
                              SceneContext& context);

@@ -2,10 +2,7 @@
 #include "prescene/interfaces/scene_files/scene_file.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <iterator>
-#include <numbers>
 #include <optional>
 
 #include "prescene/belief/validation.h"
@@ -65,25 +62,6 @@ void for_each_named(const LocatedValue* map, Problems& problems, const Read& rea
   for (std::size_t i = 0; i < map->keys.size(); ++i) read(map->items[i], map->keys[i].name);
 }
 
-template <std::size_t kCount>
-void read_shares(Binder& binder, const char* key, std::optional<std::array<double, kCount>>& to) {
-  constexpr NumberRange kShare{0.0, 0.999, "give shares of pixels without a return, at least 0 and below 1"};
-  const LocatedValue* at = binder.find(key);
-  const auto shares = at ? read_numbers(*at, binder.problems(), kCount, kShare) : std::nullopt;
-  if (shares) std::copy(shares->begin(), shares->end(), to.emplace().begin());
-}
-
-belief::DepthNoiseSettings read_depth_noise(const LocatedValue& value, Problems& problems) {
-  belief::DepthNoiseSettings noise;
-  Binder binder(value, problems);
-  binder.read("sigma_per_depth_squared", noise.sigma_per_depth_squared,
-              {1e-6, 1.0, "give the deviation in metres at 1 m, seen frontally (structured light 0.002 to 0.007)"});
-  binder.read("incidence_knee", noise.incidence_knee, {0.0, 0.999, "give a cosine, at least 0 and below 1"});
-  read_shares(binder, "incidence_missing", noise.incidence_missing);
-  read_shares(binder, "outline_missing", noise.outline_missing);
-  return noise;
-}
-
 belief::EventWeights read_events(const LocatedValue& value, Problems& problems) {
   belief::EventWeights events;
   Binder binder(value, problems);
@@ -123,9 +101,9 @@ std::optional<belief::PoseDistribution> moved(const geometry::Pose& X_WC, const 
 /// Brings the poses that were given in the camera's frame into the world's.
 void place_in_camera(SceneContext& context) {
   for (const auto& [index, at] : context.in_camera) {
-    if (!context.scene.camera) {
+    if (!context.scene.camera || !context.scene.camera->is_placed) {
       context.problems.add(at->place, at->path, "there is no camera to be in the frame of",
-                           "give the scene a 'camera', or the object a 'pose' in the world");
+                           "give the scene a 'camera' with a pose, or the object a 'pose' in the world");
       continue;
     }
     belief::PoseDistribution& pose = context.scene.objects[index].pose;
@@ -176,7 +154,11 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   for_each_named(objects, problems, [&](const LocatedValue& value, const std::string& name) {
     scene.objects.push_back(read_object(value, name, context));
   });
-  if (const LocatedValue* at = binder.find("camera")) scene.camera = read_camera(*at, context);
+  std::string which;
+  const LocatedValue* camera =
+      binder.one_of({"camera", "cameras"}, "give one 'camera', or a list of 'cameras'", true, &which);
+  if (camera && which == "camera") scene.camera = read_camera(*camera, context);
+  if (camera && which == "cameras") read_cameras(*camera, context);
   place_in_camera(context);
   const LocatedValue* joints = binder.find("joints");
   read_names(joints, problems);
@@ -242,60 +224,6 @@ belief::SceneObject read_object(const LocatedValue& value, const std::string& na
     if (!hand.empty()) object.held_by = hand;
   }
   return object;
-}
-
-belief::SceneCamera read_camera(const LocatedValue& value, SceneContext& context) {
-  Problems& problems = context.problems;
-  belief::SceneCamera camera;
-  Binder binder(value, problems);
-  binder.read("name", camera.name);
-  geometry::PinholeCamera& in = camera.intrinsics;
-  in.width = 640;
-  in.height = 480;
-  binder.read("width", in.width, 1, 16384, "give a number of pixels");
-  binder.read("height", in.height, 1, 16384, "give a number of pixels");
-  constexpr NumberRange kFocal{1.0, 1e5, "give the focal length in pixels, at least 1"};
-  constexpr NumberRange kPixel{-1e5, 1e5, "give pixels"};
-  std::string which;
-  const LocatedValue* lens = binder.one_of(
-      {"fx", "fov_deg"}, "give 'fx' in pixels, or 'fov_deg', the horizontal view in degrees", false, &which);
-  if (lens && which == "fov_deg") {
-    const double fov =
-        read_number(*lens, problems, {1.0, 170.0, "give degrees between 1 and 170", "deg"}).value_or(60.0);
-    in.fx = 0.5 * in.width / std::tan(0.5 * fov * std::numbers::pi / 180.0);
-  } else if (lens) {
-    in.fx = read_number(*lens, problems, kFocal).value_or(500.0);
-  }
-  in.fy = in.fx;
-  in.cx = 0.5 * (in.width - 1);
-  in.cy = 0.5 * (in.height - 1);
-  binder.read("fy", in.fy, kFocal);
-  binder.read("cx", in.cx, kPixel);
-  binder.read("cy", in.cy, kPixel);
-  const LocatedValue* place =
-      binder.one_of({"pose", "look"}, "give 'pose', or 'look: {from: [x, y, z], at: [x, y, z]}'", false, &which);
-  if (!place) return camera;
-  if (which == "pose") {
-    camera.X_WC = read_pose(*place, problems);
-    return camera;
-  }
-  Binder look(*place, problems);
-  const LocatedValue* from_at = look.require("from", "give the camera's position [x, y, z]");
-  const LocatedValue* at_at = look.require("at", "give the point that it looks at [x, y, z]");
-  Vector3d up = Vector3d::UnitZ();
-  if (const LocatedValue* at = look.find("up")) up = read_axis(*at, problems);
-  if (!from_at || !at_at) return camera;
-  const Vector3d from = read_vector(*from_at, problems, kPosition), to = read_vector(*at_at, problems, kPosition);
-  const Vector3d z = to - from, x = z.cross(up);
-  if (z.norm() < 1e-9 || x.norm() < 1e-6 * z.norm()) {
-    problems.add(place->place, place->path, "the direction of view is none, or is along 'up'",
-                 "move 'at' away from 'from', or give another 'up'");
-    return camera;
-  }
-  geometry::Matrix3d R_WC;
-  R_WC << x.normalized(), z.cross(x).normalized(), z.normalized();
-  camera.X_WC = {geometry::Quaterniond(R_WC).normalized(), from};
-  return camera;
 }
 
 FileReport unread_report(const std::string& file, const core::Status& status, const Problems& problems) {

@@ -2,25 +2,11 @@
 #include "prescene/service/tracking/camera_presets.h"
 
 #include <algorithm>
-#include <array>
 
 namespace prescene::service {
 namespace {
 
 using interfaces::DomainTopic;
-
-// As the launch files of the drivers name them in August 2026, without arguments of the user.
-constexpr std::array<CameraPreset, 4> kPresets = {{
-    {"azure", "azure_kinect_ros_driver (branch humble)", "", "/depth_to_rgb/image_raw", "/rgb/image_raw",
-     "/rgb/camera_info", false},
-    {"orbbec", "orbbec_camera (OrbbecSDK_ROS2)", "depth_registration:=true", "/camera/depth/image_raw",
-     "/camera/color/image_raw", "/camera/color/camera_info", false},
-    {"realsense", "realsense2_camera 4.55 or later", "align_depth.enable:=true",
-     "/camera/camera/aligned_depth_to_color/image_raw", "/camera/camera/color/image_raw",
-     "/camera/camera/color/camera_info", false},
-    {"zed", "zed_wrapper 5", "", "/zed/zed_node/depth/depth_registered", "/zed/zed_node/rgb/color/rect/image",
-     "/zed/zed_node/rgb/color/rect/camera_info", true},
-}};
 
 // Of more topics, the first are named.
 constexpr std::size_t kMostNamed = 12;
@@ -34,14 +20,6 @@ bool has(std::span<const DomainTopic> topics, std::string_view name) {
 std::string short_type(const std::string& type) { return type.substr(type.rfind('/') + 1); }
 
 }  // namespace
-
-std::span<const CameraPreset> camera_presets() { return kPresets; }
-
-const CameraPreset* find_camera_preset(std::string_view name) {
-  const auto* found =
-      std::find_if(kPresets.begin(), kPresets.end(), [&](const CameraPreset& preset) { return preset.name == name; });
-  return found == kPresets.end() ? nullptr : found;
-}
 
 void apply(const CameraPreset& preset, TrackerSettings& settings) {
   settings.topics.depth = preset.depth;
@@ -80,7 +58,7 @@ std::string nothing_came_text(const InputTopics& topics, std::span<const DomainT
   for (std::size_t i = 0; i < std::min(images.size(), kMostNamed); ++i)
     text += (i == 0 ? "" : ", ") + images[i].name + " (" + short_type(images[i].type) + ")";
   if (images.size() > kMostNamed) text += " and " + std::to_string(images.size() - kMostNamed) + " more";
-  for (const CameraPreset& preset : kPresets) {
+  for (const CameraPreset& preset : camera_presets()) {
     if (has(there, preset.depth) && preset.depth != topics.depth)
       return text + ": --camera " + std::string(preset.name) + " has these names";
   }

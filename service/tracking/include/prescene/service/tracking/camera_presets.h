@@ -1,32 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the drivers of common RGB-D cameras call their topics, and what to say where no image comes.
+// The topics of common RGB-D cameras' drivers as the tracker's, and what to say where no image comes.
 #pragma once
 
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/interfaces/scene_files/camera_presets.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
 namespace prescene::service {
 
-/// Names of a driver started with its own defaults.
-struct CameraPreset {
-  std::string_view name;    ///< "realsense"
-  std::string_view driver;  ///< "realsense2_camera 4.55 or later"
-  std::string_view needs;   ///< What its launch file must be told for registered depth; "" = nothing.
-  std::string_view depth;   ///< Topics, as in InputTopics.
-  std::string_view color;
-  std::string_view camera_info;
-  bool rectified = false;  ///< The images are.
-};
-
-/// By name.
-std::span<const CameraPreset> camera_presets();
-/// Null for a name that is none.
-const CameraPreset* find_camera_preset(std::string_view name);
+using interfaces::camera_presets;
+using interfaces::CameraPreset;
+using interfaces::find_camera_preset;
 /// Sets the topics of the images and whether they are rectified; tf stays.
 void apply(const CameraPreset& preset, TrackerSettings& settings);
 
