@@ -10,6 +10,7 @@
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/scene_files/learned_file.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/camera_presets.h"
 #include "verb.h"
 
@@ -96,6 +97,19 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
   group->add_flag_function(
       "--use-sim-time", [&topics](std::int64_t count) { topics.clock = count > 0 ? kClockTopic : ""; },
       "Time is simulated, and told on /clock (rosgraph_msgs/Clock), as for nodes of ROS with use_sim_time");
+}
+
+core::Status check_topics_once(const CLI::App& verb, const belief::Scene& scene) {
+  if (!names_topics(scene)) return core::ok_status();
+  for (const char* name : {"--camera", "--depth-topic", "--color-topic", "--depth-form", "--color-form",
+                           "--camera-info-topic", "--camera-pose", "--rectified"}) {
+    const CLI::Option* option = verb.get_option_no_throw(name);
+    if (option != nullptr && option->count() > 0)
+      return core::invalid_input(std::string(name) +
+                                 " is for a scene that does not list its cameras: change the entry under 'cameras' "
+                                 "in the scene file instead");
+  }
+  return core::ok_status();
 }
 
 void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, bool& salvage) {

@@ -8,6 +8,7 @@
 #include "prescene/interfaces/images/png.h"
 #include "prescene/service/live/doctor.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/camera_presets.h"
 #include "verb.h"
 
@@ -91,6 +92,11 @@ core::Status run(DoctorVerbOptions& options, VerbContext& context) {
   if (!options.scene.empty()) {
     PRESCENE_TRY(scene, check_scene_file(options.scene, scene_check, context.log()));
     if (scene) {
+      PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
+      take_first_camera(*scene, options.doctor.tracker);
+      if (!scene->more_cameras.empty())
+        core::log(context.log(), core::LogLevel::kInfo,
+                  "only the first of the scene's cameras is looked at, " + scene->camera->name);
       PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
       PRESCENE_TRY(options.doctor.tracker.assembler.robot, load_robot(text, options.scene));
     }

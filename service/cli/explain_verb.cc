@@ -149,6 +149,7 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},
                                                           context.log()));
+  PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *input.scene()));
   TrackerSettings settings = options.tracker;
   if (input.has_settings()) {
     PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());

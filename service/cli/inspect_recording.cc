@@ -134,6 +134,7 @@ core::Status inspect_recording(const RecordingInspection& options, VerbContext& 
     PRESCENE_RETURN_IF_ERROR(check_png(name, *output));
   }
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(options.input, context.log()));
+  PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *input.scene()));
   TrackerSettings settings = options.tracker;
   if (input.has_settings()) {
     PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());

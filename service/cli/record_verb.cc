@@ -8,6 +8,7 @@
 #include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/recording/simulated_recording.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "verb.h"
 
 namespace prescene::service {
@@ -16,6 +17,7 @@ namespace {
 struct RecordOptions {
   std::string output;
   std::string simulate;
+  std::string scene;
   std::vector<std::string> removals;
   std::vector<std::string> puts;
   bool unreported_robot = false;
@@ -61,6 +63,7 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
   FilesOfScene files;
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log(), &files));
+  PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
   // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
   std::error_code error;
   const bool replaces = std::filesystem::exists(options.output, error);
@@ -82,15 +85,24 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
 
 core::Status record_bus(RecordOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
-  PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {}));
+  PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {options.scene}));
   const std::string output = live_recording_path(options.output, context);
   // With the names of the topics, so that a replay knows them.
-  PRESCENE_TRY(
-      const auto recording,
-      RecordingWriter::create(output, {"", "", context.options().seed, belief::json_text(to_json(options.tracker))},
-                              kLiveRecording));
+  RecordingInfo info{"", "", context.options().seed, belief::json_text(to_json(options.tracker))};
+  std::vector<CameraInput> cameras = {{"", options.tracker.topics, options.tracker.assembler}};
+  if (!options.scene.empty()) {
+    FilesOfScene files;
+    PRESCENE_TRY(info.scene_text, read_scene_text(options.scene));
+    PRESCENE_TRY(const auto scene, load_scene_text(info.scene_text, options.scene, context.log(), &files));
+    PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
+    cameras = camera_inputs(options.tracker, *scene);
+    PRESCENE_RETURN_IF_ERROR(validate(cameras));
+    info.scene_file = options.scene;
+    info.files = std::move(files);
+  }
+  PRESCENE_TRY(const auto recording, RecordingWriter::create(output, info, kLiveRecording));
   PRESCENE_TRY(const std::uint64_t messages,
-               record_topics(options.dds, options.tracker.topics, context.cancellation(), context.log(), *recording));
+               record_topics(options.dds, cameras, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},
                 "recorded " + std::to_string(messages) + " messages to " + output + "\n");
   return core::ok_status();
@@ -105,7 +117,12 @@ Verb add_record_verb(CLI::App& app) {
   verb->add_option("--simulate", options->simulate,
                    "Scene file to play with a simulated RGB-D camera, instead of listening")
       ->check(file_name());
-  verb->add_option("--rate", options->simulation.rate, "Simulated frames a second")
+  verb->add_option("--scene", options->scene,
+                   "Scene file that is recorded with the topics: those of the cameras that it lists, and what a replay "
+                   "needs")
+      ->check(file_name())
+      ->excludes("--simulate");
+  verb->add_option("--rate", options->simulation.rate, "Simulated frames a second, of each camera")
       ->check(number_between(0.1, 240.0))
       ->needs("--simulate")
       ->capture_default_str();

@@ -21,6 +21,7 @@
 #include "prescene/service/recording/session_report.h"
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/topics.h"
 #include "prescene/service/training/proposals_file.h"
 #include "relations_options.h"
@@ -70,6 +71,7 @@ ReplayInputOptions input_of(const ReplayOptions& options) {
 
 /// What the recording was made with, but for what the command line says otherwise.
 core::Result<TrackerSettings> settings_of(const ReplayOptions& options, const ReplayInput& input) {
+  PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *input.scene()));
   if (!input.has_settings()) return options.tracker;
   PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
   return with_given(*options.verb, std::move(recorded), options.tracker);
@@ -122,7 +124,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   TrackingScore score(input.scene());
   Backends backends(context.pool(), options.backends);
   SessionReport report(input.scene(), settings, backends);
-  ForeseenAndCame foreseen(input.scene(), settings.topics.depth);
+  ForeseenAndCame foreseen(input.scene(), first_topics(settings, *input.scene()).depth);
   DamagedRecords damaged;
   FinalStates states;
   PRESCENE_TRY(BusReplayResult result,
@@ -198,8 +200,12 @@ class ReplayTimeline {
     if (is_asked_) context_ = backends.query_context(backends.pool());
   }
   void add(const belief::Belief& belief) {
-    if (is_asked_) static_cast<void>(history_.add(belief, context_));  // the history counts what can't be judged
-    if (is_asked_) last_ = belief.scene;
+    if (!is_asked_) return;
+    // Two cameras may have taken frames at one instant.
+    const bool is_at_once = last_ && belief.stamp_ns == last_ns_ && !belief.cameras.empty();
+    last_ = belief.scene;
+    last_ns_ = belief.stamp_ns;
+    if (!is_at_once) static_cast<void>(history_.add(belief, context_));  // the history counts what can't be judged
   }
   /// Answers the question of the options, and writes the file.
   core::Status finish(VerbContext& context) {
@@ -231,6 +237,7 @@ class ReplayTimeline {
   bool is_asked_;
   queries::QueryContext context_;
   std::shared_ptr<const belief::Scene> last_;
+  core::TimeNs last_ns_ = 0;
   ordered_json document_;
   queries::RelationHistory history_{{.seconds = 1e9, .most_intervals = 100'000}};
 };
@@ -359,7 +366,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   }
   if (explained.different() > 0)
     return core::unavailable(explained.first_difference() + ": another version, machine or setting?");
-  return check_steps(*summary, settings.topics).at(options.input + window_text(options.read));
+  return check_steps(*summary, first_topics(settings, *input.scene())).at(options.input + window_text(options.read));
 }
 
 /// kInvalidInput for an option that would do nothing.

@@ -6,6 +6,7 @@
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/training/proposals_file.h"
 #include "prescene/service/view/live_view.h"
 #include "verb.h"
@@ -32,8 +33,10 @@ core::Result<std::unique_ptr<LiveView>> open_view(ServeOptions& options,
   options.view.world_frame = options.settings.tracker.assembler.world_frame;
   PRESCENE_TRY(auto view, LiveView::create(scene, options.view, context.log()));
   LiveView* raw = view.get();
-  options.settings.on_step = [raw](const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief) {
-    raw->show({belief, step.observation, step.record.seconds, step.record.degraded});
+  options.settings.on_step = [raw, pictured = PicturedFrames()](
+                                 const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief) mutable {
+    if (pictured.has(step.observation))
+      raw->show({belief, step.observation, step.record.seconds, step.record.degraded});
   };
   options.settings.on_answer = [raw](const std::string& answer) { raw->answer(answer); };
   options.settings.on_health = [raw](const std::string& health) { raw->set_health(health); };
@@ -48,6 +51,8 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   FilesOfScene files;
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.scene, context.log(),
                                                  options.record.empty() ? nullptr : &files, Symmetries::kSuggested));
+  PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
+  PRESCENE_RETURN_IF_ERROR(validate(camera_inputs(options.settings.tracker, *scene)));
   PRESCENE_TRY(options.settings.tracker.assembler.robot, load_robot(text, options.scene));
   auto weights = interfaces::parse_event_weights(text, options.scene);
   if (!weights) return weights.status();

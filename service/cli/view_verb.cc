@@ -7,6 +7,7 @@
 
 #include "prescene/service/load_scene.h"
 #include "prescene/service/recording/replay_input.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/view/bus_view.h"
 #include "prescene/service/view/recording_view.h"
 #include "verb.h"
@@ -54,6 +55,7 @@ core::Status view_recording(ViewVerbOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.recording, options.scene, options.depth_scale,
                                                            options.frame_rate, options.read},
                                                           context.log()));
+  PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *input.scene()));
   TrackerSettings settings = options.tracker;
   if (input.has_settings()) {
     PRESCENE_TRY(TrackerSettings recorded, input.recorded_settings());
@@ -79,7 +81,7 @@ core::Status view_recording(ViewVerbOptions& options, VerbContext& context) {
   context.end_progress();
   if (!summary) return summary.status();
   if (summary->cancelled) return core::ok_status();
-  PRESCENE_RETURN_IF_ERROR(check_steps(*summary, settings.topics).at(options.recording));
+  PRESCENE_RETURN_IF_ERROR(check_steps(*summary, first_topics(settings, *input.scene())).at(options.recording));
   view->finish(remarks_of(*summary));
   core::log(context.log(), core::LogLevel::kInfo, counted(summary->steps, "step") + " to be looked at");
   wait_for_stop(context.cancellation());
@@ -92,6 +94,8 @@ core::Status view_bus(ViewVerbOptions& options, VerbContext& context) {
   if (!options.scene.empty()) {
     PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
     PRESCENE_TRY(scene, load_scene_text(text, options.scene, context.log()));
+    PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
+    take_first_camera(*scene, options.tracker);
     PRESCENE_TRY(options.tracker.assembler.robot, load_robot(text, options.scene));
   }
   PRESCENE_TRY(const auto view, BusView::create(scene, {options.dds, options.tracker, options.view}, context.log()));

@@ -5,6 +5,7 @@
 
 #include "prescene/core/clock.h"
 #include "prescene/service/live/inbox.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/camera_presets.h"
 
 namespace prescene::service {
@@ -17,35 +18,40 @@ constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t
 
 }  // namespace
 
-core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const InputTopics& topics,
+core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const std::vector<CameraInput>& cameras,
                                           const core::Cancellation& cancellation, const core::LogSink& log,
                                           RecordingWriter& recording) {
-  Inbox inbox({{topics.depth, kWaitingImages},
-               {topics.color, kWaitingImages},
-               {topics.tf, kWaitingTransforms},
-               {topics.joint_states, kWaitingTransforms}});
+  std::map<std::string, InboxLimit> limits;
+  for (const CameraInput& camera : cameras)
+    limits.insert({{camera.topics.depth, kWaitingImages},
+                   {camera.topics.color, kWaitingImages},
+                   {camera.topics.tf, kWaitingTransforms},
+                   {camera.topics.joint_states, kWaitingTransforms}});
+  Inbox inbox(limits);
   PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
-  for (const BusTopic& topic : bus_topics(topics)) {
+  for (const BusTopic& topic : topics_of_cameras(cameras)) {
     PRESCENE_RETURN_IF_ERROR(
         node->subscribe(topic.name, topic.type, topic.read,
                         [&inbox](interfaces::ReceivedMessage&& message) { inbox.put(std::move(message)); }));
   }
   const std::string domain = "in DDS domain " + std::to_string(dds.domain);
-  core::log(log, core::LogLevel::kInfo, "recording " + domain + ": " + topics_text(topics));
+  for (const CameraInput& camera : cameras)
+    core::log(log, core::LogLevel::kInfo, "recording " + domain + ": " + topics_text(camera.topics));
   std::uint64_t messages = 0;
   core::TimeNs last_ns = 0;
-  bool waits_for_depth = true;
+  std::vector<InputTopics> waits_for;  // those whose depth images have not come
+  for (const CameraInput& camera : cameras) waits_for.push_back(camera.topics);
   bool was_late = false;
   const core::Stopwatch watch;
   while (!cancellation.requested()) {
-    if (waits_for_depth && watch.seconds() > kNothingCameAfter) {
-      core::log(log, core::LogLevel::kWarning, nothing_came_text(topics, node->domain_topics(), domain));
-      waits_for_depth = false;
+    if (!waits_for.empty() && watch.seconds() > kNothingCameAfter) {
+      core::log(log, core::LogLevel::kWarning, nothing_came_text(waits_for.front(), node->domain_topics(), domain));
+      waits_for.erase(waits_for.begin());
     }
     for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kWriteInterval)) {
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
-      waits_for_depth = waits_for_depth && message.topic != topics.depth;
+      std::erase_if(waits_for, [&](const InputTopics& topics) { return topics.depth == message.topic; });
       PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
       ++messages;
     }

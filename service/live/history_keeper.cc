@@ -22,7 +22,9 @@ void HistoryKeeper::note(std::shared_ptr<const belief::Belief> belief) {
   if (!(settings_.rate > 0.0)) return;
   const std::lock_guard lock(mutex_);
   const core::TimeNs since = belief->stamp_ns - taken_ns_;
-  const bool is_soon = taken_ns_ != 0 && since > 0 && core::seconds_of(since) < 1.0 / settings_.rate - 1e-3;
+  // Two cameras may have taken frames at one instant.
+  const bool goes_on = since > 0 || (since == 0 && !belief->cameras.empty());
+  const bool is_soon = taken_ns_ != 0 && goes_on && core::seconds_of(since) < 1.0 / settings_.rate - 1e-3;
   if (is_soon) {
     ++skipped_;
     return;

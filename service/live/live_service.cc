@@ -20,6 +20,7 @@
 #include "prescene/service/live/log_limiter.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/camera_presets.h"
 #include "service_calls.h"
 #include "service_parameters.h"
@@ -43,16 +44,27 @@ constexpr std::chrono::milliseconds kPollInterval(100);
 constexpr std::chrono::milliseconds kLongestIntake(20);
 
 // Of images the newest count; what else waits is bounded so that its intake takes some tens of milliseconds.
-std::map<std::string, InboxLimit> inbox_limits(const InputTopics& topics) {
+std::map<std::string, InboxLimit> inbox_limits(const std::vector<CameraInput>& cameras) {
   constexpr std::size_t kMiB = std::size_t{1} << 20;
   const InboxLimit image{.messages = 4, .bytes = 64 * kMiB};
-  return {{topics.depth, image},
-          {topics.color, image},
-          {topics.camera_info, {.messages = 4, .bytes = kMiB}},
-          {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
-          {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}},
-          {topics.joint_states, {.messages = 1000, .bytes = 4 * kMiB}},
-          {topics.clock, {.messages = 4, .bytes = kMiB}}};
+  std::map<std::string, InboxLimit> limits;
+  for (const CameraInput& camera : cameras) {
+    const InputTopics& topics = camera.topics;
+    limits.insert({{topics.depth, image},
+                   {topics.color, image},
+                   {topics.camera_info, {.messages = 4, .bytes = kMiB}},
+                   {topics.tf, {.messages = 1000, .bytes = 4 * kMiB}},
+                   {topics.tf_static, {.messages = 100, .bytes = 4 * kMiB}},
+                   {topics.joint_states, {.messages = 1000, .bytes = 4 * kMiB}},
+                   {topics.clock, {.messages = 4, .bytes = kMiB}}});
+  }
+  return limits;
+}
+
+/// What the service says of its camera is of the first.
+LiveSettings of_first_camera(LiveSettings settings, const belief::Scene& scene) {
+  settings.tracker.topics = first_topics(settings.tracker, scene);
+  return settings;
 }
 
 /// True at most `rate` times a second; the rate may be set from any thread.
@@ -84,13 +96,14 @@ struct LiveService::Impl {
   Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings, std::unique_ptr<Tracker> a_tracker,
        std::unique_ptr<RecordingWriter> a_recording, core::LogSink a_log)
       : scene(std::move(a_scene)),
-        settings(a_settings),
+        settings(of_first_camera(a_settings, *scene)),
+        cameras(camera_inputs(a_settings.tracker, *scene)),
         tracker(std::move(a_tracker)),
         recording(std::move(a_recording)),
         log_limiter(of_level(std::move(a_log)), {}),
         log(log_limiter.sink()),
         meshes(marker_meshes(*scene)),
-        inbox(inbox_limits(settings.tracker.topics)),
+        inbox(inbox_limits(cameras)),
         marker_limit(settings.marker_rate),
         diagnostics_limit(settings.diagnostics_rate),
         frames(frame_settings(settings)),
@@ -152,6 +165,7 @@ struct LiveService::Impl {
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
+  std::vector<CameraInput> cameras;
   std::unique_ptr<Tracker> tracker;
   std::unique_ptr<RecordingWriter> recording;
   core::Status recording_status;
@@ -325,7 +339,7 @@ core::Status LiveService::Impl::join_bus() {
   };
   PRESCENE_RETURN_IF_ERROR(calls->offer());
   PRESCENE_RETURN_IF_ERROR(parameter_services->offer());
-  for (const BusTopic& topic : bus_topics(settings.tracker.topics)) {
+  for (const BusTopic& topic : topics_of_cameras(cameras)) {
     if (topic.name == kAnswerTopic) continue;  // ours
     const auto& take = topic.name == kQueryTopic ? deliver_question : deliver;
     PRESCENE_RETURN_IF_ERROR(node->subscribe(topic.name, topic.type, topic.read, take));
@@ -453,7 +467,9 @@ void LiveService::Impl::take_in(ReceivedMessage& message) {
       give_up_recording(written.status());
     }
   }
-  depth_has_come = depth_has_come || message.topic == settings.tracker.topics.depth;
+  depth_has_come = depth_has_come || std::any_of(cameras.begin(), cameras.end(), [&](const CameraInput& camera) {
+                     return message.topic == camera.topics.depth;
+                   });
   const core::TimeNs simulated_before_ns = tracker->simulated_now_ns();
   const core::Status taken = tracker->take_in(message, index);
   if (message.topic == kControlTopic && taken.ok())
@@ -572,7 +588,10 @@ ServiceHealth LiveService::Impl::health() const {
   health.refused_messages = refused;
   health.dropped_in_inbox = inbox.dropped_by_topic();
   const InputTopics& topics = settings.tracker.topics;
-  health.image_topics = {topics.depth, topics.color, topics.camera_info, topics.clock};
+  health.image_topics = {topics.clock};
+  for (const CameraInput& camera : cameras)
+    health.image_topics.insert(health.image_topics.end(),
+                               {camera.topics.depth, camera.topics.color, camera.topics.camera_info});
   health.lost_on_bus = node->dropped_samples();
   health.unsent = unsent.load(std::memory_order_relaxed);
   health.unlogged = log_limiter.held_back();
@@ -650,8 +669,10 @@ void LiveService::ask(std::string question_json) { impl_->worker->ask(std::move(
 
 core::Status LiveService::run(const core::Cancellation& cancellation) {
   Impl& impl = *impl_;
-  core::log(impl.log, core::LogLevel::kInfo,
-            "listening in " + impl.domain_text() + ": " + topics_text(impl.settings.tracker.topics));
+  for (const CameraInput& camera : impl.cameras)
+    core::log(impl.log, core::LogLevel::kInfo,
+              "listening in " + impl.domain_text() + (camera.name.empty() ? "" : " to camera " + camera.name) + ": " +
+                  topics_text(camera.topics));
   const auto turn = [&] {
     auto until = steady_clock::now() + kPollInterval;
     if (const auto deadline = impl.tracker->next_deadline()) {

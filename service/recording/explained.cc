@@ -9,6 +9,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/recording/frame_history.h"
+#include "prescene/service/tracking/camera_frames.h"
 
 namespace prescene::service {
 namespace {
@@ -135,7 +136,7 @@ core::Result<Explained> explain_recording(const ReplayInput& input, const Explai
   if (cancellation.requested()) return core::cancelled("stopped on request before the window was tracked");
   queries::ExplainWindow& window = keeper.window();
   if (!window.start) {
-    if (summary) PRESCENE_RETURN_IF_ERROR(check_steps(*summary, settings.topics));
+    if (summary) PRESCENE_RETURN_IF_ERROR(check_steps(*summary, first_topics(settings, *input.scene())));
     return core::invalid_input("there is no frame before the window's begin");
   }
   const double end = core::seconds_of(keeper.last_ns() - keeper.first_ns());

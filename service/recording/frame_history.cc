@@ -102,6 +102,7 @@ queries::WindowFrame sampled_frame(const belief::Observation& observation, std::
   kept.sampled = step;
   kept.belief = std::move(belief);
   kept.observation.stamp_ns = observation.stamp_ns;
+  kept.observation.camera = observation.camera;
   kept.observation.X_WC = observation.X_WC;
   kept.observation.robot = observation.robot;
   kept.observation.frame.camera = whole.camera.subsampled(step, offset);
@@ -120,7 +121,8 @@ void FrameHistory::add(const belief::Observation& observation, std::shared_ptr<c
   const core::TimeNs stamp_ns = observation.stamp_ns;
   {
     const std::lock_guard lock(mutex_);
-    if (any_ && stamp_ns <= newest_ns_) {
+    // Two cameras may take frames at one instant.
+    if (any_ && (stamp_ns < newest_ns_ || (stamp_ns == newest_ns_ && belief->cameras.empty()))) {
       kept_.clear();
       controls_.clear();
       bytes_ = 0;

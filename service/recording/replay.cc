@@ -6,6 +6,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/tracking/camera_frames.h"
 
 namespace prescene::service {
 namespace {
@@ -154,7 +155,7 @@ core::Result<ReplaySummary> replay_folder(const interfaces::FrameFolder& folder,
                                           const core::Cancellation& cancellation, const core::ProgressSink& progress,
                                           const StepSink& on_step) {
   Replay replay(tracker, on_step, false);
-  const InputTopics& topics = tracker.settings().topics;
+  const InputTopics topics = first_topics(tracker.settings(), *tracker.belief()->scene);
   MessageIndex index = 0;
   for (std::size_t i = 0; i < folder.frames().size(); ++i) {
     if (cancellation.requested()) {

@@ -12,6 +12,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/pictures/belief_overlay.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "tracking_sections.h"
 
 namespace prescene::service {
@@ -26,10 +27,12 @@ constexpr std::size_t kPictures = 6;                      // of them on the page
 constexpr std::size_t kMostChanges = 20;                  // of states, on the page
 constexpr int kSmallPicture = 320;                        // columns of what the camera saw, beside the overlay
 
+/// Of the first camera.
 AssemblerSettings assembler_settings(const belief::Scene& scene, const TrackerSettings& tracker) {
-  AssemblerSettings settings = tracker.assembler;
-  settings.use_color = settings.use_color && !tracker.topics.color.empty();
-  settings.rectified = is_rectified(tracker);
+  const CameraInput first = camera_inputs(tracker, scene).front();
+  AssemblerSettings settings = first.assembler;
+  settings.use_color = settings.use_color && !first.topics.color.empty();
+  if (!settings.rectified) settings.rectified = names_rectified_images(first.topics.depth);
   if (!settings.X_WC && scene.camera) settings.X_WC = scene.camera->X_WC;
   return settings;
 }
@@ -102,7 +105,7 @@ geometry::ColorImage smaller(const geometry::ColorImage& image) {
 SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings,
                              Backends& backends)
     : scene_(std::move(scene)),
-      topics_(settings.topics),
+      topics_(first_topics(settings, *scene_)),
       assembler_(assembler_settings(*scene_, settings), robot_names(*scene_), settings.tf),
       backends_(&backends),
       residual_meter_(backends) {}
@@ -134,7 +137,7 @@ void SessionReport::add(const interfaces::ReceivedMessage& message) {
 
 void SessionReport::add(const belief::Observation& observation) {
   const auto summary = summaries_.find(observation.stamp_ns);
-  if (summary == summaries_.end()) return;
+  if (summary == summaries_.end() || !pictured_.has(observation)) return;
   residuals_[observation.stamp_ns] = residual_meter_.measure(*scene_, summary->second, observation);
   if (changes_.contains(observation.stamp_ns) && at_changes_.size() < kMostChanges)
     at_changes_[observation.stamp_ns] = observation;

@@ -15,6 +15,7 @@
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/recording/foreseen.h"
+#include "prescene/service/tracking/camera_frames.h"
 
 namespace prescene::service {
 namespace {
@@ -31,6 +32,15 @@ struct Due {
   std::function<core::Status()> write;
 };
 
+/// A camera that takes the scene.
+struct Taker {
+  const belief::SceneCamera& scene;
+  InputTopics topics;
+  std::string frame;
+  rendering::SimulatedCamera camera;
+  std::optional<interfaces::LensWarp> warp = {};  // where there is a lens
+};
+
 class Player {
  public:
   Player(const belief::Scene& scene, const SimulatedRecordingOptions& options, std::uint64_t seed, Backends& backends,
@@ -40,16 +50,29 @@ class Player {
         backends_(backends),
         renderer_(renderer),
         recording_(recording),
-        camera_(rendering::SensorModel(filter::with_settings(options.sensor, scene.depth_noise)), options.camera),
         noise_(seed, core::Purpose::kSensorNoise) {
-    if (!options.lens.is_none()) warp_ = interfaces::LensWarp::distorting(scene.camera->intrinsics, options.lens);
+    TrackerSettings told;
+    told.topics = options.topics;
+    const std::vector<CameraInput> inputs = camera_inputs(told, scene);
+    for (int i = 0; i < belief::camera_count(scene); ++i) {
+      const belief::SceneCamera& camera = *belief::camera_at(scene, i);
+      Taker taker{camera, inputs[std::min(static_cast<std::size_t>(i), inputs.size() - 1)].topics,
+                  camera_frame_of(scene, i),
+                  rendering::SimulatedCamera(
+                      rendering::SensorModel(filter::with_settings(options.sensor, belief::depth_noise_of(scene, i))),
+                      options.camera)};
+      if (!options.lens.is_none()) taker.warp = interfaces::LensWarp::distorting(camera.intrinsics, options.lens);
+      cameras_.push_back(std::move(taker));
+    }
   }
 
-  core::Status write_camera_pose() {
-    const interfaces::FrameTransform transform{options_.world_frame, camera_frame_of(scene_), options_.start_ns,
-                                               scene_.camera->X_WC};
+  core::Status write_camera_poses() {
+    interfaces::RosTfMessage message;
+    for (const Taker& camera : cameras_)
+      message.transforms.push_back(interfaces::to_ros_transform(
+          interfaces::FrameTransform{options_.world_frame, camera.frame, options_.start_ns, camera.scene.X_WC}));
     return write(options_.topics.tf_static, "tf2_msgs/msg/TFMessage", options_.start_ns,
-                 interfaces::encode_cdr(interfaces::RosTfMessage{{interfaces::to_ros_transform(transform)}}));
+                 interfaces::encode_cdr(message));
   }
 
   core::Status write_robot(double time) {
@@ -71,15 +94,16 @@ class Player {
                  interfaces::encode_cdr(interfaces::RosString{belief::json_text(json)}));
   }
 
-  /// `scene`: with the objects that are there now, which are the state's.
+  /// Of the camera whose turn it is. `scene`: with the objects that are there now, which are the state's.
   core::Status write_frame(std::uint64_t number, const belief::Scene& scene, const belief::WorldState& state) {
+    const Taker& taker = cameras_[number % cameras_.size()];
     std::vector<geometry::Pose> X_WG;
     for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
       X_WG.push_back(belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), state.time));
     }
     const filter::BeliefView view =
         filter::render_scene(scene, state, X_WG, filter::MeshDetail::kDisplay, backends_.meshes());
-    const belief::SceneCamera& camera = *scene_.camera;
+    const belief::SceneCamera& camera = taker.scene;
     rendering::RenderOptions render_options;
     render_options.normals = true;
     render_options.color = rendering::has_looks(view.scene);
@@ -94,24 +118,26 @@ class Player {
     }
     geometry::DepthImage depth;
     geometry::ColorImage color;
-    camera_.sample(view.scene, images, sees_through ? &behind : nullptr, camera.intrinsics, camera.X_WC, noise_, number,
-                   &depth, &color);
+    taker.camera.sample(view.scene, images, sees_through ? &behind : nullptr, camera.intrinsics, camera.X_WC, noise_,
+                        number, &depth, &color);
 
-    if (warp_) {
-      PRESCENE_TRY(depth, warp_->depth(depth));
-      PRESCENE_TRY(color, warp_->color(color));
+    if (taker.warp) {
+      PRESCENE_TRY(depth, taker.warp->depth(depth));
+      PRESCENE_TRY(color, taker.warp->color(color));
     }
 
     const core::TimeNs stamp_ns = stamp(state.time);
-    const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ns), camera_frame_of(scene_)};
+    const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ns), taker.frame};
     PRESCENE_RETURN_IF_ERROR(
-        write(options_.topics.camera_info, "sensor_msgs/msg/CameraInfo", stamp_ns,
+        write(taker.topics.camera_info, "sensor_msgs/msg/CameraInfo", stamp_ns,
               interfaces::encode_cdr(interfaces::to_ros_camera_info(camera.intrinsics, header, options_.lens))));
-    PRESCENE_RETURN_IF_ERROR(write(options_.topics.color, "sensor_msgs/msg/Image", stamp_ns,
-                                   interfaces::encode_cdr(interfaces::to_ros_image(color, header))));
-    PRESCENE_RETURN_IF_ERROR(write(options_.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
+    if (!taker.topics.color.empty()) {
+      PRESCENE_RETURN_IF_ERROR(write(taker.topics.color, "sensor_msgs/msg/Image", stamp_ns,
+                                     interfaces::encode_cdr(interfaces::to_ros_image(color, header))));
+    }
+    PRESCENE_RETURN_IF_ERROR(write(taker.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
                                    interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
-    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(scene, state, view, images))),
+    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(scene, state, view, taker, images))),
                                  stamp_ns + core::ns_of(options_.latency));
   }
 
@@ -132,25 +158,40 @@ class Player {
     return written.status();
   }
 
-  TruthRecord truth(const belief::Scene& scene, const belief::WorldState& state, const filter::BeliefView& view,
-                    const rendering::RenderedView& images) {
-    TruthRecord record;
-    record.stamp_ns = stamp(state.time);
+  /// Of each object the share of the pixels that it would cover alone in a camera's view, `images`.
+  std::vector<double> visible_shares(std::size_t objects, const filter::BeliefView& view,
+                                     const belief::SceneCamera& camera, const rendering::RenderedView& images) {
+    std::vector<double> shares(objects, 0.0);
     std::vector<int> visible(view.scene.instances.size() + 1, 0);
     for (std::size_t i = 0; i < images.labels.size(); ++i) ++visible[images.labels.data()[i]];
-    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    for (std::size_t i = 0; i < objects; ++i) {
       rendering::RenderScene alone;
       alone.instances.push_back(view.scene.instances[i]);
       rendering::RenderedView alone_view;
-      double share = 0.0;
-      if (renderer_.render(alone, scene_.camera->intrinsics, scene_.camera->X_WC, {}, &alone_view).ok()) {
-        const auto* labels = alone_view.labels.data();
-        const auto covered =
-            std::count_if(labels, labels + alone_view.labels.size(), [](std::uint16_t l) { return l != 0; });
-        if (covered > 0) share = static_cast<double>(visible[i + 1]) / static_cast<double>(covered);
-      }
-      record.objects.push_back({scene.objects[i].name, state.objects[i].X_WO, share});
+      if (!renderer_.render(alone, camera.intrinsics, camera.X_WC, {}, &alone_view).ok()) continue;
+      const auto* labels = alone_view.labels.data();
+      const auto covered =
+          std::count_if(labels, labels + alone_view.labels.size(), [](std::uint16_t l) { return l != 0; });
+      if (covered > 0) shares[i] = static_cast<double>(visible[i + 1]) / static_cast<double>(covered);
     }
+    return shares;
+  }
+
+  TruthRecord truth(const belief::Scene& scene, const belief::WorldState& state, const filter::BeliefView& view,
+                    const Taker& taker, const rendering::RenderedView& images) {
+    TruthRecord record;
+    record.stamp_ns = stamp(state.time);
+    std::vector<double> shares = visible_shares(scene.objects.size(), view, taker.scene, images);
+    for (const Taker& other : cameras_) {
+      rendering::RenderedView others_images;
+      if (&other == &taker ||
+          !renderer_.render(view.scene, other.scene.intrinsics, other.scene.X_WC, {}, &others_images).ok())
+        continue;
+      const std::vector<double> more = visible_shares(scene.objects.size(), view, other.scene, others_images);
+      for (std::size_t i = 0; i < shares.size(); ++i) shares[i] = std::max(shares[i], more[i]);
+    }
+    for (std::size_t i = 0; i < scene.objects.size(); ++i)
+      record.objects.push_back({scene.objects[i].name, state.objects[i].X_WO, shares[i]});
     for (const belief::SceneObject& object : scene_.objects)
       if (!belief::find_object(scene, object.name)) record.objects.push_back({object.name, {}, 0.0, false});
     return record;
@@ -161,14 +202,16 @@ class Player {
   Backends& backends_;
   rendering::Renderer& renderer_;
   RecordingWriter& recording_;
-  rendering::SimulatedCamera camera_;
   core::RandomStream noise_;
-  std::optional<interfaces::LensWarp> warp_;  // where there is a lens
+  std::vector<Taker> cameras_;
 };
 
 }  // namespace
 
-std::string camera_frame_of(const belief::Scene& scene) { return scene.camera->name + "_optical_frame"; }
+std::string camera_frame_of(const belief::Scene& scene, int camera) {
+  const belief::SceneCamera& of = *belief::camera_at(scene, camera);
+  return of.frame.empty() ? of.name + "_optical_frame" : of.frame;
+}
 
 core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
                                 std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
@@ -177,8 +220,15 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     return core::invalid_input("scene '" + scene.name +
                                "' has no camera to record with: add one (docs/reference/scene_files.md)");
   }
-  PRESCENE_TRY(const std::vector<PlayedPart> parts, play_scene(scene, options.changes, backends.simulator_factory(),
-                                                               1.0 / options.rate, seed, backends.pool()));
+  for (int i = 0; i < belief::camera_count(scene); ++i) {
+    const belief::SceneCamera& camera = *belief::camera_at(scene, i);
+    if (camera.topics && !camera.is_placed)
+      return core::invalid_input("camera '" + camera.name +
+                                 "' has no place to record from: give it 'look' or 'pose' in the scene file");
+  }
+  const double interval = 1.0 / (options.rate * belief::camera_count(scene));
+  PRESCENE_TRY(const std::vector<PlayedPart> parts,
+               play_scene(scene, options.changes, backends.simulator_factory(), interval, seed, backends.pool()));
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
   Player player(scene, options, seed, backends, *renderer, recording);
 
@@ -203,7 +253,7 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
   }
   std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) { return a.time_ns < b.time_ns; });
 
-  PRESCENE_RETURN_IF_ERROR(player.write_camera_pose());
+  PRESCENE_RETURN_IF_ERROR(player.write_camera_poses());
   for (std::size_t i = 0; i < due.size(); ++i) {
     if (cancellation.requested()) return core::cancelled("stopped on request; the frames recorded so far are kept");
     PRESCENE_RETURN_IF_ERROR(due[i].write());

@@ -76,6 +76,8 @@ core::Status FrameAssembler::add_depth(DepthMessage&& message, MessageIndex inde
                 std::move(frame_id),
                 std::make_shared<geometry::DepthImage>(std::move(message.depth)),
                 std::move(message.report.warnings)};
+  if (newest_ && stamp_ns > newest_->stamp_ns) period_ns_ = stamp_ns - newest_->stamp_ns;
+  newest_ = {stamp_ns, received_ns};
   if (const char* doubt = doubt_of_stamp(entry)) {
     skip(entry, doubt);
     return core::ok_status();
@@ -229,8 +231,11 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
       waiting.frame_id.empty() ? core::Result<geometry::Pose>(core::not_found("the depth image names no frame"))
                                : tf_.lookup(settings_.world_frame, waiting.frame_id, waiting.stamp_ns);
   if (!X_WC && !settings_.X_WC) return {{}, X_WC.status().message(), false};
-  if (!X_WC && !out_of_time && tf_.knows(waiting.frame_id)) return {{}, X_WC.status().message(), false};
+  if (!X_WC && !out_of_time && (settings_.doubts_X_WC || tf_.knows(waiting.frame_id)))
+    return {{}, X_WC.status().message(), false};
   observation.X_WC = X_WC ? *X_WC : *settings_.X_WC;
+  if (!X_WC && settings_.doubts_X_WC)
+    frame.doubts.push_back("tf does not tell where the camera is: it is taken to be where the scene says");
 
   for (const std::string& body : robot_bodies_) {
     const core::Result<geometry::Pose> X_WG = tf_.lookup(settings_.world_frame, body, waiting.stamp_ns);
@@ -246,24 +251,71 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
   return {std::move(frame), "", false};
 }
 
+bool FrameAssembler::is_out_of_time(const Waiting& waiting, core::TimeNs now_ns) const {
+  // A time before it came is that of a simulation that began anew.
+  return now_ns < waiting.received_ns || now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
+}
+
+std::optional<AssembledFrame> FrameAssembler::finish(std::size_t index, AssembledFrame&& frame) {
+  const Waiting taken = waiting_[index];
+  last_taken_ = Taken{taken.stamp_ns, taken.received_ns};
+  for (std::size_t older = 0; older < index; ++older) skip(waiting_[older], "a newer frame was ready");
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(index + 1));
+  // Last, as it needs memory: the frame is gone even if there is none.
+  const core::Status straight = straighten(frame);
+  if (straight.ok()) return std::move(frame);
+  skip(taken, straight.message());
+  return std::nullopt;
+}
+
+std::optional<std::size_t> FrameAssembler::pick(core::TimeNs now_ns, std::optional<AssembledFrame>* frame) {
+  std::optional<std::size_t> picked;
+  for (std::size_t i = 0; i < waiting_.size();) {
+    const Waiting& waiting = waiting_[i];
+    const bool out_of_time = is_out_of_time(waiting, now_ns);
+    Attempt attempt = assemble(waiting, out_of_time);
+    if (!attempt.frame && (attempt.hopeless || out_of_time)) {
+      skip(waiting, attempt.missing);
+      waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(i));
+      continue;
+    }
+    if (attempt.frame) {
+      picked = i;
+      *frame = std::move(attempt.frame);
+      if (now_ns - waiting.received_ns < 2 * core::ns_of(settings_.max_wait_s)) break;
+    }
+    ++i;
+  }
+  return picked;
+}
+
+std::optional<FrameAssembler::DepthTimes> FrameAssembler::ready(core::TimeNs now_ns) {
+  std::optional<AssembledFrame> frame;
+  const auto picked = pick(now_ns, &frame);
+  if (!picked) return std::nullopt;
+  return DepthTimes{waiting_[*picked].stamp_ns, waiting_[*picked].received_ns};
+}
+
+std::optional<AssembledFrame> FrameAssembler::take_ready(core::TimeNs now_ns) {
+  std::optional<AssembledFrame> frame;
+  const auto picked = pick(now_ns, &frame);
+  if (!picked) return std::nullopt;
+  return finish(*picked, *std::move(frame));
+}
+
+void FrameAssembler::skip_up_to(core::TimeNs stamp_ns, const std::string& reason) {
+  while (!waiting_.empty() && waiting_.front().stamp_ns <= stamp_ns) {
+    skip(waiting_.front(), reason);
+    waiting_.pop_front();
+  }
+}
+
 std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
   for (std::size_t newest = waiting_.size(); newest > 0; --newest) {
     const Waiting& waiting = waiting_[newest - 1];
-    // A time before it came is that of a simulation that began anew.
-    const bool out_of_time =
-        now_ns < waiting.received_ns || now_ns - waiting.received_ns >= core::ns_of(settings_.max_wait_s);
+    const bool out_of_time = is_out_of_time(waiting, now_ns);
     Attempt attempt = assemble(waiting, out_of_time);
-    if (attempt.frame) {
-      const Waiting taken = waiting;
-      last_taken_ = Taken{taken.stamp_ns, taken.received_ns};
-      for (std::size_t older = 0; older + 1 < newest; ++older) skip(waiting_[older], "a newer frame was ready");
-      waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(newest));
-      // Last, as it needs memory: the frame is gone even if there is none.
-      const core::Status straight = straighten(*attempt.frame);
-      if (straight.ok()) return std::move(attempt.frame);
-      skip(taken, straight.message());
-      return std::nullopt;
-    }
+    if (attempt.frame) return finish(newest - 1, *std::move(attempt.frame));
     if (attempt.hopeless || out_of_time) {
       skip(waiting, attempt.missing);
       waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(newest - 1));

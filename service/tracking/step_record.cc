@@ -59,6 +59,7 @@ ordered_json to_json(const StepRecord& record) {
                        {"now_ns", record.now_ns},
                        {"stamp_ns", record.stamp_ns},
                        {"depth", record.depth}};
+  if (record.camera != 0) json["camera"] = record.camera;
   if (record.color) json["color"] = *record.color;
   json["camera_info"] = record.camera_info;
   json["tf_until"] = record.tf_until;
@@ -88,6 +89,8 @@ core::Result<StepRecord> step_record_from_json(const std::string& text) {
   if (!number("depth", record.depth)) return bad("no 'depth'");
   if (!number("camera_info", record.camera_info)) return bad("no 'camera_info'");
   if (!number("tf_until", record.tf_until)) return bad("no 'tf_until'");
+  if (json.contains("camera") && (!number("camera", record.camera) || record.camera < 0))
+    return bad("'camera' is not a number");
   if (json.contains("color") && !number("color", record.color.emplace())) return bad("'color' is not a number");
   const auto hash = json.find("belief_hash");
   if (hash == json.end() || !hash->is_string()) return bad("no 'belief_hash'");

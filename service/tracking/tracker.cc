@@ -24,13 +24,6 @@ core::Result<Message> decoded(const interfaces::ReceivedMessage& message, const 
   return interfaces::decode_cdr<Message>(message.cdr, interfaces::kSmallMessage);
 }
 
-/// Frames do not wait for the colour of a topic that nobody named, and topics say by their names what they hold.
-TrackerSettings settled(TrackerSettings settings) {
-  settings.assembler.use_color = settings.assembler.use_color && !settings.topics.color.empty();
-  settings.assembler.rectified = is_rectified(settings);
-  return settings;
-}
-
 /// With what the scene decides where the settings do not.
 filter::FilterSettings filter_settings(const TrackerSettings& settings, const belief::Scene& scene) {
   filter::FilterSettings filter = settings.filter;
@@ -76,13 +69,12 @@ Tracker::Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettin
                  interfaces::LearnedFile learned, std::vector<belief::PhysicalBelief> physics, std::uint64_t seed,
                  Backends& backends, std::unique_ptr<rendering::Renderer> renderer,
                  std::unique_ptr<rendering::LikelihoodBatch> likelihood)
-    : settings_(settled(settings)),
-      rectified_doubt_(rectified_doubt(settings)),
+    : settings_(settings),
       renderer_(std::move(renderer)),
       likelihood_(std::move(likelihood)),
       filter_(*likelihood_, *renderer_, backends.pool(), filter_settings(settings, *scene),
               backends.simulator_factory()),
-      assembler_(settings_.assembler, robot_names(*scene), settings.tf),
+      frames_(camera_inputs(settings, *scene), robot_names(*scene), settings.tf),
       scene_(std::move(scene)),
       learned_(std::move(learned)),
       physics_(std::move(physics)),
@@ -110,27 +102,7 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
       PRESCENE_TRY(simulated_now_ns_, interfaces::to_stamp_ns(clock.clock));
       return core::ok_status();
     }
-    if (message.topic == topics.depth) {
-      PRESCENE_TRY(DepthMessage depth, decode_depth(message, assembler_.image_rules()));
-      return assembler_.add_depth(std::move(depth), index, received_ns);
-    }
-    if (message.topic == topics.color) {
-      if (!assembler_.uses_color()) return core::ok_status();
-      PRESCENE_TRY(ColorMessage color, decode_color_message(message));
-      return assembler_.add_color(std::move(color), index, received_ns);
-    }
-    if (message.topic == topics.camera_info) {
-      PRESCENE_TRY(const auto info, decoded<interfaces::RosCameraInfo>(message, "sensor_msgs/msg/CameraInfo"));
-      return assembler_.add_camera_info(info, index);
-    }
-    if (message.topic == topics.tf || message.topic == topics.tf_static) {
-      PRESCENE_TRY(const auto tf, decoded<interfaces::RosTfMessage>(message, "tf2_msgs/msg/TFMessage"));
-      return assembler_.add_tf(tf, index, message.topic == topics.tf_static);
-    }
-    if (message.topic == topics.joint_states && settings_.assembler.robot) {
-      PRESCENE_TRY(const auto joints, decoded<interfaces::RosJointState>(message, "sensor_msgs/msg/JointState"));
-      return assembler_.add_joint_state(joints, index);
-    }
+    if (std::optional<core::Status> taken = frames_.take_in(message, index, received_ns)) return *std::move(taken);
     if (message.topic == kControlTopic) {
       PRESCENE_RETURN_IF_ERROR(check_type(message, "std_msgs/msg/String"));
       const auto newest_ns = belief_->step > 0 ? std::optional(belief_->stamp_ns) : std::nullopt;
@@ -140,7 +112,7 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
     if (message.topic == kSettingsTopic) {
       PRESCENE_TRY(const auto text, decoded<interfaces::RosString>(message, "std_msgs/msg/String"));
       PRESCENE_TRY(settings_, with_running(settings_, text.data));
-      assembler_.set_waits(settings_.assembler.max_wait_s, settings_.assembler.max_stamp_difference_s);
+      frames_.set_waits(settings_.assembler.max_wait_s, settings_.assembler.max_stamp_difference_s);
       filter_.look_for_new_objects(filter_settings(settings_, *scene_).augment.new_objects);
       return core::ok_status();
     }
@@ -150,11 +122,15 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
 }
 
 std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
-  std::optional<AssembledFrame> frame = assembler_.take(uses_simulated_time() ? simulated_now_ns_ : now_ns);
+  const core::TimeNs time_ns = uses_simulated_time() ? simulated_now_ns_ : now_ns;
+  std::optional<AssembledFrame> frame = frames_.take(time_ns);
   if (!frame) return std::nullopt;
   const core::Stopwatch watch;
   const core::TimeNs stamp_ns = frame->observation.stamp_ns;
-  const bool clock_went_back = belief_->step > 0 && stamp_ns <= belief_->stamp_ns;
+  // Cameras that are triggered together take frames at one instant.
+  const bool is_at_once = belief_->step > 0 && stamp_ns == belief_->stamp_ns && !belief_->cameras.empty() &&
+                          belief_->cameras[static_cast<std::size_t>(frame->observation.camera)].stamp_ns < stamp_ns;
+  const bool clock_went_back = belief_->step > 0 && stamp_ns <= belief_->stamp_ns && !is_at_once;
   // What is known only changes at the end, all at once.
   std::shared_ptr<const belief::Belief> before = belief_;
   WaitingControls controls = controls_;
@@ -163,26 +139,28 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
     before = std::make_shared<const belief::Belief>(start(belief_->seed));
     if (clock_went_back) controls.begin_again();
   }
-  // The first frame of a belief predicts nothing, so that no control could act.
-  const bool predicts = before->step > 0;
+  // The first frame of a belief predicts nothing, so that no control could act; nor does one at the instant of the
+  // last.
+  const bool predicts = before->step > 0 && stamp_ns > before->stamp_ns;
   const belief::Control control =
       predicts ? controls.due(before->stamp_ns, stamp_ns) : belief::Control{before->stamp_ns, stamp_ns, {}};
   filter::StepResult result = filter_.step(*before, frame->observation, control);
   if (predicts) controls.forget_due(stamp_ns);
-  if (!predicts && result.belief.step > 0) controls.begin_at(stamp_ns);
+  if (before->step == 0 && result.belief.step > 0) controls.begin_at(stamp_ns);
 
   TrackerStep step;
   step.record.after = last_index_;
   step.record.now_ns = now_ns;
   step.record.stamp_ns = stamp_ns;
+  step.record.camera = frame->observation.camera;
   step.record.depth = frame->depth;
   step.record.color = frame->color;
   step.record.camera_info = frame->camera_info;
   step.record.tf_until = frame->tf_until;
-  step.record.skipped = assembler_.take_skipped();
+  step.record.skipped = frames_.take_skipped();
   step.record.degraded = degraded_words(result);
   std::ranges::move(frame->doubts, std::back_inserter(step.record.degraded));
-  if (!rectified_doubt_.empty()) step.record.degraded.push_back(rectified_doubt_);
+  std::ranges::move(frames_.silent(time_ns), std::back_inserter(step.record.degraded));
   if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
   if (restarts) step.record.degraded.push_back("started again, as a control asked");
   if (const std::uint64_t dropped = controls.dropped() - controls_.dropped(); dropped > 0)

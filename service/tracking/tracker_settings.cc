@@ -103,9 +103,12 @@ bool is_rectified(const TrackerSettings& settings) {
 }
 
 std::string rectified_doubt(const TrackerSettings& settings) {
-  const InputTopics& topics = settings.topics;
-  const bool uses_color = settings.assembler.use_color && !topics.color.empty();
-  if (settings.assembler.rectified || !uses_color ||
+  return rectified_doubt(settings.topics, settings.assembler);
+}
+
+std::string rectified_doubt(const InputTopics& topics, const AssemblerSettings& assembler) {
+  const bool uses_color = assembler.use_color && !topics.color.empty();
+  if (assembler.rectified || !uses_color ||
       names_rectified_images(topics.depth) == names_rectified_images(topics.color))
     return "";
   return "by their names, one of " + topics.depth + " and " + topics.color +

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/recording_view.h"
+#include "prescene/service/tracking/camera_frames.h"
 
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -104,7 +105,8 @@ int RecordingView::port() const { return impl_->server->port(); }
 interfaces::WebCounts RecordingView::counts() const { return impl_->server->counts(); }
 
 StepSink RecordingView::step_sink() {
-  return [this](const TrackerStep& step, const Tracker& tracker) {
+  return [this, pictured = PicturedFrames()](const TrackerStep& step, const Tracker& tracker) mutable {
+    if (!pictured.has(step.observation)) return core::ok_status();
     return add({tracker.belief(), step.observation, step.record.seconds, step.record.degraded});
   };
 }

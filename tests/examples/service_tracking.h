@@ -19,6 +19,13 @@ extern const interfaces::RosJointState joint_state;
 extern TfBuffer tf;
 }  // namespace joint_transforms_h
 
+namespace camera_frames_h {
+extern const std::shared_ptr<const belief::Scene> scene;
+extern const interfaces::ReceivedMessage message;
+extern const MessageIndex index;
+extern const core::TimeNs received_ns, now_ns;
+}  // namespace camera_frames_h
+
 namespace tracker_h {
 extern const std::shared_ptr<const belief::Scene> scene;
 extern const std::uint64_t seed;

@@ -21,6 +21,7 @@
 #include "prescene/service/recording/residuals.h"
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/frame_assembler.h"
 #include "prescene/service/tracking/topics.h"
 #include "prescene/service/tracking/tracker_settings.h"
@@ -67,7 +68,8 @@ class SessionReport {
   void add_answer_section(double at, const nlohmann::ordered_json& answer, interfaces::ReportContents& contents) const;
 
   std::shared_ptr<const belief::Scene> scene_;
-  InputTopics topics_;
+  InputTopics topics_;  // of the first camera
+  PicturedFrames pictured_;
   FrameAssembler assembler_;
   MessageIndex next_index_ = 0;
   Backends* backends_;

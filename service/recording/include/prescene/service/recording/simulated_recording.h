@@ -19,11 +19,11 @@
 namespace prescene::service {
 
 struct SimulatedRecordingOptions {
-  double rate = 15.0;                                 ///< Frames a second.
+  double rate = 15.0;                                 ///< Frames a second, of each camera.
   double tf_rate = 60.0;                              ///< Poses of the robot's bodies a second.
   core::TimeNs start_ns = 1'000'000'000'000'000'000;  ///< Stamp of the first frame.
   double latency = 0.004;                             ///< s between the stamp of a message and its arrival.
-  InputTopics topics;
+  InputTopics topics;  ///< Those of the images: where the scene does not list its cameras.
   std::string world_frame = "world";
   rendering::SimulatedCameraOptions camera;
   rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
@@ -35,25 +35,26 @@ struct SimulatedRecordingOptions {
   bool reports_robot = true;
 };
 
-/// What the camera frame is called in simulated recordings: "<camera's name>_optical_frame".
-std::string camera_frame_of(const belief::Scene& scene);
+/// What the camera frame is called in simulated recordings: as the scene says, else "<camera's name>_optical_frame".
+std::string camera_frame_of(const belief::Scene& scene, int camera = 0);
 
 /// One instance of the scene, drawn from its distributions with `seed`, from its start to its duration (it goes on
 /// after everything has come to rest, so that the camera sees the end). Messages: latched camera pose, robot poses,
 /// camera info, depth (16UC1, millimetres) and colour (rgb8), the scene's actions as controls at their times, the truth
-/// of each frame, and in the end which of the scene's outcomes came to pass. Fails with kInvalidInput when the scene
-/// has no camera or a change is none (play_scene), kCancelled with what is done kept.
+/// of each frame, and in the end which of the scene's outcomes came to pass. Several cameras take turns: they are not
+/// triggered together. Fails with kInvalidInput when the scene has no camera, or one of several has no pose, or a
+/// change is none (play_scene), kCancelled with what is done kept.
 core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
                                 std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
                                 const core::ProgressSink& progress, RecordingWriter& recording);
 
-/// The truth of one simulated frame, on kTruthTopic.
+/// The truth of one simulated frame, of whichever camera, on kTruthTopic.
 struct TruthRecord {
   core::TimeNs stamp_ns = 0;
   struct Object {
     std::string name;
     geometry::Pose X_WO;
-    double visible_share = 0.0;  ///< Of the pixels that it would cover alone in this view.
+    double visible_share = 0.0;  ///< Of the pixels that it would cover alone, in the view that shows most of it.
     bool present = true;         ///< Else it was taken away, or not put in yet; the pose says nothing then.
   };
   std::vector<Object> objects;

@@ -40,6 +40,8 @@ struct AssemblerSettings {
   std::string camera_frame;
   /// The camera's pose when tf does not know it; empty = frames without tf are skipped.
   std::optional<geometry::Pose> X_WC;
+  /// X_WC is what the scene file says: tf is waited for first, and a frame that goes without it says so.
+  bool doubts_X_WC = false;
   double max_wait_s = 0.05;               ///< How long a depth image waits for its colour image, camera info and tf.
   double max_stamp_difference_s = 0.017;  ///< Between a depth image and its colour image.
   bool use_color = true;
@@ -98,6 +100,26 @@ class FrameAssembler {
 
   /// The newest frame that is complete at `now_ns`; older waiting frames are skipped.
   std::optional<AssembledFrame> take(core::TimeNs now_ns);
+  /// For whoever takes the frames of several cameras in their order. The frame that take_ready() takes, if there is
+  /// one: the oldest that is complete; of those that have waited for twice max_wait_s, as the caller can't keep up, the
+  /// newest.
+  struct DepthTimes {
+    core::TimeNs stamp_ns = 0;
+    core::TimeNs received_ns = 0;
+  };
+  std::optional<DepthTimes> ready(core::TimeNs now_ns);
+  std::optional<AssembledFrame> take_ready(core::TimeNs now_ns);
+  /// Skips what waits with a stamp up to this one.
+  void skip_up_to(core::TimeNs stamp_ns, const std::string& reason);
+  /// Whether a depth image with an earlier stamp waits for what completes it.
+  bool waits_before(core::TimeNs stamp_ns) const { return !waiting_.empty() && waiting_.front().stamp_ns < stamp_ns; }
+  /// The depth image that came last, used or not; empty = none has come.
+  const std::optional<DepthTimes>& newest() const { return newest_; }
+  /// Between the stamps of the last two depth images that came in order; 0 = there are no two.
+  core::TimeNs period_ns() const { return period_ns_; }
+  /// The sender's clock went back, as another camera's frames show.
+  void clock_jumped_back();
+
   /// When take() should be asked again although nothing has come in; empty if nothing waits.
   std::optional<core::TimeNs> next_deadline() const;
   /// What was skipped since the last call, oldest first; of more than a thousand, the newest.
@@ -136,7 +158,11 @@ class FrameAssembler {
   const char* doubt_of_stamp(const Waiting& frame);
   core::Status straighten(AssembledFrame& frame);
   void skip(const Waiting& waiting, std::string reason);
-  void clock_jumped_back();
+  /// Index into waiting_ of the frame that take_ready() takes.
+  std::optional<std::size_t> pick(core::TimeNs now_ns, std::optional<AssembledFrame>* frame);
+  /// Takes that frame out, and skips those before it.
+  std::optional<AssembledFrame> finish(std::size_t index, AssembledFrame&& frame);
+  bool is_out_of_time(const Waiting& waiting, core::TimeNs now_ns) const;
 
   AssemblerSettings settings_;
   std::vector<std::string> robot_bodies_;
@@ -156,6 +182,8 @@ class FrameAssembler {
     core::TimeNs received_ns;
   };
   std::optional<Taken> last_taken_;
+  std::optional<DepthTimes> newest_;
+  core::TimeNs period_ns_ = 0;
   int ahead_in_a_row_ = 0;            // frames whose stamps are far ahead of the last one taken, ...
   int behind_in_a_row_ = 0;           // ... or before it
   std::deque<SkippedFrame> skipped_;  // not taken yet, bounded

@@ -24,6 +24,7 @@ struct StepRecord {
   MessageIndex after = 0;
   core::TimeNs now_ns = 0;
   core::TimeNs stamp_ns = 0;  ///< Of the frame.
+  int camera = 0;             ///< Of the scene whose frame it is.
   MessageIndex depth = 0;
   std::optional<MessageIndex> color;
   MessageIndex camera_info = 0;

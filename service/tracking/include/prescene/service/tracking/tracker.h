@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One scene, tracked: messages go in, beliefs come out. The live service and the replay of a recording both drive it;
-// it reads no clock and owns no thread, so that both come to the same bits.
+// One scene, tracked by one camera or several: messages go in, beliefs come out. The live service and the replay of a
+// recording both drive it; it reads no clock and owns no thread, so that both come to the same bits.
 //
 //   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings, seed, backends));
 //   PRESCENE_RETURN_IF_ERROR(tracker->take_in(message, index));
@@ -18,6 +18,7 @@
 #include "prescene/interfaces/scene_files/learned_file.h"
 #include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/step_record.h"
 #include "prescene/service/tracking/tracker_settings.h"
 #include "prescene/service/tracking/waiting_controls.h"
@@ -55,7 +56,7 @@ class Tracker {
   std::optional<TrackerStep> step(core::TimeNs now_ns);
   /// When step() should be tried again although nothing came in. Simulated time goes on by messages only.
   std::optional<core::TimeNs> next_deadline() const {
-    return uses_simulated_time() ? std::nullopt : assembler_.next_deadline();
+    return uses_simulated_time() ? std::nullopt : frames_.next_deadline();
   }
   /// Whether the settings name a clock topic. What frames wait for each other, and the time of controls without a
   /// stamp, is counted by it then; it stands still until it comes, as in ROS.
@@ -64,13 +65,13 @@ class Tracker {
   core::TimeNs simulated_now_ns() const { return simulated_now_ns_; }
 
   /// Frames that were not used, since the start, and why the newest since the last step was not ("" = none was).
-  std::uint64_t skipped_count() const { return assembler_.skipped_count(); }
-  std::string last_skip() const { return assembler_.last_skip(); }
+  std::uint64_t skipped_count() const { return frames_.skipped_count(); }
+  std::string last_skip() const { return frames_.last_skip(); }
   /// Transforms that tf's buffer forgot early for want of room, since the start.
-  std::uint64_t tf_forgotten() const { return assembler_.tf_forgotten(); }
-  std::uint64_t tf_late() const { return assembler_.tf_late(); }
+  std::uint64_t tf_forgotten() const { return frames_.tf_forgotten(); }
+  std::uint64_t tf_late() const { return frames_.tf_late(); }
   /// What is done about the lens, as FrameAssembler::lens_text().
-  std::string lens_text() const { return assembler_.lens_text(); }
+  std::string lens_text() const { return frames_.lens_text(); }
   /// Actions of controls that wait for a frame, and those that were dropped since the start, as in WaitingControls.
   std::size_t waiting_controls() const { return controls_.count(); }
   std::uint64_t dropped_controls() const { return controls_.dropped(); }
@@ -89,11 +90,10 @@ class Tracker {
   belief::Belief start(std::uint64_t seed) const;
 
   TrackerSettings settings_;
-  std::string rectified_doubt_;
   std::unique_ptr<rendering::Renderer> renderer_;
   std::unique_ptr<rendering::LikelihoodBatch> likelihood_;
   filter::ParticleFilter filter_;
-  FrameAssembler assembler_;
+  CameraFrames frames_;
   core::TimeNs simulated_now_ns_ = 0;
   MessageIndex last_index_ = 0;
   WaitingControls controls_;

@@ -30,6 +30,7 @@ struct TrackerSettings {
 bool is_rectified(const TrackerSettings& settings);
 /// What speaks against it: one of the image topics is named as rectified, the other is not, and the settings don't say
 /// which holds. "" if nothing does.
+std::string rectified_doubt(const InputTopics& topics, const AssemblerSettings& assembler);
 std::string rectified_doubt(const TrackerSettings& settings);
 
 /// All but the filter's settings, which are those of the program's version.

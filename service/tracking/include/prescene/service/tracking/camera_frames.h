@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frames of all cameras that see one scene, in the order in which one belief takes them.
+//
+// With one camera it is that camera's FrameAssembler, and nothing else. With several, frames are taken in the order of
+// their stamps: a frame waits for those of other cameras that are older and have not come, or are not complete, but for
+// no longer than max_wait_s after it came; whether another camera's frame is still to come follows from the stamps of
+// its last two. What comes later than that is older than what was used, and is skipped, with the reason. Where the
+// caller can't keep up, cameras take turns. A camera that has sent nothing for a second is not waited for.
+//
+// The cameras' stamps are by one clock. A camera whose clock differs by more than a second from that of the frames
+// which are used is not used while another one keeps that clock, and that is said.
+//
+//   CameraFrames frames(camera_inputs(settings, *scene), robot_names(*scene), settings.tf);
+//   if (auto taken = frames.take_in(message, index, received_ns)) return *taken;  // it was on one of the topics
+//   if (auto frame = frames.take(now_ns)) ... frame->observation.camera
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/service/tracking/frame_assembler.h"
+#include "prescene/service/tracking/topics.h"
+#include "prescene/service/tracking/tracker_settings.h"
+
+namespace prescene::service {
+
+/// One camera: what its images are called and how frames are made of them.
+struct CameraInput {
+  std::string name;    ///< "" = of the only one.
+  InputTopics topics;  ///< Those that are not the camera's are the same for all.
+  AssemblerSettings assembler;
+};
+
+/// The cameras that are listened to: those that the scene lists under `cameras`, with their topics, frames, and poses
+/// where tf has none; of a scene without such a list the one that the settings tell of.
+std::vector<CameraInput> camera_inputs(const TrackerSettings& settings, const belief::Scene& scene);
+/// The topics of the first of them.
+InputTopics first_topics(const TrackerSettings& settings, const belief::Scene& scene);
+/// Settings for what looks at one camera only: the first that the scene lists, if it lists any.
+void take_first_camera(const belief::Scene& scene, TrackerSettings& settings);
+/// Whether the scene says under which topics its cameras' images come.
+bool names_topics(const belief::Scene& scene);
+/// Errors of validate(InputTopics), with the camera's name.
+core::Status validate(const std::vector<CameraInput>& cameras);
+/// Those of bus_topics(InputTopics) of all cameras, each once.
+std::vector<BusTopic> topics_of_cameras(const std::vector<CameraInput>& cameras);
+
+/// Of the frames of several cameras those that one strip of pictures is made of: the first camera's, and others while
+/// it gives none for a second.
+class PicturedFrames {
+ public:
+  bool has(const belief::Observation& observation);
+
+ private:
+  std::optional<core::TimeNs> first_ns_;  // stamp of the first camera's newest
+};
+
+/// Not thread-safe. Reads no clock.
+class CameraFrames {
+ public:
+  /// At least one camera (checked).
+  CameraFrames(std::vector<CameraInput> cameras, const std::vector<std::string>& robot_bodies,
+               const TfBufferSettings& tf);
+
+  /// Takes in a message on a topic of images, camera infos, tf or joint states; empty if it is on none of them. The
+  /// status is not ok where it says something impossible.
+  std::optional<core::Status> take_in(const interfaces::ReceivedMessage& message, MessageIndex index,
+                                      core::TimeNs received_ns);
+  /// The next frame for the belief; doubts name the camera where there are several.
+  std::optional<AssembledFrame> take(core::TimeNs now_ns);
+  /// As of FrameAssembler, of all cameras; reasons name the camera where there are several.
+  std::optional<core::TimeNs> next_deadline() const;
+  std::vector<SkippedFrame> take_skipped();
+  std::string last_skip() const;
+  std::uint64_t skipped_count() const;
+  void set_waits(double max_wait_s, double max_stamp_difference_s);
+  std::string lens_text() const;
+  std::uint64_t tf_forgotten() const { return cameras_.front().assembler.tf_forgotten(); }
+  std::uint64_t tf_late() const { return cameras_.front().assembler.tf_late(); }
+
+  /// Of several cameras those that give nothing, a sentence each: they have sent nothing for a second, or what they
+  /// send is not used.
+  std::vector<std::string> silent(core::TimeNs now_ns) const;
+
+ private:
+  struct Camera {
+    CameraInput input;
+    FrameAssembler assembler;
+    std::string prefix;                           // of messages: "camera 'side': ", "" of the only one
+    std::string rectified_doubt;                  // rectified_doubt(), with the prefix
+    int passed_over = 0;                          // complete frames that were not used since the last one that was
+    std::optional<core::TimeNs> offered_ns = {};  // stamp of the complete frame that waits its turn
+    std::optional<core::TimeNs> used_ns = {};     // when the last one that was used had come
+  };
+  /// The frame that was used last.
+  struct Used {
+    std::size_t camera = 0;
+    FrameAssembler::DepthTimes times;
+  };
+  std::optional<AssembledFrame> take_of(std::size_t camera, core::TimeNs now_ns, FrameAssembler::DepthTimes times);
+  /// What is ready of a camera and can be used; skips what can't.
+  std::optional<FrameAssembler::DepthTimes> offer(std::size_t camera, core::TimeNs now_ns);
+  bool is_of_other_clock(std::size_t camera, const FrameAssembler::DepthTimes& times) const;
+  /// Whether a frame of another camera that comes before `times` may be still to come.
+  bool waits_for_others(std::size_t camera, const FrameAssembler::DepthTimes& times, core::TimeNs now_ns) const;
+
+  std::vector<Camera> cameras_;
+  std::optional<Used> used_;
+  std::optional<core::TimeNs> began_ns_;  // when the first frame that was used had come
+  double max_wait_s_ = 0.0;
+};
+
+}  // namespace prescene::service
