@@ -113,8 +113,8 @@ void run_service(const std::string& scene_yaml, int domain, SharedFigures<FrameT
 void run_recorder(int domain, const std::filesystem::path& path, const core::Cancellation& cancellation) {
   const auto recording = service::RecordingWriter::create(path, {});
   PRESCENE_CHECK_MSG(recording.ok(), recording.status().message());
-  const auto done =
-      service::record_topics(on_domain(domain, "bench_recorder"), {}, cancellation, log_sink("recorder"), **recording);
+  const auto done = service::record_topics(on_domain(domain, "bench_recorder"), {service::CameraInput()}, cancellation,
+                                           log_sink("recorder"), **recording);
   if (!done) std::fprintf(stderr, "recorder: %s\n", done.status().message().c_str());
 }
 

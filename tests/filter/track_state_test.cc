@@ -93,16 +93,16 @@ TEST(TrackState, AFewPixelsAreNotEnoughToBeSure) {
 TEST(TrackState, HiddenIsUnseenUntilItIsTooLong) {
   belief::ObjectBelief object;
   const filter::TrackStateOptions options;
-  filter::update_track(seen(5.0), 0, options, object);
+  filter::update_track(seen(5.0), at(0), options, object);
   const double existence = object.existence;
   WeightReport hidden;
   hidden.hidden_weight = 0.9;
-  filter::update_track(hidden, static_cast<core::TimeNs>(59e9), options, object);
+  filter::update_track(hidden, at(static_cast<core::TimeNs>(59e9)), options, object);
   EXPECT_EQ(object.state, TrackState::kUnseen);
   EXPECT_EQ(object.existence, existence);  // hidden says nothing
-  filter::update_track(hidden, static_cast<core::TimeNs>(61e9), options, object);
+  filter::update_track(hidden, at(static_cast<core::TimeNs>(61e9)), options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
-  filter::update_track(hidden, static_cast<core::TimeNs>(61.1e9), options, object);
+  filter::update_track(hidden, at(static_cast<core::TimeNs>(61.1e9)), options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
 }
 

@@ -102,15 +102,24 @@ Tracked track(const std::filesystem::path& path, const std::string& scene_text, 
   return tracked;
 }
 
-/// The side's images as if both cameras had been triggered together.
-bool trigger_together(interfaces::ReceivedMessage& message) {
-  if (message.topic.rfind("/side/", 0) != 0 || message.type != "sensor_msgs/msg/Image") return true;
-  auto image = *interfaces::decode_cdr<interfaces::RosImage>(message.cdr);
-  const core::TimeNs stamp_ns = *interfaces::to_stamp_ns(image.header.stamp);
-  image.header.stamp = interfaces::to_ros_time(stamp_ns - core::ns_of(1.0 / 30.0));
-  message.cdr = interfaces::encode_cdr(image);
-  return true;
-}
+/// The side's images as if they had been taken with the front's, which came before them.
+class TriggeredTogether {
+ public:
+  bool operator()(interfaces::ReceivedMessage& message) {
+    if (message.type != "sensor_msgs/msg/Image") return true;
+    auto image = *interfaces::decode_cdr<interfaces::RosImage>(message.cdr);
+    if (message.topic.rfind("/front/", 0) == 0) {
+      front_ = image.header.stamp;
+    } else {
+      image.header.stamp = front_;
+      message.cdr = interfaces::encode_cdr(image);
+    }
+    return true;
+  }
+
+ private:
+  interfaces::RosTime front_;
+};
 
 class SeveralCameras : public testing::Test {
  protected:
@@ -188,7 +197,7 @@ TEST_F(SeveralCameras, ThatAreTriggeredTogetherAreBothUsed) {
   std::string scene = sliding_box(kWall, kBoth);
   const std::string velocity = ", velocity: [0, 0.6, 0]";
   scene.erase(scene.find(velocity), velocity.size());
-  const Tracked tracked = track(record(scene), scene, 1, trigger_together);
+  const Tracked tracked = track(record(scene), scene, 1, TriggeredTogether());
   ASSERT_GE(tracked.states.size(), 30U);
   for (std::size_t i = 1; i < tracked.states.size(); ++i)
     EXPECT_EQ(tracked.states[i], belief::TrackState::kTracked) << i;
