@@ -236,7 +236,8 @@ TEST(SceneFile, SaysWhatIsWrongWithCameras) {
   EXPECT_THAT(error("  - {fx: 500}\n"), HasSubstr("name the camera"));
   EXPECT_THAT(error("  - {name: a}\n"), HasSubstr("fov_deg"));
   EXPECT_THAT(error("  {name: a, fx: 500}\n"), HasSubstr("give a list of cameras"));
-  EXPECT_THAT(error("  - {name: a, fx: 500}\ncamera: {fx: 500, pose: {}}\n"), HasSubstr("one 'camera', or a list"));
+  EXPECT_THAT(error("  - {name: a, fx: 500}\ncamera: {fx: 500, pose: {}}\n"),
+              HasSubstr("'cameras' and 'camera' exclude each other"));
   EXPECT_EQ(error("  - {name: a, fx: 500}\n"), "");
 }
 
