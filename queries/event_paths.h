@@ -73,6 +73,8 @@ struct TrackedMotion {
   belief::Pose last;                                           ///< Where it was tracked last.
 };
 
+/// Coordinates that pushes and blows have in common, the first ones: time, direction, height and side of the touch.
+inline constexpr std::size_t kTouchDimensions = 4;
 inline constexpr double kEventInterval = 1.0 / 60.0;  ///< s between the states of simulated instances.
 /// Between the states of a run; before the first and after the last, these.
 belief::Pose pose_in(const belief::Trajectory& run, std::size_t object, double time);

@@ -217,6 +217,7 @@ class Explainer {
       propose_from(judged.posterior, target);
       options.first_points = kLaterFirstPoints;
     }
+    if (options.first_run == 0) propose_from_other_touch(hypothesis, target);
     if (options.first_run == 0 && (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise)) {
       options.most_likely = most_likely_;
       options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);
@@ -224,6 +225,15 @@ class Explainer {
     TemperedResult found = tempered_posterior(target, options, stream, context_.simulation.cancellation);
     judged.posterior = options.first_run == 0 ? std::move(found) : merge(judged.posterior, found);
     judged.log_bayes = judged.posterior.mean_log_evidence;
+  }
+
+  /// A blow touches about when and where a push does that explains the same frames, and the other way round.
+  void propose_from_other_touch(const Hypothesis& hypothesis, TemperedTarget& target) const {
+    if (hypothesis.kind != EventKind::kPushed && hypothesis.kind != EventKind::kBumped) return;
+    const EventKind other = hypothesis.kind == EventKind::kPushed ? EventKind::kBumped : EventKind::kPushed;
+    for (const Judged& judged : judged_)
+      if (judged.hypothesis.kind == other && judged.object == hypothesis.object && !judged.posterior.gave_up)
+        propose_from(judged.posterior, kTouchDimensions, target);
   }
 
   /// When an event is searched; nothing is before all others.

@@ -73,14 +73,19 @@ Vector6d PathError::innovation(const FramePeak& peak) const {
   return seen - mean_;
 }
 
-PathFit PathError::fit(const FramePeak& peak) const {
+PeakShape::PeakShape(const FramePeak& peak) {
+  const geometry::Cholesky6 factored(peak.covariance);
+  inverse = factored.inverse();
+  log_determinant = log_determinant_6(factored);
+}
+
+PathFit PathError::fit(const FramePeak& peak, const PeakShape& shape) const {
   const Vector6d off = innovation(peak);
-  const geometry::Cholesky6 alone(peak.covariance), both(covariance_ + peak.covariance);
+  const geometry::Cholesky6 both(covariance_ + peak.covariance);
   PathFit fit;
-  fit.spread = alone.inverse().cwiseProduct(covariance_).sum();
+  fit.spread = shape.inverse.cwiseProduct(covariance_).sum();
   fit.mahalanobis = off.dot(both.solve(off));
-  fit.log_likelihood =
-      peak.log_peak + 0.5 * (log_determinant_6(alone) - log_determinant_6(both)) - 0.5 * fit.mahalanobis;
+  fit.log_likelihood = peak.log_peak + 0.5 * (shape.log_determinant - log_determinant_6(both)) - 0.5 * fit.mahalanobis;
   return fit;
 }
 

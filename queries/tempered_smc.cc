@@ -353,13 +353,25 @@ class TemperedSampler {
 }  // namespace
 
 void propose_from(const TemperedResult& found, TemperedTarget& target) {
-  if (target.moved == 0 || found.points.empty()) return;
-  std::vector<double> weight;
+  propose_from(found, static_cast<std::size_t>(target.moved), target);
+}
+
+void propose_from(const TemperedResult& found, std::size_t shared, TemperedTarget& target) {
+  if (shared == 0 || found.points.empty()) return;
+  std::vector<double> weight, mean, factor;
   for (const TemperedPoint& point : found.points) weight.push_back(point.weight);
   measure_spread(
-      static_cast<std::size_t>(target.moved), weight,
-      [&](std::size_t i) -> const LatentPoint& { return found.points[i].z; }, target.found_mean, target.found_factor);
-  for (double& x : target.found_factor) x *= kFoundWider;
+      shared, weight, [&](std::size_t i) -> const LatentPoint& { return found.points[i].z; }, mean, factor);
+  const auto n = static_cast<std::size_t>(target.moved);
+  target.found_mean.assign(n, 0.0);
+  target.found_factor.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool guessed = !target.guess_mean.empty();
+    target.found_mean[i] = i < shared ? mean[i] : guessed ? target.guess_mean[i] : 0.0;
+    if (i >= shared) target.found_factor[i * n + i] = guessed ? target.guess_deviation[i] : 1.0;
+    for (std::size_t k = 0; i < shared && k <= i; ++k)
+      target.found_factor[i * n + k] = kFoundWider * factor[i * shared + k];
+  }
 }
 
 TemperedResult merge(const TemperedResult& a, const TemperedResult& b) {

@@ -122,7 +122,19 @@ void widen(belief::DepthNoiseSettings& noise) {
 WindowLikelihood::WindowLikelihood(const belief::Belief& start, std::span<const belief::SceneObject> objects,
                                    std::span<const WindowFrame> frames, const ExplainContext& context,
                                    const filter::FilterTools& tools)
-    : start_(start), objects_(objects), window_(frames), context_(context), tools_(tools), peaks_(objects.size()) {}
+    : start_(start),
+      objects_(objects),
+      window_(frames),
+      context_(context),
+      tools_(tools),
+      peaks_(objects.size()),
+      shapes_(objects.size()) {}
+
+void WindowLikelihood::set_peaks(std::size_t object, std::vector<FramePeak> peaks) {
+  shapes_[object].clear();
+  for (const FramePeak& peak : peaks) shapes_[object].emplace_back(peak);
+  peaks_[object] = std::move(peaks);
+}
 
 core::Status WindowLikelihood::prepare() {
   auto scene = std::make_shared<belief::Scene>(*start_.scene);
@@ -236,9 +248,10 @@ double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame, std
 }
 
 template <class Direct>
-double WindowLikelihood::weigh(const FramePeak* peak, PathError& error, const Direct& direct) {
+double WindowLikelihood::weigh(std::size_t object, const FramePeak* peak, PathError& error,
+                               const Direct& direct) const {
   if (peak == nullptr) return direct(error.pose());
-  const PathFit fit = error.fit(*peak);
+  const PathFit fit = error.fit(*peak, shapes_[object][static_cast<std::size_t>(peak - peaks_[object].data())]);
   const bool near = fit.mahalanobis < kAtPeak;
   // A peak is a Gaussian of some dozens of draws. It stands for paths that are nearly there, not for those of which the
   // image can be asked.
@@ -259,7 +272,8 @@ double WindowLikelihood::stays(std::size_t frame, std::size_t object, PathError&
   const Background& known = background(frame, {object});
   const std::vector<FramePeak>& peaks = peaks_[object];
   const auto direct = [&](const Pose& X_WO) { return share_ * evidence(frame, known.terms, object, X_WO).log_ratio; };
-  return share_ * known.log_ratio + weigh(!peaks.empty() && peaks[frame].seen ? &peaks[frame] : nullptr, error, direct);
+  return share_ * known.log_ratio +
+         weigh(object, !peaks.empty() && peaks[frame].seen ? &peaks[frame] : nullptr, error, direct);
 }
 
 void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of,
@@ -279,7 +293,7 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
   const geometry::Matrix3d along = up * up.transpose(), across = geometry::Matrix3d::Identity() - along;
   put_error.topLeftCorner<3, 3>() = kPutTurn * kPutTurn * along + kPutTilt * kPutTilt * across;
   put_error.bottomRightCorner<3, 3>() = kPutLift * kPutLift * along + kPutShift * kPutShift * across;
-  std::vector<std::uint8_t> put_at_peak(moved, 0);
+  std::vector<std::uint8_t> stands(moved, 0), put_at_peak(moved, 0);
   std::vector<double> log_weight(shares, -std::log(static_cast<double>(shares))), in_frame(shares);
   // A peak is measured with all else where it was. Of two that change places, one would hide the other.
   const bool alone = !path.put_down_from || path.put_anywhere;
@@ -291,7 +305,14 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
       const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
       const bool put_down = path.put_down_from && k >= *path.put_down_from;
       const FramePeak* peak = alone && !peaks.empty() && peaks[k].seen ? &peaks[k] : nullptr;
-      if (put_down && path.put_anywhere && peak != nullptr && put_at_peak[m] == 0) {
+      // It stands where it is seen first from when it is put down, whatever frames before that say of the place.
+      if (put_down && path.put_anywhere && k == *path.put_down_from) {
+        const auto first = std::find_if(peaks.begin() + static_cast<std::ptrdiff_t>(k), peaks.end(),
+                                        [](const FramePeak& of_frame) { return of_frame.seen; });
+        for (std::size_t s = 0; s < shares && first != peaks.end(); ++s) errors[s * moved + m].put_at(*first, true);
+        if (first != peaks.end()) stands[m] = 1;
+      }
+      if (stands[m] != 0 && peak != nullptr && put_at_peak[m] == 0) {
         put_at_peak[m] = 1;
         for (std::size_t s = 0; s < shares; ++s) {
           errors[s * moved + m].put_at(*peak, true);
@@ -308,9 +329,9 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
       };
       for (std::size_t s = 0; s < shares; ++s) {
         PathError& error = errors[s * moved + m];
-        if (put_at_peak[m] == 0) error.move_to(*path.paths[m][k]);
+        if (stands[m] == 0) error.move_to(*path.paths[m][k]);
         if (put_down && !path.put_anywhere && k == *path.put_down_from) error.loosen(put_error);
-        in_frame[s] += weigh(peak, error, direct);
+        in_frame[s] += weigh(path.moved[m], peak, error, direct);
       }
     }
     double top = -1e300, sum = 0.0;
@@ -349,14 +370,13 @@ void WindowLikelihood::settle(ScenePath& path) const {
   const geometry::Vector3d up = belief::up_of(*start_.scene);
   for (std::size_t m = 0; m < path.moved.size(); ++m) {
     const std::vector<FramePeak>& peaks = peaks_[path.moved[m]];
-    std::optional<Pose> at;
-    for (std::size_t k = *path.put_down_from; k < frames_.size() && !peaks.empty(); ++k) {
-      if (!at && peaks[k].seen) {
-        PathError error(0.0, 1.0, up, start_.scene->model_of(objects_[path.moved[m]]).symmetry);
-        error.put_at(peaks[k], true);
-        at = error.pose();
-      }
-      if (at) path.paths[m][k] = at;
+    const std::size_t from = *path.put_down_from;
+    for (std::size_t seen = from; seen < peaks.size(); ++seen) {
+      if (!peaks[seen].seen) continue;
+      PathError error(0.0, 1.0, up, start_.scene->model_of(objects_[path.moved[m]]).symmetry);
+      error.put_at(peaks[seen], true);
+      std::fill(path.paths[m].begin() + static_cast<std::ptrdiff_t>(from), path.paths[m].end(), error.pose());
+      break;
     }
   }
 }

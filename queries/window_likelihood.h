@@ -71,7 +71,7 @@ class WindowLikelihood {
   const std::vector<ObjectPath>& base() const { return base_; }
 
   /// Where frames say that an object is, by frame: paths near them are weighed by these, others by the image.
-  void set_peaks(std::size_t object, std::vector<FramePeak> peaks) { peaks_[object] = std::move(peaks); }
+  void set_peaks(std::size_t object, std::vector<FramePeak> peaks);
   /// Empty = none were set.
   const std::vector<FramePeak>& peaks(std::size_t object) const { return peaks_[object]; }
 
@@ -110,7 +110,7 @@ class WindowLikelihood {
   /// What a frame says of a path that is off by `error`, which learns from it. `direct`: what the image says at a pose,
   /// tempered.
   template <class Direct>
-  static double weigh(const FramePeak* peak, PathError& error, const Direct& direct);
+  double weigh(std::size_t object, const FramePeak* peak, PathError& error, const Direct& direct) const;
   /// `ends`, where given, get those of the object `of`.
   void follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of = 0,
               std::vector<PathEnd>* ends = nullptr);
@@ -125,6 +125,7 @@ class WindowLikelihood {
   std::vector<std::vector<filter::SearchTarget>> targets_;  // by frame, by object
   std::vector<ObjectPath> base_;
   std::vector<std::vector<FramePeak>> peaks_;     // by object, by frame
+  std::vector<std::vector<PeakShape>> shapes_;    // of these
   std::vector<geometry::Matrix6d> start_errors_;  // by object, coordinates of PathError
   double share_ = 1.0;                            // of tempering
   std::mutex mutex_;

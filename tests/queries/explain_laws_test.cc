@@ -27,17 +27,22 @@ struct GaussianCase {
   double posterior_mean() const { return mean / (1.0 + deviation * deviation); }
 };
 
-TemperedResult solve(const GaussianCase& gaussian, bool guess, std::uint64_t seed, TemperedOptions options = {}) {
+TemperedTarget target_of(const GaussianCase& gaussian) {
   TemperedTarget target;
   target.dimensions = 3;
   target.moved = 2;
+  target.evaluate = [gaussian](std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
+    for (std::size_t i = 0; i < points.size(); ++i) log_likelihoods[i] = gaussian.log_likelihood(points[i]);
+  };
+  return target;
+}
+
+TemperedResult solve(const GaussianCase& gaussian, bool guess, std::uint64_t seed, TemperedOptions options = {}) {
+  TemperedTarget target = target_of(gaussian);
   if (guess) {
     target.guess_mean = {gaussian.mean, 0.0};
     target.guess_deviation = {0.3, 1.0};
   }
-  target.evaluate = [&](std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
-    for (std::size_t i = 0; i < points.size(); ++i) log_likelihoods[i] = gaussian.log_likelihood(points[i]);
-  };
   return tempered_posterior(target, options, core::RandomStream(seed, core::Purpose::kTest));
 }
 
@@ -56,6 +61,25 @@ TEST(TemperedPosterior, HasTheEvidenceAndTheMeanOfAGaussian) {
       EXPECT_NEAR(weight, 1.0, 1e-9);
       EXPECT_NEAR(mean, gaussian.posterior_mean(), 5.0 * gaussian.deviation / std::sqrt(100.0));
     }
+}
+
+// A proposal changes how much work it takes and how much the runs scatter, but not the evidence, even if it is wrong.
+TEST(TemperedPosterior, HasTheSameEvidenceWhereverItIsProposedFrom) {
+  const GaussianCase gaussian{1.5, 0.05}, elsewhere{-1.0, 0.2};
+  TemperedOptions options;
+  options.runs = 16;
+  options.points = 48;
+  options.first_points = 2;
+  TemperedTarget target = target_of(gaussian);
+  const TemperedResult plain = tempered_posterior(target, options, core::RandomStream(5, core::Purpose::kTest));
+  propose_from(plain, target);
+  const TemperedResult again = tempered_posterior(target, options, core::RandomStream(6, core::Purpose::kTest));
+  EXPECT_NEAR(again.mean_log_evidence, gaussian.log_evidence(), 5.0 * again.error + 0.05);
+  EXPECT_LT(again.evaluations, plain.evaluations);
+  EXPECT_LT(again.error, plain.error);
+  propose_from(solve(elsewhere, false, 7, options), target);
+  const TemperedResult wrong = tempered_posterior(target, options, core::RandomStream(8, core::Purpose::kTest));
+  EXPECT_NEAR(wrong.mean_log_evidence, gaussian.log_evidence(), 5.0 * wrong.error + 0.05);
 }
 
 TEST(TemperedPosterior, RepeatsItsBits) {

@@ -45,6 +45,13 @@ inline constexpr double kRestHeight = 0.003;
 /// FramePeak.
 geometry::Matrix6d turns_about_W(const geometry::Pose& X_WO, const geometry::Matrix6d& covariance);
 
+/// What is asked of a peak's covariance for every path, worked out once.
+struct PeakShape {
+  explicit PeakShape(const FramePeak& peak);
+  geometry::Matrix6d inverse;
+  double log_determinant;
+};
+
 struct PathFit {
   double log_likelihood = 0.0;
   double mahalanobis = 0.0;  ///< Squared distance of the path from the peak, by the spread of both.
@@ -64,7 +71,8 @@ class PathError {
   /// The next pose of the simulated path.
   void move_to(const geometry::Pose& X_WO);
   /// `peak` must be seen, and there must be a pose.
-  PathFit fit(const FramePeak& peak) const;
+  PathFit fit(const FramePeak& peak) const { return fit(peak, PeakShape(peak)); }
+  PathFit fit(const FramePeak& peak, const PeakShape& shape) const;
   void learn(const FramePeak& peak);
 
   /// Of the true pose, about that of the simulated path: coordinates as those of FramePeak.

@@ -63,8 +63,11 @@ struct TemperedResult {
 
 /// Sets where `found`, of the same target, has the posterior, somewhat wider. Runs that are proposed from there need
 /// fewer steps and scatter less. The evidence of each is still without bias, as it is for any proposal that does not
-/// depend on that run [adaptive importance sampling, Cappe et al. 2004]. Nothing without coordinates that are moved.
+/// depend on that run [adaptive importance sampling, Cappé et al. 2004]. Nothing without coordinates that are moved.
 void propose_from(const TemperedResult& found, TemperedTarget& target);
+/// The same from the posterior of another target that has the first `shared` coordinates in common; in the others, the
+/// guess, or the prior.
+void propose_from(const TemperedResult& found, std::size_t shared, TemperedTarget& target);
 
 /// Of both results' runs, which must be of the same target and options but for `first_run`.
 TemperedResult merge(const TemperedResult& a, const TemperedResult& b);
