@@ -7,6 +7,7 @@
 #include "hidden_places.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/unknown_objects.h"
+#include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -245,7 +246,10 @@ int new_objects(const FilterFrame& frame, const belief::Observation& observation
   rendering::FrameTerms terms;
   with_known_surfaces(frame.terms, known, &terms);
   const Surroundings surroundings = surroundings_in(frame, sampled, *belief.scene, wanted, segmentation, stream);
-  const std::vector<Detection> found = detect(terms, known, sampled, surroundings, wanted, detection, tools, stream);
+  FineFrame fine = fine_frame(frame, *belief.scene, observation, tools);
+  with_coarse_known(known, frame.terms.camera, fine.terms);
+  const std::vector<Detection> found =
+      detect(terms, fine, known, sampled, surroundings, wanted, detection, tools, stream);
   if (found.empty()) return 0;
   auto scene = std::make_shared<belief::Scene>(*belief.scene);
   for (const Detection& detection_found : found) {

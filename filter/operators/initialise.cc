@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "prescene/core/check.h"
+#include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/filter/proposals/support_tracking.h"
 
 namespace prescene::filter {
@@ -230,20 +231,23 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
   FindReport report;
   const belief::Scene& scene = *belief.scene;
   std::vector<std::size_t> wide;
-  geometry::DepthImage known = frame.robot;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const belief::ObjectModel& model = scene.model_of(scene.objects[i]);
-    const ObjectBelief& object = belief.objects[i];
-    if (has_wide_prior(scene.objects[i]) && (which == FindWhich::kAll || object.state == belief::TrackState::kLost)) {
+  for (std::size_t i = 0; i < scene.objects.size(); ++i)
+    if (has_wide_prior(scene.objects[i]) &&
+        (which == FindWhich::kAll || belief.objects[i].state == belief::TrackState::kLost))
       wide.push_back(i);
-    } else {
-      const SearchTarget target = target_of(model, frame, tools);
-      const Particle& there = which == FindWhich::kAll ? object.particles.front() : belief::heaviest(object.particles);
-      merge_nearest(depth_of(target, frame.X_CW * there.X_WO, frame.terms.camera, *tools.renderer), &known);
-    }
-  }
   report.looked_for = static_cast<int>(wide.size());
   if (wide.empty()) return report;
+  FineFrame fine = fine_frame(frame, scene, observation, tools);
+  geometry::DepthImage known = frame.robot;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    if (std::find(wide.begin(), wide.end(), i) != wide.end()) continue;
+    const SearchTarget target = target_of(scene.model_of(scene.objects[i]), frame, tools);
+    const std::vector<Particle>& particles = belief.objects[i].particles;
+    const Particle& there = which == FindWhich::kAll ? particles.front() : belief::heaviest(particles);
+    const Pose X_CO = frame.X_CW * there.X_WO;
+    merge_nearest(depth_of(target, X_CO, frame.terms.camera, *tools.renderer), &known);
+    with_known_surfaces(fine.terms, depth_of(target, X_CO, fine.terms.camera, *tools.renderer), &fine.terms);
+  }
 
   const SegmentationOptions& segmentation = options.detection.segmentation;
   const SampledDepth sampled = sample_depth(*observation.frame.depth, observation.frame.camera, segmentation);
@@ -263,7 +267,7 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
   rendering::FrameTerms terms;
   with_known_surfaces(frame.terms, known, &terms);
   const std::vector<Detection> found =
-      detect(terms, known, sampled, surroundings, wanted, options.detection, tools, stream);
+      detect(terms, fine, known, sampled, surroundings, wanted, options.detection, tools, stream);
   std::vector<bool> used(found.size(), false);
   for (const std::size_t i : wide) {
     ObjectBelief& object = belief.objects[i];

@@ -2,10 +2,13 @@
 #include "prescene/filter/proposals/detection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
 
+#include "detection_parts.h"
+#include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 #include "proposal_judge.h"
@@ -15,28 +18,23 @@ namespace {
 
 constexpr int kKept = 4;                 // best poses of a cluster and model that compete
 constexpr int kRounds = 2;               // the second looks at what the first left unexplained
-constexpr double kOutlineStep = 0.02;    // m; the measured surface ends by at least so much (kLeastOutline)
-constexpr double kMostSinking = 0.03;    // m that a pose may reach into a support: planes and meshes are off by 15 mm
 constexpr double kMostFloating = 0.03;   // m between the lowest points and what they stand on
-constexpr double kMostOverlap = 0.1;     // share of an object that others may cut off (SupportSurfaces::overlap), ...
-constexpr double kContact = 0.012;       // m; ... each side of it so much smaller
+constexpr double kContact = 0.012;       // m; each side of an object is taken for so much smaller (kMostOverlap)
 constexpr double kStandingStarts = 0.3;  // share of the starts with a side of the model's box down
 constexpr int kFloatingClusters = 3;     // clusters that are over no support and yet looked at
-// m; a measurement so little in front of a known surface, or up to twice as much behind it, is explained.
-constexpr double kExplainedDepth = 0.015;
 // Log odds of a find, see probability_right: logistic regression on simulated rooms (docs/studies/tracking.md).
 constexpr double kOddsAtFull = 1.9;         // of an object with the usual log ratio that matches as well as expected
 constexpr double kUsualLogRatio = 200.0;    // nats
 constexpr double kOddsOfSize = 1.3;         // per factor e of the log ratio
 constexpr double kOddsOfLack = 13.8;        // per share of the expected evidence that is missing
 constexpr double kLeastSupportArea = 0.05;  // m^2; a smaller flat patch may be a face of an object
-constexpr double kFacesOfASupport = 1.4;    // a support or a wall is so much larger than the largest face of an object
+// What an object stands on is looked for under its lowest corners alone.
+constexpr std::array<double, 1> kAtCorners = {1.0};
+constexpr double kFacesOfASupport = 1.4;  // a support or a wall is so much larger than the largest face of an object
 // Starts for each cluster and model where something was learned of it (FilterTools::learned), in place of
 // DetectionOptions::starts. Chosen.
-constexpr int kLearnedStarts = 36;  // poses that the learned places propose, ...
-constexpr int kOtherStarts = 24;    // ... and random ones beside them
-// Joint refinement of what is accepted.
-constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
+constexpr int kLearnedStarts = 36;      // poses that the learned places propose, ...
+constexpr int kOtherStarts = 24;        // ... and random ones beside them
 constexpr double kLowestPoints = 0.01;  // m above an object's lowest point: what it may stand on
 // Where a learned judge decides, only what is hopeless is not shown to it.
 constexpr int kKeptForJudge = 6;
@@ -46,6 +44,77 @@ constexpr double kHopelessVisible = 0.15;
 // Candidates of one cluster and model that are so near and explain so much the same are one.
 constexpr double kSamePlace = 0.01;  // m
 constexpr double kSameShare = 0.03;  // of the log ratio
+
+}  // namespace
+
+bool hopeless(const rendering::PoseEvidence& e) {
+  return e.log_ratio < kHopelessLogRatio || e.hit_share() < kHopelessHits || e.visible < kHopelessVisible * e.in_view;
+}
+
+bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
+            std::span<const SupportSurfaces* const> surfaces, std::span<const double> shares) {
+  std::vector<Vector3d> points;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const auto& vertex : target.mesh->vertices) {
+    points.push_back(X_WO * vertex.cast<double>());
+    lowest = std::min(lowest, up_W.dot(points.back()));
+  }
+  std::erase_if(points, [&](const Vector3d& p) { return up_W.dot(p) > lowest + kLowestPoints; });
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
+  return std::any_of(points.begin(), points.end(), [&](const Vector3d& corner) {
+    return std::any_of(shares.begin(), shares.end(), [&](double share) {
+      const Vector3d p = share == 1.0 ? corner : Vector3d(middle + share * (corner - middle));
+      return std::any_of(surfaces.begin(), surfaces.end(), [&](const SupportSurfaces* surface) {
+        return surface->crosses(p + kMostSinking * up_W, p - kMostFloating * up_W);
+      });
+    });
+  });
+}
+
+std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
+                            const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream) {
+  if (target.learned == nullptr) return cluster_starts(cluster, target, up_C, kStandingStarts, options.starts, stream);
+  std::vector<Pose> starts = learned_starts(*target.learned, sampled.depth, sampled.camera, cluster.points_C, up_C,
+                                            kLearnedStarts, stream.for_purpose(core::Purpose::kSurface));
+  const std::vector<Pose> others = cluster_starts(cluster, target, up_C, kStandingStarts, kOtherStarts, stream);
+  starts.insert(starts.end(), others.begin(), others.end());
+  return starts;
+}
+
+SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC) {
+  SupportSurfaces surfaces;
+  for (const Detection& detection : found)
+    surfaces.add(*wanted[static_cast<std::size_t>(detection.model)].target.mesh, X_WC * detection.X_CO);
+  return surfaces;
+}
+
+std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,
+                                            const geometry::PinholeCamera& camera, const FilterTools& tools) {
+  std::vector<geometry::DepthImage> depths;
+  for (const Detection& detection : found)
+    depths.push_back(
+        depth_of(wanted[static_cast<std::size_t>(detection.model)].target, detection.X_CO, camera, *tools.renderer));
+  return depths;
+}
+
+std::vector<Cluster> clusters_over_supports(const SampledDepth& sampled, const geometry::Image<std::uint8_t>& explained,
+                                            const Surroundings& surroundings, const DetectionOptions& options) {
+  std::vector<Cluster> clusters;
+  for (const int where : {kMainSupport, kOtherSupport, kNoSupport}) {
+    auto rest = explained;
+    for (std::size_t i = 0; i < explained.size(); ++i)
+      if (surroundings.over_support.data()[i] != where) rest.data()[i] = 1;
+    std::vector<Cluster> more = find_clusters(sampled, rest, options.segmentation);
+    if (where == kNoSupport && static_cast<int>(more.size()) > kFloatingClusters) more.resize(kFloatingClusters);
+    std::move(more.begin(), more.end(), std::back_inserter(clusters));
+  }
+  if (static_cast<int>(clusters.size()) > options.max_clusters)
+    clusters.resize(static_cast<std::size_t>(options.max_clusters));
+  return clusters;
+}
+
+namespace {
 
 /// The best of each group of candidates that are one, best first.
 void keep_distinct(const Vector3d& centre, std::size_t most, std::vector<PoseCandidate>& candidates) {
@@ -60,40 +129,6 @@ void keep_distinct(const Vector3d& centre, std::size_t most, std::vector<PoseCan
     if (!known) kept.push_back(candidate);
   }
   candidates = std::move(kept);
-}
-
-/// What need not be judged.
-bool hopeless(const rendering::PoseEvidence& e) {
-  return e.log_ratio < kHopelessLogRatio || e.hit_share() < kHopelessHits || e.visible < kHopelessVisible * e.in_view;
-}
-
-/// Whether one of the lowest points of an object at X_WO is right above a surface, or a little below.
-bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
-            std::span<const SupportSurfaces* const> surfaces) {
-  std::vector<Vector3d> points;
-  double lowest = std::numeric_limits<double>::infinity();
-  for (const auto& vertex : target.mesh->vertices) {
-    points.push_back(X_WO * vertex.cast<double>());
-    lowest = std::min(lowest, up_W.dot(points.back()));
-  }
-  return std::any_of(points.begin(), points.end(), [&](const Vector3d& p) {
-    if (up_W.dot(p) > lowest + kLowestPoints) return false;
-    return std::any_of(surfaces.begin(), surfaces.end(), [&](const SupportSurfaces* surface) {
-      return surface->crosses(p + kMostSinking * up_W, p - kMostFloating * up_W);
-    });
-  });
-}
-
-/// What a cluster and model are tried from: places that look like learned ones of the model, if there are any, and
-/// random poses.
-std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
-                            const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream) {
-  if (target.learned == nullptr) return cluster_starts(cluster, target, up_C, kStandingStarts, options.starts, stream);
-  std::vector<Pose> starts = learned_starts(*target.learned, sampled.depth, sampled.camera, cluster.points_C, up_C,
-                                            kLearnedStarts, stream.for_purpose(core::Purpose::kSurface));
-  const std::vector<Pose> others = cluster_starts(cluster, target, up_C, kStandingStarts, kOtherStarts, stream);
-  starts.insert(starts.end(), others.begin(), others.end());
-  return starts;
 }
 
 /// The best poses of each wanted model in each cluster from `first` on, ordered by cluster, model, rank.
@@ -142,23 +177,6 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, const SampledD
   return proposals;
 }
 
-/// The things that were found, as surfaces.
-SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC) {
-  SupportSurfaces surfaces;
-  for (const Detection& detection : found)
-    surfaces.add(*wanted[static_cast<std::size_t>(detection.model)].target.mesh, X_WC * detection.X_CO);
-  return surfaces;
-}
-
-std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,
-                                            const geometry::PinholeCamera& camera, const FilterTools& tools) {
-  std::vector<geometry::DepthImage> depths;
-  for (const Detection& detection : found)
-    depths.push_back(
-        depth_of(wanted[static_cast<std::size_t>(detection.model)].target, detection.X_CO, camera, *tools.renderer));
-  return depths;
-}
-
 /// Accepts the strongest proposal, puts it into the frame, judges the others again, until none is acceptable.
 void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>& clusters,
                      const Surroundings& surroundings, std::span<const WantedModel> wanted, const ProposalJudge& judge,
@@ -171,7 +189,7 @@ void accept_greedily(std::vector<Proposal> proposals, const std::vector<Cluster>
       Proposal& p = proposals[i];
       const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
       const Pose X_WO = surroundings.X_WC * p.candidate.X_CO;
-      p.weigh(stands(target, X_WO, surroundings.up_W, ground));
+      p.weigh(stands(target, X_WO, surroundings.up_W, ground, kAtCorners));
     });
     // What stands on nothing now may stand on what is found next.
     std::erase_if(proposals, [&](const Proposal& p) {
@@ -290,7 +308,7 @@ void take_back(const Surroundings& surroundings, std::span<const WantedModel> wa
     Detection& detection = found[i];
     const auto model = static_cast<std::size_t>(detection.model);
     const Pose X_WO = surroundings.X_WC * detection.X_CO;
-    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground);
+    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground, kAtCorners);
     Proposal proposal;
     proposal.model = detection.model;
     proposal.candidate = {detection.X_CO, detection.evidence};
@@ -354,25 +372,6 @@ geometry::Image<std::uint8_t> explained_pixels(const SampledDepth& sampled, cons
   return explained;
 }
 
-namespace {
-
-/// Walls and sides of supports as they are measured: they are no evidence of an object.
-geometry::DepthImage walls_in(const rendering::FrameTerms& terms, const SampledDepth& sampled,
-                              const Surroundings& surroundings) {
-  geometry::DepthImage walls(terms.camera.width, terms.camera.height);
-  for (int y = 0; y < walls.height(); ++y)
-    for (int x = 0; x < walls.width(); ++x) {
-      if (!(terms.depth(x, y) > 0.0f)) continue;
-      const Eigen::Vector2d pixel = sampled.camera.project(terms.camera.unproject(x, y, 1.0));
-      const int u = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, sampled.camera.width - 1);
-      const int v = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, sampled.camera.height - 1);
-      if (surroundings.background(u, v) == kWall) walls(x, y) = terms.depth(x, y);
-    }
-  return walls;
-}
-
-}  // namespace
-
 double probability_right(const rendering::PoseEvidence& evidence, double expected_evidence) {
   if (!(evidence.log_ratio > 0.0) || !(expected_evidence > 0.0)) return 0.0;
   // Infinite: what to expect is not known.
@@ -399,8 +398,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const ge
                               const SampledDepth& sampled, const Surroundings& surroundings,
                               std::span<const WantedModel> wanted, const DetectionOptions& options,
                               const FilterTools& tools, const core::RandomStream& stream, DetectionTrace* trace) {
-  rendering::FrameTerms terms;
-  with_known_surfaces(frame_terms, walls_in(frame_terms, sampled, surroundings), &terms);
+  const rendering::FrameTerms terms = with_walls(frame_terms, sampled, surroundings);
   const ProposalJudge judge(wanted, surroundings.X_WC.rotation.conjugate() * surroundings.up_W, options, tools, trace);
   std::vector<int> left;
   for (const WantedModel& model : wanted) left.push_back(model.count);
@@ -412,18 +410,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const ge
   for (int round = 0; round < kRounds; ++round) {
     auto mask = explained_pixels(sampled, explained_depth, terms.camera, kExplainedDepth);
     for (std::size_t i = 0; i < mask.size(); ++i) mask.data()[i] |= surroundings.background.data()[i];
-    // What is over the main support first, then over others; of the rest only some.
-    std::vector<Cluster> clusters;
-    for (const int where : {kMainSupport, kOtherSupport, kNoSupport}) {
-      auto rest = mask;
-      for (std::size_t i = 0; i < mask.size(); ++i)
-        if (surroundings.over_support.data()[i] != where) rest.data()[i] = 1;
-      std::vector<Cluster> more = find_clusters(sampled, rest, options.segmentation);
-      if (where == kNoSupport && static_cast<int>(more.size()) > kFloatingClusters) more.resize(kFloatingClusters);
-      std::move(more.begin(), more.end(), std::back_inserter(clusters));
-    }
-    if (static_cast<int>(clusters.size()) > options.max_clusters)
-      clusters.resize(static_cast<std::size_t>(options.max_clusters));
+    std::vector<Cluster> clusters = clusters_over_supports(sampled, mask, surroundings, options);
     const std::size_t first = looked_at.size();
     std::move(clusters.begin(), clusters.end(), std::back_inserter(looked_at));
     std::vector<Proposal> proposals = propose(explained_terms, sampled, looked_at, first, surroundings, wanted, left,

@@ -2,6 +2,7 @@
 #include "prescene/service/evaluate/simulated_supports.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -30,6 +31,10 @@ constexpr double kExpectedShare = 0.4;    // of an object's pixels that must be 
 constexpr int kExpectedPixels = 1000;     // ... and how many, of a 640 x 480 image
 constexpr double kExpectedMargin = 20.0;  // pixels between its centre and the image's edge
 constexpr int kTries = 60;                // places tried for one thing
+
+// Things differ in colour, in turn, so that the picture shows where they end.
+constexpr std::array<geometry::Rgb, 7> kColors = {
+    {{200, 60, 50}, {230, 225, 210}, {40, 80, 160}, {90, 70, 50}, {70, 140, 70}, {235, 190, 60}, {30, 30, 35}}};
 
 using Outline = std::vector<Vector2d>;
 
@@ -468,6 +473,8 @@ core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::R
       scene->supports.push_back(one.support);
   }
   if (room.wall) drawn.instances.push_back({rendering::make_render_mesh(*room.wall), Pose::identity(), {}});
+  for (std::size_t i = 0; i < drawn.instances.size(); ++i)
+    drawn.instances[i].material = rendering::SurfaceMaterial::opaque(kColors[i % kColors.size()]);
 
   rendering::RenderOptions options;
   options.normals = true;
@@ -486,9 +493,11 @@ core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::R
         truth.visible_share >= kExpectedShare && truth.visible_pixels >= kExpectedPixels && is_in_view(camera, p_CQ);
   }
   auto depth = std::make_shared<geometry::DepthImage>();
+  auto color = std::make_shared<geometry::ColorImage>();
   other_camera().sample(drawn, view, nullptr, camera, X_WC, stream.for_purpose(core::Purpose::kSensorNoise), number,
-                        depth.get(), nullptr);
+                        depth.get(), color.get());
   frame.observation.frame.depth = std::move(depth);
+  frame.observation.frame.color = std::move(color);
   frame.scene = std::move(scene);
   return frame;
 }

@@ -11,6 +11,7 @@
 
 #include "prescene/core/clock.h"
 #include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/filter/proposals/pose_search.h"
 #include "prescene/geometry/pose_error.h"
 #include "prescene/geometry/sampling.h"
@@ -80,6 +81,7 @@ struct PreparedFrame {
   filter::SampledDepth sampled;
   filter::Surroundings surroundings;
   rendering::FrameTerms terms;
+  filter::FineFrame fine;
 };
 
 /// `least_area` of a support, m^2.
@@ -102,7 +104,10 @@ core::Status prepare(const YcbFrame& frame, double least_area, const core::Rando
   input.supports = supports;
   rendering::FrameTermsOptions options;
   options.tempering.weight.effective_pixels = kLabelPixels;
-  return make_frame_terms(input, options, rendering::SensorModel(), &prepared->terms);
+  PRESCENE_RETURN_IF_ERROR(make_frame_terms(input, options, rendering::SensorModel(), &prepared->terms));
+  prepared->fine.smear = filter::measure_edge_smear(frame.depth, &frame.color);
+  options.target_width = filter::kFineWidth;
+  return make_frame_terms(input, options, rendering::SensorModel(), &prepared->fine.terms);
 }
 
 std::vector<filter::WantedModel> wanted_in(const YcbFrame& frame, const Bench& bench) {
@@ -204,8 +209,8 @@ core::Result<YcbSection> evaluate_amortised(const fs::path& dir, std::uint64_t s
     const core::RandomStream mine = stream.for_purpose(core::Purpose::kDetection).at(f);
     const std::vector<filter::WantedModel> wanted = wanted_in(frame, bench);
     PRESCENE_RETURN_IF_ERROR(prepare(frame, filter::least_support_area(wanted), mine, &prepared));
-    const std::vector<filter::Detection> found =
-        filter::detect(prepared.terms, {}, prepared.sampled, prepared.surroundings, wanted, {}, bench.tools(), mine);
+    const std::vector<filter::Detection> found = filter::detect(prepared.terms, prepared.fine, {}, prepared.sampled,
+                                                                prepared.surroundings, wanted, {}, bench.tools(), mine);
     seconds += watch.seconds();
     for (std::size_t i = 0; i < frame.objects.size(); ++i) {
       const YcbObject& object = frame.objects[i];

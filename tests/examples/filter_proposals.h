@@ -64,6 +64,16 @@ extern const std::vector<WantedModel> wanted;
 extern const DetectionOptions options;
 }  // namespace detection_h
 
+namespace edge_smear_h {
+extern const belief::RgbdFrame frame;
+}  // namespace edge_smear_h
+
+namespace fine_frame_h {
+extern const Surroundings surroundings;
+extern const std::vector<WantedModel> wanted;
+extern const DetectionOptions options;
+}  // namespace fine_frame_h
+
 namespace frame_h {
 extern const FrameColors colors;
 extern const FrameOptions options;

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "acceptance.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+
+#include "detection_parts.h"
+#include "proposal_judge.h"
+
+namespace prescene::filter {
+namespace {
+
+constexpr double kContactInFine = 0.018;  // m (kMostOverlap): what is below may be off by as much
+constexpr std::size_t kComparedCorners = 16;
+constexpr double kSameCorner = 0.012;  // m
+// Thresholds. Chosen on rooms 1 to 40 (docs/studies/tracking.md).
+constexpr double kLeastOutlineForNow = 0.35;  // of a pose for want of better ones, until it is known what else ends it
+constexpr double kLogRatioLess = 30.0;        // nats less than DetectionOptions::min_log_ratio are enough
+constexpr double kLeastEvidence = 2.5;        // nats per visible pixel; thin things on a known surface say little
+constexpr double kLeastVisible = 0.35;        // of the pixels that a pose shows, known things in front or not
+constexpr double kFloatingNats = 30.0;        // that a pose costs which stands on nothing known, ...
+constexpr double kFloatingPart = 0.4;         // ... and a share of its log ratio
+constexpr double kPowerOfHits = 8.0;          // how much a pose's score suffers from pixels that do not match ...
+constexpr double kPowerOfOutline = 4.0;       // ... and from a surface that goes on past its outline
+// What an object stands on is looked for under the middle of its lowest points, too: its corners may all lie beyond the
+// edges of what it stands on.
+constexpr std::array<double, 3> kUnderIt = {1.0, 0.5, 0.0};
+
+}  // namespace
+
+double FineProposal::score() const {
+  const double ends = outline < 0.0 ? 1.0 : std::pow(outline, kPowerOfOutline);
+  return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kPowerOfHits) * ends - cost;
+}
+
+void FineProposal::weigh(bool on_something) {
+  stands = on_something;
+  cost = stands ? 0.0 : kFloatingNats + kFloatingPart * std::max(0.0, candidate.evidence.log_ratio);
+}
+
+bool acceptable_in_fine(const rendering::PoseEvidence& evidence, double cost, const DetectionOptions& options) {
+  return evidence.log_ratio - cost > options.min_log_ratio - kLogRatioLess &&
+         evidence.hit_share() >= options.min_hit_share && evidence.log_ratio_per_visible_pixel() >= kLeastEvidence &&
+         evidence.visible >= kLeastVisible * evidence.in_view;
+}
+
+geometry::Box box_about(const SearchTarget& target, const Pose& X_CO) {
+  geometry::Box box;
+  for (const auto& vertex : target.mesh->vertices) box.extend(X_CO * vertex.cast<double>());
+  return box;
+}
+
+bool is_same_place(const SearchTarget& target, const Pose& a_CO, const Pose& b_CO, const geometry::Box& a_box,
+                   const geometry::Box& b_box) {
+  if ((a_box.min() - b_box.min()).cwiseAbs().maxCoeff() > kSameCorner ||
+      (a_box.max() - b_box.max()).cwiseAbs().maxCoeff() > kSameCorner)
+    return false;
+  const auto& vertices = target.mesh->vertices;
+  const std::size_t stride = 1 + vertices.size() / kComparedCorners;
+  const Pose X_BA = b_CO.inverse() * a_CO;
+  for (std::size_t i = 0; i < vertices.size(); i += stride) {
+    const Vector3d corner = X_BA * vertices[i].cast<double>();
+    if (std::none_of(vertices.begin(), vertices.end(),
+                     [&](const auto& v) { return (v.template cast<double>() - corner).norm() < kSameCorner; }))
+      return false;
+  }
+  return true;
+}
+
+void reweigh(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
+             std::span<const int> left, const FilterTools& tools, std::vector<FineProposal>& proposals) {
+  std::erase_if(proposals, [&](const FineProposal& p) { return left[static_cast<std::size_t>(p.model)] == 0; });
+  tools.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
+    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+    FineProposal& p = proposals[i];
+    p.candidate.evidence =
+        weighing.of(terms, wanted[static_cast<std::size_t>(p.model)].target, p.candidate.X_CO, *workspace);
+    p.outline = -1.0;
+  });
+}
+
+void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& surroundings,
+                    std::span<const WantedModel> wanted, const Weighing& weighing, const DetectionOptions& options,
+                    const FilterTools& tools, rendering::FrameTerms& terms, geometry::DepthImage& known,
+                    std::vector<int>& left, std::vector<Detection>& found) {
+  SupportSurfaces things = surfaces_of(found, wanted, surroundings.X_WC);
+  const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+  const auto weigh_standing = [&] {
+    tools.search->threads().for_each_index(proposals.size(), [&](std::size_t i) {
+      FineProposal& p = proposals[i];
+      const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
+      const Pose X_WO = surroundings.X_WC * p.candidate.X_CO;
+      p.weigh(stands(target, X_WO, surroundings.up_W, ground, kUnderIt));
+    });
+    std::erase_if(proposals,
+                  [&](const FineProposal& p) { return !acceptable_in_fine(p.candidate.evidence, 0.0, options); });
+  };
+  const auto worse = [](const FineProposal& a, const FineProposal& b) { return a.score() < b.score(); };
+  const auto outline_of = [&](const FineProposal& p) {
+    const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
+    return outline_support(terms, depth_of(target, p.candidate.X_CO, terms.camera, *tools.renderer), kOutlineStep);
+  };
+  // For what they stand on, or where a neighbour is that is not found yet and ends their surface.
+  std::vector<FineProposal> waiting;
+  weigh_standing();
+  while (!proposals.empty() || !waiting.empty()) {
+    bool for_now = false;
+    if (proposals.empty()) {
+      // Things that stand on each other wait for each other: the best of them that stands goes first. Whether its
+      // surface ends, with the others in their places, is seen in the end.
+      for (FineProposal& p : waiting)
+        if (p.outline < 0.0) p.outline = outline_of(p);
+      std::vector<FineProposal>::iterator next = waiting.end();
+      for (auto p = waiting.begin(); p != waiting.end(); ++p)
+        if (p->outline >= kLeastOutlineForNow && acceptable_in_fine(p->candidate.evidence, p->cost, options) &&
+            (next == waiting.end() || worse(*next, *p)))
+          next = p;
+      if (next == waiting.end()) break;
+      proposals.push_back(*next);
+      waiting.erase(next);
+      for_now = true;
+    }
+    const auto best = std::max_element(proposals.begin(), proposals.end(), worse);
+    if (!acceptable_in_fine(best->candidate.evidence, best->cost, options)) {
+      // What stands on nothing now may stand on what is found next.
+      waiting.push_back(*best);
+      proposals.erase(best);
+      continue;
+    }
+    const auto model = static_cast<std::size_t>(best->model);
+    const SearchTarget& target = wanted[model].target;
+    const Pose X_WO = surroundings.X_WC * best->candidate.X_CO;
+    if (things.overlap(*target.mesh, X_WO, kContactInFine) > kMostOverlap) {
+      proposals.erase(best);
+      continue;
+    }
+    if (best->outline < 0.0) {
+      best->outline = outline_of(*best);
+      continue;  // it may not be the best any more
+    }
+    if (!for_now && best->outline < kLeastOutline) {
+      waiting.push_back(*best);
+      proposals.erase(best);
+      continue;
+    }
+    Detection detection;
+    detection.model = best->model;
+    detection.X_CO = best->candidate.X_CO;
+    detection.evidence = best->candidate.evidence;
+    detection.cluster = best->cluster;
+    found.push_back(detection);
+    --left[model];
+    const geometry::DepthImage depth = depth_of(target, detection.X_CO, terms.camera, *tools.renderer);
+    merge_nearest(depth, &known);
+    with_known_surfaces(terms, depth, &terms);
+    things.add(*target.mesh, X_WO);
+    std::move(waiting.begin(), waiting.end(), std::back_inserter(proposals));
+    waiting.clear();
+    reweigh(terms, wanted, weighing, left, tools, proposals);
+    weigh_standing();
+  }
+}
+
+void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
+                    const DetectionOptions& options, const FilterTools& tools, const core::RandomStream& stream,
+                    std::vector<Detection>& found) {
+  std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
+  const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    rendering::FrameTerms mine = terms;
+    for (std::size_t j = 0; j < found.size(); ++j)
+      if (j != i) with_known_surfaces(mine, depths[j], &mine);
+    const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
+    SearchOptions search = options.search;
+    search.refine = kSettling;
+    search.polish_candidates = 1;
+    const Pose starts[] = {found[i].X_CO};
+    const auto refined = tools.search->run_serial(mine, target, starts, search, stream.at(i), *workspace);
+    found[i].evidence = weighing.of(mine, target, found[i].X_CO, *workspace);
+    const rendering::PoseEvidence after = weighing.of(mine, target, refined.front().X_CO, *workspace);
+    if (after.log_ratio > found[i].evidence.log_ratio) found[i].X_CO = refined.front().X_CO, found[i].evidence = after;
+    depths[i] = depth_of(target, found[i].X_CO, terms.camera, *tools.renderer);
+    found[i].outline = outline_support(mine, depths[i], kOutlineStep);
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    rendering::FrameTerms mine = terms;
+    for (std::size_t j = 0; j < found.size(); ++j)
+      if (j != i) with_known_surfaces(mine, depths[j], &mine);
+    const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
+    found[i].probability =
+        probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer));
+  }
+}
+
+std::vector<Detection> take_back_in_fine(const Surroundings& surroundings, std::span<const WantedModel> wanted,
+                                         const DetectionOptions& options, const LeastOfFind& least,
+                                         std::vector<int>& left, std::vector<Detection>& found) {
+  std::vector<Detection> taken;
+  for (std::size_t i = found.size(); i-- > 0;) {
+    std::vector<Detection> others = found;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const SupportSurfaces things = surfaces_of(others, wanted, surroundings.X_WC);
+    const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+    Detection& detection = found[i];
+    const auto model = static_cast<std::size_t>(detection.model);
+    const Pose X_WO = surroundings.X_WC * detection.X_CO;
+    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground, kUnderIt);
+    FineProposal proposal;
+    proposal.model = detection.model;
+    proposal.candidate = {detection.X_CO, detection.evidence};
+    proposal.weigh(detection.stands);
+    if (acceptable_in_fine(detection.evidence, proposal.cost, options) && detection.outline >= least.outline &&
+        detection.probability >= least.probability)
+      continue;
+    ++left[model];
+    taken.push_back(detection);
+    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return taken;
+}
+
+}  // namespace prescene::filter

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parts that the search in the coarse image (detection.cc) and the one whose finds are judged in the fine image
+// (fine_detection.cc) have in common.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "prescene/filter/proposals/detection.h"
+
+namespace prescene::filter {
+
+inline constexpr double kOutlineStep = 0.02;  // m; the measured surface ends by at least so much (kLeastOutline)
+inline constexpr double kMostSinking = 0.03;  // m that a pose may reach into a support: planes and meshes are 15 mm off
+inline constexpr double kMostOverlap = 0.1;   // share of an object that others may cut off (SupportSurfaces::overlap)
+// m; a measurement so little in front of a known surface, or up to twice as much behind it, is explained.
+inline constexpr double kExplainedDepth = 0.015;
+// Joint refinement of what is accepted.
+inline constexpr RefineOptions kSettling = {.steps = 8, .first_gate = 0.02, .last_gate = 0.008};
+
+/// What need not be judged.
+bool hopeless(const rendering::PoseEvidence& e);
+/// Whether an object at X_WO has a surface right under its lowest points, or reaches a little below one. It is looked
+/// for at these `shares` of the way from the middle of its lowest points to each of them.
+bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
+            std::span<const SupportSurfaces* const> surfaces, std::span<const double> shares);
+/// What a cluster and model are tried from: places that look like learned ones of the model, if there are any, and
+/// random poses.
+std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
+                            const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream);
+/// The things that were found, as surfaces.
+SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC);
+std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,
+                                            const geometry::PinholeCamera& camera, const FilterTools& tools);
+/// What is over the main support first, then over others; of the rest only some.
+std::vector<Cluster> clusters_over_supports(const SampledDepth& sampled, const geometry::Image<std::uint8_t>& explained,
+                                            const Surroundings& surroundings, const DetectionOptions& options);
+
+}  // namespace prescene::filter

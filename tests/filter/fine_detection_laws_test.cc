@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds that are judged in the fine image, and which cameras let them be.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "filter_fixture.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/filter/proposals/fine_frame.h"
+
+namespace prescene::filter_tests {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+constexpr int kPictureWidth = 160, kPictureHeight = 120;
+constexpr int kLeft = 50, kRight = 110, kTop = 40, kBottom = 80;  // of a red thing in front of a grey wall
+
+struct Picture {
+  geometry::DepthImage depth{kPictureWidth, kPictureHeight, 1.4F};
+  geometry::ColorImage color{kPictureWidth, kPictureHeight, geometry::Rgb{120, 120, 125}};
+};
+
+/// A thing 1 m away before a wall at 1.4 m. In depth it reaches `further` pixels past where it ends in colour, and
+/// beside that `lost` pixels show nothing.
+Picture before_a_wall(int further, int lost) {
+  Picture picture;
+  for (int y = 0; y < kPictureHeight; ++y)
+    for (int x = 0; x < kPictureWidth; ++x) {
+      const int outside = std::max({kLeft - x, x - kRight, kTop - y, y - kBottom});
+      if (outside <= 0) picture.color(x, y) = {180, 40, 40};
+      if (outside <= further)
+        picture.depth(x, y) = 1.0F;
+      else if (outside <= further + lost)
+        picture.depth(x, y) = 0.0F;
+    }
+  return picture;
+}
+
+TEST(EdgeSmear, IsHowFarEdgesInDepthAreFromThoseInColour) {
+  for (const int further : {-4, -1, 0, 1, 2, 6}) {
+    const Picture picture = before_a_wall(further, 0);
+    const EdgeSmear smear = measure_edge_smear(picture.depth, &picture.color);
+    EXPECT_GE(smear.edges, kRight - kLeft + kBottom - kTop) << further;
+    EXPECT_EQ(smear.pixels, std::abs(further)) << further;
+    EXPECT_EQ(smear.is_sharp(), std::abs(further) <= 1) << further;
+  }
+}
+
+TEST(EdgeSmear, WhatIsLostBesideAnEdgeIsNoSmear) {
+  const Picture few = before_a_wall(0, 2), many = before_a_wall(0, 9);
+  EXPECT_TRUE(measure_edge_smear(few.depth, &few.color).is_sharp());
+  // Where a hole is all that is seen beside an edge, it does not tell.
+  EXPECT_EQ(measure_edge_smear(many.depth, &many.color).edges, 0);
+}
+
+TEST(EdgeSmear, IsNotKnownWithoutColoursOrEdges) {
+  const Picture picture = before_a_wall(0, 0);
+  const geometry::ColorImage grey(kPictureWidth, kPictureHeight, geometry::Rgb{120, 120, 120}), small(80, 60);
+  const geometry::DepthImage wall(kPictureWidth, kPictureHeight, 1.4F), nothing(kPictureWidth, kPictureHeight, 0.0F);
+  for (const EdgeSmear& smear : {measure_edge_smear(picture.depth, nullptr), measure_edge_smear(picture.depth, &grey),
+                                 measure_edge_smear(picture.depth, &small), measure_edge_smear(wall, &picture.color),
+                                 measure_edge_smear(nothing, &picture.color)}) {
+    EXPECT_EQ(smear.edges, 0);
+    EXPECT_FALSE(smear.is_sharp());
+  }
+}
+
+/// As measured of a camera that shows surfaces end where they do.
+constexpr EdgeSmear kSharp = {0.0, 1000};
+
+/// A table, a carton, a box and a can on it, apart from each other; the scene says no more than that they may be there.
+class FineFinding : public ::testing::Test {
+ protected:
+  FineFinding()
+      : models_{carton_model("carton"), box_model("box", {0.06, 0.10, 0.18}), can_model("can", 0.035, 0.11)},
+        poses_{Pose{geometry::exp_rotation({0.0, 0.0, 0.5}), {-0.08, -0.16, 0.11}},
+               Pose{geometry::exp_rotation({0.0, 0.0, -0.3}), {0.05, 0.02, 0.09}},
+               Pose{geometry::exp_rotation({1.5707963, 0.0, 0.0}), {-0.05, 0.18, 0.035}}} {
+    see(models_, poses_);
+  }
+
+  void see(const std::vector<belief::ObjectModel>& models, const std::vector<Pose>& poses) {
+    sequence_ = still_sequence(models, poses);
+    observation_ = sequence_.observe(0, *backends_.renderer);
+    scene_ = open_scene(models);
+    frame_ = backends_.frame_of(scene_, observation_);
+    const DetectionOptions options;
+    sampled_ = sample_depth(*observation_.frame.depth, observation_.frame.camera, options.segmentation);
+    std::vector<WantedModel> all;
+    for (const belief::ObjectModel& model : models) all.push_back(wanted(model));
+    surroundings_ =
+        surroundings_in(frame_, sampled_, *scene_, all, options.segmentation, {1, core::Purpose::kDetection});
+    ASSERT_FALSE(surroundings_.solid.empty());
+  }
+  WantedModel wanted(const belief::ObjectModel& model, int count = 1) {
+    return {target_of(model, frame_, backends_.tools), count};
+  }
+  /// As a camera that is sharp, or not, lets them be judged.
+  std::vector<Detection> found(const std::vector<WantedModel>& models, const EdgeSmear& smear = kSharp) {
+    FineFrame fine = fine_frame(frame_, *scene_, observation_, backends_.tools);
+    fine.smear = smear;
+    return detect(frame_.terms, fine, {}, sampled_, surroundings_, models, {}, backends_.tools,
+                  {5, core::Purpose::kDetection});
+  }
+  double distance(const Detection& detection, const Pose& X_WO, const SearchTarget& target) const {
+    return (frame_.X_WC * detection.X_CO * target.centre() - X_WO * target.centre()).norm();
+  }
+  static std::vector<int> models_of(const std::vector<Detection>& found) {
+    std::vector<int> models;
+    for (const Detection& detection : found) models.push_back(detection.model);
+    return models;
+  }
+
+  Backends backends_;
+  std::vector<belief::ObjectModel> models_;
+  std::vector<Pose> poses_;
+  SimulatedSequence sequence_;
+  belief::Observation observation_;
+  std::shared_ptr<const belief::Scene> scene_;
+  FilterFrame frame_;
+  SampledDepth sampled_;
+  Surroundings surroundings_;
+};
+
+TEST_F(FineFinding, FineTermsAreTheFrameAtAnotherResolution) {
+  const rendering::FrameTerms fine = fine_frame(frame_, *scene_, observation_, backends_.tools).terms;
+  ASSERT_EQ(fine.camera.width, 320);
+  EXPECT_EQ(fine.step, observation_.frame.camera.width / 320);
+  EXPECT_GT(frame_.terms.step, fine.step);
+  // Each of its pixels is one of the observation, seen along the same ray.
+  for (int y = 3; y < fine.camera.height; y += 17)
+    for (int x = 3; x < fine.camera.width; x += 17) {
+      const Eigen::Vector2d pixel = observation_.frame.camera.project(fine.camera.unproject(x, y, 1.0));
+      const float z = (*observation_.frame.depth)(static_cast<int>(std::lround(pixel.x())),
+                                                  static_cast<int>(std::lround(pixel.y())));
+      EXPECT_LT((pixel.array() - pixel.array().round()).abs().maxCoeff(), 1e-6);
+      const auto& range = fine.model.options();
+      if (z > 0.0F) {
+        EXPECT_FLOAT_EQ(fine.depth(x, y),
+                        std::clamp(z, static_cast<float>(range.min_depth), static_cast<float>(range.max_depth)));
+      } else {
+        EXPECT_EQ(fine.depth(x, y), 0.0F);
+      }
+    }
+}
+
+TEST_F(FineFinding, AnOutlineEndsAtASupportThatTheFrameAloneShows) {
+  const rendering::FrameTerms fine = fine_frame(frame_, *scene_, observation_, backends_.tools).terms;
+  const rendering::FrameTerms known = with_background(fine, sampled_, surroundings_);
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const geometry::DepthImage depth =
+        depth_of(wanted(models_[i]).target, frame_.X_CW * poses_[i], fine.camera, *backends_.renderer);
+    const double before = outline_support(fine, depth, 0.02), after = outline_support(known, depth, 0.02);
+    EXPECT_GE(after, before) << models_[i].name;
+    EXPECT_GT(after, 0.9) << models_[i].name;
+  }
+}
+
+TEST_F(FineFinding, APartOfALargerThingIsNotFound) {
+  // Nobody knows of the crate, whose faces explain those of the box.
+  const belief::ObjectModel crate = box_model("crate", {0.14, 0.18, 0.17});
+  see({crate}, {Pose{geometry::exp_rotation({0.0, 0.0, 0.3}), {0.0, 0.0, 0.085}}});
+  EXPECT_THAT(found({wanted(box_model("box", {0.06, 0.10, 0.12}))}), IsEmpty());
+  // The crate itself is found by its own model.
+  EXPECT_EQ(found({wanted(crate)}).size(), 1U);
+}
+
+TEST_F(FineFinding, AStackIsFoundWhole) {
+  // The tray's corners all lie beyond the edges of the box that it lies on, and neither ends but at the other.
+  const belief::ObjectModel box = box_model("box", {0.09, 0.11, 0.14}), tray = box_model("tray", {0.12, 0.14, 0.04});
+  const std::vector<Pose> poses = {Pose{geometry::exp_rotation({0.0, 0.0, 0.4}), {0.0, 0.0, 0.07}},
+                                   Pose{geometry::exp_rotation({0.0, 0.0, -0.2}), {0.01, 0.0, 0.16}}};
+  see({box, tray}, poses);
+  const std::vector<WantedModel> models = {wanted(box), wanted(tray)};
+  const std::vector<Detection> detections = found(models);
+  ASSERT_THAT(models_of(detections), UnorderedElementsAre(0, 1));
+  for (const Detection& detection : detections) {
+    const auto model = static_cast<std::size_t>(detection.model);
+    EXPECT_TRUE(detection.stands) << model;
+    EXPECT_LT(distance(detection, poses[model], models[model].target), 0.015) << model;
+  }
+}
+
+TEST_F(FineFinding, IsJudgedInTheFineImageOfASharpCameraAlone) {
+  const std::vector<WantedModel> models = {wanted(models_[0]), wanted(models_[1]), wanted(models_[2])};
+  const std::vector<Detection> sharp = found(models);
+  ASSERT_THAT(models_of(sharp), UnorderedElementsAre(0, 1, 2));
+  for (const Detection& detection : sharp) {
+    const auto model = static_cast<std::size_t>(detection.model);
+    EXPECT_LT(distance(detection, poses_[model], models[model].target), 0.01) << model;
+    EXPECT_GE(detection.outline, 0.9) << model;
+  }
+  const std::vector<Detection> coarse =
+      detect(frame_.terms, {}, sampled_, surroundings_, models, {}, backends_.tools, {5, core::Purpose::kDetection});
+  for (const EdgeSmear& smear : {EdgeSmear{3.0, 1000}, EdgeSmear{}}) {
+    const std::vector<Detection> smeared = found(models, smear);
+    ASSERT_EQ(smeared.size(), coarse.size());
+    for (std::size_t i = 0; i < coarse.size(); ++i) {
+      EXPECT_EQ(smeared[i].X_CO.translation, coarse[i].X_CO.translation);
+      EXPECT_EQ(smeared[i].evidence.log_ratio, coarse[i].evidence.log_ratio);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace prescene::filter_tests
