@@ -14,10 +14,15 @@ using ::testing::HasSubstr;
 TrackerSettings unusual() {
   TrackerSettings settings;
   settings.topics = {"/d", "/c", "/i", "/t", "/ts", "/js", "points", "compressed", "/clock"};
-  settings.assembler = {
-      "base", "lens", geometry::normalized(geometry::Pose{{0.3, 0.1, -0.7, 0.2}, {0.1, 1.0 / 3.0, 2}}),
-      0.07,   0.02,   false,
-      true,   true,   nullptr};
+  AssemblerSettings& assembler = settings.assembler;
+  assembler.world_frame = "base";
+  assembler.camera_frame = "lens";
+  assembler.X_WC = geometry::normalized(geometry::Pose{{0.3, 0.1, -0.7, 0.2}, {0.1, 1.0 / 3.0, 2}});
+  assembler.max_wait_s = 0.07;
+  assembler.max_stamp_difference_s = 0.02;
+  assembler.use_color = false;
+  assembler.rectified = true;
+  assembler.mono16_is_depth = true;
   settings.tf = {.history_s = 12.5, .max_frames = 77, .max_samples = 5000, .max_extrapolation_s = 0.3};
   settings.learned = "learned: {}\n";
   settings.learned_file = "learned.yaml";
