@@ -4,7 +4,7 @@
 // edges look no worse for that; but the colour image shows the same edges.
 //
 //   const EdgeSmear smear = measure_edge_smear(*frame.depth, frame.color.get());
-//   if (smear.is_sharp()) look_beside_the_edge();
+//   const int pixels_beside_the_edge = smear.is_sharp() ? 2 : 8;
 #pragma once
 
 #include "prescene/geometry/image.h"
