@@ -345,14 +345,13 @@ TEST(CommandLine, PredictRefusesWhatMeansNothingAndSaysWhatWould) {
   refused({"--budget", "1e9"}, "up to 1000000 s");
   refused({"--confidence", "0.9999999999999999"}, "between 0.5 and 0.9999");
   refused({"--duration", "3601"}, "up to 3600");
-  EXPECT_EQ(run_program({"predict", scenario("five_objects_pushed"), "--stepper", "lockstep"}).exit_code, 2);
-  const std::vector<std::string> few = {"predict", scenario("five_objects_pushed"), "--max-instances", "8"};
+  EXPECT_EQ(run_program({"predict", scenario("drawer_pulled"), "--stepper", "lockstep"}).exit_code, 2);
+  const std::vector<std::string> few = {"predict", scenario("drawer_pulled"), "--max-instances", "8"};
   const Finished automatic = run_program(few);
   EXPECT_EQ(automatic.exit_code, 0) << automatic.err;
   EXPECT_NE(automatic.out.find("Simulated by Bullet's stepper"), std::string::npos) << automatic.out;
-  EXPECT_NE(
-      run_program({"predict", scenario("five_objects_pushed"), "--stepper", "lockstep"}).err.find("--stepper bullet"),
-      std::string::npos);
+  EXPECT_NE(run_program({"predict", scenario("drawer_pulled"), "--stepper", "lockstep"}).err.find("--stepper bullet"),
+            std::string::npos);
   EXPECT_NE(run_program({"validate", scene}).out.find("1 object, "), std::string::npos);
 }
 
