@@ -45,7 +45,8 @@ class ExplainedEpisodes : public testing::TestWithParam<std::string> {};
 
 TEST_P(ExplainedEpisodes, NameTheEventAndItsTime) {
   ExplainedEventsOptions options;
-  const EpisodeResult result = explain_episode(make_event_episode(GetParam(), 1), 1, options, testing::TempDir(), {});
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(make_event_episode(GetParam(), 1), 1, options, scratch.path(), {});
   EXPECT_EQ(result.failure, "");
   // Of one episode, the second answer may be the right one, if it is not ruled out.
   EXPECT_TRUE(result.nearly_right || result.of_truth > 0.1)
@@ -93,7 +94,8 @@ TEST(ExplainedEvents, WhatIsTakenAwayInPlainViewIsNotStillThere) {
   episode.changes = {{episode.time, "bottle", {}, {}}};
   ExplainedEventsOptions options;
   options.query.runs = 2;
-  const EpisodeResult result = explain_episode(episode, 1, options, testing::TempDir(), {});
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(episode, 1, options, scratch.path(), {});
   EXPECT_EQ(result.failure, "");
   EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
   EXPECT_LT(result.time_error, 0.3);
@@ -109,7 +111,8 @@ TEST_P(GoneBeforeTheWindow, NothingHappensInIt) {
   ExplainedEventsOptions options;
   options.query.runs = 2;
   options.query.object = "bottle";
-  const EpisodeResult result = explain_episode(episode, 1, options, testing::TempDir(), {});
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(episode, 1, options, scratch.path(), {});
   EXPECT_EQ(result.failure, "");
   EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
 }
@@ -127,7 +130,8 @@ TEST(ExplainedEvents, NothingHappensInAWindowThatBeginsWhenTheThingIsThereAlread
   ExplainedEventsOptions options;
   options.query.runs = 2;
   options.query.object = "bottle";
-  const EpisodeResult result = explain_episode(episode, 1, options, testing::TempDir(), {});
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(episode, 1, options, scratch.path(), {});
   EXPECT_EQ(result.failure, "");
   EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
 }
@@ -163,7 +167,8 @@ camera: {width: 320, height: 240, fov_deg: 50, look: {from: [0.9, -0.5, 0.6], at
 TEST(ExplainedEvents, NothingHappensToADrawerThatStands) {
   ExplainedEventsOptions options;
   options.query.runs = 2;
-  const EpisodeResult result = explain_episode(still_until(kDrawer, 0.6, 1.4), 1, options, testing::TempDir(), {});
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(still_until(kDrawer, 0.6, 1.4), 1, options, scratch.path(), {});
   EXPECT_EQ(result.failure, "");
   EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
 }
