@@ -8,8 +8,8 @@
 #include "benchmarks/processor_time.h"
 #include "benchmarks/simulator_laws.h"
 #include "prescene/core/check.h"
-#include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/load_scene.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "tests/support/paths.h"
 
@@ -99,9 +99,9 @@ Table measure_scanned_pair(int instances, int in_bullet, Report* report) {
     cost.why = shift.why = tests::missing_data_message("meshes");
   } else {
     std::fprintf(stderr, "scanned bottle and mug\n");
-    auto read = interfaces::parse_scene(scene_text(std::filesystem::absolute(*meshes)), "scanned_pair.yaml");
+    const auto read = service::load_scene_text(scene_text(std::filesystem::absolute(*meshes)), "scanned_pair.yaml", {});
     PRESCENE_CHECK_MSG(read.ok(), read.status().message());
-    const auto scene = std::make_shared<const belief::Scene>(*std::move(read));
+    const std::shared_ptr<const belief::Scene>& scene = *read;
     const simulation::StartDistribution distribution = simulation::start_of(scene);
     const simulation::StartSampler sampler(distribution.components.front(), 7);
     std::vector<belief::WorldState> starts;
