@@ -137,35 +137,16 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, const SampledD
                               std::span<const WantedModel> wanted, std::span<const int> left,
                               const ProposalJudge& judge, const DetectionOptions& options, const FilterTools& tools,
                               const core::RandomStream& stream, std::uint64_t round) {
-  struct Task {
-    int cluster;
-    int model;
-    std::vector<PoseCandidate> found;
-  };
-  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
-  std::vector<Task> tasks;
-  for (std::size_t cluster = first; cluster < clusters.size(); ++cluster)
-    for (std::size_t model = 0; model < wanted.size(); ++model)
-      if (left[model] > 0) tasks.push_back({static_cast<int>(cluster), static_cast<int>(model), {}});
-  tools.search->threads().for_each_index(tasks.size(), [&](std::size_t i) {
-    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    Task& task = tasks[i];
-    const SearchTarget& target = wanted[static_cast<std::size_t>(task.model)].target;
-    core::RandomStream draws = stream;
-    const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
-    const std::vector<Pose> starts =
-        starts_in(clusters[static_cast<std::size_t>(task.cluster)], sampled, target, up_C, options, mine);
-    task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
-    std::erase_if(task.found, [&](const PoseCandidate& c) {
-      return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
-    });
+  const auto keep = [&](const SearchTarget& target, rendering::LikelihoodWorkspace&,
+                        std::vector<PoseCandidate>& found) {
     if (judge.decides())
-      keep_distinct(target.centre(), kKeptForJudge, task.found);
+      keep_distinct(target.centre(), kKeptForJudge, found);
     else
-      task.found.resize(std::min(task.found.size(), static_cast<std::size_t>(kKept)));
-  });
+      found.resize(std::min(found.size(), static_cast<std::size_t>(kKept)));
+  };
   std::vector<Proposal> proposals;
-  for (const Task& task : tasks)
+  for (const SearchedModel& task : search_clusters(terms, sampled, clusters, first, surroundings, wanted, left, options,
+                                                   tools, stream, round, keep))
     for (const PoseCandidate& candidate : task.found)
       if (judge.decides() ? !hopeless(candidate.evidence) : acceptable(candidate.evidence, 0.0, options)) {
         Proposal proposal;
@@ -322,6 +303,34 @@ void take_back(const Surroundings& surroundings, std::span<const WantedModel> wa
 }
 
 }  // namespace
+
+std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, const SampledDepth& sampled,
+                                           const std::vector<Cluster>& clusters, std::size_t first,
+                                           const Surroundings& surroundings, std::span<const WantedModel> wanted,
+                                           std::span<const int> left, const DetectionOptions& options,
+                                           const FilterTools& tools, const core::RandomStream& stream,
+                                           std::uint64_t round, const KeepCandidates& keep) {
+  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
+  std::vector<SearchedModel> tasks;
+  for (std::size_t cluster = first; cluster < clusters.size(); ++cluster)
+    for (std::size_t model = 0; model < wanted.size(); ++model)
+      if (left[model] > 0) tasks.push_back({static_cast<int>(cluster), static_cast<int>(model), {}});
+  tools.search->threads().for_each_index(tasks.size(), [&](std::size_t i) {
+    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
+    SearchedModel& task = tasks[i];
+    const SearchTarget& target = wanted[static_cast<std::size_t>(task.model)].target;
+    core::RandomStream draws = stream;
+    const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
+    const std::vector<Pose> starts =
+        starts_in(clusters[static_cast<std::size_t>(task.cluster)], sampled, target, up_C, options, mine);
+    task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
+    std::erase_if(task.found, [&](const PoseCandidate& c) {
+      return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
+    });
+    keep(target, *workspace, task.found);
+  });
+  return tasks;
+}
 
 std::vector<Pose> cluster_starts(const Cluster& cluster, const SearchTarget& target, const Vector3d& up_C,
                                  double standing_share, int count, const core::RandomStream& stream) {

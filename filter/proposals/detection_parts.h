@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,23 @@ bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
 /// random poses.
 std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
                             const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream);
+/// The poses that a wanted model was found at in a cluster.
+struct SearchedModel {
+  int cluster = 0;
+  int model = 0;
+  std::vector<PoseCandidate> found;
+};
+/// Keeps of a model's poses, best first, what is worth judging; called in the thread that found them.
+using KeepCandidates =
+    std::function<void(const SearchTarget&, rendering::LikelihoodWorkspace&, std::vector<PoseCandidate>&)>;
+/// Looks in each cluster from `first` on for each model of which some are `left`, ordered by cluster and model. Poses
+/// that reach into a support are left out before `keep` is asked.
+std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, const SampledDepth& sampled,
+                                           const std::vector<Cluster>& clusters, std::size_t first,
+                                           const Surroundings& surroundings, std::span<const WantedModel> wanted,
+                                           std::span<const int> left, const DetectionOptions& options,
+                                           const FilterTools& tools, const core::RandomStream& stream,
+                                           std::uint64_t round, const KeepCandidates& keep);
 /// The things that were found, as surfaces.
 SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC);
 std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,

@@ -73,37 +73,18 @@ std::vector<FineProposal> propose_in_fine(const rendering::FrameTerms& terms, co
                                           std::span<const int> left, const DetectionOptions& options,
                                           const FilterTools& tools, const core::RandomStream& stream,
                                           std::uint64_t round) {
-  struct Task {
-    int cluster;
-    int model;
-    std::vector<PoseCandidate> found;
-  };
-  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
-  std::vector<Task> tasks;
-  for (std::size_t cluster = first; cluster < clusters.size(); ++cluster)
-    for (std::size_t model = 0; model < wanted.size(); ++model)
-      if (left[model] > 0) tasks.push_back({static_cast<int>(cluster), static_cast<int>(model), {}});
-  tools.search->threads().for_each_index(tasks.size(), [&](std::size_t i) {
-    const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
-    Task& task = tasks[i];
-    const SearchTarget& target = wanted[static_cast<std::size_t>(task.model)].target;
-    core::RandomStream draws = stream;
-    const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
-    const std::vector<Pose> starts =
-        starts_in(clusters[static_cast<std::size_t>(task.cluster)], sampled, target, up_C, options, mine);
-    task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
-    std::erase_if(task.found, [&](const PoseCandidate& c) {
-      return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
-    });
-    std::erase_if(task.found, [](const PoseCandidate& c) { return hopeless(c.evidence); });
-    keep_distinct_shapes(target, kKeptShapes, task.found);
-    for (PoseCandidate& candidate : task.found) {
-      tools.search->refine(fine, target, kFineRefine, *workspace, std::span(&candidate.X_CO, 1));
-      candidate.evidence = weighing.of(fine, target, candidate.X_CO, *workspace);
+  const auto keep = [&](const SearchTarget& target, rendering::LikelihoodWorkspace& workspace,
+                        std::vector<PoseCandidate>& found) {
+    std::erase_if(found, [](const PoseCandidate& c) { return hopeless(c.evidence); });
+    keep_distinct_shapes(target, kKeptShapes, found);
+    for (PoseCandidate& candidate : found) {
+      tools.search->refine(fine, target, kFineRefine, workspace, std::span(&candidate.X_CO, 1));
+      candidate.evidence = weighing.of(fine, target, candidate.X_CO, workspace);
     }
-  });
+  };
   std::vector<FineProposal> proposals;
-  for (const Task& task : tasks)
+  for (const SearchedModel& task : search_clusters(terms, sampled, clusters, first, surroundings, wanted, left, options,
+                                                   tools, stream, round, keep))
     for (const PoseCandidate& candidate : task.found) {
       if (!acceptable_in_fine(candidate.evidence, 0.0, options)) continue;
       FineProposal proposal;
