@@ -246,7 +246,7 @@ int new_objects(const FilterFrame& frame, const belief::Observation& observation
   rendering::FrameTerms terms;
   with_known_surfaces(frame.terms, known, &terms);
   const Surroundings surroundings = surroundings_in(frame, sampled, *belief.scene, wanted, segmentation, stream);
-  FineFrame fine = fine_frame(frame, *belief.scene, observation, tools);
+  FineFrame fine = fine_frame_if_sharp(frame, *belief.scene, observation, tools);
   with_coarse_known(known, frame.terms.camera, fine.terms);
   const std::vector<Detection> found =
       detect(terms, fine, known, sampled, surroundings, wanted, detection, tools, stream);

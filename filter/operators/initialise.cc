@@ -237,7 +237,7 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
       wide.push_back(i);
   report.looked_for = static_cast<int>(wide.size());
   if (wide.empty()) return report;
-  FineFrame fine = fine_frame(frame, scene, observation, tools);
+  FineFrame fine = fine_frame_if_sharp(frame, scene, observation, tools);
   geometry::DepthImage known = frame.robot;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     if (std::find(wide.begin(), wide.end(), i) != wide.end()) continue;
@@ -246,7 +246,8 @@ FindReport find_in_frame(const FilterFrame& frame, const belief::Observation& ob
     const Particle& there = which == FindWhich::kAll ? particles.front() : belief::heaviest(particles);
     const Pose X_CO = frame.X_CW * there.X_WO;
     merge_nearest(depth_of(target, X_CO, frame.terms.camera, *tools.renderer), &known);
-    with_known_surfaces(fine.terms, depth_of(target, X_CO, fine.terms.camera, *tools.renderer), &fine.terms);
+    if (fine.smear.is_sharp())
+      with_known_surfaces(fine.terms, depth_of(target, X_CO, fine.terms.camera, *tools.renderer), &fine.terms);
   }
 
   const SegmentationOptions& segmentation = options.detection.segmentation;

@@ -43,10 +43,8 @@ geometry::DepthImage background_in(const rendering::FrameTerms& terms, const Sam
   return shown;
 }
 
-}  // namespace
-
-FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
-                     const FilterTools& tools) {
+rendering::FrameTerms fine_terms(const FilterFrame& frame, const belief::Scene& scene,
+                                 const belief::Observation& observation, const FilterTools& tools) {
   const belief::RgbdFrame& rgbd = observation.frame;
   const int step = std::max(1, (2 * rgbd.camera.width + kFineWidth) / (2 * kFineWidth));
   const int offset = std::min({step / 2, rgbd.camera.width - 1, rgbd.camera.height - 1});
@@ -63,8 +61,7 @@ FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const
   rendering::FrameTermsOptions options;
   options.target_width = camera.width;
   options.tempering = frame.terms.tempering;
-  FineFrame fine;
-  rendering::FrameTerms& terms = fine.terms;
+  rendering::FrameTerms terms;
   PRESCENE_CHECK(make_frame_terms(input, options, frame.terms.model, &terms).ok());
   // The frame's own image may be a reduced one.
   const int own = rgbd.camera.width / std::max(1, frame.terms.camera.width);
@@ -81,13 +78,28 @@ FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const
   }
   if (draw(known, InstanceKind::kRobot, camera, frame.X_WC, *tools.renderer, &robot))
     with_known_surfaces(terms, robot, &terms);
-  fine.smear = measure_edge_smear(*rgbd.depth, rgbd.color.get());
+  return terms;
+}
+
+}  // namespace
+
+FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
+                     const FilterTools& tools) {
+  return {fine_terms(frame, scene, observation, tools),
+          measure_edge_smear(*observation.frame.depth, observation.frame.color.get())};
+}
+
+FineFrame fine_frame_if_sharp(const FilterFrame& frame, const belief::Scene& scene,
+                              const belief::Observation& observation, const FilterTools& tools) {
+  FineFrame fine;
+  fine.smear = measure_edge_smear(*observation.frame.depth, observation.frame.color.get());
+  if (fine.smear.is_sharp()) fine.terms = fine_terms(frame, scene, observation, tools);
   return fine;
 }
 
 void with_coarse_known(const geometry::DepthImage& known, const geometry::PinholeCamera& camera,
                        rendering::FrameTerms& fine) {
-  if (known.empty()) return;
+  if (known.empty() || fine.depth.empty()) return;
   geometry::DepthImage depth(fine.camera.width, fine.camera.height);
   for (int y = 0; y < depth.height(); ++y)
     for (int x = 0; x < depth.width(); ++x) {

@@ -2,7 +2,7 @@
 // The frame at a finer resolution. The coarse image of the likelihood is enough to find poses; whether a pose is right
 // is seen where the object ends, and that a coarse image tells to half a pixel at best, 5 to 10 mm on a table.
 //
-//   const FineFrame fine = fine_frame(frame, *scene, observation, tools);
+//   const FineFrame fine = fine_frame_if_sharp(frame, *scene, observation, tools);
 //   std::vector<Detection> found = detect(terms, fine, known, sampled, surroundings, wanted, options, tools, stream);
 #pragma once
 
@@ -28,6 +28,9 @@ struct FineFrame {
 /// `scene` and `observation` are those that the frame was prepared with.
 FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
                      const FilterTools& tools);
+/// The same where the camera is sharp; else its smear alone, without terms, since finds are not judged in them.
+FineFrame fine_frame_if_sharp(const FilterFrame& frame, const belief::Scene& scene,
+                              const belief::Observation& observation, const FilterTools& tools);
 
 /// detect() where poses that were found in `terms` are judged in `fine`, with the same known things put in, if the
 /// camera shows sharply where surfaces end: what the fine image adds is the two pixels beside an outline, and a camera
