@@ -7,10 +7,10 @@
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
 //   if (!answer.error.ok()) ...
 //
-// Five questions: where is everything, and how are things related, now and in what was observed (actual belief); what
-// happens if (state anticipation); does it stay (stability); what will the camera see (observation anticipation); how
-// must it be done, so that an outcome comes about (state explanation). docs/reference/queries.md says what the answers
-// mean.
+// Questions of seven kinds (belief::Query): `where` is everything, how are things related now (`relations`) and in what
+// was observed (`timeline`): actual belief; what happens if (`predict`), does it stay (`stability`): state anticipation;
+// what will the camera see (`view`): observation anticipation; how must it be done, so that an outcome comes about
+// (`achieve`): state explanation. docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>
