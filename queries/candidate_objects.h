@@ -18,7 +18,7 @@ class CandidateObjects {
                    const ExplainQuery& query)
       : events_(&events), likelihood_(&likelihood), times_(times), query_(query) {}
 
-  /// What was not there at the begin, and the tracker did not find, in the last frame that weighs.
+  /// What was not there at the start, and the tracker did not find, in the last frame that weighs.
   core::Status look_for_missing(const WindowFrame& last, const ExplainContext& context,
                                 const filter::FilterTools& tools);
   bool may_be_explained(std::size_t object) const;

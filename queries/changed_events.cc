@@ -162,7 +162,7 @@ core::Result<std::unique_ptr<ChangedEvents>> changed_events(const ExplainWindow&
   for (std::size_t i = 0; i < events->present(); ++i)
     if (events->objects()[i].name == query.object) hypothesis.object = i;
   if (hypothesis.object == events->objects().size())
-    return core::not_found("'" + query.object + "' is not there at the window's begin");
+    return core::not_found("'" + query.object + "' is not there at the window's start");
   events->set_times({});
   events->base();
   EventPaths& kept = *events;

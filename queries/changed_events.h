@@ -11,7 +11,7 @@
 
 namespace prescene::queries {
 
-/// Of a hypothesis about an object that is there at the begin; runs go on for `goes_on` s after the window's end.
+/// Of a hypothesis about an object that is there at the start; runs go on for `goes_on` s after the window's end.
 /// `events` must outlive it.
 std::unique_ptr<ChangedEvents> changed_events(EventPaths& events, const Hypothesis& hypothesis,
                                               std::optional<WantedOutcome> wanted, double goes_on);

@@ -38,7 +38,7 @@ TrackedMotion EventPaths::motion_of(std::size_t object) const {
     return Vector3d(X_WO * belief::mean(model(object).center_of_mass));
   };
   if (n > 0) motion.last = track.estimates.back().mode;
-  if (!start) {  // not there at the begin
+  if (!start) {  // not there at the start
     motion.moved = n > 0;
     motion.after = motion.back = n > 0 ? track.times.front() : duration_;
     for (const WindowFrame& frame : window_.frames) {

@@ -47,9 +47,9 @@ core::Result<std::unique_ptr<EventPaths>> EventPaths::create(const ExplainWindow
                                   [](const SeenTrack& track) { return track.times.empty(); });
     if (none)
       return core::not_found(
-          "the belief holds no object at the window's begin, and none is found in it: begin the window later");
+          "the belief holds no object at the window's start, and none is found in it: begin the window later");
     return core::not_found(
-        "the belief holds no object at the window's begin: begin the window after the first has been found");
+        "the belief holds no object at the window's start: begin the window after the first has been found");
   }
   remark_on_loose_joints(*window.start, events->remarks_);
   events->take_actions();
@@ -141,7 +141,7 @@ void EventPaths::set_scene() {
 }
 
 void EventPaths::follow_tracks() {
-  // What was not there at the begin may be put in, if it is found later, by the tracker or by note_found().
+  // What was not there at the start may be put in, if it is found later, by the tracker or by note_found().
   for (const belief::ObjectBelief& object : window_.start->objects) {
     if (queries::is_present(object)) continue;
     belief::SceneObject absent;

@@ -25,13 +25,13 @@ struct Hypothesis {
   std::size_t object = 0;              ///< Of the objects of EventPaths.
   std::optional<std::size_t> partner;  ///< Of exchanged.
   double prior = 0.0;                  ///< Of all hypotheses they sum to one.
-  /// Of nothing: that the object is not there at the begin while the belief holds it to be, or the other way round.
+  /// Of nothing: that the object is not there at the start while the belief holds it to be, or the other way round.
   bool begins_otherwise = false;
 };
 
 /// The parameters at a point; what a schema does not have is 0.
 struct EventDraw {
-  double time = 0.0;                                          ///< s from the window's begin.
+  double time = 0.0;                                          ///< s from the window's start.
   double direction = 0.0;                                     ///< rad from W's x towards W's y.
   double height = 0.0;                                        ///< Share of the object's height.
   double sideways = 0.0;                                      ///< Share of its half width.
@@ -52,7 +52,7 @@ struct SeenTrack {
   std::vector<belief::ObjectEstimate> estimates;  ///< In these.
 };
 
-/// What the frames say of when an object left where it was at the begin, and was where it was tracked last: a tracker
+/// What the frames say of when an object left where it was at the start, and was where it was tracked last: a tracker
 /// notices either some frames late.
 struct SeenTimes {
   double left_after = 0.0, left_before = 0.0;  ///< s
@@ -61,7 +61,7 @@ struct SeenTimes {
 
 /// What a track says of when and how an object began to move.
 struct TrackedMotion {
-  bool moved = false;   ///< It was tracked elsewhere than at the begin.
+  bool moved = false;   ///< It was tracked elsewhere than at the start.
   bool lost = false;    ///< It was not tracked any more, before it was tracked elsewhere.
   double before = 0.0;  ///< s; still tracked where it was, ...
   double after = 0.0;   ///< ... the next frame, in which it is not.
@@ -84,7 +84,7 @@ geometry::Vector3d horizontal_x(const geometry::Vector3d& up);
 class EventPaths {
  public:
   /// `window` must outlive it; times of `stamps` are those of the frames that weigh. Objects: those that are present at
-  /// the begin, then those that are not.
+  /// the start, then those that are not.
   static core::Result<std::unique_ptr<EventPaths>> create(const ExplainWindow& window, const ExplainContext& context,
                                                           const belief::EventPriors& priors, std::uint64_t seed);
 
@@ -97,28 +97,28 @@ class EventPaths {
   bool is_still() const { return still_; }
   const SeenTrack& track(std::size_t object) const { return tracks_[object]; }
   bool is_held(std::size_t object) const;
-  /// Probability that it is not there at the begin: by its existence, but at least 1/2 of what the frame at the begin
+  /// Probability that it is not there at the start: by its existence, but at least 1/2 of what the frame at the start
   /// leaves in doubt, and 1/2 of what the tracker has not found, or has lost.
   double may_be_absent(std::size_t object) const;
-  /// Where it is at the begin, most probably; empty where it is not.
+  /// Where it is at the start, most probably; empty where it is not.
   std::optional<belief::Pose> start_pose(std::size_t object) const;
   /// Where what was not there is put in, but for its shift.
   const belief::Pose& put_in_place(std::size_t object) const { return put_in_at_[object]; }
   const belief::ObjectModel& model(std::size_t object) const { return scene_->model_of(objects_[object]); }
 
-  /// Times of the frames that weigh, s from the begin; before anything below.
+  /// Times of the frames that weigh, s from the start; before anything below.
   void set_times(std::vector<double> times) { times_ = std::move(times); }
   /// For guesses of kinds in which it is carried.
   void note_seen(std::size_t object, const SeenTimes& times) { seen_[object] = times; }
   /// The last frame sees where the object is put down, if it is: nothing to guess.
   void note_seen_in_the_end(std::size_t object) { seen_in_the_end_[object] = 1; }
   /// m by which its lowest point is above what it would rest on there: the surface under its centre of mass that is
-  /// nearest to that height, of supports and of the other objects at the begin. Empty where none is.
+  /// nearest to that height, of supports and of the other objects at the start. Empty where none is.
   std::optional<double> lift(std::size_t object, const belief::Pose& X_WO) const;
   /// Log density with which somebody puts it down about there, so that it rests: of m^3, and rad of turns that change
   /// something. The height is known to `height_variance`, m^2.
   double log_put_down(std::size_t object, const belief::Pose& X_WO, double height_variance) const;
-  /// What was not there at the begin was found in the last frame, and in those of `times` something is there, too.
+  /// What was not there at the start was found in the last frame, and in those of `times` something is there, too.
   void note_found(std::size_t object, const belief::Pose& X_WO, std::vector<double> times);
   /// Where objects are in those frames if nothing happens, from the most probable start.
   std::vector<ObjectPath> base();
@@ -128,7 +128,7 @@ class EventPaths {
   /// A guess of the event's parameters from the track, into `target`.
   void guess(const Hypothesis& hypothesis, TemperedTarget& target) const;
   EventDraw decode(const Hypothesis& hypothesis, const LatentPoint& z) const;
-  /// Where its object is at the begin.
+  /// Where its object is at the start.
   belief::Pose start_at(const Hypothesis& hypothesis, const LatentPoint& z) const;
   /// Runs go on so long after the window's end, s: for who asks what comes of an event.
   void go_on_for(double seconds) { horizon_ = duration_ + seconds; }
@@ -138,7 +138,7 @@ class EventPaths {
 
   /// paths[i] at points[i]; `draws`, where given, get the touched places too, `runs` the simulated instances from the
   /// event on (kinds that are simulated, and nothing; else empty ones). `moved`, where given: so far from where it is
-  /// drawn the object is at the begin, m in W; of what is held only where all is still, and then its hand is, too.
+  /// drawn the object is at the start, m in W; of what is held only where all is still, and then its hand is, too.
   void simulate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<ScenePath> paths,
                 std::span<EventDraw> draws = {}, std::span<belief::Trajectory> runs = {},
                 std::span<const geometry::Vector3d> moved = {});
@@ -197,7 +197,7 @@ class EventPaths {
   std::vector<std::uint8_t> seen_in_the_end_;   // by object
   std::vector<double> directions_;       // by object: in which it was tracked to move, rad; directions count from it
   std::vector<belief::Pose> put_in_at_;  // by object: where what was not there is put in, but for its shift
-  std::vector<belief::Action> actions_;  // known ones, times from the begin
+  std::vector<belief::Action> actions_;  // known ones, times from the start
   std::vector<double> times_;
   double duration_ = 0.0;
   double world_radius_ = 0.0;  // m

@@ -105,7 +105,7 @@ class Explainer {
     const Explanation& first = answer.explanations.front();
     const bool can_be = first.kind == EventKind::kPushed || first.kind == EventKind::kBumped ||
                         first.kind == EventKind::kSlipped ||
-                        (first.kind == EventKind::kNothing && !first.present_at_begin);
+                        (first.kind == EventKind::kNothing && !first.present_at_start);
     Judged* judged = first.kind == EventKind::kNothing ? &nothings_.front() : nullptr;
     for (Judged& one : judged_)
       if (one.hypothesis.kind == first.kind && events_->objects()[one.object].name == first.object) judged = &one;
@@ -165,7 +165,7 @@ class Explainer {
     return core::not_found("'" + query_.object +
                            "' is lost in the whole window: there is nothing to "
                            "explain; choose a window in which it is "
-                           "tracked at the begin or found later");
+                           "tracked at the start or found later");
   }
 
   core::Result<std::optional<std::size_t>> asked_object() const {
@@ -393,7 +393,7 @@ core::Result<ExplainAnswer> explain(const ExplainWindow& window, const ExplainQu
   PRESCENE_RETURN_IF_ERROR(validate(query));
   if (!window.start || !window.start->scene || window.start->step == 0)
     return core::invalid_input(
-        "there is no belief at the window's begin: "
+        "there is no belief at the window's start: "
         "begin it after the first frame");
   if (window.frames.empty())
     return core::invalid_input(

@@ -155,7 +155,7 @@ class AnswerBuilder {
       e.object = events_->objects()[judged.object].name;
       e.log_bayes_factor = judged.log_bayes;
     }
-    if (judged.hypothesis.begins_otherwise) e.present_at_begin = !events_->is_present(judged.object);
+    if (judged.hypothesis.begins_otherwise) e.present_at_start = !events_->is_present(judged.object);
     if (judged.hypothesis.partner) e.partner = events_->objects()[*judged.hypothesis.partner].name;
     if (judged.draws.empty() || kind == EventKind::kNothing) {
       e.sentence = sentence_of(e, window_);

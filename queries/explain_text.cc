@@ -14,7 +14,7 @@ using core::fixed_text;
 using geometry::Vector3d;
 
 std::string at_time(const Explanation& e) {
-  return e.time ? " " + fixed_text(e.time->mean, 2) + " s after the window's begin (" + fixed_text(e.time->low, 2) +
+  return e.time ? " " + fixed_text(e.time->mean, 2) + " s after the window's start (" + fixed_text(e.time->low, 2) +
                       " to " + fixed_text(e.time->high, 2) + " s)"
                 : "";
 }
@@ -45,9 +45,9 @@ std::string probability_text(double probability) {
 std::string sentence_of(const Explanation& e, const ExplainWindow& window) {
   switch (e.kind) {
     case EventKind::kNothing:
-      if (e.present_at_begin)
+      if (e.present_at_start)
         return "Nothing happened in the window but what is known to have been done: " + e.object + " was " +
-               (*e.present_at_begin ? "there already" : "gone already") + " when it began.";
+               (*e.present_at_start ? "there already" : "gone already") + " when it began.";
       return "Nothing happened but what is known to have been done.";
     case EventKind::kPushed:
       return e.object + " was pushed" + (e.towards ? " " + towards_text(e.towards->mean, window) : "") + at_time(e) +
@@ -113,7 +113,7 @@ std::string paragraph_of(const ExplainAnswer& answer) {
       if (most == nullptr || frame.against_nothing > most->against_nothing) most = &frame;
     if (most != nullptr && most->against_nothing > 0.0)
       text += " The frame " + fixed_text(most->time, 2) +
-              " s after the begin speaks most against nothing having happened (" +
+              " s after the start speaks most against nothing having happened (" +
               fixed_text(most->against_nothing, 1) + " nats).";
   }
   for (const WhereItIs& object : answer.objects) {

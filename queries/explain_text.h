@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Explanations in plain English. Times in them count from the window's begin.
+// Explanations in plain English. Times in them count from the window's start.
 #pragma once
 
 #include <string>

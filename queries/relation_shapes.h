@@ -20,7 +20,7 @@ class RelationShapes {
   /// Errors of the meshes, which name the body.
   static core::Result<RelationShapes> make(const belief::Scene& scene, core::ThreadPool& pool);
 
-  /// Poses of all bodies: objects as in the state, robot bodies at the begin of their timelines.
+  /// Poses of all bodies: objects as in the state, robot bodies at the start of their timelines.
   std::vector<belief::Pose> poses(const belief::Scene& scene, const belief::WorldState& state) const;
   /// Height of the body's lowest point along `up_W`, m.
   double lowest(std::size_t body, const belief::Pose& X_WB, const geometry::Vector3d& up_W) const;

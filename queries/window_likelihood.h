@@ -82,7 +82,7 @@ class WindowLikelihood {
                 std::span<double> log_ratios);
   /// Of a frame in which an object of its own is where `error` has it, all others as the base has them; `error` learns.
   double stays(std::size_t frame, std::size_t object, PathError& error);
-  /// How well an object's pose at the begin is known, in the coordinates of PathError.
+  /// How well an object's pose at the start is known, in the coordinates of PathError.
   const geometry::Matrix6d& start_error(std::size_t object) const { return start_errors_[object]; }
   /// Sets the poses of what was put down anywhere to those that the frames see.
   void settle(ScenePath& path) const;

@@ -129,7 +129,7 @@ bool stands_still(const Pose& X_WG_from, const Pose& X_WG_to) {
   return geometry::box_minus(X_WG_to, X_WG_from).norm() < kStillBody;
 }
 
-/// A ball that something fills which moves in this step, at its begin and its end.
+/// A ball that something fills which moves in this step, at its start and its end.
 struct Mover {
   Vector3d p_from_W;
   Vector3d p_to_W;

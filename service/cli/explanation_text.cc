@@ -31,8 +31,8 @@ std::string percent_text_of(const ordered_json& value, int decimals) {
 }
 
 /// " (gone already)" of what the belief held to be there when the window began; " (there already)" the other way round.
-std::string at_begin_text(const ordered_json& explanation) {
-  const auto present = explanation.find("present_at_begin");
+std::string at_start_text(const ordered_json& explanation) {
+  const auto present = explanation.find("present_at_start");
   if (present == explanation.end()) return "";
   return present->get<bool>() ? " (there already)" : " (gone already)";
 }
@@ -48,7 +48,7 @@ ExplanationTables explanation_tables(const ordered_json& explained) {
     const std::string partner = e.value("partner", "");
     const auto effects = e.find("effects");
     tables.events.push_back(
-        {e.value("event", "") + at_begin_text(e), e.value("object", "") + (partner.empty() ? "" : ", " + partner),
+        {e.value("event", "") + at_start_text(e), e.value("object", "") + (partner.empty() ? "" : ", " + partner),
          percent_text_of(e.at("probability"), 1),
          percent_text_of(e.at("interval").at(0), 1) + " to " + percent_text_of(e.at("interval").at(1), 1),
          fixed_text(e.value("log_bayes_factor", 0.0), 1), value_text(e, "time", 2), value_text(e, "towards_deg", 0),

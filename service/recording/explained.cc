@@ -47,7 +47,7 @@ ordered_json explanation_json(const queries::Explanation& e, double from) {
   ordered_json json = {{"event", belief::name_of(e.kind)}};
   if (!e.object.empty()) json["object"] = e.object;
   if (!e.partner.empty()) json["partner"] = e.partner;
-  if (e.present_at_begin) json["present_at_begin"] = *e.present_at_begin;
+  if (e.present_at_start) json["present_at_start"] = *e.present_at_start;
   json["probability"] = e.probability;
   json["interval"] = {e.low, e.high};
   json["log_bayes_factor"] = e.log_bayes_factor;
@@ -137,7 +137,7 @@ core::Result<Explained> explain_recording(const ReplayInput& input, const Explai
   queries::ExplainWindow& window = keeper.window();
   if (!window.start) {
     if (summary) PRESCENE_RETURN_IF_ERROR(check_steps(*summary, first_topics(settings, *input.scene())));
-    return core::invalid_input("there is no frame before the window's begin");
+    return core::invalid_input("there is no frame before the window's start");
   }
   const double end = core::seconds_of(keeper.last_ns() - keeper.first_ns());
   const double between =

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Observation explanation: which event makes the frames of a window most probable?
 //
-//   ExplainWindow window;                     // the belief at its begin, frames with the beliefs after them, actions
+//   ExplainWindow window;                     // the belief at its start, frames with the beliefs after them, actions
 //   PRESCENE_TRY(ExplainAnswer answer, explain(window, {.object = "carton"}, context));
 //   answer.explanations.front().sentence;     // "The carton was pushed at 2.31 s ..."
 //
 // Events are schemas with parameters (prescene/belief/event.h). For each schema and object, parameters are drawn, the
-// event is simulated from the belief at the window's begin, and the frames of the window weigh it by the tempered
+// event is simulated from the belief at the window's start, and the frames of the window weigh it by the tempered
 // likelihood; sequential Monte Carlo gives the posterior of the parameters and the evidence of the schema, evidence
 // times prior its probability. docs/reference/explain.md says what is assumed.
 #pragma once
@@ -37,7 +37,7 @@ struct WindowFrame {
 };
 
 struct ExplainWindow {
-  std::shared_ptr<const belief::Belief> start;  ///< After the last frame at or before the window's begin.
+  std::shared_ptr<const belief::Belief> start;  ///< After the last frame at or before the window's start.
   std::vector<WindowFrame> frames;              ///< After that, in the order of their stamps.
   /// What the robot was told to do in the window, by the clock of the frames.
   std::vector<std::pair<core::TimeNs, belief::Action>> actions;
@@ -78,21 +78,21 @@ struct EventValue {
 struct Explanation {
   belief::EventKind kind = belief::EventKind::kNothing;
   std::string object;  ///< "" for nothing, but for what follows.
-  /// Of nothing: `object` is there at the window's begin, or is not, other than the belief had it. It came, or went,
+  /// Of nothing: `object` is there at the window's start, or is not, other than the belief had it. It came, or went,
   /// before.
-  std::optional<bool> present_at_begin;
+  std::optional<bool> present_at_start;
   std::string partner;  ///< What it was exchanged with, else "".
   double probability = 0.0;
   double low = 0.0, high = 1.0;          ///< Interval of what more work would change.
   double log_bayes_factor = 0.0;         ///< Against nothing, nats: of the evidences, without priors.
-  std::optional<EventValue> time;        ///< s from the window's begin.
+  std::optional<EventValue> time;        ///< s from the window's start.
   std::optional<EventValue> towards;     ///< Horizontal direction of push or blow, degrees from W's x towards W's y.
   std::optional<EventValue> speed;       ///< Of the push, or impulse over mass, m/s.
   std::optional<EventValue> impulse;     ///< N s, of a blow.
   std::optional<EventValue> touched_at;  ///< Height above the object's lowest point, m.
   /// Shares of the posterior in which the object ends tilted by more than 30 degrees, or more than 5 cm lower.
   double tips = 0.0, falls = 0.0;
-  belief::Timeline timeline;  ///< Of the most probable instance, about the object; s from the window's begin.
+  belief::Timeline timeline;  ///< Of the most probable instance, about the object; s from the window's start.
   std::string sentence;
 };
 
@@ -106,7 +106,7 @@ struct WhereItIs {
 };
 
 struct DecidingFrame {
-  double time = 0.0;      ///< s from the window's begin.
+  double time = 0.0;      ///< s from the window's start.
   std::size_t frame = 0;  ///< Of the window.
   /// Where the objects are (of ExplainAnswer::objects) in the most probable instance of the best explanation; empty =
   /// it is not there.
@@ -119,7 +119,7 @@ struct DecidingFrame {
 struct ChangedPart {
   std::string name, unit;
   double from = 0.0, to = 0.0;  ///< Means of the posterior.
-  double deviations = 0.0;      ///< Standard deviations of the prior; of the place at the begin, of 5 cm each.
+  double deviations = 0.0;      ///< Standard deviations of the prior; of the place at the start, of 5 cm each.
 };
 
 /// What would have led to a wanted outcome.
@@ -150,7 +150,7 @@ struct ExplainAnswer {
   /// Time ran out (QueryContext::simulate_until) before the intervals were narrow; the same question says something
   /// else on another machine then.
   bool cut_short = false;
-  double duration = 0.0;  ///< s, from the window's begin to its last frame.
+  double duration = 0.0;  ///< s, from the window's start to its last frame.
   int simulated = 0;      ///< Instances.
   int evaluated = 0;      ///< Instances that were weighed.
   int failed = 0;         ///< That became unstable, or were impossible.

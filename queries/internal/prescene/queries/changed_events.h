@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An event as it would have been with other parameters, or with its object elsewhere at the begin: how it ends then.
+// An event as it would have been with other parameters, or with its object elsewhere at the start: how it ends then.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ class ChangedEvents {
   virtual ~ChangedEvents() = default;
 
   /// Parameters of the event but for its time where all lies still; standard normal under its priors. Then the place of
-  /// the object at the begin, along W's x laid flat, along the horizontal axis to the left of it, and, of what is held,
+  /// the object at the start, along W's x laid flat, along the horizontal axis to the left of it, and, of what is held,
   /// upwards: of kPlaceDeviation each. The hand that holds it moves with it.
   virtual const std::vector<ChangeCoordinate>& coordinates() const = 0;
   /// Of a draw: the event's parameters, then what the start takes, all standard normal.
@@ -44,7 +44,7 @@ class ChangedEvents {
 
 inline constexpr double kPlaceDeviation = 0.05;  ///< m
 
-/// Of an event of an object that is there at the window's begin, with the priors of the query; what is wanted is that
+/// Of an event of an object that is there at the window's start, with the priors of the query; what is wanted is that
 /// the object stays as it was (smallest_change.h). All must outlive it. Errors of explain().
 core::Result<std::unique_ptr<ChangedEvents>> changed_events(const ExplainWindow& window, const ExplainQuery& query,
                                                             const ExplainContext& context, belief::EventKind kind);

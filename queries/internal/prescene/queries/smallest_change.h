@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest change of an event, or of where its object was at the begin, that would have led to a wanted outcome.
+// The smallest change of an event, or of where its object was at the start, that would have led to a wanted outcome.
 //
 // The latent coordinates of an event are standard normal under the priors (event_paths.h), so that the length of a
 // shift of all of an event's posterior draws is a number of standard deviations. The shortest shift that leads to the

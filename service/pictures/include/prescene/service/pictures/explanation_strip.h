@@ -13,7 +13,7 @@
 namespace prescene::service {
 
 struct ExplanationStrip {
-  double time = 0.0;             ///< s from the window's begin.
+  double time = 0.0;             ///< s from the window's start.
   double against_nothing = 0.0;  ///< Nats, as DecidingFrame.
   geometry::ColorImage seen;
   geometry::ColorImage explained;  ///< Of the best explanation's most probable instance, in the models' colours.

@@ -62,7 +62,7 @@ class ActionPlayer {
     Pose X_GO;        // in the hand, while there is one; else in W
     int action = -1;  // the carry or pour under way
     double begin = 0.0;
-    Pose X_from;  // X_WO at its begin
+    Pose X_from;  // X_WO at its start
   };
   /// Of one robot body.
   struct Hand {

@@ -12,7 +12,7 @@
 //     left -= splits < most_splits(1) ? parts_until(first, options.step, left) : left;
 //   }
 //
-// Nothing is split while something is moved by other than contacts: that goes from the begin of a step to its end.
+// Nothing is split while something is moved by other than contacts: that goes from the start of a step to its end.
 #pragma once
 
 #include "prescene/simulation/rules/mechanics_options.h"
