@@ -52,15 +52,15 @@ struct MotionEpisode {
 struct GripRecord {
   Pose X_GO;             ///< In the hand, the mean over `frames`.
   int frames = 0;        ///< 0 = not known yet.
-  int apart_frames = 0;  ///< In a row in which it was seen to be elsewhere.
+  int apart_frames = 0;  ///< Consecutive frames in which it was seen elsewhere.
   friend bool operator==(const GripRecord&, const GripRecord&) = default;
 };
 
 struct MotionRecord {
   Pose X_still;                      ///< Where it lies still, the mean over `still_frames`.
   int still_frames = 0;              ///< 0 = it does not.
-  int moved_frames = 0;              ///< In a row in which it was seen elsewhere than where it lay still.
-  bool place_judged = false;         ///< What lying there says was learned.
+  int moved_frames = 0;              ///< Consecutive frames in which it was seen elsewhere.
+  bool place_judged = false;         ///< The evidence of its lying there has been used.
   bool held = false;                 ///< In the step before.
   int episodes_unexplained = 0;      ///< That no draw explained, and that therefore changed nothing.
   std::vector<MotionSample> recent;  ///< The last frames, while it lies still.

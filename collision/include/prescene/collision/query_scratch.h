@@ -7,9 +7,9 @@
 
 namespace prescene::collision {
 
-/// Work of a query; added to, never reset. A vector of pairs counts as so many; what only fills it up does not count
-/// as triangles, so that these numbers compare between trees. In those of volumes the default tree counts its first
-/// look at a pair of nodes, by bytes, as 32.
+/// Work done by a query; counters are added to, never reset. A vector operation on n pairs counts n; padding lanes are
+/// not counted as triangles, so the numbers compare between trees. In `volume_tests`, the default tree counts its first
+/// test of a pair of nodes, in bytes, as 32.
 struct QueryCounts {
   /// Pairs of nodes whose children were tested against each other; of rays, nodes whose children were.
   std::uint64_t node_pairs = 0;
@@ -51,7 +51,7 @@ struct MovingPair {
   NodePair pair;
 };
 
-/// Two nodes, or two leaves' blocks (then without children), that wait for being looked at; see distance_descent-inl.h.
+/// Two nodes, or two leaves' blocks (then without children), that wait to be visited; see distance_descent-inl.h.
 struct NearPair {
   NodePair pair;
   float key;           ///< Grows with the distance that they have at least.

@@ -23,9 +23,8 @@ class ScrewMotion {
   geometry::Pose pose(double t) const;
   /// Place at t of the point of B that is at p_start at t = 0, in A, m.
   Eigen::Vector3d place(const Eigen::Vector3d& p_start, double t) const;
-  /// Length of the second derivative of place(p_start, t) by t, m; constant in t. Between two times the point is off
-  /// the straight line between its places there, at the same time, by at most an eighth of it times the square of their
-  /// difference.
+  /// Length of the second derivative of place(p_start, t) by t, m; constant in t. Between times t0 and t1 the point
+  /// deviates from its chord, traversed at constant speed, by at most bend (t1 - t0)^2 / 8.
   double bend(const Eigen::Vector3d& p_start) const { return spin_.cross(velocity(p_start)).norm(); }
   /// Length of the first derivative, m; constant in t.
   double speed(const Eigen::Vector3d& p_start) const { return velocity(p_start).norm(); }
