@@ -103,7 +103,7 @@ void remark_on(const SearchResult& found, const belief::AchieveQuery& query, bel
     answer.remarks.push_back("The parameters hardly matter: the outcome comes about almost wherever they are.");
   if (answer.overlapping_share > 0.01)
     answer.remarks.push_back("In " + core::fixed_text(100.0 * answer.overlapping_share, 1) +
-                             " % of the instances things were in each other by more than 2 mm (" +
+                             " % of the instances objects overlapped by more than 2 mm (" +
                              core::fixed_text(1e3 * answer.deepest_overlap, 1) +
                              " mm at most) when they began or were let go; they are parted gently.");
   if (answer.failed_instances > 0)

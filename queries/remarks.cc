@@ -119,7 +119,7 @@ void remark_on_instances(const belief::Basis& basis, std::vector<std::string>& r
   }
   if (basis.overlapping_share > 0.0)
     remarks.push_back("In " + percent(basis.overlapping_share, 1) +
-                      " of the instances things were in each other, at the start or when let go, by up to " +
+                      " of the instances objects overlapped, at the start or when let go, by up to " +
                       fixed_text(1000.0 * basis.deepest_overlap, 0) +
                       " mm. They are parted gently; what comes of it is doubtful.");
   if (basis.crowded_instances > 0)

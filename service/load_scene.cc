@@ -141,7 +141,7 @@ interfaces::SceneFileOptions carried_options(const std::filesystem::path& scene,
   options.read_look = [looks](const interfaces::MeshRequest& request) { return looks->of(request); };
   options.read_mesh = [=](const interfaces::MeshRequest& request) -> core::Result<geometry::TriangleMesh> {
     const auto format = interfaces::mesh_format(request.path);
-    if (!format) return core::unsupported(request.path.string() + ": is no mesh that can be read");
+    if (!format) return core::unsupported(request.path.string() + ": not a readable mesh");
     PRESCENE_TRY(const std::vector<std::uint8_t> bytes, files(carried_mesh_name(request, scene)));
     // Scale and axis are in the PLY already. What is odd about the mesh was said when it was recorded.
     const bool whole = is_whole(*format);

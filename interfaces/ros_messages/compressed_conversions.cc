@@ -54,7 +54,7 @@ Result<Codes> decode_codes(Bytes payload, const Format& format, const ImageRules
   if (is_jpeg(payload))
     return core::invalid_input("is a JPEG, which does not keep depth; send the depth image's compressedDepth");
   if (format.packing.find("rvl") == std::string_view::npos)
-    return core::invalid_input("is no PNG, and the format " + quote(format.packing) +
+    return core::invalid_input("not a PNG image (bad signature), and the format " + quote(format.packing) +
                                " names no other coding; send compressedDepth as png or rvl");
   ByteReader in(payload, std::endian::little);
   const auto columns = in.read<std::uint32_t>();

@@ -97,7 +97,7 @@ std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) 
     const ordered_json answer = parse_or_discard(answered.answer);
     text += "answered after " + fixed_text(answered.seconds, 2) + " s\n";
     const bool is_below = answer.is_object() && answer.contains("predict") && !answer.contains("error");
-    text += is_below ? "what was foreseen stands below, beside what came\n" : answer_text(answer);
+    text += is_below ? "the prediction is compared with what happened below\n" : answer_text(answer);
   }
   return text;
 }
@@ -105,11 +105,11 @@ std::string answers_text(const std::vector<BusReplayResult::Answered>& answers) 
 std::string foreseen_text_of(const ForeseenAndCame& foreseen) {
   const std::vector<Comparison> comparisons = foreseen.comparisons();
   if (comparisons.empty()) return "";
-  std::string text = "\nForeseen, and what came\n";
+  std::string text = "\nPredictions and what happened\n";
   for (const Comparison& comparison : comparisons) {
     text += "\nAsked at " + fixed_text(comparison.at, 2) + " s: " + comparison.question + "\n" + comparison.note + "\n";
     std::vector<std::vector<std::string>> cells = {
-        {"outcome", "group", "foreseen", comparison.comparable ? "came to pass" : "came to pass (not to be compared)"}};
+        {"outcome", "group", "predicted", comparison.comparable ? "happened" : "happened (not to be compared)"}};
     for (const Comparison::Row& row : comparison.rows) {
       if (is_worth_a_row(row)) cells.push_back({row.outcome, row.group, foreseen_text(row), came_text(row)});
     }

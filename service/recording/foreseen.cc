@@ -306,7 +306,7 @@ void ForeseenAndCame::relate(const Asked& asked, std::uint64_t step, Comparison*
   const double turned = geometry::angle_between(then->X_WO.rotation, meant->X_WO.rotation);
   comparison->comparable = moved <= kSamePlace && turned <= kSameTurn;
   comparison->note += comparison->comparable
-                          ? " and from the same place: what came can be compared with this answer."
+                          ? " and from the same place: what happened can be compared with this answer."
                           : ", when it was " + fixed_text(100.0 * moved, 0) + " cm further and turned by " +
                                 fixed_text(turned * 180.0 / std::numbers::pi, 0) +
                                 " degrees: this answer was about letting go at another time and place, and what came "

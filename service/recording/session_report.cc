@@ -234,12 +234,12 @@ void SessionReport::add_supports(interfaces::ReportContents& contents) const {
 
 void SessionReport::add_foreseen(interfaces::ReportContents& contents) const {
   if (comparisons_.empty()) return;
-  interfaces::ReportSection section{"Foreseen, and what came", {}};
+  interfaces::ReportSection section{"Predictions and what happened", {}};
   for (const Comparison& comparison : comparisons_) {
     section.blocks.push_back(interfaces::TextBlock{"Asked at " + fixed_text(comparison.at, 2) +
                                                    " s: " + comparison.question + "\n\n" + comparison.note});
     interfaces::TableBlock table{comparison.comparable ? "" : "Not to be compared: see above",
-                                 {"outcome", "group", "foreseen", "came to pass"},
+                                 {"outcome", "group", "predicted", "happened"},
                                  {}};
     for (const Comparison::Row& row : comparison.rows) {
       if (is_worth_a_row(row)) table.rows.push_back({row.outcome, row.group, foreseen_text(row), came_text(row)});

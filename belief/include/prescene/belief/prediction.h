@@ -195,7 +195,7 @@ struct Basis {
   std::string not_lockstep;    ///< Why the faster "lockstep" could not, where it was tried first; else "".
   double hull_error = 0.0;     ///< m: how far simulated hulls lie inside the scene's; 0 = they are the scene's.
   CertificateSummary certificates;
-  /// Share of instances in which things were in each other by more than 2 mm (they are parted gently), and the deepest
+  /// Share of instances in which objects overlapped by more than 2 mm (they are parted gently), and the deepest
   /// of it, m.
   double overlapping_share = 0.0;
   double deepest_overlap = 0.0;

@@ -37,8 +37,8 @@ struct Trajectory {
   TrajectoryEnd end = TrajectoryEnd::kDuration;
   double simulated_seconds = 0.0;
   double flown_seconds = 0.0;  ///< Of these, what took no search for contacts.
-  /// How deep two things were in each other at the start or when something was let go, m. 0 where the simulator does
-  /// not tell.
+  /// How deep two objects overlapped at the start or when something was let go, m. 0 where the simulator does
+  /// not report it.
   double deepest_overlap = 0.0;
   /// Contacts that steps found and had no room for, summed over the steps: these were solved without them.
   std::int64_t dropped_contacts = 0;

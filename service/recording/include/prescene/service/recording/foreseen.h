@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was foreseen beside what came to pass: the predictions that were made while a recording was played, each with
-// whether the robot then did what the question was about, and with the outcomes as they came.
+// What was predicted beside what happened: the predictions that were made while a recording was played, each with
+// whether the robot then did what the question was about, and with the outcomes that occurred.
 #pragma once
 
 #include <map>
@@ -18,12 +18,12 @@
 
 namespace prescene::service {
 
-/// Whether one outcome came to pass. Of exclusive outcomes, only the one that did is listed, with its group.
+/// Whether one outcome occurred. Of exclusive outcomes, only the one that did is listed, with its group.
 struct CameOutcome {
   std::string name;
   std::string group;          ///< Of exclusive outcomes; empty otherwise.
   std::optional<bool> came;   ///< Empty: it could not be judged.
-  core::TimeNs since_ns = 0;  ///< Where it came to pass: from when on it held to the end.
+  core::TimeNs since_ns = 0;  ///< If it occurred: from when on it held to the end.
 };
 
 /// How a recording ended, by the outcomes of its scene. JSON form on kOutcomeTopic.
@@ -40,7 +40,7 @@ OutcomeRecord outcomes_of(const belief::Scene& scene, const belief::Trajectory& 
 /// the end.
 OutcomeRecord outcomes_of(const belief::Scene& scene, const std::map<core::TimeNs, BeliefSummary>& summaries);
 
-/// One prediction beside what came.
+/// One prediction beside what happened.
 struct Comparison {
   double at = 0.0;       ///< When it was asked, s into the recording.
   std::string question;  ///< "What if carton is let go at 2.30 s?"
@@ -50,17 +50,17 @@ struct Comparison {
     std::string outcome, group;
     double probability = 0.0, low = 0.0, high = 1.0;
     std::optional<bool> came;
-    double since = 0.0;  ///< s into the recording, where it came.
+    double since = 0.0;  ///< s into the recording, if it occurred.
   };
   std::vector<Row> rows;
 };
-/// Whether a row says something: outcomes that were foreseen with less than half a per cent and did not come are left
-/// out.
+/// Whether a row is worth showing: outcomes that were predicted with less than half a per cent and did not occur are
+/// left out.
 bool is_worth_a_row(const Comparison::Row& row);
-/// Where it is known from what came.
-inline constexpr const char* kCameByTruth = "What came to pass is the simulated truth.";
+/// How it is known what happened.
+inline constexpr const char* kCameByTruth = "What happened is taken from the simulated truth.";
 inline constexpr const char* kCameByTracking =
-    "What came to pass is read off the tracked poses; outcomes about contacts can't be judged by these.";
+    "What happened is taken from the tracked poses, which cannot decide outcomes about contacts.";
 /// "92 % (90 to 94 %)"
 std::string foreseen_text(const Comparison::Row& row);
 /// "yes, from 3.40 s on", "no", "not known"

@@ -27,9 +27,9 @@ struct SimulatedRecordingOptions {
   std::string world_frame = "world";
   rendering::SimulatedCameraOptions camera;
   rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
-  /// The camera's lens, which bends the images and is told in the camera info: of plumb_bob's or equidistant's form.
+  /// The camera's lens, which bends the images and is published in the camera info: of plumb_bob's or equidistant's form.
   geometry::LensDistortion lens;
-  /// What happens to objects without being told. Whether outcomes came to pass is not recorded then.
+  /// What happens to objects without being announced. Which outcomes occurred is not recorded then.
   std::vector<UnannouncedChange> changes;
   /// Else the poses of robot bodies and the actions are left out: hands that nobody knows of, which act unannounced.
   bool reports_robot = true;
@@ -41,7 +41,7 @@ std::string camera_frame_of(const belief::Scene& scene, int camera = 0);
 /// One instance of the scene, drawn from its distributions with `seed`, from its start to its duration (it goes on
 /// after everything has come to rest, so that the camera sees the end). Messages: latched camera pose, robot poses,
 /// camera info, depth (16UC1, millimetres) and colour (rgb8), the scene's actions as controls at their times, the truth
-/// of each frame, and in the end which of the scene's outcomes came to pass. Several cameras take turns: they are not
+/// of each frame, and in the end which of the scene's outcomes occurred. Several cameras take turns: they are not
 /// triggered together. Fails with kInvalidInput when the scene has no camera, or one of several has no pose, or a
 /// change is none (play_scene), kCancelled with what is done kept.
 core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
