@@ -32,7 +32,7 @@ std::vector<ActionSchema> all_schemas() {
       {"release",
        "the hand that holds the object opens, wherever its motion has brought it by then",
        true,
-       {{"time", "s", 0.0, 3600.0, {}, 0.0, {}, "when the hand is told to open"}}},
+       {{"time", "s", 0.0, 3600.0, {}, 0.0, {}, "when the hand is commanded to open"}}},
   };
 }
 

@@ -150,8 +150,8 @@ TrueShift true_shift(const std::shared_ptr<const belief::Scene>& scene, int pair
 }
 
 /// Whether somebody who asks for `model_error` reads that the step shifts something.
-bool is_told(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed, service::Backends& backends,
-             core::ThreadPool& pool, int* instances) {
+bool is_reported(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t seed, service::Backends& backends,
+                 core::ThreadPool& pool, int* instances) {
   belief::PredictQuery query;
   query.detail.model_error = true;
   const belief::Answer answer = queries::answer(scene, seed, {"", query}, backends.query_context(pool));
@@ -165,10 +165,11 @@ bool is_told(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t se
 }  // namespace
 
 Table measure_model_error(int scenes, Report* report) {
-  Table table{"model_error", {"scene", "step us", "class", "P", "times the step", "shift", "pairs asked", "told"}, {}};
+  Table table{
+      "model_error", {"scene", "step us", "class", "P", "times the step", "shift", "pairs asked", "reported"}, {}};
   core::ThreadPool pool(2);
   core::RandomStream stream(20'000, core::Purpose::kTest);
-  int told = 0, with_shift = 0, tries = 0;
+  int reported = 0, with_shift = 0, tries = 0;
   while (with_shift < scenes && tries < kMostTries * scenes) {
     service::Backends backends(pool);  // Keeps the shapes of its scenes.
     const tests::NamedScene named = random_scene(stream);
@@ -178,8 +179,8 @@ Table measure_model_error(int scenes, Report* report) {
     if (shift.least < kShift) continue;
     ++with_shift;
     int pairs = 0;
-    const bool is = is_told(named.scene, static_cast<std::uint64_t>(tries), backends, pool, &pairs);
-    told += is ? 1 : 0;
+    const bool is = is_reported(named.scene, static_cast<std::uint64_t>(tries), backends, pool, &pairs);
+    reported += is ? 1 : 0;
     std::fprintf(stderr, "model error, %d of %d, after %d scenes\n", with_shift, scenes, tries);
     table.rows.push_back({named.name, 1e6 * *named.scene->step, shift.name, shift.before, shift.factor, shift.shift,
                           static_cast<std::int64_t>(pairs), static_cast<std::int64_t>(is)});
@@ -193,7 +194,7 @@ Table measure_model_error(int scenes, Report* report) {
                 .n = with_shift,
                 .baseline = "4096 pairs of a scene, of which the shift is 3 points or more with 95 % confidence",
                 .why = "of " + std::to_string(tries) + " scenes with steps of 3 to 9 ms for things of 10 cm"};
-  if (with_shift > 0) target.reached = 100.0 * told / with_shift;
+  if (with_shift > 0) target.reached = 100.0 * reported / with_shift;
   report->add(std::move(target));
   return table;
 }

@@ -27,7 +27,7 @@ std::invoke_result_t<Work> interruptibly(core::Cancellation& cancellation, const
   return *std::move(result);
 }
 
-/// Whether this process was forked from one that had worked: its objects can't be told to end threads.
+/// Whether this process was forked from one that had worked: its objects can't end threads.
 bool process_lacks_threads();
 
 /// Calls body(begin, end) for blocks of [0, count), one after the other on the calling thread and without the GIL.

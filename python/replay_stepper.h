@@ -78,9 +78,9 @@ class ReplayStepper {
   bool wanted_ = false;
   bool ended_ = false;
   std::shared_ptr<const ReplayFrame> frame_;  // made and not yet taken
-  core::Status end_;                          // why it ended, until it was told
+  core::Status end_;                          // why it ended, until it was reported
   std::string summary_json_;
-  std::exception_ptr exception_;  // that ended it, until it was told
+  std::exception_ptr exception_;  // that ended it, until it was reported
 
   std::mutex thread_mutex_;  // guards thread_
   std::thread thread_;       // made by the first next()

@@ -60,7 +60,7 @@ void remark_on_leaving(const simulation::OutcomeEstimate& estimate, double radiu
 void remark_on_certainty(const simulation::OutcomeEstimate& estimate, std::vector<std::string>& remarks) {
   if (estimate.certain)
     remarks.push_back(
-        "Nothing in the scene is uncertain: one instance tells what the simulator does, not how sure that is.");
+        "Nothing in the scene is uncertain: one instance shows what the simulator does, not how sure that is.");
 }
 
 }  // namespace prescene::queries

@@ -10,7 +10,7 @@
 namespace prescene::queries {
 
 /// Those of the candidates that can be and have a weight. The weight of a kind is shared by all objects that it may
-/// happen to, candidates or not. `meshes` tells which objects have the same shape.
+/// happen to, candidates or not. `meshes` knows which objects have the same shape.
 std::vector<Hypothesis> hypotheses_about(const std::vector<std::size_t>& candidates, const EventPaths& events,
                                          const belief::EventWeights& weights, filter::MeshCache& meshes);
 

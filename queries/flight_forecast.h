@@ -7,7 +7,7 @@
 
 namespace prescene::queries {
 
-/// For how long nothing can touch anything, into `flight`. Nothing is told when stopped, without a shape store, or
+/// For how long nothing can touch anything, into `flight`. Nothing is set when stopped, without a shape store, or
 /// where a shape can't be made of spheres. Fails when the objects can't be simulated each by itself.
 core::Status forecast_flight(const Foresight& foresight, const Prior& prior, const QueryContext& context,
                              belief::PredictAnswer& answer);

@@ -26,7 +26,7 @@ struct Foresight {
   simulation::OutcomeEstimate estimate;
 };
 struct ForesightDetail {
-  bool to_rest = true;  ///< Else instances end as soon as they are decided, where that can be told.
+  bool to_rest = true;  ///< Else instances end as soon as they are decided, where that can be proved.
   bool keep_contacts = false;
 };
 /// Requested when the question is cancelled, and from QueryContext::simulate_until on.
@@ -43,19 +43,19 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
 /// did.
 std::optional<std::size_t> typical_instance(const Foresight& foresight, std::size_t variable,
                                             const std::set<int>& class_indices, std::size_t object);
-/// Between two states of a run that is told: the interval given, longer where the whole duration of it would not fit
+/// Between two states of a run in an answer: the interval given, longer where the whole duration of it would not fit
 /// into an answer (above 266 s of one object at 30 Hz).
 double interval_told(const Foresight& foresight, double interval);
 /// That instance again, with states every 1/30 s as far as interval_told() lets it.
 std::optional<belief::Trajectory> run_again(const Foresight& foresight, const Prior& prior, std::size_t instance,
                                             const QueryContext& context);
 
-/// The variable whose classes an object's ends are told apart by: the first exclusive group about it, else the first
+/// The variable whose classes distinguish an object's ends: the first exclusive group about it, else the first
 /// outcome about it.
 std::optional<std::size_t> variable_about(const belief::Scene& scene, const std::string& object);
 /// The group's name, or the outcome's.
 const std::string& name_of(const simulation::Variable& variable);
-/// Classes that are told: of a single outcome its opposite is not, which is the same number again.
+/// Classes that are reported: of a single outcome its opposite is not, which is the same number again.
 std::size_t reported_classes(const simulation::Variable& variable);
 
 }  // namespace prescene::queries

@@ -333,7 +333,7 @@ core::Result<belief::RelationsAnswer> relations_of(const Prior& prior, const Rel
     answer.remarks.push_back(std::to_string(answer.failed_draws) + " of " + std::to_string(answer.draws) +
                              " draws failed in the simulator; the probabilities are those of the others.");
   if (foresight.estimate.certain)
-    answer.remarks.push_back("Nothing in the scene is uncertain: one state of the world tells all.");
+    answer.remarks.push_back("Nothing in the scene is uncertain: one state of the world is enough.");
   return answer;
 }
 

@@ -77,7 +77,7 @@ void remark_on_model(const belief::PredictAnswer& answer, double confidence, std
   const std::string steps = large_shifts(answer, ErrorKind::kStep, widening(error, ErrorKind::kStep, confidence));
   if (!steps.empty())
     remarks.push_back(
-        "The model's step: the intervals tell what more instances would change, not what the simulator itself is wrong "
+        "The model's step: the intervals say what more instances would change, not what the simulator itself is wrong "
         "by: " +
         steps + ".");
   const std::string priors = large_shifts(answer, ErrorKind::kPrior, widening(error, ErrorKind::kPrior, confidence));

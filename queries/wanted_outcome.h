@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outcome that is wanted: which of the scene's it is, and whether it can come about and be told at all.
+// The outcome that is wanted: which of the scene's it is, and whether it can come about and be judged at all.
 #pragma once
 
 #include <optional>

@@ -51,7 +51,7 @@ struct PathEnd {
 };
 
 /// The frames that differ most: places in `frames` at which equal parts of all change have passed, filled up evenly
-/// where little changes; the last always, and the first, which tells what is there when the window begins. Ascending.
+/// where little changes; the last always, and the first, which shows what is there when the window begins. Ascending.
 std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int count);
 
 class WindowLikelihood {

@@ -7,7 +7,7 @@
 // kernel of the sensor's noise alone (sharpness 1), a draw would win by luck. How sharp the kernel may be is therefore
 // found out with the runs themselves. One run of each draw takes the part of what was seen, with noise added; the runs
 // of the other draws say which draw it came from; the sharpness that does best at this, by the logarithmic score, is
-// taken. Where no run tells another's draw this is 0, and nothing is learned. (Approximate Bayesian computation,
+// taken. Where no run identifies another's draw this is 0, and nothing is learned. (Approximate Bayesian computation,
 // [Sisson et al. 2018]; the bandwidth is chosen by cross-validation.)
 #pragma once
 

@@ -194,7 +194,7 @@ Status out_of_time(const ChildLimits& limits) {
 Status status_of_end(std::optional<int> end, const ChildLimits& limits) {
   if (!end)
     return core::unavailable(
-        "ended in a way that can't be told: another part of this process waited for it; wait for one's own children "
+        "ended in an unknown way: another part of this process waited for it; wait for one's own children "
         "only");
   const int status = *end;
   if (WIFEXITED(status)) {
@@ -259,7 +259,7 @@ Result<std::vector<std::uint8_t>> run_in_child(const std::function<void(ChildOut
                                                const core::Cancellation* cancellation) {
   if (ends_are_lost())
     return core::unavailable(
-        "cannot be started: SIGCHLD is ignored, so how it ends could not be told; set SIGCHLD to its default");
+        "cannot be started: SIGCHLD is ignored, so how it ends would be unknown; set SIGCHLD to its default");
   std::size_t mapped = 0;
   if (kLimitsMemory) {
     PRESCENE_TRY(mapped, mapped_bytes());

@@ -42,8 +42,8 @@ std::map<std::string, double> joint_positions(const RobotKinematics& robot,
   std::map<std::string, double> positions;
   for (const RobotJoint& joint : robot.joints) {
     if (!joint.is_moving()) continue;
-    const auto told = given.find(joint.name);
-    positions[joint.name] = told != given.end() ? told->second : start_position(robot, joint);
+    const auto known = given.find(joint.name);
+    positions[joint.name] = known != given.end() ? known->second : start_position(robot, joint);
   }
   for (const RobotJoint& joint : robot.joints) {
     if (!joint.mimic || given.contains(joint.name) || robot.positions.contains(joint.name)) continue;

@@ -86,7 +86,7 @@ def replay(
     scene: a scene file; default: the one that the recording holds.
     seed: default: the one that the recording was made with, which repeats its bits, else 1.
     begin, end: seconds after the recording's first message; the belief begins anew at `begin`.
-    salvage: read what is sound of a damaged recording, rather than refusing it; `summary["loss"]` tells what was left out.
+    salvage: read what is sound of a damaged recording, rather than refusing it; `summary["loss"]` says what was left out.
     learned: a learned file to begin with.
     depth_scale, frame_rate: of a folder of images: metres per unit of its depth images, frames a second.
 

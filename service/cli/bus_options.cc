@@ -96,7 +96,7 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker) {
       ->capture_default_str();
   group->add_flag_function(
       "--use-sim-time", [&topics](std::int64_t count) { topics.clock = count > 0 ? kClockTopic : ""; },
-      "Time is simulated, and told on /clock (rosgraph_msgs/Clock), as for nodes of ROS with use_sim_time");
+      "Time is simulated and published on /clock (rosgraph_msgs/Clock), as for nodes of ROS with use_sim_time");
 }
 
 core::Status check_topics_once(const CLI::App& verb, const belief::Scene& scene) {

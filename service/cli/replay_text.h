@@ -14,7 +14,7 @@
 
 namespace prescene::service {
 
-/// Records of the truth and of outcomes that a recording holds but that can't be read: they are left out, and told.
+/// Records of the truth and of outcomes that a recording holds but that can't be read: they are left out and reported.
 class DamagedRecords {
  public:
   /// `first` is ok where there are none.

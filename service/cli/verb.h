@@ -111,7 +111,7 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 core::Status take_domain(const CLI::App& verb, interfaces::DdsOptions& dds);
 /// --camera and the names of the robot's topics; --camera also sets whether images are rectified.
 void add_topic_options(CLI::App& verb, TrackerSettings& tracker);
-/// kInvalidInput where an option that tells of the camera is given although the scene lists its cameras.
+/// kInvalidInput if an option that describes the camera is given although the scene lists its cameras.
 core::Status check_topics_once(const CLI::App& verb, const belief::Scene& scene);
 /// Both.
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, TrackerSettings& tracker);

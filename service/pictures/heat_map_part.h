@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a heat map's picture tells of one object: its endings, and what of the scene has to be seen.
+// What a heat map's picture shows of one object: its endings, and what of the scene has to be seen.
 #pragma once
 
 #include <optional>
@@ -16,7 +16,7 @@ namespace prescene::service {
 struct HeatMapPart {
   std::size_t object = 0;
   const belief::FinalPoses* poses = nullptr;
-  std::string group;  ///< Whose outcomes its ends are told apart by; empty: a single outcome, or none.
+  std::string group;  ///< Whose outcomes distinguish its ends; empty: a single outcome, or none.
   struct Ending {
     std::string name;
     const belief::OutcomeProbability* probability = nullptr;

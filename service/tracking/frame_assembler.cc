@@ -235,7 +235,7 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
     return {{}, X_WC.status().message(), false};
   observation.X_WC = X_WC ? *X_WC : *settings_.X_WC;
   if (!X_WC && settings_.doubts_X_WC)
-    frame.doubts.push_back("tf does not tell where the camera is: it is taken to be where the scene says");
+    frame.doubts.push_back("tf does not say where the camera is: it is taken to be where the scene says");
 
   for (const std::string& body : robot_bodies_) {
     const core::Result<geometry::Pose> X_WG = tf_.lookup(settings_.world_frame, body, waiting.stamp_ns);

@@ -64,17 +64,17 @@ core::Status JointTransforms::add(const interfaces::RosJointState& message, cons
   core::Status first_bad;
   for (const RobotJoint& joint : robot_->joints) {
     if (!joint.is_moving()) continue;
-    const auto told = positions.find(joint.name);
+    const auto reported = positions.find(joint.name);
     const auto source = joint.mimic ? positions.find(joint.mimic->joint) : positions.end();
     double q = 0.0;
-    if (told != positions.end())
-      q = told->second;
+    if (reported != positions.end())
+      q = reported->second;
     else if (source != positions.end() && !robot_->positions.contains(joint.name))
       q = joint.mimic->multiplier * source->second + joint.mimic->offset;
     else
       continue;
     if (assumed_.erase(joint.name) > 0 && !of_tf_.contains(joint.child)) tf.forget(joint.child);
-    told_.insert(joint.name);
+    reported_.insert(joint.name);
     if (is_far_beyond(joint, q))
       beyond_.insert(joint.name);
     else
@@ -98,7 +98,7 @@ core::Status JointTransforms::begin(core::TimeNs stamp_ns, const std::string& wo
     const auto assumed = robot_->positions.find(joint.name);
     if (joint.kind == RobotJoint::Kind::kFixed) {
       keep(set(joint, 0.0, stamp_ns, true, tf));
-    } else if (joint.is_moving() && assumed != robot_->positions.end() && !is_told(joint)) {
+    } else if (joint.is_moving() && assumed != robot_->positions.end() && !is_reported(joint)) {
       assumed_.insert(joint.name);
       keep(set(joint, assumed->second, stamp_ns, true, tf));
     }
@@ -125,7 +125,7 @@ std::vector<std::string> JointTransforms::missing() const {
   std::vector<std::string> names;
   if (!robot_) return names;
   for (const RobotJoint& joint : robot_->joints)
-    if (joint.is_moving() && !is_told(joint) && !robot_->positions.contains(joint.name) &&
+    if (joint.is_moving() && !is_reported(joint) && !robot_->positions.contains(joint.name) &&
         !of_tf_.contains(joint.child))
       names.push_back(joint.name);
   return names;
@@ -136,7 +136,7 @@ std::vector<std::string> JointTransforms::doubts(core::TimeNs stamp_ns) const {
   if (!begun_) return sentences;
   const std::vector<std::string> unknown = missing();
   if (!unknown.empty() && stamp_ns - begun_ns_ > kPatienceNs)
-    sentences.push_back("no joint state tells where " + listed(unknown) + (unknown.size() == 1 ? " is" : " are") +
+    sentences.push_back("no joint state says where " + listed(unknown) + (unknown.size() == 1 ? " is" : " are") +
                         ", so the links behind stay where they were: publish it, or give it under "
                         "robot_description.joint_positions");
   if (!beyond_.empty())

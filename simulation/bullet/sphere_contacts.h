@@ -3,7 +3,7 @@
 // step. The trees find the spheres that are near enough; each then stands for its part of the surface:
 //   - a sphere against the other's surface, at the sphere's lowest point, with the other's normal;
 //   - the other's nearest point against the sphere's patch of surface, with the patch's normal.
-// Both are places of the bodies, so a gap is never told smaller than it is, and the smallest of all is the bodies'.
+// Both are places of the bodies, so a gap is never reported smaller than it is, and the smallest of all is the bodies'.
 // What is found is a function of poses and velocities alone.
 #pragma once
 

@@ -50,7 +50,7 @@ class LaneEngine {
 
   LaneMotion motion(int slot, int object) const { return moved_[place_of(object, slot)].motion; }
   bool free(int slot, int object) const { return motion(slot, object) == LaneMotion::kFree; }
-  /// The object goes from X_now to X_next in the next steps, until it is told otherwise.
+  /// The object goes from X_now to X_next in the next steps, until this is called again.
   void hold(int slot, int object, const geometry::Pose& X_now, const geometry::Pose& X_next);
   /// To where hold() said, without a step.
   void arrive(int slot, int object);

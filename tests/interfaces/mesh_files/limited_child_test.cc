@@ -83,7 +83,7 @@ TEST(LimitedChild, WhoseEndAnotherTookIsNotTakenForDone) {
       },
       kLimits);
   greedy.join();
-  EXPECT_THAT(to_string(result.status()), HasSubstr("unavailable: ended in a way that can't be told"));
+  EXPECT_THAT(to_string(result.status()), HasSubstr("unavailable: ended in an unknown way"));
 }
 
 TEST(LimitedChild, IsToldByASignalThatItsProcessorTimeIsUp) {

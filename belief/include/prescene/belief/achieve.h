@@ -30,7 +30,7 @@ struct ParameterRange {
 struct ActionErrors {
   Vector3d position = Vector3d::Zero();                 ///< Standard deviations of where the object is let go, m, in W.
   Vector3d rotation = Vector3d::Zero();                 ///< Of a small turn about the object's own axes, rad.
-  ScalarDistribution delay = FixedScalar{0.0};          ///< Between being told and doing it, s, at least 0.
+  ScalarDistribution delay = FixedScalar{0.0};          ///< Between the command and the action, s, at least 0.
   ScalarDistribution lateral_error = FixedScalar{0.0};  ///< Of a push: shift to its left, m.
   /// What the opening hand adds to the object's velocity.
   std::optional<TwistDistribution> disturbance;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The numbers of bodies that contacts speak of (objects, then supports, then robot bodies, then pushers of actions),
-// and how motion and support are told.
+// and the rules by which motion and support are recognised.
 #pragma once
 
 #include <optional>

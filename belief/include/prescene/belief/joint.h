@@ -125,7 +125,7 @@ std::vector<JointState> joint_states(const Scene& scene, const WorldState& state
 void obey_joints(const Scene& scene, WorldState& state);
 /// Those of the state or, where it has none, the means.
 JointParameters parameters_of(const Scene& scene, const WorldState& state, int joint);
-/// Removes the joints of objects that the scene does not have (any more), and tells their names.
+/// Removes the joints of objects that the scene does not have (any more), and returns their names.
 std::vector<std::string> drop_loose_joints(Scene& scene);
 
 /// Of the joints whose things the belief has, in the scene's order.

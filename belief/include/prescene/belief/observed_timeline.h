@@ -78,7 +78,7 @@ struct IntervalPattern {
 core::Result<IntervalPattern> pattern_from_text(const std::string& text);
 
 /// Without `first`: all intervals. Without `second`: those of the first pattern. With both: the pairs of which one of
-/// `relations` is true (empty: any, which is then told).
+/// `relations` is true (empty: any, which is then reported).
 struct TimelineQuery {
   std::optional<IntervalPattern> first, second;
   std::vector<AllenRelation> relations;

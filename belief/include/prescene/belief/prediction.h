@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a prediction tells: probabilities, where things end, typical runs, what decides, who touches whom, and how far
+// What a prediction holds: probabilities, where things end, typical runs, what decides, who touches whom, and how far
 // all this can be trusted. Plain values; queries/ makes them, prescene/belief/json.h writes them.
 #pragma once
 
@@ -88,8 +88,8 @@ struct DecidingInputs {
   std::string about;                 ///< The group's name, or the outcome's.
   std::vector<InputShare> inputs;    ///< Largest share first.
   double explained_by_single = 0.0;  ///< Sum of the shares, at most 1.
-  /// Of the variance, what only several together decide. Nothing where the instances are too few to tell that from what
-  /// a single input does between the few values of it that can be told apart.
+  /// Of the variance, what only several together decide. Nothing if the instances are too few to part that from what
+  /// a single input does between the few values of it that can be distinguished.
   std::optional<double> by_several;
   friend bool operator==(const DecidingInputs&, const DecidingInputs&) = default;
 };
@@ -101,7 +101,7 @@ struct ChaosCheck {
   double displacement = 0.0;     ///< Of every uncertain number, in its standard deviations.
   double changed = 0.0;          ///< Share of the pairs.
   double low = 0.0, high = 1.0;  ///< Its interval of the wanted confidence.
-  /// More than a tenth of the pairs differ, beyond chance: the outcome can't be told from the start more exactly, and
+  /// More than a tenth of the pairs differ, beyond chance: the start does not decide the outcome more exactly, and
   /// every instance is as good as a random draw.
   bool chaotic = false;
   friend bool operator==(const ChaosCheck&, const ChaosCheck&) = default;
@@ -129,8 +129,8 @@ enum class FlightEnd {
 /// "may_touch", "push", "not_followed", "run_ends".
 std::string to_string(FlightEnd end);
 
-/// For how long a start is one object: nothing can touch anything, and what each object does is told by the moments of
-/// its flight. What is in contact from the start ends it at 0.
+/// For how long a start is one object: nothing can touch anything, and the motion of each object follows from moments
+/// of its flight. What is in contact from the start ends it at 0.
 struct FlightForecast {
   struct Pair {
     std::string first, second;

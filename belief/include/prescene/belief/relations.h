@@ -16,7 +16,7 @@ enum class RelationKind {
   kOn,           ///< `subject` rests on `other`: what bears its weight.
   kSupports,     ///< `subject` bears `other`; the same as `other` on `subject`.
   kIn,           ///< `subject` is inside the hollow of `other`.
-  kTouches,      ///< Both touch; told once for two things.
+  kTouches,      ///< Both touch; listed once for two things.
   kHolds,        ///< The hand `subject` holds `other`.
   kUpright,      ///< `subject` stands as its model stands.
   kVisible,      ///< The camera sees some of it.

@@ -88,7 +88,7 @@ struct SceneCamera {
   Pose X_WC;
   bool is_placed = false;  ///< The scene says where it is; else X_WC is the identity.
   std::string frame;       ///< Its frame in tf; empty = the one that its depth images name.
-  /// Of a camera that the scene lists under `cameras`; empty: whoever listens is told otherwise.
+  /// Of a camera that the scene lists under `cameras`; empty: they are given elsewhere.
   std::optional<CameraTopics> topics;
   DepthNoiseSettings depth_noise;  ///< What is empty is Scene::depth_noise.
   friend bool operator==(const SceneCamera&, const SceneCamera&) = default;

@@ -39,7 +39,7 @@ struct WindowFrame {
 struct ExplainWindow {
   std::shared_ptr<const belief::Belief> start;  ///< After the last frame at or before the window's start.
   std::vector<WindowFrame> frames;              ///< After that, in the order of their stamps.
-  /// What the robot was told to do in the window, by the clock of the frames.
+  /// What the robot was commanded to do in the window, by the clock of the frames.
   std::vector<std::pair<core::TimeNs, belief::Action>> actions;
 };
 

@@ -3,7 +3,7 @@
 //
 // Kernels are smoothed within one outcome, one resting face and one place only: h s_c n_c^(-1/6) wide on each axis, s_c
 // being the spread and n_c the number of the instances that ended so [Scott 1992, section 6.3; bandwidth factor h = 0.6
-// measured]. Places are told apart by long empty stretches between them.
+// measured]. Places are separated by long empty stretches between them.
 #pragma once
 
 #include <span>

@@ -7,10 +7,10 @@
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
 //   if (!answer.error.ok()) ...
 //
-// Questions of seven kinds (belief::Query): `where` is everything, how are things related now (`relations`) and in what
-// was observed (`timeline`): actual belief; what happens if (`predict`), does it stay (`stability`): state anticipation;
-// what will the camera see (`view`): observation anticipation; how must it be done, so that an outcome comes about
-// (`achieve`): state explanation. docs/reference/queries.md says what the answers mean.
+// Questions of seven kinds (belief::Query): `where` is everything, how are things related now (`relations`) and in
+// what was observed (`timeline`): actual belief; what happens if (`predict`), does it stay (`stability`): state
+// anticipation; what will the camera see (`view`): observation anticipation; how must it be done, so that an outcome
+// comes about (`achieve`): state explanation. docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,7 @@ struct QueryContext {
   simulation::SimulatorFactory make_simulator;
   /// MechanicsOptions::edge_rounding of those simulators, m.
   double edge_rounding = simulation::MechanicsOptions{}.edge_rounding;
-  /// Where shapes are kept over queries; null: answers do not tell of flights (belief::FlightForecast).
+  /// Where shapes are kept over queries; null: answers have no belief::FlightForecast.
   simulation::ShapeStore* shapes = nullptr;
   /// Needed by `view`; called once a query.
   std::function<core::Result<std::unique_ptr<rendering::Renderer>>()> make_renderer;
@@ -60,7 +60,7 @@ struct QueryContext {
 };
 
 /// How long an answer takes beyond its Effort::max_seconds, s: instances under way are cut off after the first, and all
-/// else ends after the second; what had to be left out is told in the remarks.
+/// else ends after the second; what had to be left out is named in the remarks.
 inline constexpr double kCutAfter = 0.6, kEndAfter = 1.5;
 
 /// Answers from a snapshot. Objects that are lost or probably not there (existence below 1/2) take no part. The same

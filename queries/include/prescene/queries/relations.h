@@ -10,9 +10,9 @@
 // - contacts are those of the simulator and its contact rules (simulation/rules): everything is stopped, hands let go,
 //   and gravity acts for as long as a fall through the tolerance of an object takes. The tolerance is the contact
 //   rules' touching distance and three standard deviations, over the draws, of the height of the object's lowest point,
-//   at most Seating::kMostGap (3 cm). So a gap below that can't be told from contact is closed, and things that are
-//   drawn in each other touch, as they can't be there. `on`: the mean normal of the contact, weighted by impulse, is
-//   within 60 degrees of the vertical and points up (belief::supports). `supports` is the same, told of the lower
+//   at most Seating::kMostGap (3 cm). So a gap below that can't be distinguished from contact is closed, and things
+//   drawn overlapping touch, as they can't be there. `on`: the mean normal of the contact, weighted by impulse, is
+//   within 60 degrees of the vertical and points up (belief::supports). `supports` is the same, said of the lower
 //   thing.
 // - `in`: at least half of a thing's surface is in the other's hollow. A point is in the hollow when at least 5/8 of
 //   all directions from it meet the other's surface (in the plane of a rim half of them do) and it is not in its solid;

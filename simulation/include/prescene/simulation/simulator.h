@@ -98,7 +98,7 @@ class InstanceNumbers {
   std::span<const std::uint32_t> numbers_;
 };
 
-/// Which of our steppers a simulator runs on, for those who are told.
+/// Which of our steppers a simulator runs on, and why.
 struct StepperUse {
   std::string name;          ///< "lockstep" or "bullet"; "" = another, which has no name.
   std::string not_lockstep;  ///< Why it is not "lockstep", where that was asked for first; else "".

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Operator 3, augment: rival poses. What a frame can hardly tell from where an object is thought to be, but is turned
-// against it (a mug whose handle is behind it, a block with edges of about one length), is held beside it as further
+// Operator 3, augment: rival poses. What a frame can hardly distinguish from the believed pose, but is turned against
+// it (a mug whose handle is behind it, a block with edges of about one length), is held beside it as further
 // particles, and the frames share the weight out.
 //
 //   propose_rivals(frame, terms, target, symmetry, RivalPrior::kFound, weighting, spread, tools, object);
@@ -54,8 +54,8 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
                    const InitialiseOptions& spread, const FilterTools& tools, belief::ObjectBelief& object);
 
 /// After a frame has weighed the particles: what makes one turn look better than another (mixed pixels at an edge, a
-/// coarse image, a mesh that is not quite right) mostly stays from frame to frame, so that many frames tell of two
-/// turns what one average frame does. Their log odds go to the mean of what single frames say, with a memory of twenty
+/// coarse image, a mesh that is not quite right) mostly stays from frame to frame, so that many frames say no
+/// more of two turns than an average one. Their log odds go to the mean of what single frames say, with a memory of 20
 /// frames, and turns that no frame tells apart keep sharing the weight. A turn that is 3 nats or more behind the
 /// likeliest was decided against: its log odds go to 5 nats less. Where `cameras` see the object, what single frames
 /// say is summed over them: their errors are not the same.

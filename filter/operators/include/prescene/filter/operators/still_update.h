@@ -22,8 +22,8 @@ struct StillUpdate {
 /// `covariance`: of the prediction (rotation, translation as geometry::box_plus), positive definite. `information`,
 /// `gradient`: of the frame's log likelihood at the prediction's mean, in the same coordinates; directions of which the
 /// frame says nearly nothing (less than a hundredth of what is known) stay as they are. `common`: share of a frame's
-/// variance that all frames have in common, in [0, 1). A frame that tells less than the frames before have in common
-/// changes nothing.
+/// variance that all frames have in common, in [0, 1). A frame with less information than the frames before have in
+/// common changes nothing.
 StillUpdate still_update(const geometry::Matrix6d& covariance, const geometry::Matrix6d& information,
                          const geometry::Vector6d& gradient, double common);
 

@@ -35,7 +35,7 @@ class McapWriter {
  public:
   static core::Result<std::unique_ptr<McapWriter>> create(const std::filesystem::path& path,
                                                           const McapWriterOptions& options);
-  /// Closes without telling of errors; call close() to hear of them.
+  /// Closes without reporting errors; call close() to get them.
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;

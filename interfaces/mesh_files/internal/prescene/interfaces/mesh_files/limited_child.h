@@ -45,7 +45,7 @@ class ChildOutput {
 /// The status of a failure says what happened, as a sentence without its subject. kResourceExhausted: "ran out of its
 /// 800.0 MiB of memory", "did not finish within 8 s", more output than the limit; kInvalidInput: "crashed (signal
 /// 11)", threw, or ended otherwise; kCancelled, within a tenth of a second; kUnavailable: no process can be started, or
-/// how it ended can't be told, since SIGCHLD is ignored or another waited for it.
+/// how it ended is unknown, since SIGCHLD is ignored or another waited for it.
 core::Result<std::vector<std::uint8_t>> run_in_child(const std::function<void(ChildOutput&)>& work,
                                                      const ChildLimits& limits,
                                                      const core::Cancellation* cancellation = nullptr);

@@ -129,8 +129,8 @@ struct CameraReport {
 core::Result<geometry::PinholeCamera> to_camera(const RosCameraInfo& info, const CameraRules& rules = {},
                                                 CameraReport* report = nullptr);
 /// The lens of the images as they arrive: none for rectified ones, and where all of D is zero (as in image_geometry,
-/// whatever the model). plumb_bob and rational_polynomial are one model, told by the number of coefficients (4, 5, 8,
-/// or 12 and 14, of which the first 8 count); equidistant and fisheye have 4. The report warns of an unknown model,
+/// whatever the model). plumb_bob and rational_polynomial are one model, with 4, 5 or 8 coefficients, or 12 or
+/// 14, of which the first 8 count; equidistant and fisheye have 4. The report warns of an unknown model,
 /// whose lens is none, and of coefficients that are left out. kInvalidInput where one is not finite.
 core::Result<geometry::LensDistortion> to_lens(const RosCameraInfo& info, const CameraRules& rules = {},
                                                CameraReport* report = nullptr);
@@ -142,7 +142,7 @@ RosImage to_ros_image_32fc1(const geometry::DepthImage& depth, const RosHeader& 
 /// rgb8.
 RosImage to_ros_image(const geometry::ColorImage& color, const RosHeader& header);
 /// The camera of raw images: R the identity, P = [K 0]. Without a lens plumb_bob of zeros. (An equidistant lens of
-/// zeros cannot be told: to_lens() and ROS read it as none.)
+/// zeros cannot be expressed: to_lens() and ROS read it as none.)
 RosCameraInfo to_ros_camera_info(const geometry::PinholeCamera& camera, const RosHeader& header,
                                  const geometry::LensDistortion& lens = {});
 

@@ -14,7 +14,7 @@ namespace prescene::interfaces {
 struct CameraPreset {
   std::string_view name;    ///< "realsense"
   std::string_view driver;  ///< "realsense2_camera 4.55 or later"
-  std::string_view needs;   ///< What its launch file must be told for registered depth; "" = nothing.
+  std::string_view needs;   ///< What its launch file must set for registered depth; "" = nothing.
   std::string_view depth;   ///< Topics, as in belief::CameraTopics.
   std::string_view color;
   std::string_view camera_info;

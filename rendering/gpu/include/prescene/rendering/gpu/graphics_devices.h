@@ -16,7 +16,7 @@ namespace prescene::rendering {
 /// One device of EGL, in the order in which EGL lists them.
 struct GraphicsDevice {
   int index = 0;
-  std::string name;       ///< What the driver tells without a context: a name, a device file, or "".
+  std::string name;       ///< What the driver reports without a context: a name, a device file, or "".
   bool software = false;  ///< Draws on the processor (Mesa's llvmpipe and its like).
 };
 
@@ -26,7 +26,7 @@ std::vector<GraphicsDevice> graphics_devices();
 /// Accidents to try, for tests. Each is counted down when it happens.
 struct GraphicsFaults {
   std::atomic<int> losses{0};    ///< Contexts that are gone when they are next used.
-  std::atomic<int> resets{0};    ///< Resets of the device that the driver tells of after work.
+  std::atomic<int> resets{0};    ///< Resets of the device that the driver reports after work.
   std::atomic<int> refusals{0};  ///< Contexts that can't be made.
 };
 

@@ -45,7 +45,7 @@ struct DepthNoise {
   /// The model's defaults with what was found in their place.
   rendering::SensorModelOptions settings;
   std::vector<std::string> found;    ///< Names of the settings that come from this recording.
-  std::vector<std::string> remarks;  ///< What it does not tell, and why.
+  std::vector<std::string> remarks;  ///< What it does not show, and why.
 };
 
 class DepthNoiseEstimator {

@@ -43,7 +43,7 @@ struct ObjectCalibration {
   belief::ObjectModel model;             ///< With the values as means and the errors as deviations.
   simulation::ThrowScatter throws;       ///< By held-out recordings, or where too few come to rest by the fit.
   std::optional<HeldOutScatter> held_out;
-  std::vector<std::string> remarks;  ///< Plain sentences: what the recordings do not tell, and what is odd.
+  std::vector<std::string> remarks;  ///< Plain sentences: what the recordings do not show, and what is odd.
 };
 
 /// Parameters by all recordings (but of twins one each), and how throws differ by recordings that parameters were not

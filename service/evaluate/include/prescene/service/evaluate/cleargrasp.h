@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Does the transparent material explain real transparent things? ClearGrasp has frames of transparent objects with a
-// twin, the same objects painted, which tells where the surface is. Pixel by pixel: which of two materials makes the
+// twin, the same objects painted, which shows where the surface is. Pixel by pixel: which of two materials makes the
 // measured depth, or its absence, more likely. No poses: the data set has neither meshes nor poses.
 //
 //   PRESCENE_TRY(ClearGraspReport report, evaluate_cleargrasp(dir, seed));
@@ -45,7 +45,7 @@ struct ClearGraspScore {
   std::string frame;
   int mask_pixels = 0;
   bool knows_plane = false;  ///< A support plane was found, so what is behind is known.
-  /// Mask pixels where the painted twin tells the surface, by what the camera returned of the transparent object.
+  /// Mask pixels where the painted twin shows the surface, by what the camera returned of the transparent object.
   ClearGraspShare all, missing, behind, at_surface, in_front;
   /// The same pixels of the painted twin itself, which the opaque material should explain better.
   ClearGraspShare painted;

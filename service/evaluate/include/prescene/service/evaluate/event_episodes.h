@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes in which one thing happens that nobody is told of, drawn at random: what explanations are tested on.
+// Episodes in which one unreported thing happens, drawn at random: what explanations are tested on.
 #pragma once
 
 #include <cstdint>

@@ -57,7 +57,7 @@ struct ExplainedEventsReport {
   std::vector<EpisodeResult> episodes;
 };
 
-/// Errors of no episode: those are told in its `failure`. kInvalidInput for an unknown kind, kCancelled.
+/// Errors of no episode: those are in its `failure`. kInvalidInput for an unknown kind, kCancelled.
 core::Result<ExplainedEventsReport> evaluate_explained_events(const ExplainedEventsOptions& options, std::uint64_t seed,
                                                               core::ThreadPool& threads,
                                                               const core::ProgressSink& progress,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes of everyday situations that a tracker has to cope with, drawn at random: what a simulated robot and its
-// surroundings do, and what the tracker is told of it.
+// surroundings do, and what of it is reported to the tracker.
 #pragma once
 
 #include <cstdint>

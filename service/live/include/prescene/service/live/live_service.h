@@ -62,7 +62,7 @@ class LiveService {
   ~LiveService();
 
   /// Works until cancelled, then closes the recording and writes the learned file. A recording that fails on the way (a
-  /// full disk) ends there, while tracking goes on; the status then tells of it, as of a learned file that could not be
+  /// full disk) ends there, while tracking goes on; the status then says so, and also if the learned file could not be
   /// written in the end.
   core::Status run(const core::Cancellation& cancellation);
   /// A question as if it had come over the bus, from any thread; its answer goes there, too. See QueryWorker::ask.

@@ -146,8 +146,8 @@ class QueryWorker {
 std::string error_answer(const std::string& id, const core::Status& error);
 
 /// Adds "learned_s" to each item of an answer to `where`, or object of a summary of a belief: when the last motion that
-/// it was learned from ended, in seconds after the session's first frame. Negative = in an earlier session, of which a
-/// learned file told; null = nothing was learned.
+/// it was learned from ended, in seconds after the session's first frame. Negative = in an earlier session, which a
+/// learned file contained; null = nothing was learned.
 void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& objects);
 
 }  // namespace prescene::service

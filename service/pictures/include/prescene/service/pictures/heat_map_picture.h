@@ -13,9 +13,9 @@
 
 namespace prescene::service {
 
-/// `answer` was made from `scene` and tells final poses, and typical runs for outlines and ways (paths for the fan of
-/// ways). One part for each object that it tells of, at most three, one below the other. Fails with kNotFound where it
-/// tells of none.
+/// `answer` was made from `scene` and has final poses, and typical runs for outlines and ways (paths for the fan of
+/// ways). One part for each object that has final poses, at most three, one below the other. Fails with kNotFound if
+/// none has.
 core::Result<geometry::ColorImage> heat_map_picture(const belief::Scene& scene, const belief::PredictAnswer& answer,
                                                     Backends& backends);
 /// The same as a PNG file.

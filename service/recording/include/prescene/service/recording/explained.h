@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Explains what a recording shows in a window of time (prescene/queries/explain.h): the recording is tracked up to the
-// window's end, with what is told of the robot in it.
+// window's end, with what is reported of the robot in it.
 //
 //   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({.path = "milk.mcap"}, log));
 //   PRESCENE_TRY(auto explained, explain_recording(input, {.path = "milk.mcap", .from = 2.0, .to = 4.0}, settings,
@@ -20,7 +20,7 @@
 namespace prescene::service {
 
 struct ExplainOptions {
-  std::filesystem::path path;  ///< Of the recording, as in `input`; a folder of images tells of no actions.
+  std::filesystem::path path;  ///< Of the recording, as in `input`; a folder of images has no actions.
   double from = 0.0;           ///< s since the first frame's stamp; the belief there is that of the last frame before.
   double to = 0.0;             ///< The same; the last frame that is looked at is not after it.
   RecordingReadOptions read;

@@ -16,7 +16,7 @@
 
 namespace prescene::service {
 
-/// Something that happens to an object and that nobody is told.
+/// Something that happens to an object and is announced to nobody.
 struct UnannouncedChange {
   double time = 0.0;  ///< s since the scene's start, in [0, its duration]; taken to the nearest frame.
   std::string object;

@@ -52,7 +52,7 @@ struct RecordingSafety {
 };
 /// Of what can't be made again: at most 0.2 s and, with a disk that takes up to a quarter of a second, 1 s are lost.
 inline constexpr RecordingSafety kLiveRecording{0.2, 0.3};
-/// After so long, s, it is told that the disk does not keep up.
+/// After this time, s, it is reported that the disk does not keep up.
 inline constexpr double kTooLongAtRisk = 1.0;
 
 /// Writes one recording. Not thread-safe: owned by the thread that steps the belief.

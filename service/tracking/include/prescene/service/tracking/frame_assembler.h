@@ -31,7 +31,7 @@
 
 namespace prescene::service {
 
-/// Of the bodies whose poses tf tells.
+/// Of the bodies whose poses come from tf.
 std::vector<std::string> robot_names(const belief::Scene& scene);
 
 struct AssemblerSettings {
@@ -93,7 +93,7 @@ class FrameAssembler {
   interfaces::ImageRules image_rules() const;
   bool uses_color() const { return settings_.use_color; }
   core::Status add_camera_info(const interfaces::RosCameraInfo& info, MessageIndex index);
-  /// Takes every good transform of the message; the status tells of the first bad one.
+  /// Takes every good transform of the message; the status names the first bad one.
   core::Status add_tf(const interfaces::RosTfMessage& message, MessageIndex index, bool is_static);
   /// Takes the links' transforms that follow from the joints' positions, as JointTransforms::add.
   core::Status add_joint_state(const interfaces::RosJointState& message, MessageIndex index);

@@ -19,8 +19,8 @@
 namespace prescene::service {
 
 /// Each joint's transform, parent link to child link, goes into the tf buffer by itself: links that move at different
-/// times, or that are told of by different messages, are interpolated as all frames of tf are. A transform that tf
-/// tells takes precedence over that of a joint, from then on.
+/// times, or that come in different messages, are interpolated as all frames of tf are. A transform that tf
+/// contains takes precedence over that of a joint, from then on.
 class JointTransforms {
  public:
   explicit JointTransforms(std::shared_ptr<const interfaces::RobotKinematics> robot) : robot_(std::move(robot)) {}
@@ -37,27 +37,27 @@ class JointTransforms {
   /// The clock went back: what is static goes in again with the next message.
   void begin_again() { begun_ = false; }
 
-  /// What a person should know at this time, in sentences: joints that nobody tells the position of, and positions far
+  /// What a person should know at this time, in sentences: joints whose position nobody publishes, and positions far
   /// beyond the limits of a joint. Empty without a robot, and while all is well.
   std::vector<std::string> doubts(core::TimeNs stamp_ns) const;
-  /// Joints that move, and have neither been told of nor have a position in the scene file.
+  /// Joints that move, of which no position came and which have none in the scene file.
   std::vector<std::string> missing() const;
-  /// Messages that told at least one joint's position.
+  /// Messages that held at least one joint's position.
   std::uint64_t messages() const { return messages_; }
 
  private:
   core::Status begin(core::TimeNs stamp_ns, const std::string& world, TfBuffer& tf);
   core::Status set(const interfaces::RobotJoint& joint, double q, core::TimeNs stamp_ns, bool is_static, TfBuffer& tf);
-  bool is_told(const interfaces::RobotJoint& joint) const { return told_.contains(joint.name); }
+  bool is_reported(const interfaces::RobotJoint& joint) const { return reported_.contains(joint.name); }
 
   std::shared_ptr<const interfaces::RobotKinematics> robot_;
   bool begun_ = false;
   core::TimeNs begun_ns_ = 0;  // stamp of the first message
   std::uint64_t messages_ = 0;
-  std::set<std::string> told_;     // joints
-  std::set<std::string> of_tf_;    // links whose transforms tf tells
-  std::set<std::string> assumed_;  // joints at the scene file's position, of which nothing has come
-  std::set<std::string> beyond_;   // joints whose last position was far beyond its limits
+  std::set<std::string> reported_;  // joints
+  std::set<std::string> of_tf_;     // links whose transforms come from tf
+  std::set<std::string> assumed_;   // joints at the scene file's position, of which nothing has come
+  std::set<std::string> beyond_;    // joints whose last position was far beyond its limits
 };
 
 }  // namespace prescene::service

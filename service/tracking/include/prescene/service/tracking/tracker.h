@@ -30,7 +30,7 @@ struct TrackerStep {
   StepRecord record;
   filter::StepCounters counters;
   std::string physics_failure;  ///< As in filter::StepResult.
-  IdleControls idle_controls;   ///< Also told, in words, by record.degraded.
+  IdleControls idle_controls;   ///< Also reported, in words, in record.degraded.
   filter::HashTrace trace;
   std::vector<filter::SupportMeasurement> supports;
   belief::Observation observation;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tracker may be told, and its form in recordings.
+// The tracker's settings, and their form in recordings.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

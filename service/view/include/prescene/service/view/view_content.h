@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the page is told of a scene and of a belief step, as JSON, and the pictures beside it.
+// What the page gets of a scene and of a belief step, as JSON, and the pictures beside it.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ BeliefSummary summary_of(const ShownStep& step);
 /// "supports": [{"name", "color", "mesh", "pose"}], "robot": the same}. A mesh is {"vertices": [x, y, z, ...],
 /// "triangles": [a, b, c, ...]}, of at most some thousand triangles; a pose [x, y, z, qw, qx, qy, qz].
 nlohmann::ordered_json scene_document(const belief::Scene& scene);
-/// Equal for scenes whose documents differ in poses at most, which steps tell.
+/// Equal for scenes whose documents differ in poses at most, which steps contain.
 std::uint64_t scene_shape_hash(const belief::Scene& scene);
 
 /// {"op": "step", "index", "step", "stamp_ns", "objects": [{"name", "state", "confidence", "existence", "pose",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What free flights alone tell of a thrown object, without any contact: where its centre of mass is (the tracked frame
+// What free flights alone show of a thrown object, without any contact: where its centre of mass is (the tracked frame
 // wobbles about the parabola that the centre flies on), how its moments of inertia compare (how its spin wanders), and
-// gravity in the tracker's units, which tells the scale of its lengths and the tilt of its ground.
+// gravity in the tracker's units, which gives the scale of its lengths and the tilt of its ground.
 //
 //   std::vector<std::span<const TimedPose>> flights;                // of each toss the frames before it first touches
 //   PRESCENE_TRY(const FlightCalibration found, calibrate_flights(flights, prior));
@@ -50,7 +50,7 @@ struct FlightCalibration {
   /// Of the parameters' errors, in the order of FlightParameter: flights are independent, the frames of one need not be
   /// [Liang & Zeger 1986]; the prior's part is added.
   Eigen::Matrix<double, kFlightParameters, kFlightParameters> covariance;
-  /// Standard deviation after the flights over that before; 1: they tell nothing of it, and it is the prior's.
+  /// Standard deviation after the flights over that before; 1: they say nothing about it, and it is the prior's.
   Eigen::Matrix<double, kFlightParameters, 1> left_of_prior;
   double position_noise = 0.0;  ///< Of a frame's coordinate, m, robust against outliers.
   double rotation_noise = 0.0;  ///< rad, likewise.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What recorded tosses, bounces and slides tell of an object: frictions, restitution, inertia, rounding of edges and
+// What recorded tosses, bounces and slides show of an object: frictions, restitution, inertia, rounding of edges and
 // centre of mass, each with its standard error. Every recording is simulated from its beginning, while the object flies
 // or slides freely, from several starts about what these frames say, and compared with what came then.
 //
@@ -78,7 +78,7 @@ struct CalibratedParameter {
   MotionParameter parameter = MotionParameter::kFriction;
   double value = 0.0;  ///< Recordings and prior together.
   double standard_error = 0.0;
-  /// Over the prior's deviation, at most 1: then the recordings tell nothing of it, and the value is the prior's mean.
+  /// Over the prior's deviation, at most 1: then the recordings say nothing about it; the value is the prior's mean.
   double left_of_prior = 1.0;
 };
 struct MotionCalibration {
@@ -95,7 +95,7 @@ struct MotionCalibration {
   bool estimate_settled = false;  ///< Else the errors may be too small.
   bool settled() const { return search_settled && estimate_settled; }
 };
-/// Of the centre of mass: no number of frames with this noise of a coordinate, m, tells it better.
+/// Of the centre of mass: no number of frames with this noise of a coordinate, m, determines it better.
 double least_center_error(double position_noise);
 
 /// Of what was known with the error `before`, and with the error `after` once more was seen: its error where both may

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What recordings do not tell keeps what was believed of it.
+// A parameter about which recordings say nothing keeps its prior.
 #pragma once
 
 #include <Eigen/Core>

@@ -44,7 +44,7 @@ class Certifier : public EndRule {
 
 /// Understands conditions at the end: inside a volume, below a height, upright, a face up, resting on a support or
 /// object; and actions that let go. Null where any variable needs something else, gravity is not along -z of W, or
-/// spheres stand for a support, or when it is cancelled. `request` tells actions and duration.
+/// spheres stand for a support, or when it is cancelled. `request` gives actions and duration.
 std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const belief::Scene>& scene,
                                                 std::span<const Variable> variables, const RunRequest& request,
                                                 const CertifierOptions& options = {});

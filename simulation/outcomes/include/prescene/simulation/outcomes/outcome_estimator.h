@@ -133,7 +133,7 @@ struct OutcomeEstimate {
   CertificateUse certificates;
   /// Instances whose simulation failed. They might have been of any class: their share widens every interval.
   int failed = 0;
-  /// Neither starts nor actions hold anything random: one instance a component tells all, and intervals have no width.
+  /// Neither starts nor actions hold anything random: one instance a component is enough; intervals have no width.
   bool certain = false;
   std::vector<EstimateStage> history;  ///< At each growth of the net, the last being this estimate.
   double wall_seconds = 0.0;           ///< These two alone differ between runs of equal `instances.size()`.
@@ -145,7 +145,7 @@ struct OutcomeEstimate {
 /// Runs instances until the stop rule (top of this file) holds. The same arguments give the same bits for any number of
 /// threads; with a time limit or cancellation, for equal numbers of instances (rerun with exact_instances for that
 /// number). `variables` may be empty: then the first step at min_instances or above ends it. `stream` seeds the nets
-/// and what is random in the simulator's actions. Progress is told between chunks of instances, from the calling
+/// and what is random in the simulator's actions. Progress is reported between chunks of instances, from the calling
 /// thread; its seconds_left come from the rate at which the widest interval shrinks. With a certifier, the share of
 /// audited instances that had another class times the share certified is added to every half width.
 OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistribution& starts,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time in which a start distribution is one object: as long as nothing can touch anything, the moments of its
-// flight tell all about it. What then may touch opens it into instances.
+// flight describe it completely. What then may touch opens it into instances.
 //
 //   PRESCENE_TRY(const FlightBodies bodies, FlightBodies::make(scene, shapes));
 //   PRESCENE_TRY(const CommonFlight flight,

@@ -12,7 +12,7 @@
 namespace prescene::simulation {
 
 /// Of shapes, inertia, contact properties, gravity, fixed poses, timelines, names, and the options. Not of where
-/// objects start or what they weigh (states tell that), nor of what is seen or asked.
+/// objects start or what they weigh (states contain that), nor of what is seen or asked.
 std::uint64_t mechanics_hash(const belief::Scene& scene, const MechanicsOptions& options);
 /// Of the actions with what is drawn in them.
 std::uint64_t mechanics_hash(const std::vector<belief::Action>& actions, const core::RandomStream& stream);
