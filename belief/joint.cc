@@ -22,7 +22,7 @@ using core::Status;
 constexpr double kJointRounding = 1e-9;
 constexpr ScalarRange kJointFrictionRange{0.0, 1e6, "give N m of a hinge or N of a slider, at least 0", true};
 constexpr ScalarRange kJointDampingRange{0.0, 1e6, "give N m s/rad of a hinge or N s/m of a slider, at least 0", true};
-// Of a hinge, so that positions are told apart where it turns all the way round.
+// Of a hinge, so that positions are distinguished where it turns all the way round.
 constexpr double kWidestHinge = 350.0 / 180.0 * std::numbers::pi;
 
 /// The point of the child that is on the anchor at position 0, in C.

@@ -106,7 +106,7 @@ Condition condition_from(const std::string& key, const JsonAt& at) {
 
 std::vector<Condition> conditions_from(JsonObject& fields);
 
-/// Of a map that has no other keys; a mistyped one is told before the caller can miss the condition.
+/// Of a map that has no other keys; a mistyped one is reported before the caller can miss the condition.
 std::vector<Condition> conditions_of(const JsonAt& at) {
   JsonObject fields(at);
   return conditions_from(fields);

@@ -47,7 +47,7 @@ struct ThreadPool::Impl {
     }
   }
   int threads;
-  // TBB has one worker a hardware thread, and warns when an arena asks for more, unless it is told otherwise.
+  // TBB has one worker a hardware thread, and warns when an arena asks for more, unless it is configured otherwise.
   std::optional<tbb::global_control> more_than_hardware;
   tbb::task_arena arena;
 };

@@ -53,7 +53,7 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   report = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
                   stream.at(belief.step, static_cast<std::uint32_t>(object)), seen.particles, context);
   if (report.all_impossible) step.result.degraded |= kImpossibleWeights;
-  // What is hidden is not told apart by its turn.
+  // What is hidden is not distinguished by its turn.
   if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share)
     share_among_turns(before, model_of(belief, object).symmetry, seen.particles, seeing_cameras(step.by(), seen));
   for (const ParticleWeight& particle : report.particles) step.result.counters.hidden_particles += particle.hidden;

@@ -18,7 +18,7 @@ using belief::Vector3d;
 constexpr std::size_t kFewestInstances = 128;
 constexpr std::size_t kMostRolloutsLookedAt = 65536;  // shares of a prefix of the net are those of the whole
 constexpr std::size_t kFewestForRest = 512;           // below, first_order_effect() cuts inputs into 4 intervals only
-constexpr double kLargestTurn = 2.0;  // rad: beyond it a rotation is no longer told by a turn from its mean
+constexpr double kLargestTurn = 2.0;  // rad: beyond it a rotation is no longer described by a turn from its mean
 const char* const kAxes[] = {"x", "y", "z"};
 
 bool varies(const std::vector<double>& values) {

@@ -200,7 +200,7 @@ double EventPaths::may_be_absent(std::size_t object) const {
   if (is_held(object)) return 0.0;
   const auto index = belief::find_object(*window_.start, objects_[object].name);
   const belief::ObjectBelief& believed = window_.start->objects[static_cast<std::size_t>(*index)];
-  // Of what is lost, existence tells of the place where it was, not of others; and it follows slowly: the state says
+  // Of what is lost, existence speaks of the place where it was, not of others; and it follows slowly: the state says
   // what the last frame did. What was refuted is out of sight next to where it was, or gone.
   if (!is_present(object)) return kOpenAbsence;
   const bool refuted = believed.state == belief::TrackState::kUnseen && believed.existence < kNeverRefuted;

@@ -125,7 +125,7 @@ class AnswerBuilder {
     points = std::move(kept);
   }
 
-  /// What follows from the posterior of a hypothesis: its points, once more, with all that is told.
+  /// What follows from the posterior of a hypothesis: its points, once more, with all that is reported.
   void work_out(Judged& judged) {
     if (judged.hypothesis.kind == EventKind::kOther) return;
     thin_out(judged.posterior.points);

@@ -20,7 +20,7 @@ constexpr double kTimelineInterval = 1.0 / 30.0;
 constexpr int kUnaskedInstances = 256;
 // Of an instance's record besides its objects' states: its classes, and contacts where they are kept.
 constexpr std::size_t kRecordBytes = 256, kContactsBytes = 4096;
-// Object states of a run that is told: an answer holds twelve such, about 3 MB each.
+// Object states of a run in an answer: an answer holds twelve such, about 3 MB each.
 constexpr double kMostStatesTold = 8000.0;
 
 bool needs_states_along_the_way(const belief::Scene& scene) {

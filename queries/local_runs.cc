@@ -45,7 +45,7 @@ std::vector<std::size_t> LocalRuns::with_neighbours(std::vector<std::size_t> ope
   const std::size_t n = scene_.objects.size();
   if (boxes_.empty())
     for (std::size_t i = 0; i < n; ++i) boxes_.push_back(box_of(i, likeliest_.objects[i].X_WO));
-  // What is jointed is told apart by no box: then all are simulated.
+  // What is jointed is separated by no box: then all are simulated.
   std::vector<std::uint8_t> kept(n, scene_.joints.empty() ? 0 : 1);
   for (const std::size_t i : open) kept[i] = 1;
   // What it touches, what that touches, and so on.

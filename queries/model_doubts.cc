@@ -171,7 +171,7 @@ std::vector<belief::ModelError::Shift> shifts_of(const Foresight& foresight, std
       shift.shift = sum / weight;
       const double count = weight * weight / squares;
       const double variance = std::max(0.0, sum_squares / weight - shift.shift * shift.shift) / count;
-      // The continuity term is what keeps no change at all from being told as certainly none.
+      // The continuity term is what keeps no change at all from being reported as certainly none.
       const double half = reach * std::sqrt(variance + 1.0 / (count * count));
       shift.low = std::max(-1.0, shift.shift - half);
       shift.high = std::min(1.0, shift.shift + half);
@@ -302,7 +302,7 @@ core::Result<std::optional<belief::ModelError>> model_error(const Foresight& for
   belief::ModelError error = error_of(foresight, variants, pairs, confidence);
   if (foresight.estimate.instances.size() < 2) return std::optional(std::move(error));  // nothing is uncertain
 
-  // Others, until they tell enough; when time ends, those that are complete.
+  // Others, until they say enough; when time ends, those that are complete.
   cancellation = &until;
   Pairs fresh;
   const std::size_t most = std::min(kMostRepeated, kMostRuns / variants.size());

@@ -20,7 +20,7 @@ namespace {
 constexpr std::uint32_t kLocalScenarios = 1U << 23U, kCommonScenarios = 1U << 24U;
 constexpr int kMostTests = 20;         // of points: the error that is left then is nothing
 constexpr int kMostTestTrials = 1024;  // of one test
-constexpr int kNearestTrials = 128;    // of what is told where no claim holds
+constexpr int kNearestTrials = 128;    // of what is reported where no claim holds
 constexpr int kFirstTestTrials = 64, kMoreTestTrials = 32;
 constexpr std::size_t kElites = 24;   // points that race
 constexpr std::size_t kRanked = 160;  // points whose neighbours are looked at, each of which takes a pass over all
@@ -142,7 +142,7 @@ class Search {
     return sum;
   }
 
-  /// How far a point tells something of its neighbours: less than their mean distance.
+  /// How far a point says something of its neighbours: less than their mean distance.
   double reach() const {
     const auto count = static_cast<double>(std::max<std::size_t>(points_.size(), 16));
     return 0.6 * std::pow(count, -1.0 / static_cast<double>(dimensions_));
@@ -485,7 +485,7 @@ class Search {
     result_.map_y = static_cast<int>(y);
   }
 
-  /// What is told where no claim holds; beyond the limits of the search, so that there is an interval.
+  /// What is reported where no claim holds; beyond the limits of the search, so that there is an interval.
   void tell_nearest() {
     std::vector<Ranked> order = ranked();
     if (order.empty()) {

@@ -100,7 +100,7 @@ class ChangeSearcher {
     if (stopped()) return false;
     const auto n = static_cast<int>(changed.size());
     const auto successes = static_cast<int>(std::count(wanted.begin(), wanted.end(), std::uint8_t{1}));
-    // Each test may be the one that is told.
+    // Each test may be the one that is reported.
     const ShareInterval interval = clopper_pearson(successes, n, (1.0 - search_.confidence) / kChangeTests);
     const bool found = interval.low >= search_.probability;
     const double probability = static_cast<double>(successes) / n;
@@ -109,7 +109,7 @@ class ChangeSearcher {
     for (std::size_t i = 0; i < wanted.size(); ++i)
       if (wanted[i] == 0) refuting.push_back(changed[i].draw);
     draws_.insert(draws_.begin(), std::make_move_iterator(refuting.begin()), std::make_move_iterator(refuting.end()));
-    // Where none stands, the one that came nearest is told.
+    // Where none stands, the one that came nearest is reported.
     if (!found && probability <= change_.probability && change_.instances > 0) return false;
     change_.found = found;
     change_.size = length_of(shift);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kGuessShare = 0.5;  // of what is not drawn where runs before found the posterior
 constexpr double kFoundShare = 0.5;
-constexpr double kFoundWider = 1.4;   // by which deviations of what was found are widened: few points tell them
+constexpr double kFoundWider = 1.4;   // by which deviations of what was found are widened: few points determine them
 constexpr double kImpossible = -1e5;  // log L of what can't be: finite, so that paths go on
 constexpr double kNuisanceStep =
     0.35;  // of a move in nuisances, which leaves their prior as it is [Cotter et al. 2013]

@@ -24,7 +24,7 @@ constexpr double kLastingError = 0.25;
 // A path is at a frame's peak up to this squared distance (95 % of chi-squared with six degrees of freedom): what the
 // image says of further ones is looked at.
 constexpr double kAtPeak = 12.6;
-// A path is known so much better than a frame tells, by this sum of ratios of variances, that the image itself weighs
+// A path is known so much better than a frame shows, by this sum of ratios of variances, that the image itself weighs
 // it: what the spread of the path adds is less than a quarter of a nat then.
 constexpr double kKnownWell = 0.5;
 constexpr float kBehindSupport = 0.02F;  // m; so far behind a support's surface an object is hidden by it

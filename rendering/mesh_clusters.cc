@@ -16,7 +16,7 @@ std::size_t filled(std::size_t count) {
   return (count + MeshClusters::kMultiple - 1) / MeshClusters::kMultiple * MeshClusters::kMultiple;
 }
 
-/// Triangles by their corners, whichever comes first: the library does not tell which is which.
+/// Triangles by their corners, whichever comes first: the library does not say which is which.
 class TriangleFinder {
  public:
   explicit TriangleFinder(const std::vector<TriangleCorners>& triangles) {

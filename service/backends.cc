@@ -25,7 +25,7 @@ simulation::LockstepOptions lockstep_options(const simulation::BulletOptions& bu
 /// leave the lanes empty, too.
 class EitherSimulator : public simulation::Simulator, public simulation::OwnActionsRunner {
  public:
-  /// `on_bullet` is told why, once for each run that Bullet's stepper has to take over.
+  /// `on_bullet` gets the reason, once for each run that Bullet's stepper has to take over.
   EitherSimulator(std::unique_ptr<simulation::Simulator> lockstep, std::unique_ptr<simulation::Simulator> bullet,
                   std::function<void(const std::string&)> on_bullet)
       : lockstep_(std::move(lockstep)), bullet_(std::move(bullet)), on_bullet_(std::move(on_bullet)) {}

@@ -8,7 +8,7 @@
 namespace prescene::service {
 namespace {
 
-// Bytes: what is refused for its long id is still told to whoever sent it, unless that were a burden.
+// Bytes: what is refused for its long id is still reported to whoever sent it, unless that were a burden.
 constexpr std::size_t kLongestIdKept = 4096;
 
 }  // namespace

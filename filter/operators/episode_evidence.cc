@@ -20,7 +20,7 @@ constexpr int kSharpnesses = 14;
 double sharpness_of(int k) { return k + 1 == kSharpnesses ? 0.0 : std::exp2(-k); }
 
 /// The least width of the kernels over which draws are spread, in standard normal coordinates of the priors: more
-/// than a hundred draws do not tell more.
+/// than a hundred draws do not say more.
 constexpr double kLeastWidth = 0.02;
 
 /// Bounds the score of a twin whose draw is ruled out.

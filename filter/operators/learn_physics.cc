@@ -378,7 +378,7 @@ LearnReport learn_physics(belief::Belief& belief, const LearnPhysicsOptions& opt
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     follow_motion(belief, static_cast<int>(i), belief.objects[i].motion);
     auto& episode = belief.objects[i].motion.episode;
-    // How a joint's own friction goes along with the object's is not told apart.
+    // How a joint's own friction goes along with the object's is not separated.
     if (!options.enabled || !simulators || belief::joint_of(*belief.scene, belief.objects[i].name) ||
         belief::physical_dimensions(belief::model_of(belief, belief.objects[i])) == 0)
       episode.reset();

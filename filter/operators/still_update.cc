@@ -32,7 +32,7 @@ StillUpdate still_update(const Matrix6d& covariance, const Matrix6d& information
     const double ratio = eigen.values[i];  // variance of the prediction over that of the frame
     if (!(ratio > kLeastRatio)) continue;
     // In units of the frame's variance, the prediction has `common` of its error from the same source, and the rest of
-    // its own; a frame that is worse than the earlier ones together tells nothing new.
+    // its own; a frame that is worse than the earlier ones together says nothing new.
     const double own = std::max(0.0, ratio - common);
     const double innovation = own + 1.0 - common;
     const double gain = own / innovation;

@@ -84,7 +84,7 @@ std::optional<int> granted_receive_buffer(int asked) {
 
 namespace {
 
-/// Reads the names of the network interfaces off Cyclone's trace, which has no other way to tell them.
+/// Reads the names of the network interfaces off Cyclone's trace, which has no other way to name them.
 class InterfaceListener {
  public:
   explicit InterfaceListener(bool listens) : listens_(listens) {

@@ -51,7 +51,7 @@ Status cannot_look(const fs::path& path, const std::error_code& error) {
 }
 
 /// Whether something of that name is there, readable or not: a link that leads nowhere is. Fails where that can't be
-/// told.
+/// reported.
 Result<bool> is_there(const fs::path& path) {
   std::error_code error;
   const fs::file_status found = fs::symlink_status(path, error);

@@ -243,7 +243,7 @@ class LayoutFinder {
     return head && parse(*head, &parsed) && agree(*frame, parsed) && find_compression(parsed.compression);
   }
 
-  /// A chunk's length is told twice.
+  /// A chunk's length is given twice.
   static bool agree(const Frame& frame, const records::ChunkHead& head) {
     return frame.length >= head.bytes() && head.records_size == frame.length - head.bytes();
   }
@@ -333,7 +333,7 @@ class LayoutFinder {
   }
 
   /// Its name is kept, not its data. One that makes no sense is passed over: no message needs it, and whoever asks for
-  /// it is told that it is not there.
+  /// it is reported as not there.
   Result<bool> add_attachment(const Frame& frame) {
     const std::uint64_t begin = position_ + records::kFrameBytes;
     PRESCENE_TRY(

@@ -44,7 +44,7 @@ constexpr bool kLimitsMemory = false;
 constexpr bool kLimitsMemory = true;
 #endif
 
-// How the child tells what an exit status alone can't. Others than 0 are taken for crashes.
+// How the child reports what an exit status alone can't. Others than 0 are taken for crashes.
 constexpr int kExitOutOfMemory = 97;
 constexpr int kExitThrew = 98;
 constexpr int kExitNoLimits = 99;
@@ -100,7 +100,7 @@ bool set_limits(std::size_t mapped, const ChildLimits& limits) {
   const auto seconds = static_cast<rlim_t>(std::chrono::ceil<std::chrono::seconds>(limits.time).count());
   // Not dumpable: a limit on core files does not hold where the system pipes them to a program.
   return ::prctl(PR_SET_DUMPABLE, 0) == 0 && limit(RLIMIT_CORE, 0) && limit(RLIMIT_FSIZE, 0) &&
-         // Beyond the soft limit it ends by SIGXCPU, which tells why; at the hard one by SIGKILL, which does not.
+         // Beyond the soft limit it ends by SIGXCPU, which says why; at the hard one by SIGKILL, which does not.
          limit(RLIMIT_CPU, seconds + 1, seconds + 2) &&
          (!kLimitsMemory || limit(RLIMIT_AS, mapped + limits.memory_bytes));
 }
@@ -118,7 +118,7 @@ void restore_default_signals() {
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-// Where nobody is told of children's ends, none is kept to be waited for, and its number may be another's next.
+// Where children's ends are reported to nobody, none is kept to be waited for, and its number may be another's next.
 bool ends_are_lost() {
   struct sigaction action {};
   if (::sigaction(SIGCHLD, nullptr, &action) != 0) return false;
@@ -155,7 +155,7 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  // How it ended, as waitpid tells it; nothing where another in this process has waited for it. One that has closed its
+  // How it ended, as waitpid says it; nothing where another in this process has waited for it. One that has closed its
   // pipe without ending is killed; one that was ending already keeps its status.
   std::optional<int> end() {
     if (process_ <= 0) return status_;

@@ -9,7 +9,7 @@
 namespace prescene::interfaces {
 namespace {
 
-/// Tilt and heading of the body's z and x axes, as a person would tell them.
+/// Tilt and heading of the body's z and x axes, as a person would say them.
 std::string orientation_text(const geometry::Quaterniond& rotation) {
   const geometry::Vector3d z = rotation * geometry::Vector3d::UnitZ(), x = rotation * geometry::Vector3d::UnitX();
   return in_degrees(std::acos(std::clamp(z.z(), -1.0, 1.0))) + ", " + in_degrees(std::atan2(x.y(), x.x()));
@@ -106,7 +106,7 @@ void add_deciding(const belief::PredictAnswer& answer, std::vector<ReportSection
   ReportSection& section = sections.emplace_back();
   section.title = "What decides";
   for (const belief::DecidingInputs& one : answer.inputs) {
-    // Told by the likeliest of its outcomes; where that is almost sure there is nothing to decide.
+    // Shown for the likeliest of its outcomes; where that is almost sure there is nothing to decide.
     const belief::OutcomeProbability* shown = nullptr;
     for (const belief::OutcomeProbability& outcome : answer.outcomes)
       if (belongs(outcome, one.about) && (!shown || outcome.probability > shown->probability)) shown = &outcome;

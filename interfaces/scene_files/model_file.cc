@@ -92,7 +92,7 @@ std::string key_line(const char* key, const std::string& value) {
   return std::string("  ") + key + ": " + value + "\n";
 }
 
-// What recordings of its motion tell of an object.
+// What recordings of its motion say about an object.
 std::string fitted_lines(const belief::ObjectModel& model) {
   const belief::ContactProperties& contact = model.contact;
   std::string text = key_line("center_of_mass", value_text(model.center_of_mass) + "  # m");

@@ -53,7 +53,7 @@ Function function_named(const char* name) {
   return reinterpret_cast<Function>(eglGetProcAddress(name));
 }
 
-/// EGL's list of devices, and the functions that tell of them; empty where there is no such list.
+/// EGL's list of devices, and the functions that describe them; empty where there is no such list.
 struct DeviceList {
   DeviceList() {
     const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
@@ -183,7 +183,7 @@ std::unique_ptr<EglContext> EglContext::on_display(void* display, const GlVersio
   EGLint configs = 0;
   if (eglChooseConfig(display, config_wish, &config, 1, &configs) != EGL_TRUE || configs < 1)
     return failed("eglChooseConfig");
-  // First a context that tells when the device was reset; not every driver has one.
+  // First a context that reports when the device was reset; not every driver has one.
   const EGLint context_wish[] = {EGL_CONTEXT_MAJOR_VERSION,
                                  version.major,
                                  EGL_CONTEXT_MINOR_VERSION,
@@ -271,7 +271,7 @@ EglContext::Turn::Turn(EglContext& context) : context_(context), lock_(context.m
 
 core::Status EglContext::Turn::reset_status() const {
   PRESCENE_RETURN_IF_ERROR(status_);
-  // Where the driver has no such call, it tells of no reset.
+  // Where the driver has no such call, it reports no reset.
   const bool reset = glGetGraphicsResetStatus() != GL_NO_ERROR;
   if (!reset && !happens(context_.faults_, &GraphicsFaults::resets)) return core::ok_status();
   return core::unavailable("OpenGL: the device was reset and lost what it held");

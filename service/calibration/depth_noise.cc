@@ -190,7 +190,7 @@ void find_steps(const std::vector<geometry::DepthImage>& frames, DepthNoise* noi
   }
 }
 
-/// Puts `value` in place of a setting where enough pixels tell.
+/// Puts `value` in place of a setting where there are enough pixels.
 void set(const std::string& name, const DepthNoiseClass& from, double value, double* setting, DepthNoise* noise) {
   if (from.pixels < kEnoughPixels) {
     noise->remarks.push_back(name + ": " + std::to_string(from.pixels) + " pixels of its class in view, " +
@@ -293,7 +293,7 @@ core::Result<DepthNoise> DepthNoiseEstimator::finish() const {
     noise.by_edge.push_back(by_edge[i].result(settings.outline_px[i]));
   }
 
-  // A pattern that stays is in every frame alike and can't be told from the surface's own shape.
+  // A pattern that stays is in every frame alike and can't be distinguished from the surface's own shape.
   const double fixed = rendering::SimulatedCameraOptions{}.fixed_pattern_share;
   set("sigma_per_depth_squared", middle, middle.sigma / std::sqrt(1.0 - fixed), &settings.sigma_per_depth_squared,
       &noise);

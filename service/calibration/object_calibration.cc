@@ -24,7 +24,7 @@ using simulation::RecordedMotion;
 // A tracker that claims to be better than that is a simulation.
 constexpr double kLeastPositionNoise = 1e-5;  // m
 constexpr double kLeastRotationNoise = 1e-4;  // rad
-// Share of the prior's deviation that is left where little was told.
+// Share of the prior's deviation that is left where recordings say little.
 constexpr double kLittle = 0.6;
 // A tracker's metre is worth a remark when it is off by so much, and by three standard errors.
 constexpr double kScaleRemark = 0.003;
@@ -35,7 +35,7 @@ constexpr double kNoFriction = 0.02;
 constexpr double kLeastFrameRate = 100.0;  // Hz
 // m: twice the gap at which things still count as touching, and more.
 constexpr double kNoisySlide = 5e-4;
-// Parts of the recordings, each of which is forecast by what the others tell.
+// Parts of the recordings, each of which is forecast by what the others say.
 constexpr int kFolds = 5;
 // Simulated starts: of a recording, and of all of them at most as long as each has the least.
 constexpr std::size_t kSamples = 16;
@@ -83,7 +83,7 @@ simulation::MotionPrior kept_prior(const belief::Scene& scene, const std::vector
   return prior;
 }
 
-/// What flights tell becomes the prior of what contacts, which come later, are asked.
+/// What flights say becomes the prior of what contacts, which come later, are asked.
 void use_flights(const FlightCalibration& flight, const simulation::FlightPrior& before, belief::Scene* scene,
                  simulation::MotionPrior* prior) {
   scene->models[static_cast<std::size_t>(scene->objects[0].model)].unit_inertia = flight.unit_inertia(before);
@@ -210,7 +210,7 @@ core::Result<ObjectCalibration> calibrate_usable(const MotionDataset& dataset, c
                                                  const core::Cancellation* cancellation) {
   ObjectCalibration found;
   found.remarks = all.remarks;
-  // A twin tells nothing that the other does not.
+  // A twin says nothing that the other does not.
   const UsableMotions usable = all.without_twins();
   const std::vector<RecordedMotion>& motions = usable.motions;
   belief::Scene scene = *dataset.scene;
@@ -243,7 +243,7 @@ core::Result<ObjectCalibration> calibrate_usable(const MotionDataset& dataset, c
                                                backends.pool(), motion, part_of(progress, 0.0, 0.8), cancellation));
   for (simulation::CalibratedParameter& p : found.motion.parameters) {
     const simulation::MotionBelief& before = found.prior[place_of(p.parameter)];
-    // What flights tell was the prior; their frames also begin the simulated motions.
+    // What flights say was the prior; their frames also begin the simulated motions.
     const double flown = prior[place_of(p.parameter)].deviation;
     if (found.flight && flown < before.deviation)
       p.standard_error = simulation::error_of_shared_frames(flown, p.standard_error);

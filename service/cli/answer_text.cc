@@ -52,7 +52,7 @@ std::string learned_text(const nlohmann::ordered_json& item) {
             fixed_text(parameter.value("standard_deviation", 0.0), 3) +
             " (90 %: " + fixed_text(parameter.value("low", 0.0), 3) + " to " +
             fixed_text(parameter.value("high", 0.0), 3) + ")\n";
-  std::string when;  // not told by a service of another version
+  std::string when;  // not given by a service of another version
   if (const auto learned = item.find("learned_s"); learned != item.end() && learned->is_number())
     when = learned->get<double>() < 0.0 ? ", the last in an earlier session"
                                         : ", the last at " + fixed_text(learned->get<double>(), 1) + " s";

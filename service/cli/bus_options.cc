@@ -216,7 +216,7 @@ core::Status take_learned(const std::string& file, const std::vector<std::string
   if (!std::filesystem::exists(file, error)) return core::ok_status();
   PRESCENE_TRY(const std::vector<std::uint8_t> bytes, interfaces::read_file(file, interfaces::YamlLimits{}.max_bytes));
   settings.learned.assign(bytes.begin(), bytes.end());
-  // Here, so that it is told before anything is opened; and an empty file is none that was learned.
+  // Here, so that it is reported before anything is opened; and an empty file is none that was learned.
   return interfaces::parse_learned(settings.learned, file).status();
 }
 

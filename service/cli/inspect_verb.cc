@@ -151,7 +151,7 @@ core::Status inspect_mesh(InspectOptions& options, VerbContext& context) {
       if (word == options.use) options.inspection.use = use;
   }
   options.inspection.read.cancellation = &context.cancellation();
-  // Of smaller meshes all is told before anybody could read how far it is.
+  // Of smaller meshes all is printed before anybody could read how far it is.
   constexpr std::uintmax_t kTakesSeconds = std::uintmax_t{4} << 20;
   std::error_code ignored;
   if (const auto bytes = std::filesystem::file_size(options.file, ignored); !ignored && bytes > kTakesSeconds)

@@ -120,7 +120,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
                    [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
   options.bus.read = options.read;
-  options.bus.read.check_data = options.read.salvage;  // It was when the input was opened, but its loss is told here.
+  options.bus.read.check_data = options.read.salvage;  // Checked when it was opened; its loss is reported here.
   TrackingScore score(input.scene());
   Backends backends(context.pool(), options.backends);
   SessionReport report(input.scene(), settings, backends);

@@ -258,7 +258,7 @@ core::Result<ExplainedEventsReport> evaluate_explained_events(const ExplainedEve
   ExplainedEventsReport report;
   const auto count = static_cast<std::size_t>(options.episodes);
   report.episodes.resize(count);
-  // In parts, so that progress is told from here.
+  // In parts, so that progress is reported from here.
   const auto part = static_cast<std::size_t>(std::max(1, threads.threads()));
   for (std::size_t begin = 0; begin < count; begin += part) {
     if (stop.requested()) return core::cancelled("stopped on request");

@@ -24,7 +24,7 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
     PRESCENE_TRY(reader, RecordingReader::open(options.path, options.read));
     input.info_ = reader->info();
     input.read_ = options.read;
-    // Once is enough, and chunks are checked whenever they are read; but what is salvaged has its loss told at the end.
+    // Once is enough, and chunks are checked whenever they are read; what is salvaged has its loss reported at the end.
     input.read_.check_data = options.read.salvage;
   }
   if (input.scene_) return input;

@@ -112,7 +112,7 @@ SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const T
 
 void SessionReport::add(const interfaces::ReceivedMessage& message) {
   const MessageIndex index = next_index_++;
-  // What makes no sense is told by the tracker; here it is only left out.
+  // What makes no sense is reported by the tracker; here it is only left out.
   core::Status taken;
   if (message.topic == topics_.depth) {
     if (auto depth = decode_depth(message, assembler_.image_rules()))

@@ -51,9 +51,9 @@ class Player {
         renderer_(renderer),
         recording_(recording),
         noise_(seed, core::Purpose::kSensorNoise) {
-    TrackerSettings told;
-    told.topics = options.topics;
-    const std::vector<CameraInput> inputs = camera_inputs(told, scene);
+    TrackerSettings settings;
+    settings.topics = options.topics;
+    const std::vector<CameraInput> inputs = camera_inputs(settings, scene);
     for (int i = 0; i < belief::camera_count(scene); ++i) {
       const belief::SceneCamera& camera = *belief::camera_at(scene, i);
       Taker taker{camera, inputs[std::min(static_cast<std::size_t>(i), inputs.size() - 1)].topics,

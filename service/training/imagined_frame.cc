@@ -118,7 +118,7 @@ class Imagination {
     return core::ok_status();
   }
 
-  /// What the camera sees, its noise, and what of it the search is told.
+  /// What the camera sees, its noise, and what of it the search gets.
   core::Result<ImaginedFrame> see(filter::MeshCache& meshes, rendering::Renderer& renderer) {
     const filter::BeliefView shown = filter::render_scene(world_, state_, {}, filter::MeshDetail::kDisplay, meshes);
     const geometry::PinholeCamera& camera = world_.camera->intrinsics;

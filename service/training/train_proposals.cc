@@ -161,7 +161,7 @@ filter::BoostedTrees judge_from(const std::vector<Lesson>& lessons) {
   return filter::fit_boosted_trees(values, filter::kFitNumbers, right, {}, {});
 }
 
-/// Logistic regression of whether finds are right on their two log odds; a prior holds what few finds don't tell.
+/// Logistic regression of whether finds are right on their two log odds; a prior holds what few finds don't determine.
 std::array<double, 3> confidence_from(const std::vector<Lesson>& lessons) {
   const Vector3d prior(0.0, 0.5, 0.5);
   Vector3d c = prior;

@@ -91,7 +91,7 @@ struct Step {
 Step step_from(const VectorXd& u, const MatrixXd& slopes, const MatrixXd& curvature, const Neighbourhood& around,
                const Problem& problem) {
   const auto cases = static_cast<double>(slopes.rows());
-  // Directions in which the scores do not rise tell nothing.
+  // Directions in which the scores do not rise say nothing.
   const geometry::SymmetricEigen eigen = geometry::symmetric_eigen(curvature);
   const MatrixXd H = product(eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal(), eigen.vectors.transpose());
   const VectorXd slope = slopes.colwise().mean().transpose();

@@ -40,7 +40,7 @@ constexpr int kTurns = 2;
 constexpr int kNoiseHalvings = 2;
 constexpr int kNoiseEvaluations = 40;
 
-// Of the friction that slides tell, beside its statistical error: by how much simulated slides of known friction were
+// Of the friction from slides, beside its statistical error: by how much simulated slides of known friction were
 // off. A third of it is half a step of the simulator, in which a sliding object's velocity lags behind its place.
 constexpr double kSlideError = 0.04;
 // Of the centre of mass, in the noise of a position: what frames of one tracker have in common, such as where it takes
@@ -109,7 +109,7 @@ SearchResult search_from(std::vector<std::vector<SearchParameter>> starts, const
   return best.best();
 }
 
-/// What the recordings tell, and what they do not.
+/// What the recordings determine, and what they do not.
 std::vector<CalibratedParameter> reported(const Estimate& estimate, const VariedParameters& varied,
                                           const MotionPrior& prior, double slide_share, double position_noise) {
   const auto n = static_cast<Eigen::Index>(varied.free().size());
@@ -133,7 +133,7 @@ std::vector<CalibratedParameter> reported(const Estimate& estimate, const Varied
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto place = static_cast<std::size_t>(i);
     const double error = std::sqrt(covariance(i, i));
-    // What is told hardly more than that may end beyond what can be.
+    // What is determined hardly more than that may end beyond what can be.
     const bool unidentifiable = error >= kUnidentifiable * deviation[i];
     all.push_back({static_cast<MotionParameter>(varied.free()[place]),
                    unidentifiable ? value[i] : std::clamp(value[i], estimated[place].low, estimated[place].high), error,
@@ -142,7 +142,7 @@ std::vector<CalibratedParameter> reported(const Estimate& estimate, const Varied
   return all;
 }
 
-/// Of each fold; what the recordings do not tell stays as all of them leave it.
+/// Of each fold; what the recordings do not determine stays as all of them leave it.
 std::vector<std::vector<double>> values_without(const Estimate& estimate, const VariedParameters& varied,
                                                 const std::vector<CalibratedParameter>& reported_values) {
   const std::vector<EstimatedParameter> estimated = varied.estimated({});
@@ -213,7 +213,7 @@ belief::ObjectModel calibrated_model(belief::ObjectModel model, const MotionCali
   for (const CalibratedParameter& p : found.parameters) {
     const bool unidentifiable = p.left_of_prior >= kUnidentifiable;
     const auto fitted = [&](const ScalarDistribution& prior, double low, double high) {
-      // A distribution that nothing is told of stays what it is, whatever its form.
+      // A distribution about which nothing is said stays what it is, whatever its form.
       if (unidentifiable && belief::variance(prior) > 0.0) return prior;
       return ScalarDistribution(belief::NormalScalar{p.value, p.standard_error, low, high});
     };
