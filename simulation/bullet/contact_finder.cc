@@ -19,8 +19,6 @@ constexpr double kSamePoint = 1e-4;
 constexpr double kOnEdge = 1e-6;
 // The same of points on triangles that were rounded to single precision.
 constexpr double kOnEdgeSingle = 1e-4;
-// Sine of the angle up to which two segments count as parallel.
-constexpr double kParallel = 0.05;
 
 Feature& to_world(const Frame& X, Feature& feature) {
   for (int i = 0; i < feature.count; ++i) feature[i] = X * feature[i];
@@ -160,7 +158,7 @@ void ContactFinder::clip_features(const ConvexCore& a, const Frame& X_WA, const 
     const Vector3d u = feature_a_[1] - feature_a_[0];
     const Vector3d v = feature_b_[1] - feature_b_[0];
     const double length = u.squaredNorm();
-    if (length == 0.0 || v.squaredNorm() == 0.0 || u.cross(v).norm() > kParallel * u.norm() * v.norm()) return;
+    if (length == 0.0 || v.squaredNorm() == 0.0 || u.cross(v).norm() > kParallelEdges * u.norm() * v.norm()) return;
     // Parallel segments touch along their common part.
     const double s0 = u.dot(feature_b_[0] - feature_a_[0]) / length;
     const double s1 = u.dot(feature_b_[1] - feature_a_[0]) / length;

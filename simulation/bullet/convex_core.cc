@@ -11,9 +11,7 @@
 namespace prescene::simulation {
 namespace {
 
-constexpr int kCapPoints = 12;
-// Tilt (rad) up to which a cap counts as flat: 12 points then miss the lowest one by less than 4e-5 of the radius.
-constexpr double kFlatCap = 1e-3;
+constexpr int kCapPoints = 12;  // up to kFlatCap they miss the lowest point by less than 4e-5 of the radius
 
 // std::hypot is too slow here.
 double hypotenuse(double x, double y) { return std::sqrt(x * x + y * y); }

@@ -5,6 +5,7 @@
 
 #include "instance_world.h"
 #include "prescene/belief/body_names.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
 namespace {
@@ -130,7 +131,7 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
   const std::uint64_t key = (static_cast<std::uint64_t>(a) << 48) | (static_cast<std::uint64_t>(b) << 32) |
                             (static_cast<std::uint64_t>(part_a & 0xffffu) << 16) | (part_b & 0xffffu);
   // A contact moves on its bodies by what they slide in a step.
-  const double reach = ma.travel + mb.travel + 1e-3;
+  const double reach = ma.travel + mb.travel + kSameContact;
   for (const ContactPoint& point : points_) {
     SolverContact c;
     c.body_a = a;

@@ -5,6 +5,7 @@
 
 #include "body_motion.h"
 #include "instance_world.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
 namespace {

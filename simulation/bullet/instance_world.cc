@@ -6,6 +6,7 @@
 
 #include "body_motion.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/rules/contact_rules.h"
 #include "prescene/simulation/rules/impact_split.h"
 
 namespace prescene::simulation {

@@ -29,9 +29,6 @@ struct Touch {
 
 class InstanceWorld {
  public:
-  /// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
-  static constexpr double kContactMargin = 5e-4;
-
   explicit InstanceWorld(std::shared_ptr<const CompiledScene> scene);
 
   /// Starts over from `start`; nothing of what was before remains.
@@ -50,7 +47,7 @@ class InstanceWorld {
   void read(belief::WorldState& state) const;
   /// Touching pairs of the last step, ordered.
   const std::vector<Touch>& touches() const { return touches_; }
-  /// How deep two things were in each other at the beginning of the last step if it was the first or let something go,
+  /// How deep two things overlapped at the beginning of the last step if it was the first or let something go,
   /// else 0; m.
   double overlap() const { return overlap_; }
   /// Some number is not finite or some speed beyond 1e4.

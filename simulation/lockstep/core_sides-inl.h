@@ -12,6 +12,7 @@
 
 #include "lane_math-inl.h"
 #include "lane_state.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
@@ -105,7 +106,6 @@ inline void side_of_box(const Vec3<V>& low, const Vec3<V>& high, const Vec3<V>& 
 
 /// The side, rim, line or point of a core that faces `direction`; both in S.
 inline void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side& side) {
-  constexpr double kFlat = 1e-3;  // rad: up to it a rim keeps its points
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   side.normal = {zero, zero, zero};
@@ -128,7 +128,7 @@ inline void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side&
     }
     case CoreKind::kCylinder: {
       const V s = hn::Sqrt(direction.x * direction.x + direction.y * direction.y);
-      const auto tilted = hn::Gt(s, set<V>(kFlat));
+      const auto tilted = hn::Gt(s, set<V>(kFlatCap));
       const V scale = one / select(tilted, s, one);
       const V cx = select(tilted, direction.x * scale, one);
       const V cy = select(tilted, direction.y * scale, zero);
@@ -153,7 +153,7 @@ inline void side_of_part(const ConvexPart& part, const Vec3<V>& direction, Side&
     case CoreKind::kCone: {
       // The base, or the line up the side that faces most.
       const V s = hn::Sqrt(direction.x * direction.x + direction.y * direction.y);
-      const auto tilted = hn::Gt(s, set<V>(kFlat));
+      const auto tilted = hn::Gt(s, set<V>(kFlatCap));
       const V scale = one / select(tilted, s, one);
       const V cx = select(tilted, direction.x * scale, one);
       const V cy = select(tilted, direction.y * scale, zero);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lane_state.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "flight.cc"
@@ -116,7 +117,7 @@ void find_pairs_lanes(const LockstepScene* scene, const PartQuery* query, LaneSt
     const int at = state->at(query->object, slot);
     const Mat3<V> R = load(state->R, at);
     const Vec3<V> center = load(state->p, at) + R * (set3<V>(part.center) - load(state->com, at));
-    const V range = hn::Load(d, state->travel + at) + set<V>(kLaneMargin);
+    const V range = hn::Load(d, state->travel + at) + set<V>(kContactMargin);
     const Vec3<V> half = abs(R) * set3<V>(part.box_half) + Vec3<V>{range, range, range};
     for (std::size_t f = 0; f < scene->fixed.size(); ++f) {
       const FixedPart& fixed = scene->fixed[f];
@@ -180,7 +181,7 @@ void find_body_pairs_lanes(const LockstepScene* scene, const PartQuery* query, i
     const int at_other = state->at(body, slot);
     const Mat3<V> R = load(state->R, at);
     const Vec3<V> center = load(state->p, at) + R * (set3<V>(part.center) - load(state->com, at));
-    const V range = hn::Load(d, state->travel + at) + hn::Load(d, state->travel + at_other) + set<V>(kLaneMargin);
+    const V range = hn::Load(d, state->travel + at) + hn::Load(d, state->travel + at_other) + set<V>(kContactMargin);
     const Vec3<V> half = abs(R) * set3<V>(part.box_half) + Vec3<V>{range, range, range};
     const Mat3<V> R_other = load(state->R, at_other);
     const Vec3<V> p_other = load(state->p, at_other);

@@ -17,6 +17,7 @@
 
 #include "lane_math-inl.h"
 #include "lane_state.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
@@ -326,7 +327,7 @@ void ContactRows<kMany>::warm_start(Rates* changes) {
       }
     }
     // A contact moves on its bodies by what they slide in a step.
-    V reach = object(group.a).travel + set<V>(1e-3);
+    V reach = object(group.a).travel + set<V>(kSameContact);
     if (kMany && group.b >= 0) reach = reach + object(group.b).travel;
     Rates& a = changes[group.a];
     Rates& b = changes[kMany && group.b >= 0 ? group.b : group.a];

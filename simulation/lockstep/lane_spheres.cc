@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "prescene/core/check.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
 namespace {
@@ -247,7 +248,7 @@ void touch_spheres(const LockstepScene& scene, const ConvexPart& part, int other
     const PlacedPart object = placed(scene, part, at / state.slots(), at, state);
     const PlacedPart opposite = placed(scene, second, id.body, pair.other, state);
     const bool with_object = id.body >= 0;
-    const double range = static_cast<double>(state.travel[at]) + kLaneMargin +
+    const double range = static_cast<double>(state.travel[at]) + kContactMargin +
                          (with_object ? static_cast<double>(state.travel[pair.other]) : 0.0);
     const double dt = scene.settings.dt * static_cast<double>(state.share[at]);
     const bool turned = !part.spheres;

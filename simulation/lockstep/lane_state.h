@@ -230,9 +230,6 @@ struct LanePairs {
   std::vector<std::vector<Near>> shapes;  ///< All others, by LockstepScene::parts.
 };
 
-/// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
-inline constexpr double kLaneMargin = 5e-4;
-
 /// A part of an object in the slots whose `wanted` is not 0.
 struct PartQuery {
   int object, part;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "lane_state.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "near_contacts.cc"
@@ -81,7 +82,7 @@ void gather_objects(const ConvexPart& part, const LanePairs::Near* pairs, std::s
       lanes.center[k][i] = static_cast<double>(state.p[k][object]);
       lanes.middle[k][i] = part.center[k] - static_cast<double>(state.com[k][object]);
     }
-    lanes.range[i] = static_cast<double>(state.travel[object]) + kLaneMargin;
+    lanes.range[i] = static_cast<double>(state.travel[object]) + kContactMargin;
     lanes.object[i] = object;
   }
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lane_state.h"
+#include "prescene/simulation/rules/contact_rules.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "plane_contacts.cc"
@@ -109,12 +110,10 @@ HWY_INLINE void box_corners(const ConvexPart& part, const Vec3<V>& n, const Add&
 /// The lower rim where the axis is steep, the lower line where it is flat; n in S.
 template <class Add>
 HWY_INLINE void cylinder_points(const ConvexPart& part, const Vec3<V>& n, const Add& add) {
-  // Up to this tilt (rad) a rim counts as flat and keeps its points: where it is lowest would be noise.
-  constexpr double kFlat = 1e-3;
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   const V s = hn::Sqrt(n.x * n.x + n.y * n.y);
-  const auto tilted = hn::Gt(s, set<V>(kFlat));
+  const auto tilted = hn::Gt(s, set<V>(kFlatCap));
   const V scale = one / select(tilted, s, one);
   const V cx = select(tilted, hn::Neg(n.x * scale), one);
   const V cy = select(tilted, hn::Neg(n.y * scale), zero);
@@ -138,11 +137,10 @@ HWY_INLINE void cylinder_points(const ConvexPart& part, const Vec3<V>& n, const 
 /// The base where it faces the plane more than the side, else the line up the side; n in S.
 template <class Add>
 HWY_INLINE void cone_points(const ConvexPart& part, const Vec3<V>& n, const Add& add) {
-  constexpr double kFlat = 1e-3;  // as of cylinders
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   const V s = hn::Sqrt(n.x * n.x + n.y * n.y);
-  const auto tilted = hn::Gt(s, set<V>(kFlat));
+  const auto tilted = hn::Gt(s, set<V>(kFlatCap));
   const V scale = one / select(tilted, s, one);
   const V cx = select(tilted, hn::Neg(n.x * scale), one);
   const V cy = select(tilted, hn::Neg(n.y * scale), zero);
@@ -228,7 +226,7 @@ void touch_planes_lanes(const LockstepScene* scene, const ConvexPart* given, con
         lanes.normal[k][i] = plane.normal[k];
       }
       lanes.offset[i] = plane.offset;
-      lanes.range[i] = state->travel[object] + static_cast<Real>(kLaneMargin);
+      lanes.range[i] = state->travel[object] + static_cast<Real>(kContactMargin);
       lanes.object[i] = object;
       lanes.part[i] = plane.part;
     }

@@ -201,7 +201,6 @@ inline void cut_line(const NearPair& pair, const Side& a, const Side& b, M wante
 
 /// The common part of two parallel lines.
 inline void cut_parallel_lines(const NearPair& pair, const Side& a, const Side& b, M wanted, NearWriter& writer) {
-  constexpr double kParallel = 0.05;  // sine of the angle
   const V zero = set<V>(0.0);
   const V one = set<V>(1.0);
   const Vec3<V> u = a.corner[1] - a.corner[0];
@@ -209,7 +208,7 @@ inline void cut_parallel_lines(const NearPair& pair, const Side& a, const Side& 
   const V uu = dot(u, u);
   const Vec3<V> across = cross(u, v);
   auto cut = hn::And(wanted, hn::Gt(uu, zero));
-  cut = hn::And(cut, hn::Le(dot(across, across), set<V>(kParallel * kParallel) * uu * dot(v, v)));
+  cut = hn::And(cut, hn::Le(dot(across, across), set<V>(kParallelEdges * kParallelEdges) * uu * dot(v, v)));
   const V per_uu = one / select(cut, uu, one);
   const V s0 = dot(u, b.corner[0] - a.corner[0]) * per_uu;
   const V s1 = dot(u, b.corner[1] - a.corner[0]) * per_uu;

@@ -59,6 +59,15 @@ inline double rounded_edge(double rounding, double thinnest) { return std::min(r
 inline constexpr double kSteepestFeature = 0.2;
 /// m: a nearest point this much closer than every clipped one is a contact of its own.
 inline constexpr double kSameGap = 1e-7;
+/// m: contacts are made this much before they are needed, so that resting bodies keep theirs when they breathe.
+inline constexpr double kContactMargin = 5e-4;
+/// m: a contact continues one of the step before, whose impulses it starts with, if it is no further from that than its
+/// bodies move in a step and this.
+inline constexpr double kSameContact = 1e-3;
+/// Sine of the angle up to which two edges count as parallel and touch along their common part.
+inline constexpr double kParallelEdges = 0.05;
+/// Tilt, rad, up to which a round cap counts as flat and its rim keeps its points: where it is lowest would be noise.
+inline constexpr double kFlatCap = 1e-3;
 /// m/s and rad/s: speeds beyond it are a simulation that blew up.
 inline constexpr double kLargestSpeed = 1e4;
 
