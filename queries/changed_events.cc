@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "changed_events.h"
+#include "prescene/queries/changed_events.h"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "prescene/belief/body_names.h"
+#include "simulated_changes.h"
 
 namespace prescene::queries {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Events as paths: from a point of the standard normal prior of a schema's parameters to where every object is in each
-// frame of the window, by simulation where an event sets things in motion.
+// frame of the window, by simulation where an event sets things in motion. Three sources: event_paths.cc has the set-up
+// and the parameters, event_guess.cc what the tracker's path suggests of them, event_simulation.cc what follows.
 #pragma once
 
 #include <memory>

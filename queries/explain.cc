@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "candidate_objects.h"
-#include "changed_events.h"
 #include "event_hypotheses.h"
 #include "event_paths.h"
 #include "explain_answer.h"
@@ -15,6 +14,7 @@
 #include "prescene/core/spelling.h"
 #include "prescene/queries/smallest_change.h"
 #include "prescene/queries/tempered_smc.h"
+#include "simulated_changes.h"
 #include "weigh_events.h"
 #include "window_likelihood.h"
 

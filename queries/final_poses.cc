@@ -9,6 +9,7 @@
 #include "prescene/core/check.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/resting_poses.h"
+#include "prescene/queries/merge_components.h"
 
 namespace prescene::queries {
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reduction of a mixture of Gaussians on poses [Runnalls 2007].
+#include "prescene/queries/merge_components.h"
+
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -7,7 +8,6 @@
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/dense_solvers.h"
-#include "prescene/queries/final_poses.h"
 
 namespace prescene::queries {
 namespace {

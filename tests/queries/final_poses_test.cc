@@ -9,6 +9,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
+#include "prescene/queries/merge_components.h"
 
 namespace prescene::queries {
 namespace {

@@ -41,11 +41,6 @@ struct Kernel {
 std::vector<Kernel> kernels(std::span<const FinalSample> samples, std::span<const std::string> outcomes,
                             const geometry::SymmetryGroup& symmetry, const DensityOptions& options);
 
-/// Fewer components of about the same density: greedily merges the pair of one group whose merging costs least. Mass,
-/// mean and covariance of the whole are kept (to first order in rotation). Heaviest first.
-std::vector<belief::PoseComponent> merged(std::vector<Kernel> kernels, const DensityOptions& options,
-                                          core::ThreadPool& pool);
-
 /// Exact mass of each cell under kernels whose position covariance is diagonal, as those of kernels() are.
 belief::HeatMap heat_map(std::span<const Kernel> kernels, const DensityOptions& options);
 

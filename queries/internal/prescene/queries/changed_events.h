@@ -36,8 +36,8 @@ class ChangedEvents {
   virtual const std::vector<ChangeCoordinate>& coordinates() const = 0;
   /// Of a draw: the event's parameters, then what the start takes, all standard normal.
   virtual int dimensions() const = 0;
-  /// Whether each has the outcome that is wanted; no if it can't be (nothing is touched, two things would be in each
-  /// other). `values`, where given, get the values of the coordinates of each in their units.
+  /// Whether each has the outcome that is wanted; no if it can't be (nothing is touched, two things would
+  /// overlap). `values`, where given, get the values of the coordinates of each in their units.
   virtual std::vector<std::uint8_t> outcomes(std::span<const ChangedDraw> draws,
                                              std::vector<std::vector<double>>* values = nullptr) = 0;
 };
