@@ -3,12 +3,29 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "prescene/core/random.h"
 #include "prescene/geometry/sampling.h"
 #include "tests/support/simple_scenes.h"
 
 namespace prescene::benchmarks {
+namespace {
+
+RootMeanSquare without_chance(const std::vector<double>& differences, const std::vector<double>& variances) {
+  std::vector<double> squares;
+  for (std::size_t i = 0; i < differences.size(); ++i)
+    squares.push_back(differences[i] * differences[i] - variances[i]);
+  const auto n = static_cast<double>(squares.size());
+  double mean = 0.0, spread = 0.0;
+  for (const double square : squares) mean += square / n;
+  for (const double square : squares) spread += (square - mean) * (square - mean);
+  const double error = std::sqrt(spread / (n * (n - 1.0)));
+  const auto root = [](double square) { return std::sqrt(std::max(0.0, square)); };
+  return {root(mean), root(mean - error), root(mean + error)};
+}
+
+}  // namespace
 
 belief::Scene dice_scene(double width, double ratio, const DiceThrow& how) {
   constexpr double kSteel = 7800.0;  // kg/m^3
@@ -39,17 +56,22 @@ bool lies_on_square_face(const belief::WorldState& end) {
   return axis == 2;
 }
 
-RootMeanSquare without_chance(const std::vector<double>& differences, const std::vector<double>& variances) {
-  std::vector<double> squares;
-  for (std::size_t i = 0; i < differences.size(); ++i)
-    squares.push_back(differences[i] * differences[i] - variances[i]);
-  const auto n = static_cast<double>(squares.size());
-  double mean = 0.0, spread = 0.0;
-  for (const double square : squares) mean += square / n;
-  for (const double square : squares) spread += (square - mean) * (square - mean);
-  const double error = std::sqrt(spread / (n * (n - 1.0)));
-  const auto root = [](double square) { return std::sqrt(std::max(0.0, square)); };
-  return {root(mean), root(mean - error), root(mean + error)};
+RootMeanSquare compare_dice(const std::function<SquareShares(const DiceKind&)>& throw_both_ways) {
+  std::vector<double> differences, variances;
+  const auto variance = [](double share, int throws) { return share * (1.0 - share) / (throws - 1); };
+  for (const DiceThrow& how : kDiceThrows) {
+    std::fprintf(stderr, "dice, %s\n", how.name);
+    for (const double width : kDiceWidths) {
+      for (const double ratio : kDiceRatios) {
+        const SquareShares shares =
+            throw_both_ways({differences.size(), how, width, ratio, dice_scene(width, ratio, how)});
+        differences.push_back(shares.first - shares.second);
+        variances.push_back(variance(shares.first, shares.first_throws) +
+                            variance(shares.second, shares.second_throws));
+      }
+    }
+  }
+  return without_chance(differences, variances);
 }
 
 }  // namespace prescene::benchmarks

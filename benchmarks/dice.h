@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "prescene/belief/scene.h"
@@ -36,11 +37,28 @@ std::vector<belief::WorldState> dice_starts(const belief::Scene& scene, const Di
 /// Whether the die lies on a square face.
 bool lies_on_square_face(const belief::WorldState& end);
 
-/// Root of the mean square of true differences between shares, from the differences that were found and the variances
-/// that chance gives them; with the same a standard error lower and higher.
+/// Root of the mean square of true differences between shares: of those that were found, less the variances that chance
+/// gives them; with the same a standard error lower and higher.
 struct RootMeanSquare {
   double value = 0.0, low = 0.0, high = 0.0;
 };
-RootMeanSquare without_chance(const std::vector<double>& differences, const std::vector<double>& variances);
+
+/// One of the kinds of dice that are thrown: each throw with each width (m) and each ratio.
+struct DiceKind {
+  std::uint64_t number = 0;  ///< From 0: for seeds, so that each kind has chance errors of its own.
+  DiceThrow how;
+  double width = 0.0, ratio = 0.0;
+  belief::Scene scene;  ///< As dice_scene().
+};
+inline constexpr int kDiceKinds = static_cast<int>(kDiceThrows.size() * kDiceWidths.size() * kDiceRatios.size());
+
+/// Shares of throws that end on a square face, in two ways of working them out, of so many throws each (at least 2).
+struct SquareShares {
+  double first = 0.0, second = 0.0;
+  int first_throws = 0, second_throws = 0;
+};
+/// Of the differences between the two ways over all kinds, chance taken out. Each throw's name is printed to standard
+/// error when its kinds begin.
+RootMeanSquare compare_dice(const std::function<SquareShares(const DiceKind&)>& throw_both_ways);
 
 }  // namespace prescene::benchmarks

@@ -39,35 +39,25 @@ Table measure_dice_in_mujoco(int ours, int theirs, Report* report) {
                "cpu ms, mujoco"},
               {}};
   core::ThreadPool pool(1);
-  std::vector<double> differences, variances;
-  for (const DiceThrow& how : kDiceThrows) {
-    std::fprintf(stderr, "dice, %s\n", how.name);
-    for (const double width : kDiceWidths) {
-      for (const double ratio : kDiceRatios) {
-        const belief::Scene scene = dice_scene(width, ratio, how);
-        const std::uint64_t seed = 2 * table.rows.size() + 10'001;
-        const double p = share_in_lockstep(scene, dice_starts(scene, how, ours, seed), pool);
-        tests::MujocoScene engine(scene, kStiff);
-        int square = 0, ended = 0;
-        const double before = processor_seconds();
-        for (const belief::WorldState& start : dice_starts(scene, how, theirs, seed + 1)) {
-          const belief::Trajectory run = engine.run(start, kDiceDuration);
-          if (run.end == belief::TrajectoryEnd::kDiverged) continue;
-          ++ended;
-          square += lies_on_square_face(run.final()) ? 1 : 0;
-        }
-        const double cpu = (processor_seconds() - before) / theirs;
-        PRESCENE_CHECK(ended > 1);
-        const double q = static_cast<double>(square) / ended;
-        const auto variance = [](double share, int n) { return share * (1.0 - share) / (n - 1); };
-        differences.push_back(p - q);
-        variances.push_back(variance(p, ours) + variance(q, ended));
-        table.rows.push_back(
-            {how.name, 1e3 * width, ratio, p, q, static_cast<std::int64_t>(theirs - ended), 1e3 * cpu});
-      }
+  const RootMeanSquare error = compare_dice([&](const DiceKind& kind) -> SquareShares {
+    const std::uint64_t seed = 2 * kind.number + 10'001;
+    const double in_lockstep = share_in_lockstep(kind.scene, dice_starts(kind.scene, kind.how, ours, seed), pool);
+    tests::MujocoScene engine(kind.scene, kStiff);
+    int square = 0, ended = 0;
+    const double before = processor_seconds();
+    for (const belief::WorldState& start : dice_starts(kind.scene, kind.how, theirs, seed + 1)) {
+      const belief::Trajectory run = engine.run(start, kDiceDuration);
+      if (run.end == belief::TrajectoryEnd::kDiverged) continue;
+      ++ended;
+      square += lies_on_square_face(run.final()) ? 1 : 0;
     }
-  }
-  const RootMeanSquare error = without_chance(differences, variances);
+    const double cpu = (processor_seconds() - before) / theirs;
+    PRESCENE_CHECK(ended > 1);
+    const double in_mujoco = static_cast<double>(square) / ended;
+    table.rows.push_back({kind.how.name, 1e3 * kind.width, kind.ratio, in_lockstep, in_mujoco,
+                          static_cast<std::int64_t>(theirs - ended), 1e3 * cpu});
+    return {in_lockstep, in_mujoco, ours, ended};
+  });
   char why[160];
   std::snprintf(why, sizeof why, "one standard error: %.4f to %.4f; %d and %d throws a cell", error.low, error.high,
                 ours, theirs);
@@ -77,7 +67,7 @@ Table measure_dice_in_mujoco(int ours, int theirs, Report* report) {
                .aim = at_most(0.02),
                .reached = error.value,
                .unit = "",
-               .n = static_cast<std::int64_t>(differences.size()),
+               .n = kDiceKinds,
                .baseline = "MuJoCo 2.2.2, elliptic cones, contacts with a time constant of 0.2 ms",
                .why = why});
   return table;

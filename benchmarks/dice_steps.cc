@@ -47,25 +47,16 @@ Table measure_dice_steps(int count, Report* report) {
                "cpu ms, auto", "cpu ms, 1/7680 s"},
               {}};
   core::ThreadPool pool(1);
-  std::vector<double> differences, variances;
-  for (const DiceThrow& how : kDiceThrows) {
-    std::fprintf(stderr, "dice, %s\n", how.name);
-    for (const double width : kDiceWidths) {
-      for (const double ratio : kDiceRatios) {
-        belief::Scene scene = dice_scene(width, ratio, how);
-        const std::uint64_t seed = 2 * table.rows.size() + 1;  // Each cell has chance errors of its own.
-        const Shares found = throw_dice(scene, how, count, seed, pool);
-        scene.step = kFineStep;
-        const Shares fine = throw_dice(scene, how, count, seed + 1, pool);
-        const auto variance = [&](double p) { return p * (1.0 - p) / (count - 1); };
-        differences.push_back(found.square - fine.square);
-        variances.push_back(variance(found.square) + variance(fine.square));
-        table.rows.push_back({how.name, 1e3 * width, ratio, found.square, fine.square, 1.0 / found.step,
-                              1e3 * found.cpu, 1e3 * fine.cpu});
-      }
-    }
-  }
-  const RootMeanSquare error = without_chance(differences, variances);
+  const RootMeanSquare error = compare_dice([&](const DiceKind& kind) -> SquareShares {
+    const std::uint64_t seed = 2 * kind.number + 1;
+    const Shares found = throw_dice(kind.scene, kind.how, count, seed, pool);
+    belief::Scene fine_scene = kind.scene;
+    fine_scene.step = kFineStep;
+    const Shares fine = throw_dice(fine_scene, kind.how, count, seed + 1, pool);
+    table.rows.push_back({kind.how.name, 1e3 * kind.width, kind.ratio, found.square, fine.square, 1.0 / found.step,
+                          1e3 * found.cpu, 1e3 * fine.cpu});
+    return {found.square, fine.square, count, count};
+  });
   char why[160];
   std::snprintf(why, sizeof why, "one standard error: %.4f to %.4f; %d throws a cell and step", error.low, error.high,
                 count);
@@ -75,7 +66,7 @@ Table measure_dice_steps(int count, Report* report) {
                .aim = at_most(0.008),
                .reached = error.value,
                .unit = "",
-               .n = static_cast<std::int64_t>(differences.size()),
+               .n = kDiceKinds,
                .baseline = "the same simulator at 1/7680 s",
                .why = why});
   return table;
