@@ -107,7 +107,7 @@ class Mesh:
         return self.closest_points(other, X_AB, limit).distance
 
     def penetrations(self, other: "Mesh", X_AB: ArrayLike) -> Penetrations:
-        """How deep two solids, closed meshes, are in each other."""
+        """How deep two solids, closed meshes, overlap."""
         return Penetrations(*self._inner.penetrations(_inner_of(other), X_AB))
 
     def cast_rays(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How deep two solids are in each other: the length of the shortest translation that takes them apart, between bounds.
+// How deep two solids overlap: the length of the shortest translation that takes them apart, between bounds.
 //
 //   PenetrationScratch scratch;                                       // one a thread, kept
 //   if (const auto overlap = penetration(cup, table, X_CT, {}, scratch)) {
@@ -43,7 +43,7 @@ struct Penetration {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< In A's frame, unit length.
   Transform X_AB_apart;                                  ///< X_AB moved so: neither collides nor is one in the other.
   /// Nearest points of the bodies when they have come apart, put back: p_A is on A, p_B on B, and p_B is about as far
-  /// behind p_A along the direction as the bodies are deep in each other. In A's frame, m.
+  /// behind p_A along the direction as the overlap is deep. In A's frame, m.
   Eigen::Vector3d p_A = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_B = Eigen::Vector3d::Zero();
 };
