@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/crc32.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
@@ -45,7 +46,6 @@ constexpr const char* kOutputKind = "output";
 constexpr const char* kAttachedKey = "attached_files";
 
 std::string kind_of(const interfaces::McapChannel& channel) {
-  if (channel.message_encoding == "json") return kJsonKind;
   const auto kind = channel.metadata.find(kKindKey);
   return kind == channel.metadata.end() ? std::string() : kind->second;
 }
@@ -208,8 +208,7 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::own_json(const inter
   std::vector<std::uint8_t>& data = entry.message.cdr;
   // The text may have a head, a length and an end around it.
   constexpr std::size_t kAroundText = 9;
-  const bool is_bare = channel.message_encoding == "json";
-  const std::size_t size = data.size() - (is_bare ? 0 : std::min(data.size(), kAroundText));
+  const std::size_t size = data.size() - std::min(data.size(), kAroundText);
   if (is_parsed_in_recordings(channel.topic) && size > kMostParsedJsonBytes) {
     if (!options_.salvage) {
       return core::resource_exhausted("the recording has a JSON document of " + interfaces::size_text(size) + " on " +
@@ -219,15 +218,13 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::own_json(const inter
     ++too_long_json_;
     return std::optional<RecordedEntry>();
   }
-  if (!is_bare) {
-    const auto text = interfaces::decode_cdr<interfaces::RosString>(data);
-    if (!text && !options_.salvage) return text.status().at("the recording's " + channel.topic);
-    if (!text) {
-      ++damaged_json_;
-      return std::optional<RecordedEntry>();
-    }
-    data.assign(text->data.begin(), text->data.end());
+  const auto text = interfaces::decode_cdr<interfaces::RosString>(data);
+  if (!text && !options_.salvage) return text.status().at("the recording's " + channel.topic);
+  if (!text) {
+    ++damaged_json_;
+    return std::optional<RecordedEntry>();
   }
+  data.assign(text->data.begin(), text->data.end());
   return std::optional<RecordedEntry>(std::move(entry));
 }
 

@@ -196,10 +196,13 @@ TEST(Recording, SalvageLeavesOutTruthThatWouldUnfold) {
   {
     const auto writer = interfaces::McapWriter::create(path, {});
     ASSERT_TRUE(writer.ok());
-    const auto channel = (*writer)->add_channel({kTruthTopic, "json", {"truth", "jsonschema", "{}"}, {}});
+    interfaces::McapChannel truth = interfaces::ros_channel(kTruthTopic, "std_msgs/msg/String");
+    truth.metadata["prescene"] = "json";
+    const auto channel = (*writer)->add_channel(truth);
     ASSERT_TRUE(channel.ok());
-    ASSERT_TRUE((*writer)->write({*channel, 0, 1, 1, std::vector<std::uint8_t>(kMostParsedJsonBytes + 1, ' ')}).ok());
-    ASSERT_TRUE((*writer)->write({*channel, 1, 2, 2, {'{', '}'}}).ok());
+    const auto text = [](const std::string& json) { return interfaces::encode_cdr(interfaces::RosString{json}); };
+    ASSERT_TRUE((*writer)->write({*channel, 0, 1, 1, text(std::string(kMostParsedJsonBytes + 1, ' '))}).ok());
+    ASSERT_TRUE((*writer)->write({*channel, 1, 2, 2, text("{}")}).ok());
     ASSERT_TRUE((*writer)->close().ok());
   }
   const auto reader = RecordingReader::open(path);
@@ -211,6 +214,11 @@ TEST(Recording, SalvageLeavesOutTruthThatWouldUnfold) {
   ASSERT_TRUE(entry.ok() && entry->has_value());
   EXPECT_EQ((*entry)->message.received_ns, 2);
   EXPECT_NE((*salvaging)->loss_text().find("1 JSON documents above the size limit"), std::string::npos);
+}
+
+TEST(Recording, JsonOfOtherProgramsIsNotTakenForOurs) {
+  EXPECT_FALSE(holds_own_json({kStepTopic, "json", {"step", "jsonschema", "{}"}, {}}));
+  EXPECT_FALSE(holds_own_json(interfaces::ros_channel(kStepTopic, "std_msgs/msg/String")));
 }
 
 TEST(Recording, NumbersStandBehindAGapThatSalvageLeft) {

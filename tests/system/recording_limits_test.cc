@@ -72,10 +72,11 @@ class HandRecording {
 void write_truth(const std::filesystem::path& path, const std::string& json) {
   const auto writer = interfaces::McapWriter::create(path, {});
   ASSERT_TRUE(writer.ok()) << writer.status().message();
-  const auto truth =
-      (*writer)->add_channel({service::kTruthTopic, "json", {"truth", "jsonschema", R"({"type": "object"})"}, {}});
+  interfaces::McapChannel channel = interfaces::ros_channel(service::kTruthTopic, "std_msgs/msg/String");
+  channel.metadata["prescene"] = "json";
+  const auto truth = (*writer)->add_channel(channel);
   ASSERT_TRUE(truth.ok());
-  ASSERT_TRUE((*writer)->write({*truth, 0, kStart, kStart, {json.begin(), json.end()}}).ok());
+  ASSERT_TRUE((*writer)->write({*truth, 0, kStart, kStart, interfaces::encode_cdr(interfaces::RosString{json})}).ok());
   ASSERT_TRUE((*writer)->close().ok());
   write_file(path.parent_path() / "box.yaml", kScene);
 }

@@ -38,8 +38,7 @@ struct RecordingInfo {
 /// robot saw can't be seen again, so nothing live is written over it.
 std::filesystem::path unused_recording_path(const std::filesystem::path& path);
 
-/// Whether a channel holds JSON of ours: in a std_msgs/String that says so in the channel's metadata, or bare, as in
-/// recordings of earlier versions.
+/// Whether a channel holds JSON of ours, in std_msgs/String: its metadata says so.
 bool holds_own_json(const interfaces::McapChannel& channel);
 /// Whether it holds what we made for other programs (RecordingWriter::write_output).
 bool is_own_output(const interfaces::McapChannel& channel);
