@@ -44,4 +44,6 @@ refuses 'whose source is no page' '  /// m. How far. Range 0 to 2. Measured: doc
   double far = 1.0;' far
 refuses 'whose default is out of range' '  /// m. How far. Range 2 to 3. Chosen.
   double far = 1.0;' far
+refuses 'with several numbers of which one is out of range' '  /// m. How far. Range 0 to 2. Chosen.
+  std::array<double, 2> far = {1.0, 3.0};' far
 refuses 'of changed defaults without a source' '  OtherOptions other = {.less = 1};' other

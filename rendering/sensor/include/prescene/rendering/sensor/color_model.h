@@ -38,9 +38,14 @@ class ColorHistogram {
 };
 
 struct ColorModelOptions {
-  double smoothing_bins = 1.0;  ///< Standard deviation of the Gaussian that both histograms are smoothed by.
-  double uniform_share = 0.02;  ///< Of both distributions, spread over all bins: a colour seen in neither says nothing.
-  double max_ratio = 20.0;      ///< Ratios are clipped to [1/max_ratio, max_ratio].
+  /// bins. Standard deviation of the Gaussian that both histograms are smoothed by. Range 0 to 8. Chosen.
+  double smoothing_bins = 1.0;
+  /// share. Of both distributions, this share is spread over all bins: a colour seen in neither says nothing. Range 0
+  /// to
+  /// 1. Chosen.
+  double uniform_share = 0.02;
+  /// factor. Ratios are clipped to [1 / this, this]. Range 1 to 10000. Chosen.
+  double max_ratio = 20.0;
 };
 
 /// log p(c | object) - log p(c | not object) for each bin.

@@ -45,8 +45,8 @@ struct FrameTermsInput {
 };
 
 struct FrameTermsOptions {
-  /// The image is sampled (never averaged: flying pixels) every round(width / target_width) pixels. 80 is enough: finer
-  /// gave no better pose on real frames.
+  /// pixels. The image is sampled (never averaged: flying pixels) every round(width / target_width) pixels. 80 is
+  /// enough for near objects. Range 16 to 4096. Measured: docs/studies/likelihood.md.
   int target_width = 80;
   TemperingOptions tempering;
 };

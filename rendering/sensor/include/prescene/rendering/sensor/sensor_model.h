@@ -30,27 +30,47 @@
 
 namespace prescene::rendering {
 
-/// Figures of the model; defaults from opaque household objects at 0.7 to 1.1 m, structured-light camera.
+/// Figures of the model; defaults from opaque household objects at 0.7 to 1.1 m, structured-light camera. The comments
+/// have the form that tools/filter_settings reads.
 struct SensorModelOptions {
-  double min_depth = 0.3;                   ///< m; nothing is returned from nearer.
-  double max_depth = 2.5;                   ///< m; nor from further.
-  double sigma_per_depth_squared = 0.0038;  ///< Of a hit on a surface seen frontally, 1/m: sigma = s d^2.
-  double incidence_knee = 0.6;        ///< Below this cosine between ray and normal, sigma grows with 1 / cosine ...
-  double incidence_max_growth = 4.0;  ///< ... up to this factor.
-  double support_sigma = 0.004;       ///< m; about a known support plane (its own error included).
-  double support_weight = 0.6;       ///< Share of pixels on a known support plane that return the plane, object absent.
-  double background_weight = 0.8;    ///< Share of pixels that return the known background (earlier or empty scene, or a
-                                     ///< known neighbour behind the object), object absent.
-  double background_missing = 0.03;  ///< Probability that a pixel returns nothing where the known background did ...
-  double background_missing_again = 0.7;  ///< ... and where the known background did not either.
-  double color_exponent = 1.0;            ///< beta: the colour ratio is raised to it; 0 switches colour off.
-  /// Missing returns grow towards the object's outline: classes by the distance to it in pixels of the
-  /// full image, up to and including outline_px[i].
+  /// m. Nothing is returned from nearer. Range 0.01 to 10. Chosen.
+  double min_depth = 0.3;
+  /// m. Nothing is returned from further. Range 0.1 to 100. Chosen.
+  double max_depth = 2.5;
+  /// 1/m. The standard deviation of a hit on a surface seen frontally at depth d is this times d^2. Range 1e-6 to 1.
+  /// Measured: docs/studies/likelihood.md.
+  double sigma_per_depth_squared = 0.0038;
+  /// cosine. If ray and normal have a smaller one, the deviation grows with 1 / cosine. Range 0 to 0.999. Tuned:
+  /// docs/studies/likelihood.md.
+  double incidence_knee = 0.6;
+  /// factor. It grows by no more than this. Range 1 to 100. Tuned: docs/studies/likelihood.md.
+  double incidence_max_growth = 4.0;
+  /// m. Standard deviation about a known support plane, the plane's own error included. Range 0.0001 to 0.1. Chosen.
+  double support_sigma = 0.004;
+  /// share. Of the pixels on a known support plane, this share returns the plane if the object is absent. Range 0 to
+  /// 0.999. Measured: docs/studies/likelihood.md.
+  double support_weight = 0.6;
+  /// share. Of the pixels with a known background (an earlier or the empty scene, or a known neighbour behind the
+  /// object), this share returns it if the object is absent. Range 0 to 0.999. Chosen.
+  double background_weight = 0.8;
+  /// probability. A pixel returns nothing where the known background returned something. Range 0.001 to 0.999. Tuned:
+  /// docs/studies/likelihood.md.
+  double background_missing = 0.03;
+  /// probability. A pixel returns nothing where the known background did not either. Range 0.001 to 0.999. Chosen.
+  double background_missing_again = 0.7;
+  /// exponent. The colour ratio is raised to this power; 0 switches colour off. Range 0 to 10. Chosen.
+  double color_exponent = 1.0;
+  /// pixels. Missing returns grow towards the object's outline: upper ends of the classes of the distance to it in the
+  /// full image. Range 0 to 1000. Chosen.
   std::array<double, 4> outline_px = {1.5, 3.0, 6.0, 12.0};
+  /// probability. A pixel of each of these classes returns nothing. Range 0 to 0.999. Tuned:
+  /// docs/studies/likelihood.md.
   std::array<double, 4> outline_missing = {0.38, 0.35, 0.27, 0.12};
-  /// Missing returns grow with the incidence angle: classes by the cosine, up to and including
-  /// incidence_cosine[i].
+  /// cosine. Missing returns grow with the angle of incidence: upper ends of the classes of its cosine. Range 0 to 1.
+  /// Chosen.
   std::array<double, 3> incidence_cosine = {0.2, 0.4, 0.6};
+  /// probability. A pixel of each of these classes returns nothing. Range 0 to 0.999. Tuned:
+  /// docs/studies/likelihood.md.
   std::array<double, 3> incidence_missing = {0.47, 0.28, 0.10};
 
   friend bool operator==(const SensorModelOptions&, const SensorModelOptions&) = default;
@@ -59,8 +79,12 @@ struct SensorModelOptions {
 /// Pixels are correlated, so a sum of log ratios over n of them, `step` full-image pixels apart, is worth less than n
 /// independent ones: it is multiplied by alpha = 1 / (1 + correlated_px2 / step^2 + n / effective_pixels).
 struct Tempering {
-  double correlated_px2 = 0.0;    ///< Full-image pixels that share one error (an area): what noise is correlated over.
-  double effective_pixels = 0.0;  ///< No sum is worth more: errors that all pixels share. 0 = there are none.
+  /// pixels. As many of the full image (an area) share one error: what noise is correlated over. Range 0 to 1e6.
+  /// Chosen.
+  double correlated_px2 = 0.0;
+  /// pixels. No sum is worth more than as many: errors that all pixels share. 0: there are none. Range 0 to 1e6.
+  /// Chosen.
+  double effective_pixels = 0.0;
 
   friend bool operator==(const Tempering&, const Tempering&) = default;
 };
@@ -70,7 +94,9 @@ double tempering(const Tempering& tempering, double pixels, int step);
 /// The two sums that are tempered: log ratios, which weigh poses against each other, and the information of
 /// Gauss-Newton equations, which knows no silhouettes.
 struct TemperingOptions {
+  /// Of log ratios. Tuned: docs/studies/accuracy.md.
   Tempering weight = {75.0, 500.0};
+  /// Of Gauss-Newton equations. Tuned: docs/studies/accuracy.md.
   Tempering information = {90.0, 0.0};
 
   friend bool operator==(const TemperingOptions&, const TemperingOptions&) = default;
