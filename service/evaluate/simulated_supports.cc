@@ -22,6 +22,7 @@ namespace {
 using Eigen::Vector2d;
 using geometry::BoxShape;
 using geometry::Pose;
+using geometry::SymmetryGroup;
 using geometry::TriangleMesh;
 using geometry::Vector3d;
 
@@ -45,6 +46,7 @@ struct Kind {
   geometry::Primitive solid;  // stands for it in simulations
   std::vector<geometry::Quaterniond> lying;
   bool flat_top = false;  // something may stand on it
+  SymmetryGroup symmetry{};
 };
 
 geometry::Quaterniond about(const Vector3d& axis, double angle) { return geometry::exp_rotation(angle * axis); }
@@ -59,12 +61,14 @@ std::vector<geometry::Quaterniond> on_any_face() {
 }
 
 Kind box_kind(const std::string& name, const Vector3d& size) {
-  return {name, geometry::make_mesh(BoxShape{size}), BoxShape{size}, on_any_face(), true};
+  return {name, geometry::make_mesh(BoxShape{size}), BoxShape{size}, on_any_face(), true, SymmetryGroup::cuboid()};
 }
 
 Kind can_kind(const std::string& name, double radius, double length) {
   const geometry::Cylinder cylinder{radius, length};
-  return {name, geometry::make_mesh(cylinder, 24), cylinder, upright_or_on_its_side(), false};
+  return {name,     geometry::make_mesh(cylinder, 24),
+          cylinder, upright_or_on_its_side(),
+          false,    SymmetryGroup::continuous(Vector3d::UnitZ(), true)};
 }
 
 Kind mug_kind() {
@@ -93,21 +97,24 @@ std::vector<Kind> object_kinds() {
       can_kind("tin", 0.051, 0.139),
       {"bottle",
        geometry::make_lathe({{0.0, 0.0}, {0.035, 0.0}, {0.035, 0.13}, {0.014, 0.18}, {0.014, 0.21}, {0.0, 0.21}}, 24),
-       geometry::Cylinder{0.035, 0.21}, upright_or_on_its_side(), false},
+       geometry::Cylinder{0.035, 0.21}, upright_or_on_its_side(), false,
+       SymmetryGroup::continuous(Vector3d::UnitZ(), false)},
       {"carton", geometry::make_gable_carton(0.07, 0.07, 0.19, 0.23), BoxShape{{0.07, 0.07, 0.23}}, on_any_face(),
-       false},
+       false, SymmetryGroup::cyclic(Vector3d::UnitZ(), 2)},
       mug_kind(),
       {"bowl",
        geometry::make_lathe({{0.0, 0.0}, {0.035, 0.0}, {0.080, 0.055}, {0.076, 0.055}, {0.033, 0.005}, {0.0, 0.005}},
                             24),
        geometry::Cylinder{0.08, 0.055},
        {geometry::Quaterniond::Identity()},
-       false},
+       false,
+       SymmetryGroup::continuous(Vector3d::UnitZ(), false)},
       {"ball",
        geometry::make_mesh(geometry::Sphere{0.045}, 24),
        geometry::Sphere{0.045},
        {geometry::Quaterniond::Identity()},
-       false}};
+       false,
+       SymmetryGroup::every_rotation()}};
 }
 
 /// Something nobody knows of: a box or a cylinder.
@@ -391,6 +398,7 @@ core::Result<belief::ObjectModel> model_of(const Kind& kind) {
   model.collision.push_back(
       belief::PrimitiveShape{kind.solid, Pose::from_translation(geometry::bounding_box(kind.mesh).center())});
   model.visual = std::make_shared<const TriangleMesh>(kind.mesh);
+  model.symmetry = kind.symmetry;
   return belief::with_derived_properties(std::move(model));
 }
 
