@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "detection_parts.h"
+#include "prescene/filter/proposals/fit_judgement.h"
 #include "proposal_judge.h"
 
 namespace prescene::filter {
@@ -16,6 +17,7 @@ constexpr std::size_t kComparedCorners = 16;
 constexpr double kSameCorner = 0.012;  // m
 // Thresholds. Chosen on rooms 1 to 40 (docs/studies/tracking.md).
 constexpr double kLeastOutlineForNow = 0.35;  // of a pose for want of better ones, until it is known what else ends it
+constexpr double kLeastProbability = 0.5;     // of being right (probability_of_fit)
 constexpr double kLogRatioLess = 30.0;        // nats less than DetectionOptions::min_log_ratio are enough
 constexpr double kLeastEvidence = 2.5;        // nats per visible pixel; thin things on a known surface say little
 constexpr double kLeastVisible = 0.35;        // of the pixels that a pose shows, known things in front or not
@@ -27,11 +29,30 @@ constexpr double kPowerOfOutline = 4.0;       // ... and from a surface that goe
 // edges of what it stands on.
 constexpr std::array<double, 3> kUnderIt = {1.0, 0.5, 0.0};
 
+/// A find, its rivals being what was proposed beside it.
+Fit fit_of(const Detection& detection, std::span<const WantedModel> wanted, std::span<const FineProposal> proposals) {
+  Fit fit;
+  fit.target = &wanted[static_cast<std::size_t>(detection.model)].target;
+  fit.X_CO = detection.X_CO;
+  fit.evidence = detection.evidence;
+  const Vector3d centre = fit.X_CO * fit.target->centre();
+  const double apart = 0.5 * static_cast<double>(fit.target->mesh->radius);
+  for (const FineProposal& other : proposals) {
+    const double log_ratio = other.candidate.evidence.log_ratio;
+    if (other.model != detection.model) {
+      if (other.cluster == detection.cluster) fit.rival_models = std::max(fit.rival_models, log_ratio);
+    } else if ((other.candidate.X_CO * fit.target->centre() - centre).norm() > apart) {
+      fit.rival_poses = std::max(fit.rival_poses, log_ratio);
+    }
+  }
+  return fit;
+}
+
 }  // namespace
 
 double FineProposal::score() const {
-  const double ends = outline < 0.0 ? 1.0 : std::pow(outline, kPowerOfOutline);
-  return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kPowerOfHits) * ends - cost;
+  const double fits = outline < 0.0 ? 1.0 : probability * std::pow(outline, kPowerOfOutline);
+  return candidate.evidence.log_ratio * std::pow(candidate.evidence.hit_share(), kPowerOfHits) * fits - cost;
 }
 
 void FineProposal::weigh(bool on_something) {
@@ -97,9 +118,15 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
                   [&](const FineProposal& p) { return !acceptable_in_fine(p.candidate.evidence, 0.0, options); });
   };
   const auto worse = [](const FineProposal& a, const FineProposal& b) { return a.score() < b.score(); };
-  const auto outline_of = [&](const FineProposal& p) {
-    const SearchTarget& target = wanted[static_cast<std::size_t>(p.model)].target;
-    return outline_support(terms, depth_of(target, p.candidate.X_CO, terms.camera, *tools.renderer), kOutlineStep);
+  const auto look_at = [&](FineProposal& p) {
+    Fit fit;
+    fit.target = &wanted[static_cast<std::size_t>(p.model)].target;
+    fit.X_CO = p.candidate.X_CO;
+    fit.evidence = p.candidate.evidence;
+    FitNumbers numbers = fit_numbers(fit, terms, *tools.renderer);
+    numbers[kFitRivalModels] = numbers[kFitRivalPoses] = 0.0F;  // rivals compete by their scores
+    p.outline = static_cast<double>(numbers[kFitOutline]);
+    p.probability = probability_of_fit(numbers);
   };
   // For what they stand on, or where a neighbour is that is not found yet and ends their surface.
   std::vector<FineProposal> waiting;
@@ -110,7 +137,7 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
       // Things that stand on each other wait for each other: the best of them that stands goes first. Whether its
       // surface ends, with the others in their places, is seen in the end.
       for (FineProposal& p : waiting)
-        if (p.outline < 0.0) p.outline = outline_of(p);
+        if (p.outline < 0.0) look_at(p);
       std::vector<FineProposal>::iterator next = waiting.end();
       for (auto p = waiting.begin(); p != waiting.end(); ++p)
         if (p->outline >= kLeastOutlineForNow && acceptable_in_fine(p->candidate.evidence, p->cost, options) &&
@@ -136,10 +163,10 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
       continue;
     }
     if (best->outline < 0.0) {
-      best->outline = outline_of(*best);
+      look_at(*best);
       continue;  // it may not be the best any more
     }
-    if (!for_now && best->outline < kLeastOutline) {
+    if (!for_now && best->probability < kLeastProbability) {
       waiting.push_back(*best);
       proposals.erase(best);
       continue;
@@ -164,7 +191,7 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
 
 void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
                     const DetectionOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                    std::vector<Detection>& found) {
+                    std::span<const FineProposal> proposals, std::vector<Detection>& found) {
   std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
   const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -187,9 +214,8 @@ void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedMo
     rendering::FrameTerms mine = terms;
     for (std::size_t j = 0; j < found.size(); ++j)
       if (j != i) with_known_surfaces(mine, depths[j], &mine);
-    const SearchTarget& target = wanted[static_cast<std::size_t>(found[i].model)].target;
-    found[i].probability =
-        probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer));
+    found[i].numbers = fit_numbers(fit_of(found[i], wanted, proposals), mine, *tools.renderer);
+    found[i].probability = probability_of_fit(found[i].numbers);
   }
 }
 

@@ -18,10 +18,11 @@ struct FineProposal {
   int cluster = 0;    ///< Of those that were looked at.
   double cost = 0.0;  ///< nats; what stands on nothing known costs.
   bool stands = false;
-  double outline = -1.0;  ///< outline_support; negative: not known as things are now.
+  double outline = -1.0;     ///< outline_support; negative: this and `probability` are not known as things are now.
+  double probability = 0.0;  ///< probability_of_fit, with as many rivals as usual.
 
   /// nats. A wrong model that explains much of a large thing badly must not go before a right one that explains little
-  /// well. While the outline is not known, what it is at most.
+  /// well. While the probability is not known, what it is at most.
   double score() const;
   void weigh(bool on_something);
 };
@@ -65,10 +66,11 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
                     std::span<const WantedModel> wanted, const Weighing& weighing, const DetectionOptions& options,
                     const FilterTools& tools, rendering::FrameTerms& terms, geometry::DepthImage& known,
                     std::vector<int>& left, std::vector<Detection>& found);
-/// Each accepted object once more, given the others where they are now; gives each its probability.
+/// Each accepted object once more, given the others where they are now; gives each the probability that it is right,
+/// `proposals` being all that was proposed.
 void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
                     const DetectionOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                    std::vector<Detection>& found);
+                    std::span<const FineProposal> proposals, std::vector<Detection>& found);
 struct LeastOfFind {
   double outline = 0.0;      ///< outline_support
   double probability = 0.0;  ///< Of being right.

@@ -15,11 +15,12 @@ namespace {
 constexpr std::size_t kKeptShapes = 12;  // best poses of a cluster and model that compete
 // Finds whose surface goes on may stay until the next round has looked for what ends it, twice.
 constexpr int kFineRounds = 4;
-constexpr double kSameCluster = 0.9;      // share of the pixels of clusters that are not looked at again
+constexpr double kSameCluster = 0.9;      // share of the pixels of clusters that are the same
+constexpr int kLooks = 2;                 // each from other random starts, while a cluster stays unexplained
 constexpr double kSameShapeShare = 0.15;  // of the log ratio
 /// What is asked of finds between rounds, and at the end. Chosen on rooms 1 to 40.
 constexpr LeastOfFind kForNow = {.outline = 0.35, .probability = 0.0};
-constexpr LeastOfFind kAtTheEnd = {.outline = kLeastOutline, .probability = 0.15};
+constexpr LeastOfFind kAtTheEnd = {.outline = kLeastOutline, .probability = 0.5};
 // What competes is refined once more at the resolution at which it is judged.
 constexpr RefineOptions kFineRefine = {.steps = 6, .first_gate = 0.02, .last_gate = 0.008};
 
@@ -97,15 +98,15 @@ std::vector<FineProposal> propose_in_fine(const rendering::FrameTerms& terms, co
   return proposals;
 }
 
-/// Whether most of a cluster's pixels are those of one that was looked at before, and the other way round.
+/// Whether clusters that have most of their pixels in common with this one were looked at often enough.
 bool is_looked_at(const Cluster& cluster, std::span<const Cluster> looked_at) {
-  return std::any_of(looked_at.begin(), looked_at.end(), [&](const Cluster& other) {
-    std::vector<int> common;
-    std::set_intersection(cluster.pixels.begin(), cluster.pixels.end(), other.pixels.begin(), other.pixels.end(),
-                          std::back_inserter(common));
-    return static_cast<double>(common.size()) >
-           kSameCluster * static_cast<double>(std::max(cluster.pixels.size(), other.pixels.size()));
-  });
+  return kLooks <= std::count_if(looked_at.begin(), looked_at.end(), [&](const Cluster& other) {
+           std::vector<int> common;
+           std::set_intersection(cluster.pixels.begin(), cluster.pixels.end(), other.pixels.begin(), other.pixels.end(),
+                                 std::back_inserter(common));
+           return static_cast<double>(common.size()) >
+                  kSameCluster * static_cast<double>(std::max(cluster.pixels.size(), other.pixels.size()));
+         });
 }
 
 }  // namespace
@@ -147,7 +148,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const Fi
     reweigh(explained_fine, wanted, weighing, left, tools, proposals);
     accept_in_fine(std::move(proposals), surroundings, wanted, weighing, options, tools, explained_fine,
                    explained_depth, left, found);
-    settle_in_fine(fine, wanted, weighing, options, tools, stream, found);
+    settle_in_fine(fine, wanted, weighing, options, tools, stream, pool, found);
     const bool is_strict = round % 2 == 1;
     const std::vector<Detection> taken =
         take_back_in_fine(surroundings, wanted, options, is_strict ? kAtTheEnd : kForNow, left, found);

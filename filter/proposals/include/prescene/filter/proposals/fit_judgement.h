@@ -51,7 +51,7 @@ enum FitNumber : std::size_t {
 /// A candidate and what belongs to it.
 struct Fit {
   const SearchTarget* target = nullptr;
-  const LearnedModel* learned = nullptr;
+  const LearnedModel* learned = nullptr;  ///< Null: how it comes to lie is not known (kFitRestAngle = pi).
   Pose X_CO;
   rendering::PoseEvidence evidence;
   std::span<const Vector3d> cluster_C;  ///< Points of the cluster that it is to explain.
@@ -63,6 +63,11 @@ struct Fit {
 
 /// What can't be drawn counts as explaining nothing.
 FitNumbers fit_numbers(const Fit& fit, const rendering::FrameTerms& terms, rendering::Renderer& renderer);
+/// Probability that a pose which fits the fine image (fine_frame.h) like this is right: logistic regression on its
+/// share of the expected evidence, its outline, its residuals and its rivals. In cross-validation over 260 simulated
+/// rooms, more numbers told no more (docs/studies/tracking.md). What is learned of the models themselves is
+/// BoostedTrees to tell.
+double probability_of_fit(const FitNumbers& numbers);
 /// Only kFitRivalModels, kFitRivalPoses: they change when others do.
 void set_rivals(const Fit& fit, FitNumbers& numbers);
 
