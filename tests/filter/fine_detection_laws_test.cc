@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/proposals/fine_frame.h"
+#include "prescene/filter/proposals/fit_judgement.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -192,6 +194,7 @@ TEST_F(FineFinding, IsJudgedInTheFineImageOfASharpCameraAlone) {
     const auto model = static_cast<std::size_t>(detection.model);
     EXPECT_LT(distance(detection, poses_[model], models[model].target), 0.01) << model;
     EXPECT_GE(detection.outline, 0.9) << model;
+    EXPECT_GE(detection.probability, 0.8) << model;
   }
   const std::vector<Detection> coarse =
       detect(frame_.terms, {}, sampled_, surroundings_, models, {}, backends_.tools, {5, core::Purpose::kDetection});
@@ -203,6 +206,34 @@ TEST_F(FineFinding, IsJudgedInTheFineImageOfASharpCameraAlone) {
       EXPECT_EQ(smeared[i].evidence.log_ratio, coarse[i].evidence.log_ratio);
     }
   }
+}
+
+TEST(ProbabilityOfFit, FallsWithAllThatSpeaksAgainstAFitAndWithItsRivals) {
+  FitNumbers good{};
+  good[kFitEvidenceShare] = 1.0F;
+  good[kFitOutline] = 1.0F;
+  good[kFitResidual] = 0.7F;
+  const double best = probability_of_fit(good);
+  EXPECT_GT(best, 0.95);
+  for (const auto& [which, worse] : {std::pair{kFitEvidenceShare, 0.8F},
+                                     {kFitOutline, 0.8F},
+                                     {kFitResidual, 1.0F},
+                                     {kFitRivalModels, -1.0F},
+                                     {kFitRivalPoses, -1.0F}}) {
+    FitNumbers numbers = good;
+    numbers[which] = worse;
+    const double probability = probability_of_fit(numbers);
+    EXPECT_GT(probability, 0.0) << which;
+    EXPECT_LT(probability, best) << which;
+  }
+  // More evidence than expected, and rivals that explain next to nothing, count no more than enough.
+  FitNumbers more = good;
+  more[kFitEvidenceShare] = 1.5F;
+  EXPECT_EQ(probability_of_fit(more), best);
+  more[kFitRivalModels] = 1.0F;
+  const double without_rival = probability_of_fit(more);
+  more[kFitRivalModels] = 3.0F;
+  EXPECT_EQ(probability_of_fit(more), without_rival);
 }
 
 }  // namespace
