@@ -41,6 +41,7 @@ core::Status CandidateObjects::look_for_missing(const WindowFrame& last, const E
     for (std::size_t k = times_.size(); k-- > 0;) {
       double there = 0.0;
       likelihood_->evaluate(k, i, std::span(&X_WO, 1), std::span(&there, 1));
+      if (is_silent(there, absent[k])) continue;
       if (there <= absent[k]) break;
       seen.insert(seen.begin(), times_[k]);
     }
@@ -61,8 +62,18 @@ void CandidateObjects::note_when_seen(std::size_t object) {
       likelihood_->evaluate(k, object, std::span(&track.estimates.back().mode, 1), std::span(&there[k], 1));
   }
   std::size_t left = n, came = n;
-  while (left > 0 && here[left - 1] < std::max(absent[left - 1], there[left - 1])) --left;
-  while (came > 0 && there[came - 1] > std::max(absent[came - 1], here[came - 1])) --came;
+  for (std::size_t k = n; k > 0; --k) {
+    const double best = std::max(absent[k - 1], there[k - 1]);
+    if (is_silent(here[k - 1], best)) continue;
+    if (!(here[k - 1] < best)) break;
+    left = k - 1;
+  }
+  for (std::size_t k = n; k > 0; --k) {
+    const double best = std::max(absent[k - 1], here[k - 1]);
+    if (is_silent(there[k - 1], best)) continue;
+    if (!(there[k - 1] > best)) break;
+    came = k - 1;
+  }
   if (left == n && came == n) return;
   const auto time = [&](std::size_t k) { return k < n ? times_[k] : events_->duration(); };
   const auto before = [&](std::size_t k) { return k > 0 ? times_[k - 1] : 0.0; };

@@ -3,6 +3,7 @@
 // where it is in each of them.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -16,9 +17,12 @@ class CandidateObjects {
   /// All must outlive it; the base of `likelihood` is set, `times` are those of its frames.
   CandidateObjects(EventPaths& events, WindowLikelihood& likelihood, const std::vector<double>& times,
                    const ExplainQuery& query)
-      : events_(&events), likelihood_(&likelihood), times_(times), query_(query) {}
+      : events_(&events), likelihood_(&likelihood), times_(times), query_(query) {
+    for (std::size_t k = 1; k < likelihood.frames(); ++k)
+      has_several_cameras_ = has_several_cameras_ || likelihood.camera(k) != likelihood.camera(0);
+  }
 
-  /// What was not there at the start, and the tracker did not find, in the last frame that weighs.
+  /// What was not there at the start, and nobody has found, in the last frame of a camera.
   core::Status look_for_missing(const WindowFrame& last, const ExplainContext& context,
                                 const filter::FilterTools& tools);
   bool may_be_explained(std::size_t object) const;
@@ -34,6 +38,7 @@ class CandidateObjects {
   const std::vector<std::string>& remarks() const { return remarks_; }
 
  private:
+  static constexpr double kSilent = 0.1;  // nats
   struct Elsewhere {
     double moved = 0.0;  // m, turns by a lever of 5 cm
     bool elsewhere = false;
@@ -41,12 +46,15 @@ class CandidateObjects {
   Elsewhere tracked_elsewhere(std::size_t object) const;
   /// By frame, nats: what it says of the object's absence.
   std::vector<double> absent_ratios(std::size_t object) const;
+  /// Of several cameras, one may not see what another sees: its frames say the same of all.
+  bool is_silent(double a, double b) const { return has_several_cameras_ && std::abs(a - b) < kSilent; }
   belief::Pose base_at(std::size_t object, double time) const;
 
   EventPaths* events_;
   WindowLikelihood* likelihood_;
   const std::vector<double>& times_;
   const ExplainQuery& query_;
+  bool has_several_cameras_ = false;
   int evaluated_ = 0;
   std::vector<std::string> remarks_;
 };

@@ -50,7 +50,8 @@ class Explainer {
     events_->set_times(times_);
     likelihood_->set_base(events_->base());
     CandidateObjects looked(*events_, *likelihood_, times_, query_);
-    PRESCENE_RETURN_IF_ERROR(looked.look_for_missing(frames_.back(), context_, tools_));
+    for (const std::size_t last : last_of_cameras(frames_))
+      PRESCENE_RETURN_IF_ERROR(looked.look_for_missing(frames_[last], context_, tools_));
     if (asked && !looked.may_be_explained(*asked)) return lost_for_good();
     const std::vector<std::size_t> candidates = asked ? std::vector{*asked} : looked.to_look_at();
     for (const std::size_t object : candidates) looked.note_when_seen(object);

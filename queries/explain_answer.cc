@@ -294,7 +294,9 @@ class AnswerBuilder {
           std::max(result.radius_90, std::sqrt(kChi90 * estimate.covariance.bottomRightCorner<3, 3>().trace() / 3.0));
     }
     const ScenePath path = most_probable_path(*all.front());
-    result.out_of_sight = result.present > 0.5 && likelihood_->visible_share(path, times_.size() - 1, object) < 0.05;
+    result.out_of_sight = result.present > 0.5;
+    for (const std::size_t k : likelihood_->last_frames())
+      result.out_of_sight = result.out_of_sight && likelihood_->visible_share(path, k, object) < 0.05;
     return result;
   }
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
+#include "prescene/queries/camera_name.h"
 
 namespace prescene::queries {
 namespace {
@@ -19,14 +20,19 @@ std::string at_time(const Explanation& e) {
                 : "";
 }
 
-/// As the camera sees it at the window's end.
+/// As the camera sees it at the window's end; of several cameras the scene's first one that took a frame.
 std::string towards_text(double degrees, const ExplainWindow& window) {
   const double angle = degrees * std::numbers::pi / 180.0;
   const Vector3d d(std::cos(angle), std::sin(angle), 0.0);
-  const Vector3d d_C = window.frames.back().observation.X_WC.rotation.conjugate() * d;
+  const belief::Observation* seen = &window.frames.back().observation;
+  for (std::size_t i = window.frames.size(); i-- > 0;)
+    if (window.frames[i].observation.camera < seen->camera) seen = &window.frames[i].observation;
+  const std::string name = camera_name(*window.start->scene, seen->camera);
+  const Vector3d d_C = seen->X_WC.rotation.conjugate() * d;
   if (std::abs(d_C.x()) >= Vector3d(0.0, d_C.y(), d_C.z()).norm())
-    return d_C.x() > 0.0 ? "to the right" : "to the left";
-  return d_C.z() > 0.0 ? "away from the camera" : "towards the camera";
+    return std::string(d_C.x() > 0.0 ? "to the right" : "to the left") +
+           (name.empty() ? "" : ", as camera " + name + " sees it,");
+  return (d_C.z() > 0.0 ? "away from " : "towards ") + (name.empty() ? "the camera" : "camera " + name);
 }
 
 std::string effects_text(const Explanation& e) {

@@ -29,34 +29,6 @@ constexpr double kAtPeak = 12.6;
 constexpr double kKnownWell = 0.5;
 constexpr float kBehindSupport = 0.02F;  // m; so far behind a support's surface an object is hidden by it
 constexpr double kFarFromOutline = 1e3;  // px
-constexpr int kSampled = 8;              // pixels between two that changes are looked for at
-constexpr float kChanged = 0.02F;        // m; a depth that changes by more has changed
-constexpr int kColorChanged = 90;        // sum over red, green and blue
-
-/// Share of the sampled pixels that differ; both images hold every `held`-th pixel of the camera's.
-double change_between(const belief::RgbdFrame& a, const belief::RgbdFrame& b, int held) {
-  const int step = std::max(1, kSampled / std::max(1, held));
-  if (!a.depth || !b.depth || a.depth->width() != b.depth->width() || a.depth->height() != b.depth->height())
-    return 1.0;
-  const bool colors = a.color && b.color && a.color->width() == a.depth->width() &&
-                      b.color->width() == a.depth->width() && a.color->height() == a.depth->height() &&
-                      b.color->height() == a.depth->height();
-  int changed = 0, all = 0;
-  for (int y = step / 2; y < a.depth->height(); y += step)
-    for (int x = step / 2; x < a.depth->width(); x += step) {
-      ++all;
-      const float p = (*a.depth)(x, y), q = (*b.depth)(x, y);
-      bool differs = p > 0.0F && q > 0.0F && std::abs(p - q) > kChanged;
-      if (colors && !differs) {
-        int difference = 0;
-        for (std::size_t c = 0; c < 3; ++c)
-          difference += std::abs(static_cast<int>((*a.color)(x, y)[c]) - static_cast<int>((*b.color)(x, y)[c]));
-        differs = difference > kColorChanged;
-      }
-      changed += differs ? 1 : 0;
-    }
-  return all > 0 ? static_cast<double>(changed) / all : 0.0;
-}
 
 /// A known surface that is seen at a slant returns as little as an object's would: the more holes are to be expected
 /// where the object is absent, the less they speak for an object.
@@ -80,35 +52,6 @@ void expect_holes_at_slants(filter::FilterFrame& frame) {
 }
 
 }  // namespace
-
-std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int count) {
-  const auto wanted = static_cast<std::size_t>(count);
-  std::vector<std::size_t> chosen;
-  if (frames.size() <= wanted) {
-    for (std::size_t i = 0; i < frames.size(); ++i) chosen.push_back(i);
-    return chosen;
-  }
-  chosen.push_back(0);
-  // A quarter of the weight goes by time alone, so that stillness is seen, too.
-  std::vector<double> passed(frames.size(), 0.0);
-  for (std::size_t i = 1; i < frames.size(); ++i)
-    passed[i] =
-        passed[i - 1] + change_between(frames[i - 1].observation.frame, frames[i].observation.frame, frames[i].sampled);
-  const double all = passed.back();
-  const auto at = [&](std::size_t i) {
-    const double time = static_cast<double>(i) / static_cast<double>(frames.size() - 1);
-    return all > 0.0 ? 0.25 * time + 0.75 * passed[i] / all : time;
-  };
-  for (std::size_t n = 2; n <= wanted; ++n) {
-    std::size_t i = chosen.back() + 1;
-    const double share = static_cast<double>(n - 1) / static_cast<double>(wanted - 1);
-    while (i + 1 < frames.size() && at(i) + 1e-9 < share) ++i;
-    // Room for those that are still to come.
-    i = std::min(i, frames.size() - 1 - (wanted - n));
-    chosen.push_back(i);
-  }
-  return chosen;
-}
 
 namespace {
 
@@ -143,13 +86,14 @@ core::Status WindowLikelihood::prepare() {
       kHitSpread * scene->depth_noise.sigma_per_depth_squared.value_or(options.sensor.sigma_per_depth_squared);
   if (scene->camera) widen(scene->camera->depth_noise);
   for (belief::SceneCamera& camera : scene->more_cameras) widen(camera.depth_noise);
-  filter::FrameCache cache;
+  std::map<int, filter::FrameCache> caches;  // by camera
   for (const WindowFrame& seen : window_) {
     filter::FilterFrame& frame = frames_.emplace_back();
     const filter::FrameColors colors{context_.settings.colors,
                                      filter::learned_models(start_, options.colors, seen.observation.camera)};
     PRESCENE_RETURN_IF_ERROR(filter::prepare_frame(std::shared_ptr<const belief::Scene>(scene), seen.observation,
-                                                   seen.belief->robot, colors, options, tools_, cache, &frame));
+                                                   seen.belief->robot, colors, options, tools_,
+                                                   caches[seen.observation.camera], &frame));
     frame.terms.step *= seen.sampled;
     expect_holes_at_slants(frame);
     stamps_.push_back(seen.observation.stamp_ns);

@@ -17,6 +17,7 @@
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/queries/explain.h"
 #include "prescene/queries/path_error.h"
+#include "prescene/queries/telling_frames.h"
 
 namespace prescene::queries {
 
@@ -50,10 +51,6 @@ struct PathEnd {
   geometry::Matrix3d covariance = geometry::Matrix3d::Zero();
 };
 
-/// The frames that differ most: places in `frames` at which equal parts of all change have passed, filled up evenly
-/// where little changes; the last always, and the first, which shows what is there when the window begins. Ascending.
-std::vector<std::size_t> telling_frames(std::span<const WindowFrame> frames, int count);
-
 class WindowLikelihood {
  public:
   /// `objects`: names and models of the scene's objects, in the order of paths. All must outlive it.
@@ -65,6 +62,10 @@ class WindowLikelihood {
 
   std::size_t frames() const { return stamps_.size(); }
   core::TimeNs stamp(std::size_t frame) const { return stamps_[frame]; }
+  /// Which of the scene's cameras it is of.
+  int camera(std::size_t frame) const { return window_[frame].observation.camera; }
+  /// The last of each camera.
+  std::vector<std::size_t> last_frames() const { return last_of_cameras(window_); }
 
   /// Where objects are if nothing is said of them.
   void set_base(std::vector<ObjectPath> base);

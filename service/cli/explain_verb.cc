@@ -86,7 +86,9 @@ core::Status write_explanation_report(const std::string& path, const std::string
         "further, both from 5 cm on in full; grey is not known."});
     for (const ExplanationStrip& strip : strips)
       seen.blocks.emplace_back(interfaces::PictureBlock{
-          {{fixed_text(strip.time + explained.from, 2) + " s, seen", strip.seen},
+          {{fixed_text(strip.time + explained.from, 2) + " s, seen" +
+                (strip.camera.empty() ? "" : " by camera " + strip.camera),
+            strip.seen},
            {"explained; " + fixed_text(strip.against_nothing, 1) + " nats against nothing", strip.explained},
            {"difference", strip.difference}}});
   }
@@ -113,11 +115,13 @@ core::Status make_pictures_folder(const std::string& folder) {
   return core::ok_status();
 }
 
-/// A picture of each strip in the folder, named by its time: explained_1.733.png.
+/// A picture of each strip in the folder, named by its time, and by its camera if there are several:
+/// explained_1.733_side.png.
 core::Status write_strips(const std::string& folder, const std::vector<ExplanationStrip>& strips, double from) {
   for (const ExplanationStrip& strip : strips) {
     const geometry::ColorImage picture = side_by_side(strip);
-    const std::string name = "explained_" + fixed_text(strip.time + from, 3) + ".png";
+    const std::string name =
+        "explained_" + fixed_text(strip.time + from, 3) + (strip.camera.empty() ? "" : "_" + strip.camera) + ".png";
     PRESCENE_RETURN_IF_ERROR(interfaces::write_png(std::filesystem::path(folder) / name, picture.view()));
   }
   return core::ok_status();

@@ -68,13 +68,17 @@ ExplanationTables explanation_tables(const ordered_json& explained) {
   const ordered_json& events = explained.at("explanations");
   const bool something =
       !events.empty() && events.front().value("event", "") != belief::name_of(belief::EventKind::kNothing);
+  const ordered_json& frames = explained.at("frames");
+  const bool several = !frames.empty() && frames.front().contains("camera");
   tables.frames = {{"frame, s", "against the second, nats"}};
+  if (several) tables.frames.front().push_back("camera");
   if (something) tables.frames.front().insert(tables.frames.front().begin() + 1, "against nothing, nats");
-  for (const ordered_json& frame : explained.at("frames")) {
+  for (const ordered_json& frame : frames) {
     std::vector<std::string>& row = tables.frames.emplace_back();
     row.push_back(fixed_text(frame.value("time", 0.0), 2));
     if (something) row.push_back(fixed_text(frame.value("against_nothing", 0.0), 1));
     row.push_back(fixed_text(frame.value("against_second", 0.0), 1));
+    if (several) row.push_back(frame.value("camera", ""));
   }
   return tables;
 }

@@ -7,6 +7,7 @@
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"
+#include "prescene/queries/camera_name.h"
 #include "prescene/service/pictures/belief_overlay.h"
 #include "prescene/service/pictures/likelihood_picture.h"
 #include "prescene/service/recording/recording_overview.h"
@@ -164,10 +165,12 @@ core::Status inspect_recording(const RecordingInspection& options, VerbContext& 
   for (ordered_json& object : belief["objects"])
     for (const ObjectEvidence& evidence : evidences)
       if (object["name"] == evidence.object) object["evidence"] = to_json(evidence.evidence);
+  const std::string camera = queries::camera_name(*input.scene(), frame->observation.camera);
   ordered_json document = {{"recording", place}, {"frame", options.frame}, {"seed", seed}};
+  if (!camera.empty()) document["camera"] = camera;
   document.update(belief);
-  context.print(document,
-                "frame " + std::to_string(options.frame) + " of " + place + "\n" + text_of(summary, evidences));
+  context.print(document, "frame " + std::to_string(options.frame) + " of " + place +
+                              (camera.empty() ? "" : ", of camera " + camera) + "\n" + text_of(summary, evidences));
   return core::ok_status();
 }
 

@@ -8,6 +8,7 @@
 
 #include "prescene/filter/proposals/render_scene.h"
 #include "prescene/interfaces/reports/overlay.h"
+#include "prescene/queries/camera_name.h"
 #include "prescene/service/pictures/belief_overlay.h"
 
 namespace prescene::service {
@@ -76,6 +77,7 @@ core::Result<std::vector<ExplanationStrip>> explanation_strips(const queries::Ex
     PRESCENE_TRY(rendering::RenderedView drawn, explained_view(frame, deciding, answer, *renderer, backends.meshes()));
     ExplanationStrip strip;
     strip.time = deciding.time;
+    strip.camera = queries::camera_name(*frame.belief->scene, frame.observation.camera);
     strip.against_nothing = deciding.against_nothing;
     strip.seen = picture_of(frame.observation);
     strip.difference = depth_difference_picture(*frame.observation.frame.depth, drawn.depth);

@@ -8,6 +8,7 @@
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
+#include "prescene/queries/camera_name.h"
 #include "prescene/service/recording/frame_history.h"
 #include "prescene/service/tracking/camera_frames.h"
 
@@ -37,6 +38,12 @@ core::Status read_actions(const ExplainOptions& options, queries::ExplainWindow&
   }
   controls.put_into(window, remarks);
   return core::ok_status();
+}
+
+/// "" where there is one.
+std::string camera_of(const queries::ExplainWindow& window, const queries::DecidingFrame& deciding) {
+  if (!window.start || deciding.frame >= window.frames.size()) return "";
+  return queries::camera_name(*window.start->scene, window.frames[deciding.frame].observation.camera);
 }
 
 ordered_json value_json(const queries::EventValue& value, double shift = 0.0) {
@@ -180,10 +187,12 @@ ordered_json to_json(const Explained& explained) {
                        {"mean", {object.mean.x(), object.mean.y(), object.mean.z()}},
                        {"radius_90", object.radius_90},
                        {"out_of_sight", object.out_of_sight}});
-  for (const queries::DecidingFrame& frame : answer.frames)
-    frames.push_back({{"time", frame.time + explained.from},
-                      {"against_nothing", frame.against_nothing},
-                      {"against_second", frame.against_second}});
+  for (const queries::DecidingFrame& frame : answer.frames) {
+    ordered_json& entry = frames.emplace_back(ordered_json{{"time", frame.time + explained.from}});
+    if (const std::string camera = camera_of(explained.window, frame); !camera.empty()) entry["camera"] = camera;
+    entry["against_nothing"] = frame.against_nothing;
+    entry["against_second"] = frame.against_second;
+  }
   ordered_json remarks = answer.remarks;
   for (const std::string& remark : explained.remarks) remarks.push_back(remark);
   ordered_json json = {{"from", explained.from},

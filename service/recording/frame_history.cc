@@ -131,8 +131,12 @@ void FrameHistory::add(const belief::Observation& observation, std::shared_ptr<c
     if (!any_) first_ns_ = stamp_ns;
     any_ = true;
     newest_ns_ = stamp_ns;
-    const bool is_soon = !kept_.empty() && core::seconds_of(stamp_ns - kept_.back().frame.observation.stamp_ns) <
-                                               1.0 / settings_.rate - kStampJitter;
+    // Each camera by itself: another one's frame says something else.
+    const auto last = std::find_if(kept_.rbegin(), kept_.rend(), [&](const Kept& kept) {
+      return kept.frame.observation.camera == observation.camera;
+    });
+    const bool is_soon = last != kept_.rend() && core::seconds_of(stamp_ns - last->frame.observation.stamp_ns) <
+                                                     1.0 / settings_.rate - kStampJitter;
     if (is_soon) return;
   }
   Kept kept{sampled_frame(observation, std::move(belief), settings_.width)};

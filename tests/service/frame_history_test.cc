@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
@@ -83,6 +85,26 @@ TEST(FrameHistory, HoldsTheSecondsAndFramesThatItMayHoldAndNoMore) {
   fill(small, 20.0, 30.0);
   EXPECT_LE(small.bytes(), bytes / 2);
   EXPECT_GT(small.frames(), 25u);
+}
+
+TEST(FrameHistory, KeepsTheFramesOfEveryCamera) {
+  FrameHistory history({.seconds = 4.0, .rate = 15.0});
+  for (std::uint64_t i = 0; i < 60; ++i) {  // triggered together, 30 a second
+    const core::TimeNs stamp_ns = kBegin + core::ns_of(static_cast<double>(i) / 30.0);
+    for (const int camera : {0, 1}) {
+      auto belief = std::make_shared<belief::Belief>(*belief_with(stamp_ns, 2 * i + 1));
+      belief->cameras.resize(2);
+      belief::Observation observation = observation_at(stamp_ns, 32, 24);
+      observation.camera = camera;
+      history.add(observation, std::move(belief));
+    }
+  }
+  const auto window = history.window(between(0.5, 1.5));
+  ASSERT_TRUE(window.ok()) << window.status().message();
+  std::map<int, int> frames;
+  for (const queries::WindowFrame& frame : window->window.frames) ++frames[frame.observation.camera];
+  EXPECT_EQ(frames[0], 15);
+  EXPECT_EQ(frames[1], 15);
 }
 
 TEST(FrameHistory, GivesTheWindowWithTheBeliefBeforeIt) {

@@ -45,7 +45,7 @@ struct ExplainWindow {
 
 struct ExplainQuery {
   std::string object;  ///< Events that happen to it; empty = to any object that the frames show to be elsewhere.
-  int frames = 10;     ///< That weigh; those between which most changes are taken. In [2, 64].
+  int frames = 10;     ///< That weigh, of all cameras; those between which most changes are taken. In [2, 64].
   int runs = 4;        ///< Independent runs of each schema that competes, more where intervals are wide. In [2, 64].
   int points = 24;     ///< Of each run. In [8, 4096].
   double confidence = 0.95;  ///< Of the intervals.
@@ -102,7 +102,7 @@ struct WhereItIs {
   double present = 1.0;  ///< Probability that it is there at all.
   geometry::Vector3d mean = geometry::Vector3d::Zero();
   double radius_90 = 0.0;     ///< m about the mean within which it is with 90 %, if it is there.
-  bool out_of_sight = false;  ///< The last frame shows less than 5 % of it.
+  bool out_of_sight = false;  ///< The last frame of each camera shows less than 5 % of it.
 };
 
 struct DecidingFrame {

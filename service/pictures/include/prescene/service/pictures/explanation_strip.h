@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "prescene/core/status.h"
@@ -14,6 +15,7 @@ namespace prescene::service {
 
 struct ExplanationStrip {
   double time = 0.0;             ///< s from the window's start.
+  std::string camera;            ///< Whose frame it is; "" of the only one.
   double against_nothing = 0.0;  ///< Nats, as DecidingFrame.
   geometry::ColorImage seen;
   geometry::ColorImage explained;  ///< Of the best explanation's most probable instance, in the models' colours.

@@ -29,7 +29,7 @@ namespace prescene::service {
 
 struct FrameHistorySettings {
   double seconds = 20.0;  ///< That are kept, of the frames' stamps; 0 = nothing is.
-  double rate = 15.0;     ///< Frames a second, at most.
+  double rate = 15.0;     ///< Frames a second of each camera, at most.
   /// Of images and beliefs; where they have more, the oldest are forgotten early. 20 s of five objects and 15 frames a
   /// second have some 50 MB.
   std::size_t most_bytes = std::size_t{96} << 20;
