@@ -9,10 +9,9 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
-#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/queries/camera_name.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/pictures/belief_overlay.h"
-#include "prescene/service/tracking/camera_frames.h"
 #include "tracking_sections.h"
 
 namespace prescene::service {
@@ -23,18 +22,16 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kMaxObservations = 48;              // in memory, evenly spread
 constexpr std::size_t kMaxPixels = std::size_t{1} << 24;  // of all of them: 54 of 640 x 480
-constexpr std::size_t kPictures = 6;                      // of them on the page
+constexpr std::size_t kPictures = 6;                      // of them on the page, of each camera
 constexpr std::size_t kMostChanges = 20;                  // of states, on the page
 constexpr int kSmallPicture = 320;                        // columns of what the camera saw, beside the overlay
 
-/// Of the first camera.
-AssemblerSettings assembler_settings(const belief::Scene& scene, const TrackerSettings& tracker) {
-  const CameraInput first = camera_inputs(tracker, scene).front();
-  AssemblerSettings settings = first.assembler;
-  settings.use_color = settings.use_color && !first.topics.color.empty();
-  if (!settings.rectified) settings.rectified = names_rectified_images(first.topics.depth);
-  if (!settings.X_WC && scene.camera) settings.X_WC = scene.camera->X_WC;
-  return settings;
+/// Pictures need a place even where nobody tells one.
+std::vector<CameraInput> pictured_cameras(const belief::Scene& scene, const TrackerSettings& tracker) {
+  std::vector<CameraInput> cameras = camera_inputs(tracker, scene);
+  AssemblerSettings& first = cameras.front().assembler;
+  if (!first.X_WC && scene.camera) first.X_WC = scene.camera->X_WC;
+  return cameras;
 }
 
 belief::Timeline timeline_from(const ordered_json& json) {
@@ -105,54 +102,38 @@ geometry::ColorImage smaller(const geometry::ColorImage& image) {
 SessionReport::SessionReport(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings,
                              Backends& backends)
     : scene_(std::move(scene)),
-      topics_(first_topics(settings, *scene_)),
-      assembler_(assembler_settings(*scene_, settings), robot_names(*scene_), settings.tf),
+      frames_(pictured_cameras(*scene_, settings), robot_names(*scene_), settings.tf),
       backends_(&backends),
       residual_meter_(backends) {}
 
 void SessionReport::add(const interfaces::ReceivedMessage& message) {
-  const MessageIndex index = next_index_++;
   // What makes no sense is reported by the tracker; here it is only left out.
-  core::Status taken;
-  if (message.topic == topics_.depth) {
-    if (auto depth = decode_depth(message, assembler_.image_rules()))
-      taken = assembler_.add_depth(*std::move(depth), index, message.received_ns);
-  } else if (message.topic == topics_.color) {
-    if (auto color = decode_color_message(message))
-      taken = assembler_.add_color(*std::move(color), index, message.received_ns);
-  } else if (message.topic == topics_.camera_info) {
-    if (const auto info = interfaces::decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage))
-      taken = assembler_.add_camera_info(*info, index);
-  } else if (message.topic == topics_.tf || message.topic == topics_.tf_static) {
-    if (const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage)) {
-      taken = assembler_.add_tf(*tf, index, message.topic == topics_.tf_static);
-    }
-  } else if (message.topic == topics_.joint_states) {
-    if (const auto joints = interfaces::decode_cdr<interfaces::RosJointState>(message.cdr, interfaces::kSmallMessage))
-      taken = assembler_.add_joint_state(*joints, index);
-  }
-  static_cast<void>(taken);
-  while (const auto frame = assembler_.take(message.received_ns)) add(frame->observation);
+  static_cast<void>(frames_.take_in(message, next_index_++, message.received_ns));
+  while (const auto frame = frames_.take(message.received_ns)) add(frame->observation);
+  static_cast<void>(frames_.take_skipped());
 }
 
 void SessionReport::add(const belief::Observation& observation) {
   const auto summary = summaries_.find(observation.stamp_ns);
-  if (summary == summaries_.end() || !pictured_.has(observation)) return;
+  if (summary == summaries_.end()) return;
   residuals_[observation.stamp_ns] = residual_meter_.measure(*scene_, summary->second, observation);
   if (changes_.contains(observation.stamp_ns) && at_changes_.size() < kMostChanges)
     at_changes_[observation.stamp_ns] = observation;
-  if (seen_++ % every_ != 0) return;
-  observations_.push_back(observation);
+  Kept& kept = kept_[observation.camera];
+  if (kept.seen++ % kept.every != 0) return;
+  kept.observations.push_back(observation);
+  const auto cameras = static_cast<std::size_t>(belief::camera_count(*scene_));
   const auto too_many = [&] {
     std::size_t pixels = 0;
-    for (const belief::Observation& kept : observations_) pixels += kept.frame.depth ? kept.frame.depth->size() : 0;
-    return observations_.size() > kMaxObservations || (observations_.size() > 1 && pixels > kMaxPixels);
+    for (const belief::Observation& one : kept.observations) pixels += one.frame.depth ? one.frame.depth->size() : 0;
+    return kept.observations.size() > std::max<std::size_t>(kPictures, kMaxObservations / cameras) ||
+           (kept.observations.size() > 1 && pixels > kMaxPixels / cameras);
   };
   while (too_many()) {
-    std::vector<belief::Observation> kept;
-    for (std::size_t i = 0; i < observations_.size(); i += 2) kept.push_back(std::move(observations_[i]));
-    observations_ = std::move(kept);
-    every_ *= 2;
+    std::vector<belief::Observation> fewer;
+    for (std::size_t i = 0; i < kept.observations.size(); i += 2) fewer.push_back(std::move(kept.observations[i]));
+    kept.observations = std::move(fewer);
+    kept.every *= 2;
   }
 }
 
@@ -164,18 +145,25 @@ void SessionReport::add(const BeliefSummary& summary) {
   summaries_[summary.stamp_ns] = summary;
 }
 
+std::string SessionReport::by_camera(const belief::Observation& observation) const {
+  const std::string name = queries::camera_name(*scene_, observation.camera);
+  return name.empty() ? "" : ", camera " + name;
+}
+
 interfaces::PictureBlock SessionReport::pictures() const {
   interfaces::PictureBlock block;
-  if (observations_.empty()) return block;
+  if (summaries_.empty()) return block;
   const core::TimeNs first_ns = summaries_.begin()->first;
-  const std::size_t count = std::min(kPictures, observations_.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    const belief::Observation& observation =
-        observations_[count > 1 ? i * (observations_.size() - 1) / (count - 1) : 0];
-    auto picture = belief_overlay(*scene_, summaries_.at(observation.stamp_ns), observation, *backends_);
-    if (!picture) continue;
-    block.pictures.push_back(
-        {fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s", *std::move(picture), false});
+  for (const auto& [camera, kept] : kept_) {
+    const std::vector<belief::Observation>& all = kept.observations;
+    const std::size_t count = std::min(kPictures, all.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      const belief::Observation& observation = all[count > 1 ? i * (all.size() - 1) / (count - 1) : 0];
+      auto picture = belief_overlay(*scene_, summaries_.at(observation.stamp_ns), observation, *backends_);
+      if (!picture) continue;
+      const std::string time = fixed_text(core::seconds_of(observation.stamp_ns - first_ns), 2) + " s";
+      block.pictures.push_back({time + by_camera(observation), *std::move(picture), false});
+    }
   }
   return block;
 }
@@ -186,7 +174,8 @@ void SessionReport::add_changes(interfaces::ReportContents& contents) const {
   const core::TimeNs first_ns = summaries_.begin()->first;
   interfaces::PictureBlock block;
   for (const auto& [stamp_ns, observation] : at_changes_) {
-    const std::string caption = fixed_text(core::seconds_of(stamp_ns - first_ns), 2) + " s: " + changes_.at(stamp_ns);
+    const std::string caption = fixed_text(core::seconds_of(stamp_ns - first_ns), 2) + " s" + by_camera(observation) +
+                                ": " + changes_.at(stamp_ns);
     block.pictures.push_back({caption, smaller(picture_of(observation)), false});
     auto picture = belief_overlay(*scene_, summaries_.at(stamp_ns), observation, *backends_);
     if (picture) block.pictures.push_back({"the belief then", *std::move(picture), false});

@@ -22,8 +22,6 @@
 #include "prescene/service/recording/support_score.h"
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/camera_frames.h"
-#include "prescene/service/tracking/frame_assembler.h"
-#include "prescene/service/tracking/topics.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
 namespace prescene::service {
@@ -59,8 +57,10 @@ class SessionReport {
   core::Status write(const std::filesystem::path& path, const TrackingScore& score) const;
 
  private:
-  /// Evenly spread over the session.
+  /// Of each camera, evenly spread over the session.
   interfaces::PictureBlock pictures() const;
+  /// ", camera side"; "" of the only one.
+  std::string by_camera(const belief::Observation& observation) const;
   void add_changes(interfaces::ReportContents& contents) const;
   void add_supports(interfaces::ReportContents& contents) const;
   void add_foreseen(interfaces::ReportContents& contents) const;
@@ -68,15 +68,17 @@ class SessionReport {
   void add_answer_section(double at, const nlohmann::ordered_json& answer, interfaces::ReportContents& contents) const;
 
   std::shared_ptr<const belief::Scene> scene_;
-  InputTopics topics_;  // of the first camera
-  PicturedFrames pictured_;
-  FrameAssembler assembler_;
+  CameraFrames frames_;
   MessageIndex next_index_ = 0;
   Backends* backends_;
   ResidualMeter residual_meter_;
-  std::vector<belief::Observation> observations_;
-  std::size_t every_ = 1;  // observations between two that are kept
-  std::size_t seen_ = 0;
+  /// The frames of a camera that are kept.
+  struct Kept {
+    std::vector<belief::Observation> observations;
+    std::size_t every = 1;  // frames between two that are kept
+    std::size_t seen = 0;
+  };
+  std::map<int, Kept> kept_;  // by camera
   std::map<core::TimeNs, BeliefSummary> summaries_;
   std::map<core::TimeNs, std::string> changes_;  // of states: what they are
   std::map<core::TimeNs, belief::Observation> at_changes_;
