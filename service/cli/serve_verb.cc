@@ -33,10 +33,8 @@ core::Result<std::unique_ptr<LiveView>> open_view(ServeOptions& options,
   options.view.world_frame = options.settings.tracker.assembler.world_frame;
   PRESCENE_TRY(auto view, LiveView::create(scene, options.view, context.log()));
   LiveView* raw = view.get();
-  options.settings.on_step = [raw, pictured = PicturedFrames()](
-                                 const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief) mutable {
-    if (pictured.has(step.observation))
-      raw->show({belief, step.observation, step.record.seconds, step.record.degraded});
+  options.settings.on_step = [raw](const TrackerStep& step, const std::shared_ptr<const belief::Belief>& belief) {
+    raw->show({belief, step.observation, step.record.seconds, step.record.degraded});
   };
   options.settings.on_answer = [raw](const std::string& answer) { raw->answer(answer); };
   options.settings.on_health = [raw](const std::string& health) { raw->set_health(health); };
@@ -77,6 +75,10 @@ core::Status run(ServeOptions& options, VerbContext& context) {
     options.settings.started_with.push_back({name, description, std::move(value)});
   };
   started_with("scene", options.scene, "Scene file.");
+  std::string cameras;
+  for (const CameraInput& camera : camera_inputs(options.settings.tracker, *scene))
+    cameras += (cameras.empty() ? "" : ", ") + camera.name;
+  started_with("cameras", cameras, "Cameras that the scene lists; empty = the one that the options tell of.");
   started_with("record", options.record, "Recording that is written; empty = none.");
   started_with("proposals", options.proposals, "File of `prescene train` that is used; empty = none.");
   started_with("seed", static_cast<std::int64_t>(context.options().seed), "Seed of all random numbers.");

@@ -95,7 +95,6 @@ core::Status view_bus(ViewVerbOptions& options, VerbContext& context) {
     PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
     PRESCENE_TRY(scene, load_scene_text(text, options.scene, context.log()));
     PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
-    take_first_camera(*scene, options.tracker);
     PRESCENE_TRY(options.tracker.assembler.robot, load_robot(text, options.scene));
   }
   PRESCENE_TRY(const auto view, BusView::create(scene, {options.dds, options.tracker, options.view}, context.log()));

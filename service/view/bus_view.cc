@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/bus_view.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -8,7 +9,7 @@
 #include <utility>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
-#include "prescene/service/tracking/image_messages.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {
@@ -64,16 +65,18 @@ struct BusView::Impl {
       : settings(of),
         given_scene(std::move(a_scene)),
         log(std::move(a_log)),
-        assembler(of.tracker.assembler, given_scene ? robot_names(*given_scene) : std::vector<std::string>(),
-                  of.tracker.tf),
+        cameras(camera_inputs(of.tracker, given_scene ? *given_scene : belief::Scene())),
+        frames(cameras, given_scene ? robot_names(*given_scene) : std::vector<std::string>(), of.tracker.tf),
         scene(given_scene) {}
 
   BusViewSettings settings;
   std::shared_ptr<const belief::Scene> given_scene;
   core::LogSink log;
 
+  std::vector<CameraInput> cameras;
+
   // Of the bus's thread.
-  FrameAssembler assembler;
+  CameraFrames frames;
   MessageIndex next_index = 0;
   belief::Observation observation;  // the newest
   std::shared_ptr<const belief::Scene> scene;
@@ -128,12 +131,15 @@ core::Status BusView::Impl::join() {
   const auto subscribe = [&](const std::string& topic, const std::string& type, TopicQos qos, auto take) {
     return node->subscribe(topic, type, qos, [this, take](ReceivedMessage&& message) { (this->*take)(message); });
   };
-  const InputTopics& topics = settings.tracker.topics;
-  for (const BusTopic& topic : bus_topics(topics)) {
-    const bool is_of_frames = topic.name == topics.depth || topic.name == topics.color ||
-                              topic.name == topics.camera_info || topic.name == topics.tf ||
-                              topic.name == topics.tf_static ||
-                              (settings.tracker.assembler.robot && topic.name == topics.joint_states);
+  const auto is_input = [this](const std::string& name) {
+    return std::any_of(cameras.begin(), cameras.end(), [&](const CameraInput& camera) {
+      const InputTopics& topics = camera.topics;
+      return name == topics.depth || name == topics.color || name == topics.camera_info || name == topics.tf ||
+             name == topics.tf_static || (settings.tracker.assembler.robot && name == topics.joint_states);
+    });
+  };
+  for (const BusTopic& topic : topics_of_cameras(cameras)) {
+    const bool is_of_frames = is_input(topic.name);
     if (is_of_frames) PRESCENE_RETURN_IF_ERROR(subscribe(topic.name, topic.type, topic.read, &Impl::take_frame_part));
   }
   PRESCENE_RETURN_IF_ERROR(subscribe(kBeliefTopic, "std_msgs/msg/String", TopicQos::kState, &Impl::take_belief));
@@ -147,31 +153,13 @@ core::Status BusView::Impl::join() {
 }
 
 void BusView::Impl::take_frame_part(const ReceivedMessage& message) {
-  const InputTopics& topics = settings.tracker.topics;
-  const MessageIndex index = next_index++;
   // What is refused here the service refuses too, and says why.
-  const auto add = [&](auto decoded, const auto& to) {
-    if (decoded) static_cast<void>(to(*std::move(decoded)));
-  };
-  using interfaces::decode_cdr;
-  if (message.topic == topics.depth) {
-    add(decode_depth(message, assembler.image_rules()),
-        [&](DepthMessage image) { return assembler.add_depth(std::move(image), index, message.received_ns); });
-  } else if (message.topic == topics.color) {
-    add(decode_color_message(message),
-        [&](ColorMessage image) { return assembler.add_color(std::move(image), index, message.received_ns); });
-  } else if (message.topic == topics.camera_info) {
-    add(decode_cdr<interfaces::RosCameraInfo>(message.cdr, interfaces::kSmallMessage),
-        [&](const auto& info) { return assembler.add_camera_info(info, index); });
-  } else if (message.topic == topics.joint_states) {
-    add(decode_cdr<interfaces::RosJointState>(message.cdr, interfaces::kSmallMessage),
-        [&](const auto& joints) { return assembler.add_joint_state(joints, index); });
-  } else {
-    add(decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage),
-        [&](const auto& tf) { return assembler.add_tf(tf, index, message.topic == topics.tf_static); });
+  static_cast<void>(frames.take_in(message, next_index++, message.received_ns));
+  while (auto frame = frames.take(message.received_ns)) {
+    observation = std::move(frame->observation);
+    if (cameras.size() > 1) view->note_frame(observation);
   }
-  if (auto frame = assembler.take(message.received_ns)) observation = std::move(frame->observation);
-  static_cast<void>(assembler.take_skipped());
+  static_cast<void>(frames.take_skipped());
 }
 
 void BusView::Impl::take_markers(const ReceivedMessage& message) {

@@ -67,16 +67,15 @@ ordered_json status_document(StatusLevel level, const std::string& text) {
       .take();
 }
 
-interfaces::RosTfMessage tf_of(const ShownStep& step, const BeliefSummary& summary, const std::string& world_frame) {
-  interfaces::RosTfMessage tf;
-  const auto add = [&](const std::string& child, const geometry::Pose& X_WF) {
-    tf.transforms.push_back(
-        interfaces::to_ros_transform(interfaces::FrameTransform{world_frame, child, summary.stamp_ns, X_WF}));
-  };
-  add(kCameraFrame, step.observation.X_WC);
-  for (const ObjectSummary& object : summary.objects)
-    if (object.state != belief::TrackState::kLost) add("prescene/" + object.name, object.X_WO);
-  return tf;
+std::string camera_frame(std::size_t camera, const std::vector<std::string>& names) {
+  return camera == 0 ? kCameraFrame : "prescene_camera_" + names.at(camera);
+}
+
+/// Of that camera, the newest frame; null where it has given none.
+const belief::Observation* frame_of(const ShownStep& step, std::size_t camera) {
+  if (step.frames.empty()) return camera == 0 ? &step.observation : nullptr;
+  const auto found = step.frames.find(static_cast<int>(camera));
+  return found == step.frames.end() ? nullptr : &found->second;
 }
 
 bool is_u32(const ordered_json& number) {
@@ -94,10 +93,28 @@ bool FoxgloveServer::speaks(const std::string& subprotocol) {
   return std::find(subprotocols().begin(), subprotocols().end(), subprotocol) != subprotocols().end();
 }
 
-ordered_json FoxgloveServer::channel_list() {
+std::uint32_t FoxgloveServer::channels() const {
+  return kChannels + 2 * static_cast<std::uint32_t>(cameras_.empty() ? 0 : cameras_.size() - 1);
+}
+
+interfaces::RosTfMessage FoxgloveServer::tf_of(const ShownStep& step, const BeliefSummary& summary,
+                                               const std::string& world_frame) const {
+  interfaces::RosTfMessage tf;
+  const auto add = [&](const std::string& child, const geometry::Pose& X_WF) {
+    tf.transforms.push_back(
+        interfaces::to_ros_transform(interfaces::FrameTransform{world_frame, child, summary.stamp_ns, X_WF}));
+  };
+  for (std::size_t i = 0; i < std::max<std::size_t>(1, cameras_.size()); ++i)
+    if (const belief::Observation* frame = frame_of(step, i)) add(camera_frame(i, cameras_), frame->X_WC);
+  for (const ObjectSummary& object : summary.objects)
+    if (object.state != belief::TrackState::kLost) add("prescene/" + object.name, object.X_WO);
+  return tf;
+}
+
+ordered_json FoxgloveServer::channel_list() const {
   ordered_json channels = ordered_json::array();
-  const auto add = [&](Channel channel, const std::string& topic, const char* encoding, const std::string& schema_name,
-                       const char* schema_encoding, const std::string& schema) {
+  const auto add = [&](std::uint32_t channel, const std::string& topic, const char* encoding,
+                       const std::string& schema_name, const char* schema_encoding, const std::string& schema) {
     channels.push_back(JsonFields()
                            .count("id", channel)
                            .text("topic", topic)
@@ -107,15 +124,20 @@ ordered_json FoxgloveServer::channel_list() {
                            .text("schemaEncoding", schema_encoding)
                            .take());
   };
-  const auto add_ros = [&](Channel channel, const std::string& topic, const interfaces::RosType& type) {
+  const auto add_ros = [&](std::uint32_t channel, const std::string& topic, const interfaces::RosType& type) {
     add(channel, topic, "cdr", std::string(type.name), "ros2msg", interfaces::ros2msg_schema(type));
   };
   add(kBelief, kBeliefTopic, "json", "prescene.Belief", "jsonschema", kBeliefSchema);
   add_ros(kMarkers, kMarkersTopic, interfaces::ros_type<interfaces::RosMarkerArray>());
   add_ros(kTf, "/tf", interfaces::ros_type<interfaces::RosTfMessage>());
   add_ros(kDetections, kDetectionsTopic, interfaces::ros_type<interfaces::RosDetection3dArray>());
-  add_ros(kPicture, "/prescene/camera/image/compressed", interfaces::ros_type<interfaces::RosCompressedImage>());
-  add_ros(kCameraInfo, "/prescene/camera/camera_info", interfaces::ros_type<interfaces::RosCameraInfo>());
+  const auto add_camera = [&](std::uint32_t channel, const std::string& topics) {
+    add_ros(channel, topics + "/image/compressed", interfaces::ros_type<interfaces::RosCompressedImage>());
+    add_ros(channel + 1, topics + "/camera_info", interfaces::ros_type<interfaces::RosCameraInfo>());
+  };
+  add_camera(kPicture, "/prescene/camera");
+  for (std::uint32_t i = 1; i < cameras_.size(); ++i)
+    add_camera(kChannels + 2 * (i - 1), "/prescene/camera_" + cameras_[i]);
   return channels;
 }
 
@@ -159,13 +181,13 @@ void FoxgloveServer::subscribe(WebClient client, const ordered_json& request, co
     auto& known = subscriptions_[client];
     for (const ordered_json& one : *wanted) {
       const bool good = one.is_object() && one.contains("id") && is_u32(one["id"]) && one.contains("channelId") &&
-                        is_u32(one["channelId"]) && one["channelId"].get<std::uint32_t>() < kChannels;
+                        is_u32(one["channelId"]) && one["channelId"].get<std::uint32_t>() < channels();
       if (!good) {
         problem = "subscribe: not {\"id\", \"channelId\"} of a channel that is advertised";
       } else if (known.size() >= kMostSubscriptions) {
         problem = "subscribe: no more than " + std::to_string(kMostSubscriptions) + " subscriptions";
       } else {
-        known[one["id"].get<std::uint32_t>()] = static_cast<Channel>(one["channelId"].get<std::uint32_t>());
+        known[one["id"].get<std::uint32_t>()] = one["channelId"].get<std::uint32_t>();
       }
     }
   }
@@ -181,10 +203,9 @@ void FoxgloveServer::unsubscribe(WebClient client, const ordered_json& request) 
     if (is_u32(id)) known.erase(id.get<std::uint32_t>());
 }
 
-std::string FoxgloveServer::payload_of(Channel channel, const ShownStep& step, const BeliefSummary& summary,
+std::string FoxgloveServer::payload_of(std::uint32_t channel, const ShownStep& step, const BeliefSummary& summary,
                                        const std::string& world_frame) {
   const belief::Scene& scene = *step.belief->scene;
-  const interfaces::RosHeader camera_header{interfaces::to_ros_time(summary.stamp_ns), kCameraFrame};
   switch (channel) {
     case kBelief:
       return belief::json_text(to_json(summary));
@@ -198,32 +219,38 @@ std::string FoxgloveServer::payload_of(Channel channel, const ShownStep& step, c
       return cdr_text(tf_of(step, summary, world_frame));
     case kDetections:
       return cdr_text(detections_of(summary, scene, world_frame));
-    case kPicture: {
-      // Whole: the camera info is of this size.
-      const std::string jpeg = picture_jpeg(step.observation, step.observation.frame.camera.width, kPictureQuality);
-      return cdr_text(interfaces::RosCompressedImage{camera_header, "jpeg", {jpeg.begin(), jpeg.end()}});
-    }
-    case kCameraInfo:
-      return cdr_text(interfaces::to_ros_camera_info(step.observation.frame.camera, camera_header));
-    case kChannels:
+    default:
       break;
   }
-  return "";
+  const bool is_first = channel < kChannels;
+  const std::uint32_t part = is_first ? channel - kPicture : (channel - kChannels) % 2;
+  const std::size_t camera = is_first ? 0 : 1 + (channel - kChannels) / 2;
+  const belief::Observation* frame = frame_of(step, camera);
+  if (frame == nullptr || (!step.frames.empty() && sent_ns_[channel] == frame->stamp_ns)) return "";
+  sent_ns_[channel] = frame->stamp_ns;
+  const interfaces::RosHeader header{interfaces::to_ros_time(step.frames.empty() ? summary.stamp_ns : frame->stamp_ns),
+                                     camera_frame(camera, cameras_)};
+  if (part != 0) return cdr_text(interfaces::to_ros_camera_info(frame->frame.camera, header));
+  // Whole: the camera info is of this size.
+  const std::string jpeg = picture_jpeg(*frame, frame->frame.camera.width, kPictureQuality);
+  return cdr_text(interfaces::RosCompressedImage{header, "jpeg", {jpeg.begin(), jpeg.end()}});
 }
 
 void FoxgloveServer::publish(const ShownStep& step, const BeliefSummary& summary, const std::string& world_frame,
                              const Send& send) {
-  std::vector<std::pair<WebClient, std::map<std::uint32_t, Channel>>> wanted;
+  std::vector<std::pair<WebClient, std::map<std::uint32_t, std::uint32_t>>> wanted;
   {
     const std::lock_guard lock(mutex_);
     wanted.assign(subscriptions_.begin(), subscriptions_.end());
   }
-  std::array<std::string, kChannels> payloads;
+  std::map<std::uint32_t, std::string> payloads;  // "" = nothing new
   const core::TimeNs now_ns = core::wall_now_ns();
   for (const auto& [client, subscriptions] : wanted) {
     for (const auto& [id, channel] : subscriptions) {
-      std::string& payload = payloads.at(channel);
-      if (payload.empty()) payload = payload_of(channel, step, summary, world_frame);
+      const auto [known, is_new] = payloads.try_emplace(channel);
+      std::string& payload = known->second;
+      if (is_new) payload = payload_of(channel, step, summary, world_frame);
+      if (payload.empty()) continue;
       std::string message(1, static_cast<char>(kMessageData));
       for (unsigned shift = 0; shift < 32; shift += 8) message += static_cast<char>((id >> shift) & 0xffU);
       for (unsigned shift = 0; shift < 64; shift += 8)

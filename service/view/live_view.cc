@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "json_fields.h"
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/view/view_history.h"
 #include "question_ids.h"
 
@@ -42,12 +44,14 @@ struct LiveView::Impl {
   std::mutex mutex;  // guards what is handed over
   std::condition_variable changed;
   std::optional<ShownStep> waiting;
+  std::map<int, belief::Observation> frames;  // of several cameras the newest of each
   std::string health;
   bool health_changed = false;
   bool stop = false;
 
   std::mutex shown_mutex;  // guards what a page that opens is given
-  interfaces::WebMessagePtr scene, step, picture;
+  interfaces::WebMessagePtr scene, step;
+  std::map<int, interfaces::WebMessagePtr> pictures;  // by camera
   ViewHistory history;
   std::vector<interfaces::WebMessagePtr> strips;
 
@@ -55,12 +59,21 @@ struct LiveView::Impl {
   std::uint64_t next_index = 0;
   std::shared_ptr<const belief::Scene> last_scene;
   std::uint64_t scene_hash = 0, revision = 0;
-  Pace picture_pace{kPicturesPerSecond}, strip_pace{kStripsPerSecond}, idle_pace{kIdlePerSecond};
+  struct Pictured {
+    Pace pace{kPicturesPerSecond};
+    std::optional<core::TimeNs> stamp_ns;  // of the frame whose picture was made last
+  };
+  std::map<int, Pictured> pictured;  // by camera
+  PicturedFrames stripped;
+  Pace strip_pace{kStripsPerSecond}, idle_pace{kIdlePerSecond};
   std::thread thread;
 
+  /// Of the newest frames; with the lock.
+  void note(const belief::Scene& of, const belief::Observation& observation);
   void work();
   void show(const ShownStep& shown);
-  void show_picture(const ShownStep& shown, std::uint64_t index, bool watched);
+  void show_strip(const ShownStep& shown, std::uint64_t index);
+  void show_picture(const belief::Observation& frame, std::uint64_t index, bool watched);
   void open(WebClient client);
   void take(WebClient client, const std::string& op, const ordered_json& request);
 
@@ -79,6 +92,9 @@ core::Result<std::unique_ptr<LiveView>> LiveView::create(std::shared_ptr<const b
                                                          const ViewOptions& options, const core::LogSink& log) {
   auto impl = std::make_unique<Impl>();
   Impl* raw = impl.get();
+  ViewOptions of_scene = options;
+  for (int i = 0; !scene->more_cameras.empty() && i < belief::camera_count(*scene); ++i)
+    of_scene.cameras.push_back(belief::camera_at(*scene, i)->name);
   impl->scene = view_text(scene_document(*scene), WebDelivery::kEach);
   impl->scene_hash = scene_shape_hash(*scene);
   impl->last_scene = std::move(scene);
@@ -87,7 +103,7 @@ core::Result<std::unique_ptr<LiveView>> LiveView::create(std::shared_ptr<const b
   handlers.on_request = [raw](WebClient client, const std::string& op, const ordered_json& request) {
     raw->take(client, op, request);
   };
-  PRESCENE_TRY(auto server, ViewServer::create(options, true, std::move(handlers), log));
+  PRESCENE_TRY(auto server, ViewServer::create(of_scene, true, std::move(handlers), log));
   {
     const std::lock_guard lock(raw->shown_mutex);  // a page may be opening already
     impl->server = std::move(server);
@@ -111,9 +127,15 @@ void LiveView::set_asker(std::function<void(std::string)> asker) {
 void LiveView::show(ShownStep step) {
   {
     const std::lock_guard lock(impl_->mutex);
+    impl_->note(*step.belief->scene, step.observation);
     impl_->waiting = std::move(step);
   }
   impl_->changed.notify_one();
+}
+
+void LiveView::note_frame(const belief::Observation& observation) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->frames[observation.camera] = observation;
 }
 
 void LiveView::set_health(const std::string& text) {
@@ -137,7 +159,7 @@ void LiveView::Impl::open(WebClient client) {
   server->send(client, view_text(to_json(history), WebDelivery::kEach));
   for (const auto& strip : strips) server->send(client, strip);
   if (step) server->send(client, step);
-  if (picture) server->send(client, picture);
+  for (const auto& [camera, picture] : pictures) server->send(client, picture);
 }
 
 void LiveView::Impl::take(WebClient client, const std::string& op, const ordered_json& request) {
@@ -160,6 +182,7 @@ void LiveView::Impl::work() {
       changed.wait(lock, [&] { return stop || waiting || health_changed; });
       if (stop) return;
       shown = std::exchange(waiting, std::nullopt);
+      if (shown) shown->frames = frames;
       if (std::exchange(health_changed, false)) health_text = health;
     }
     try {
@@ -208,25 +231,36 @@ void LiveView::Impl::show(const ShownStep& shown) {
     const std::lock_guard lock(shown_mutex);
     step = std::move(message);
   }
-  show_picture(shown, index, watched);
+  show_strip(shown, index);
+  if (shown.frames.empty()) show_picture(shown.observation, index, watched);
+  for (const auto& [camera, frame] : shown.frames)
+    if (pictured[camera].stamp_ns != frame.stamp_ns) show_picture(frame, index, watched);
 }
 
-void LiveView::Impl::show_picture(const ShownStep& shown, std::uint64_t index, bool watched) {
-  if (strip_pace.due()) {
-    const std::string jpeg = picture_jpeg(shown.observation, kStripWidth, kStripQuality);
-    auto message = view_picture(ViewPictureKind::kStrip, index, jpeg, WebDelivery::kEach);
-    server->send_to_all(message);
-    const std::lock_guard lock(shown_mutex);
-    strips.push_back(std::move(message));
-    if (strips.size() > kMostLiveStrips) strips.erase(strips.begin());
-  }
-  if (watched && !picture_pace.due()) return;
-  const std::string jpeg = picture_jpeg(shown.observation, kPictureWidth, kPictureQuality);
-  if (jpeg.empty()) return;
-  auto message = view_picture(ViewPictureKind::kFrame, index, jpeg, WebDelivery::kNewest);
+void LiveView::Impl::note(const belief::Scene& of, const belief::Observation& observation) {
+  if (!of.more_cameras.empty()) frames[observation.camera] = observation;
+}
+
+void LiveView::Impl::show_strip(const ShownStep& shown, std::uint64_t index) {
+  if (!stripped.has(shown.observation) || !strip_pace.due()) return;
+  const std::string jpeg = picture_jpeg(shown.observation, kStripWidth, kStripQuality);
+  auto message = view_picture(ViewPictureKind::kStrip, index, jpeg, WebDelivery::kEach, shown.observation.camera);
   server->send_to_all(message);
   const std::lock_guard lock(shown_mutex);
-  picture = std::move(message);
+  strips.push_back(std::move(message));
+  if (strips.size() > kMostLiveStrips) strips.erase(strips.begin());
+}
+
+void LiveView::Impl::show_picture(const belief::Observation& frame, std::uint64_t index, bool watched) {
+  Pictured& of_camera = pictured[frame.camera];
+  if (watched && !of_camera.pace.due()) return;
+  of_camera.stamp_ns = frame.stamp_ns;
+  const std::string jpeg = picture_jpeg(frame, kPictureWidth, kPictureQuality);
+  if (jpeg.empty()) return;
+  auto message = view_picture(ViewPictureKind::kFrame, index, jpeg, WebDelivery::kNewest, frame.camera);
+  server->send_to_all(message);
+  const std::lock_guard lock(shown_mutex);
+  pictures[frame.camera] = std::move(message);
 }
 
 }  // namespace prescene::service

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/recording_view.h"
-#include "prescene/service/tracking/camera_frames.h"
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
 #include "prescene/service/live/query_worker.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/view/step_store.h"
 #include "prescene/service/view/view_history.h"
 #include "recording_answers.h"
@@ -37,8 +39,9 @@ struct RecordingView::Impl {
   ViewHistory history;
   std::uint64_t revision = 0;
   ordered_json new_rows = ordered_json::array();
+  std::vector<int> cameras;  // whose frame each step is of
   struct Strip {
-    std::uint64_t index;
+    std::uint64_t number;  // of the frames that strips are made of
     WebMessagePtr message;
   };
   std::vector<Strip> strips;
@@ -52,6 +55,9 @@ struct RecordingView::Impl {
   std::shared_ptr<const belief::Scene> last_scene;
   std::uint64_t scene_hash = 0;
   Pace extent_pace{kExtentsPerSecond};
+  PicturedFrames stripped;
+  std::uint64_t strip_frames = 0;
+  std::map<int, belief::Observation> frames;  // of several cameras the newest of each
 
   std::unique_ptr<RecordingAnswers> answers;
   std::unique_ptr<ViewServer> server;
@@ -64,7 +70,9 @@ struct RecordingView::Impl {
   void open(WebClient client);
   void take(WebClient client, const std::string& op, const ordered_json& request);
   void ask(WebClient client, const ordered_json& request);
-  void show(WebClient client, std::uint64_t index);
+  void show(WebClient client, std::uint64_t index, int camera);
+  /// The step at or before this one whose frame is of the camera.
+  std::uint64_t step_of(std::uint64_t index, int camera);
   core::Status add(const ShownStep& step);
   void add_strip(const ShownStep& step, std::uint64_t index);
   void send_new_scene(const ShownStep& step);
@@ -105,8 +113,7 @@ int RecordingView::port() const { return impl_->server->port(); }
 interfaces::WebCounts RecordingView::counts() const { return impl_->server->counts(); }
 
 StepSink RecordingView::step_sink() {
-  return [this, pictured = PicturedFrames()](const TrackerStep& step, const Tracker& tracker) mutable {
-    if (!pictured.has(step.observation)) return core::ok_status();
+  return [this](const TrackerStep& step, const Tracker& tracker) {
     return add({tracker.belief(), step.observation, step.record.seconds, step.record.degraded});
   };
 }
@@ -156,16 +163,35 @@ void RecordingView::Impl::open(WebClient client) {
 void RecordingView::Impl::take(WebClient client, const std::string& op, const ordered_json& request) {
   if (op == "ask") return ask(client, request);
   const auto index = request.find("index");
-  if (op == "show" && index != request.end() && index->is_number_unsigned()) show(client, index->get<std::uint64_t>());
+  const auto camera = request.find("camera");
+  const bool has_camera =
+      camera != request.end() && camera->is_number_unsigned() && camera->get<std::uint64_t>() < belief::kMostCameras;
+  if (op == "show" && index != request.end() && index->is_number_unsigned())
+    show(client, index->get<std::uint64_t>(), has_camera ? static_cast<int>(camera->get<std::uint64_t>()) : 0);
 }
 
-void RecordingView::Impl::show(WebClient client, std::uint64_t index) {
+std::uint64_t RecordingView::Impl::step_of(std::uint64_t index, int camera) {
+  const std::lock_guard lock(mutex);
+  for (std::uint64_t i = std::min<std::uint64_t>(index + 1, cameras.size()); i-- > 0;)
+    if (cameras[i] == camera) return i;
+  return index;
+}
+
+void RecordingView::Impl::show(WebClient client, std::uint64_t index, int camera) {
   const auto entry = store->read(index);
   if (!entry) return;
   using interfaces::make_web_message;
+  const std::uint64_t of_camera = step_of(index, camera);
+  const auto other = of_camera == index ? entry : store->read(of_camera);
   // The step is last: when it is there, the page has all of it and may ask for the next.
-  if (!entry->picture.empty())
-    server->send(client, view_picture(ViewPictureKind::kFrame, index, entry->picture, WebDelivery::kEach));
+  if (other && !other->picture.empty()) {
+    int shown = camera;
+    {
+      const std::lock_guard lock(mutex);
+      if (of_camera < cameras.size()) shown = cameras[of_camera];
+    }
+    server->send(client, view_picture(ViewPictureKind::kFrame, index, other->picture, WebDelivery::kEach, shown));
+  }
   server->send(client, make_web_message(interfaces::WebSocketKind::kText, entry->text, WebDelivery::kEach));
 }
 
@@ -185,7 +211,11 @@ void RecordingView::Impl::ask(WebClient client, const ordered_json& request) {
   answers->ask(asked, *std::move(question), std::move(belief));
 }
 
-core::Status RecordingView::Impl::add(const ShownStep& step) {
+core::Status RecordingView::Impl::add(const ShownStep& given) {
+  ShownStep step = given;
+  const int camera = step.observation.camera;
+  if (!step.belief->scene->more_cameras.empty()) frames[camera] = step.observation;
+  step.frames = frames;
   const BeliefSummary summary = summary_of(step);
   const std::uint64_t index = store->size();
   send_new_scene(step);
@@ -195,6 +225,7 @@ core::Status RecordingView::Impl::add(const ShownStep& step) {
     if (history.add(summary, index)) new_rows.push_back(to_json(history.rows().back()));
     document["time"] = history.seconds_of(summary.stamp_ns);
     beliefs.add(index, step.belief);
+    cameras.push_back(camera);
   }
   PRESCENE_RETURN_IF_ERROR(
       store->add(belief::json_text(document), picture_jpeg(step.observation, kPictureWidth, kPictureQuality)));
@@ -204,15 +235,17 @@ core::Status RecordingView::Impl::add(const ShownStep& step) {
 }
 
 void RecordingView::Impl::add_strip(const ShownStep& step, std::uint64_t index) {
-  if (index % strip_stride != 0) return;
+  if (!stripped.has(step.observation)) return;
+  const std::uint64_t number = strip_frames++;
+  if (number % strip_stride != 0) return;
   const std::string jpeg = picture_jpeg(step.observation, kStripWidth, kStripQuality);
-  auto message = view_picture(ViewPictureKind::kStrip, index, jpeg, WebDelivery::kEach);
+  auto message = view_picture(ViewPictureKind::kStrip, index, jpeg, WebDelivery::kEach, step.observation.camera);
   server->send_to_all(message);
   const std::lock_guard lock(mutex);
-  strips.push_back({index, std::move(message)});
+  strips.push_back({number, std::move(message)});
   if (strips.size() <= kMostStrips) return;
   strip_stride *= 2;
-  std::erase_if(strips, [this](const Strip& strip) { return strip.index % strip_stride != 0; });
+  std::erase_if(strips, [this](const Strip& strip) { return strip.number % strip_stride != 0; });
 }
 
 void RecordingView::Impl::send_new_scene(const ShownStep& step) {

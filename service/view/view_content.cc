@@ -156,6 +156,19 @@ ordered_json object_document(const ObjectSummary& summary, const belief::ObjectB
   return document.take();
 }
 
+ordered_json camera_document(const belief::Observation& observation) {
+  const geometry::PinholeCamera& camera = observation.frame.camera;
+  return JsonFields()
+      .field("pose", pose_numbers(observation.X_WC))
+      .count("width", static_cast<std::uint64_t>(camera.width))
+      .count("height", static_cast<std::uint64_t>(camera.height))
+      .number("fx", camera.fx)
+      .number("fy", camera.fy)
+      .number("cx", camera.cx)
+      .number("cy", camera.cy)
+      .take();
+}
+
 geometry::ColorImage reduced(const geometry::ColorImage& image, int factor) {
   geometry::ColorImage small(image.width() / factor, image.height() / factor);
   for (int y = 0; y < small.height(); ++y) {
@@ -187,9 +200,13 @@ ordered_json scene_document(const belief::Scene& scene) {
     supports.push_back(body_document(support.name, support.color, seen_mesh(support), support.X_WS));
   for (const belief::KinematicBody& body : scene.robot)
     robot.push_back(body_document(body.name, body.color, seen_mesh(body), belief::pose_at(body, 0.0)));
+  std::vector<std::string> cameras;
+  for (int i = 0; !scene.more_cameras.empty() && i < belief::camera_count(scene); ++i)
+    cameras.push_back(belief::camera_at(scene, i)->name);
   return JsonFields()
       .text("op", "scene")
       .text("name", scene.name)
+      .texts("cameras", cameras)
       .numbers("gravity", {g.x(), g.y(), g.z()})
       .field("models", std::move(models))
       .field("objects", std::move(objects))
@@ -225,27 +242,24 @@ ordered_json step_document(const ShownStep& step, const BeliefSummary& summary, 
   ordered_json robot = ordered_json::array(), supports = ordered_json::array();
   for (const geometry::Pose& X_WG : belief.robot) robot.push_back(pose_numbers(X_WG));
   for (const belief::Support& support : belief.scene->supports) supports.push_back(pose_numbers(support.X_WS));
-  const geometry::PinholeCamera& camera = step.observation.frame.camera;
-  return JsonFields()
-      .text("op", "step")
+  ordered_json cameras = ordered_json::array();
+  for (int i = 0; !step.frames.empty() && i <= step.frames.rbegin()->first; ++i) {
+    const auto frame = step.frames.find(i);
+    cameras.push_back(frame == step.frames.end() ? ordered_json() : camera_document(frame->second));
+  }
+  JsonFields document;
+  document.text("op", "step")
       .count("index", index)
       .count("step", belief.step)
       .field("stamp_ns", ordered_json(belief.stamp_ns))
       .field("objects", std::move(objects))
-      .field("camera", JsonFields()
-                           .field("pose", pose_numbers(step.observation.X_WC))
-                           .count("width", static_cast<std::uint64_t>(camera.width))
-                           .count("height", static_cast<std::uint64_t>(camera.height))
-                           .number("fx", camera.fx)
-                           .number("fy", camera.fy)
-                           .number("cx", camera.cx)
-                           .number("cy", camera.cy)
-                           .take())
+      .field("camera", camera_document(step.observation))
       .field("robot", std::move(robot))
       .field("supports", std::move(supports))
       .number("seconds", rounded(step.seconds, 1e5))
-      .texts("degraded", step.degraded)
-      .take();
+      .texts("degraded", step.degraded);
+  if (!cameras.empty()) document.field("cameras", std::move(cameras));
+  return document.take();
 }
 
 std::string picture_jpeg(const belief::Observation& observation, int most_width, int quality) {

@@ -28,9 +28,10 @@ interfaces::WebMessagePtr view_text(const nlohmann::ordered_json& document, inte
 }
 
 interfaces::WebMessagePtr view_picture(ViewPictureKind kind, std::uint64_t index, std::string_view jpeg,
-                                       interfaces::WebDelivery delivery) {
+                                       interfaces::WebDelivery delivery, int camera) {
   std::string payload(1, static_cast<char>(kind));
-  payload.append(7, '\0');
+  payload.push_back(static_cast<char>(camera));
+  payload.append(6, '\0');
   put_u64(index, payload);
   payload.append(jpeg);
   return interfaces::make_web_message(interfaces::WebSocketKind::kBinary, payload, delivery);
@@ -53,7 +54,7 @@ core::Result<std::unique_ptr<ViewServer>> ViewServer::create(const ViewOptions& 
   view->handlers_ = std::move(handlers);
   view->world_frame_ = options.world_frame;
   if (foxglove) {
-    view->foxglove_ = std::make_unique<FoxgloveServer>();
+    view->foxglove_ = std::make_unique<FoxgloveServer>(options.cameras);
     const auto& names = FoxgloveServer::subprotocols();
     web.subprotocols.insert(web.subprotocols.end(), names.begin(), names.end());
   }

@@ -263,8 +263,10 @@ export class SpaceView {
     this.painter.drawPaint(this.painter.gl.LINES, numbers, clip);
   }
   drawCamera(step, clip, dark) {
-    const { pose, width, height, fx, fy, cx, cy } = step.camera, m = poseMatrix(pose), reach = 0.12;
-    if (!width) return;
+    for (const camera of step.cameras ?? [step.camera]) if (camera && camera.width) this.drawOneCamera(camera, clip, dark);
+  }
+  drawOneCamera({ pose, width, height, fx, fy, cx, cy }, clip, dark) {
+    const m = poseMatrix(pose), reach = 0.12;
     const corner = (u, v) => transform(m, [(u - cx) / fx * reach, (v - cy) / fy * reach, reach]).slice(0, 3);
     const eye = pose.slice(0, 3), c = [corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)];
     const color = shade(dark ? [200, 205, 215] : [70, 76, 88], 0.9), numbers = [];

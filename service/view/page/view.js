@@ -9,6 +9,7 @@ const $ = (id) => document.getElementById(id);
 const page = {
   mode: 'live', scene: null, step: null, steps: 0, done: true, selected: null, ghosts: true, overlay: true, shownAnswer: null,
   playing: false, following: true, waitingFor: null, wanted: null, colors: new Map(), indexes: new Map(), strips: new Map(),
+  cameras: [], camera: 0, pictures: new Map(),  // of several cameras: their names, which is shown, and the newest picture of each
 };
 let socket = null, nextNumber = 1, retry = 500, drawing = false;
 const asked = new Map();  // number -> {text, element, answer}
@@ -57,6 +58,7 @@ const receivers = {
   },
   scene(scene) {
     page.scene = scene;
+    setCameras(scene.cameras);
     if (page.mode === 'live') $('source').textContent = scene.name;
     space.setScene(scene);
     overlay.setScene(scene);
@@ -96,23 +98,53 @@ function take(message) {
 }
 
 async function takePicture(data) {
-  const view = new DataView(data), kind = view.getUint8(0), index = Number(view.getBigUint64(8, true));
+  const view = new DataView(data), kind = view.getUint8(0), camera = view.getUint8(1), index = Number(view.getBigUint64(8, true));
   if (kind === 1 && page.mode === 'live' && !page.playing && page.step) return;
   let picture;
   try { picture = await createImageBitmap(new Blob([new Uint8Array(data, 16)], { type: 'image/jpeg' })); } catch { return; }
   if (kind === 2) { page.strips.set(index, picture); if (page.strips.size > 140) page.strips.delete(page.strips.keys().next().value); drawStrip(); return; }
-  const { canvas } = photo;
+  page.pictures.set(camera, picture);
+  showPicture();
+}
+
+// The newest of the camera that is chosen.
+function showPicture() {
+  const picture = page.pictures.get(page.camera), { canvas } = photo;
+  $('photo-hint').hidden = !!picture;
+  canvas.hidden = !picture;
+  if (!picture) return redraw();
   if (canvas.width !== picture.width || canvas.height !== picture.height) { canvas.width = picture.width; canvas.height = picture.height; }
   photo.drawImage(picture, 0, 0);
   page.pictureSize = [picture.width, picture.height];
-  $('photo-hint').hidden = true;
   redraw();
+}
+
+// --- cameras
+
+function setCameras(names) {
+  if (names.join('\n') === page.cameras.join('\n')) return;
+  page.cameras = names;
+  $('which').replaceChildren(...names.map((name, i) => make('option', { value: i, textContent: name })));
+  $('which').hidden = names.length < 2;
+  setCamera(0);
+}
+function setCamera(camera) {
+  page.camera = camera;
+  $('which').value = camera;
+  if (page.step) page.step = seenBy(page.step);
+  showPicture();
+  if (page.step && page.mode !== 'live') request(page.step.index);
+}
+// The step with the camera that is chosen as its camera; one that has given no frame yet has no width.
+function seenBy(step) {
+  if (!step.cameras) return step;
+  return { ...step, camera: step.cameras[page.camera] ?? { ...step.camera, width: 0 } };
 }
 
 // --- showing
 
 function showStep(step) {
-  page.step = step;
+  page.step = seenBy(step);
   step.objects.forEach((o) => {
     if (page.colors.has(o.name)) return;
     page.indexes.set(o.name, page.colors.size);
@@ -182,7 +214,7 @@ function request(index) {
   page.wanted = index;
   if (page.waitingFor !== null) return;
   page.waitingFor = index;
-  say({ op: 'show', index });
+  say({ op: 'show', index, camera: page.camera });
 }
 function seek(index) {
   if (page.mode === 'live') return;
@@ -275,6 +307,7 @@ $('overlay').onclick = () => toggle('overlay');
 $('frame').onclick = whole;
 $('theme').onclick = swapTheme;
 $('help').onclick = () => $('keys').showModal();
+$('which').onchange = () => setCamera(Number($('which').value));
 $('play').onclick = () => setPlaying(!page.playing);
 $('back').onclick = () => move(-1);
 $('on').onclick = () => move(1);
@@ -294,6 +327,7 @@ new ResizeObserver(() => { redraw(); drawStrip(); }).observe(document.querySelec
 const keys = {
   ' ': () => setPlaying(!page.playing), ArrowLeft: (e) => move(e.shiftKey ? -10 : -1), ArrowRight: (e) => move(e.shiftKey ? 10 : 1),
   Home: () => seek(0), End: () => seek(page.steps - 1), g: () => toggle('ghosts'), o: () => toggle('overlay'), f: whole, c: fromCamera,
+  v: () => { if (page.cameras.length > 1) setCamera((page.camera + 1) % page.cameras.length); },
   t: swapTheme, w: questions.where, s: questions.stays, r: questions.release, '?': () => $('keys').showModal(),
 };
 addEventListener('keydown', (e) => {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -21,12 +22,15 @@ struct ShownStep {
   double seconds = 0.0;  ///< Wall time that the step took.
   std::vector<std::string> degraded;
   std::shared_ptr<const BeliefSummary> summary = {};  ///< As published; null = that of `belief`.
+  /// Of several cameras the newest frame of each by its number, this step's among them; empty where there is one.
+  std::map<int, belief::Observation> frames = {};
 };
 BeliefSummary summary_of(const ShownStep& step);
 
-/// {"op": "scene", "name", "gravity", "models": [{"name", "color", "mesh"}], "objects": [{"name", "model"}],
-/// "supports": [{"name", "color", "mesh", "pose"}], "robot": the same}. A mesh is {"vertices": [x, y, z, ...],
-/// "triangles": [a, b, c, ...]}, of at most some thousand triangles; a pose [x, y, z, qw, qx, qy, qz].
+/// {"op": "scene", "name", "cameras": [name...] (of several), "gravity", "models": [{"name", "color", "mesh"}],
+/// "objects": [{"name", "model"}], "supports": [{"name", "color", "mesh", "pose"}], "robot": the same}. A mesh is
+/// {"vertices": [x, y, z, ...], "triangles": [a, b, c, ...]}, of at most some thousand triangles; a pose [x, y, z, qw,
+/// qx, qy, qz].
 nlohmann::ordered_json scene_document(const belief::Scene& scene);
 /// Equal for scenes whose documents differ in poses at most, which steps contain.
 std::uint64_t scene_shape_hash(const belief::Scene& scene);
@@ -35,7 +39,8 @@ std::uint64_t scene_shape_hash(const belief::Scene& scene);
 /// "spread" (m, standard deviation of the position), "speed", "visible_share", "parameters", "lessons", "ghosts":
 /// [pose...] (particles by weight, at most 24, without those near the mean), "region": [x, y, z, ...] (positions drawn
 /// from the belief, only where the object is not tracked)}], "camera": {"pose", "width", "height", "fx", "fy", "cx",
-/// "cy"}, "robot": [pose...], "supports": [pose...], "seconds", "degraded"}
+/// "cy"}, "cameras" (of several; the same by number, null where a camera has given no frame), "robot": [pose...],
+/// "supports": [pose...], "seconds", "degraded"}
 nlohmann::ordered_json step_document(const ShownStep& step, const BeliefSummary& summary, std::uint64_t index);
 
 /// The camera's picture as a JPEG of at most `most_width` pixels across, made smaller by a whole factor.

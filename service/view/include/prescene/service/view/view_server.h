@@ -27,21 +27,23 @@ struct ViewOptions {
   std::string token;                  ///< Empty: one is made up where the address needs it.
   std::vector<std::string> allowed_origins;
   std::string world_frame = "world";  ///< As messages of ROS name it.
+  std::vector<std::string> cameras;   ///< Names of several; empty = there is one.
 };
 
 class FoxgloveServer;
 struct BeliefSummary;
 struct ShownStep;
 
-/// First byte of a binary message to the page; seven bytes of 0, a little-endian index (u64) and a JPEG follow.
+/// First byte of a binary message to the page; the number of the camera (one byte), six bytes of 0, a little-endian
+/// index (u64) and a JPEG follow.
 enum class ViewPictureKind : std::uint8_t {
-  kFrame = 1,  ///< The camera's picture of the step with this index.
+  kFrame = 1,  ///< The camera's picture at the step with this index.
   kStrip = 2,  ///< A small one for the strip beside the timeline.
 };
 
 interfaces::WebMessagePtr view_text(const nlohmann::ordered_json& document, interfaces::WebDelivery delivery);
 interfaces::WebMessagePtr view_picture(ViewPictureKind kind, std::uint64_t index, std::string_view jpeg,
-                                       interfaces::WebDelivery delivery);
+                                       interfaces::WebDelivery delivery, int camera = 0);
 
 /// Called on the server's thread, with a document that is an object whose "op" is a text.
 struct ViewHandlers {
