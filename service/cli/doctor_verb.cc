@@ -53,13 +53,19 @@ core::Result<std::shared_ptr<const belief::Scene>> check_scene_file(const std::s
 
 std::string text_of(const Diagnosis& diagnosis) {
   std::string text;
+  std::size_t width = 18;
+  const auto name_of = [](const DoctorCheck& check) {
+    return (check.camera.empty() ? "" : check.camera + ": ") + check.name;
+  };
+  for (const DoctorCheck& check : diagnosis.checks)
+    if (!check.camera.empty()) width = std::max(width, std::min<std::size_t>(40, name_of(check).size()));
   for (const DoctorCheck& check : diagnosis.checks) {
-    std::string name = check.name;
-    name.resize(std::max<std::size_t>(name.size(), 18), ' ');
+    std::string name = name_of(check);
+    name.resize(std::max(name.size(), width), ' ');
     std::string status = to_string(check.status);
     status.resize(7, ' ');
     text += status + "  " + name + "  " + check.what + "\n";
-    if (!check.remedy.empty()) text += "         " + std::string(18, ' ') + "  -> " + check.remedy + "\n";
+    if (!check.remedy.empty()) text += "         " + std::string(width, ' ') + "  -> " + check.remedy + "\n";
   }
   std::vector<std::vector<std::string>> rows = {{"topic", "type", "writers", "readers", "rate"}};
   for (const ExaminedTopic& row : diagnosis.topics)
@@ -93,17 +99,15 @@ core::Status run(DoctorVerbOptions& options, VerbContext& context) {
     PRESCENE_TRY(scene, check_scene_file(options.scene, scene_check, context.log()));
     if (scene) {
       PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
-      take_first_camera(*scene, options.doctor.tracker);
-      if (!scene->more_cameras.empty())
-        core::log(context.log(), core::LogLevel::kInfo,
-                  "only the first of the scene's cameras is looked at, " + scene->camera->name);
       PRESCENE_TRY(const std::string text, read_scene_text(options.scene));
       PRESCENE_TRY(options.doctor.tracker.assembler.robot, load_robot(text, options.scene));
     }
   }
-  core::log(context.log(), core::LogLevel::kInfo,
-            "listening for " + core::fixed_text(options.doctor.seconds, 1) + " s in DDS domain " +
-                std::to_string(options.doctor.dds.domain) + ": " + topics_text(options.doctor.tracker.topics));
+  for (const CameraInput& camera : camera_inputs(options.doctor.tracker, scene ? *scene : belief::Scene()))
+    core::log(context.log(), core::LogLevel::kInfo,
+              "listening for " + core::fixed_text(options.doctor.seconds, 1) + " s in DDS domain " +
+                  std::to_string(options.doctor.dds.domain) + (camera.name.empty() ? "" : " to camera " + camera.name) +
+                  ": " + topics_text(camera.topics));
   Backends backends(context.pool());
   auto examined = examine_bus(options.doctor, scene, backends, context.cancellation(), context.progress("listening"),
                               context.log());

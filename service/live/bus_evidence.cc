@@ -31,8 +31,9 @@ std::optional<double> TopicEvidence::rate() const {
   return static_cast<double>(messages - 1) / core::seconds_of(last_ns - first_ns);
 }
 
-BusEvidence::BusEvidence(const TrackerSettings& settings, const belief::Scene* scene)
-    : settings_(settings),
+BusEvidence::BusEvidence(const TrackerSettings& settings, const belief::Scene* scene, std::string camera)
+    : camera_name_(std::move(camera)),
+      settings_(settings),
       robot_(scene == nullptr ? std::vector<std::string>() : robot_names(*scene)),
       assembler_(settled_assembler(settings), robot_, settings.tf),
       tf_(settings.tf),

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
+#include <utility>
 
 #include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
@@ -29,18 +31,38 @@ constexpr double kWidest = 150.0;
 
 class Checks {
  public:
-  explicit Checks(std::vector<DoctorCheck>& checks) : checks_(checks) {}
-  void ok(const std::string& name, const std::string& what) { checks_.push_back({name, CheckStatus::kOk, what, ""}); }
+  /// `camera`: that all of them are about. `error`: what a failure is; a warning where another camera is used.
+  explicit Checks(std::vector<DoctorCheck>& checks, std::string camera = "", CheckStatus error = CheckStatus::kError)
+      : checks_(checks), camera_(std::move(camera)), error_(error) {}
+  void ok(const std::string& name, const std::string& what) { add(name, CheckStatus::kOk, what, ""); }
   void warn(const std::string& name, const std::string& what, const std::string& remedy) {
-    checks_.push_back({name, CheckStatus::kWarning, what, remedy});
+    add(name, CheckStatus::kWarning, what, remedy);
   }
   void fail(const std::string& name, const std::string& what, const std::string& remedy) {
-    checks_.push_back({name, CheckStatus::kError, what, remedy});
+    add(name, error_, what, remedy);
   }
 
  private:
+  void add(const std::string& name, CheckStatus status, const std::string& what, const std::string& remedy) {
+    checks_.push_back({name, camera_, status, what, remedy});
+  }
   std::vector<DoctorCheck>& checks_;
+  std::string camera_;
+  CheckStatus error_;
 };
+
+/// What says so: the option, or the key of a camera that the scene file lists.
+std::string said_with(const BusEvidence& evidence, const std::string& option) {
+  if (evidence.camera_name().empty()) return option;
+  const std::string key = option == "--depth-topic"         ? "topics.depth"
+                          : option == "--color-topic"       ? "topics.color"
+                          : option == "--camera-info-topic" ? "topics.camera_info"
+                          : option == "--depth-form"        ? "topics.depth_form"
+                          : option == "--color-form"        ? "topics.color_form"
+                          : option == "--rectified"         ? "rectified"
+                                                            : "pose";
+  return "'" + key + "' of the camera in the scene file";
+}
 
 std::string counted_text(std::size_t number, const std::string& thing) {
   return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
@@ -103,14 +125,17 @@ void check_domain(const BusSurroundings& around, Checks& checks) {
     checks.ok(name, around.interfaces);
 }
 
-void check_buffer(const BusEvidence& evidence, const BusSurroundings& around, Checks& checks) {
+void check_buffer(std::span<const BusEvidence> cameras, const BusSurroundings& around, Checks& checks) {
   const std::string name = "receive buffer";
-  const InputTopics& topics = evidence.settings().topics;
   std::size_t frame_bytes = 0;
-  for (const auto& [topic, seen] : evidence.topics())
-    if (topic == topics.depth || topic == topics.color) frame_bytes += seen.largest_bytes;
-  const std::string frame =
-      frame_bytes == 0 ? "" : "; a frame of depth and colour has " + interfaces::size_text(frame_bytes);
+  for (const BusEvidence& evidence : cameras)
+    for (const auto& [topic, seen] : evidence.topics())
+      if (topic == evidence.settings().topics.depth || topic == evidence.settings().topics.color)
+        frame_bytes += seen.largest_bytes;
+  const std::string frame = frame_bytes == 0 ? ""
+                                             : std::string("; a frame of depth and colour") +
+                                                   (cameras.size() > 1 ? " of all cameras" : "") + " has " +
+                                                   interfaces::size_text(frame_bytes);
   // Two frames, as the second may arrive while the first is taken out.
   const std::size_t needed = std::max<std::size_t>(kLeastBuffer, 2 * frame_bytes);
   const std::string remedy =
@@ -140,15 +165,19 @@ void check_services(const BusSurroundings& around, Checks& checks) {
     checks.ok("other services", "none in this domain");
 }
 
-std::string remedy_for_type(const std::string& option, const std::string& type, bool is_image) {
-  std::string other_topic = "name a topic of that type with " + option;
+std::string remedy_for_type(const BusEvidence& evidence, const std::string& option, const std::string& type,
+                            bool is_image) {
+  std::string other_topic = "name a topic of that type with " + said_with(evidence, option);
   if (!is_image || !is_image_type(type)) return other_topic;
   const std::string form = type.ends_with("/Image")             ? "image"
                            : type.ends_with("/CompressedImage") ? "compressed"
                                                                 : "points";
   const bool is_depth = option == "--depth-topic";
   if (form == "points" && !is_depth) return other_topic;
-  return (is_depth ? "--depth-form " : "--color-form ") + form + ", or " + other_topic;
+  const std::string says_form = is_depth ? "--depth-form" : "--color-form";
+  if (!evidence.camera_name().empty())
+    return "give " + form + " with " + said_with(evidence, says_form) + ", or " + other_topic;
+  return says_form + " " + form + ", or " + other_topic;
 }
 
 /// Whether messages come and can be read; says why not.
@@ -172,7 +201,7 @@ bool check_topic(const std::string& name, const std::string& topic, const std::s
   }
   if (seen.refused > 0) {
     complain("all " + std::to_string(seen.messages) + " messages on " + topic + " were refused: " + seen.last_refusal,
-             "correct the sender as the text says, or name another topic with " + option);
+             "correct the sender as the text says, or name another topic with " + said_with(evidence, option));
     return false;
   }
   const std::string other = other_type_of(around, topic, type);
@@ -181,13 +210,17 @@ bool check_topic(const std::string& name, const std::string& topic, const std::s
              "look whether the camera runs (ros2 topic hz " + topic +
                  "); across machines, whether a firewall stops UDP, and the receive buffer");
   } else if (!other.empty()) {
-    complain(topic + " carries " + other + ", not " + type, remedy_for_type(option, other, is_image_type(type)));
+    complain(topic + " carries " + other + ", not " + type,
+             remedy_for_type(evidence, option, other, is_image_type(type)));
   } else if (topic == evidence.settings().topics.depth) {
-    complain(
-        nothing_came_text(evidence.settings().topics, around.topics, "in DDS domain " + std::to_string(around.domain)),
-        "name the camera's topics (--camera, " + option + "), or start its driver");
+    complain(nothing_came_text(evidence.settings().topics, around.topics,
+                               "in DDS domain " + std::to_string(around.domain), evidence.camera_name()),
+             evidence.camera_name().empty()
+                 ? "name the camera's topics (--camera, " + option + "), or start its driver"
+                 : "correct " + said_with(evidence, option) + ", or start the camera's driver");
   } else {
-    complain("nobody offers " + topic, "name the topic with " + option + ", or start what publishes it");
+    complain("nobody offers " + topic,
+             "name the topic with " + said_with(evidence, option) + ", or start what publishes it");
   }
   return false;
 }
@@ -243,14 +276,15 @@ void check_agreement(const BusEvidence& evidence, Checks& checks) {
   }
   if (camera && !info.frame_id.empty() && info.frame_id != depth.frame_id)
     warn("the depth image is of frame " + quote(depth.frame_id) + ", the camera info of " + quote(info.frame_id),
-         "name the camera info of the camera that depth is registered to (--camera-info-topic), or publish registered "
-         "depth");
+         "name the camera info of the camera that depth is registered to (" +
+             said_with(evidence, "--camera-info-topic") + "), or publish registered depth");
   if (!topics.color.empty()) {
     const TopicEvidence& color = evidence.topics().at(topics.color);
     if (color.messages > color.refused) {
       if (color.width != depth.width || color.height != depth.height)
         warn("depth has " + size_of(depth) + " pixels, colour " + size_of(color) + ": colour is not used",
-             "publish depth that is registered to colour, or leave colour out (--color-topic '')");
+             "publish depth that is registered to colour, or leave colour out (" +
+                 (evidence.camera_name().empty() ? "--color-topic ''" : said_with(evidence, "--color-topic")) + ")");
       else if (color.frame_id != depth.frame_id)
         warn("depth is of frame " + quote(depth.frame_id) + ", colour of " + quote(color.frame_id),
              "publish depth that is registered to colour");
@@ -262,7 +296,8 @@ void check_agreement(const BusEvidence& evidence, Checks& checks) {
     }
   }
   if (const std::string doubt = rectified_doubt(evidence.settings()); !doubt.empty() && agree)
-    warn(doubt, "say it with --rectified or --not-rectified");
+    warn(doubt, "say it with " + (evidence.camera_name().empty() ? "--rectified or --not-rectified"
+                                                                 : said_with(evidence, "--rectified")));
   if (agree && camera) checks.ok(name, "sizes, frames and stamps of depth, colour and camera info fit together");
 }
 
@@ -335,7 +370,8 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
   const InputTopics& topics = evidence.settings().topics;
   const std::string frame = evidence.camera_frame();
   const core::TimeNs stamp_ns = evidence.topics().at(topics.depth).stamp_ns;
-  const std::string pose_option = "--camera-pose x y z qw qx qy qz";
+  const bool is_listed = !evidence.camera_name().empty();
+  const std::string pose_option = is_listed ? said_with(evidence, "--camera-pose") : "--camera-pose x y z qw qx qy qz";
   const auto X_WC = frame.empty() ? core::Result<geometry::Pose>(core::not_found("the depth image names no frame"))
                                   : evidence.tf().lookup(settings.world_frame, frame, stamp_ns);
   std::string way;
@@ -350,6 +386,10 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
   if (X_WC) {
     checks.ok("tf to the camera",
               way + "; the camera is at " + pose_text(*X_WC) + " of " + quote(settings.world_frame));
+  } else if (is_listed && settings.X_WC && way.empty()) {
+    checks.warn("tf to the camera",
+                X_WC.status().message() + "; it is taken to be where the scene file says: " + pose_text(*settings.X_WC),
+                "publish the camera's pose in tf, from " + quote(settings.world_frame) + " to its frame");
   } else if (newest) {
     // Moving transforms may be ahead of or behind the last image.
     checks.ok("tf to the camera", (settings.X_WC && way.empty() ? "none, --camera-pose is used" : way) +
@@ -366,6 +406,14 @@ void check_tf(const BusEvidence& evidence, Checks& checks) {
                 "give the camera's pose with " +
                     pose_option);
   }
+}
+
+/// Of the robot, whichever camera sees it.
+void check_robot(const BusEvidence& evidence, Checks& checks) {
+  const AssemblerSettings& settings = evidence.settings().assembler;
+  const InputTopics& topics = evidence.settings().topics;
+  const core::TimeNs stamp_ns = evidence.topics().at(topics.depth).stamp_ns;
+  const auto& newest = evidence.newest();
   for (const std::string& topic : {topics.tf, topics.tf_static}) {
     const TopicEvidence& seen = evidence.topics().at(topic);
     if (seen.refused > 0)
@@ -465,15 +513,9 @@ void check_frames(const BusEvidence& evidence, Checks& checks) {
     checks.ok("frames", what);
 }
 
-}  // namespace
-
-std::vector<DoctorCheck> checks_of(const BusEvidence& evidence, const BusSurroundings& around) {
-  std::vector<DoctorCheck> list;
-  Checks checks(list);
+/// Everything about one camera; whether depth images of it come.
+bool check_one_camera(const BusEvidence& evidence, const BusSurroundings& around, Checks& checks) {
   const InputTopics& topics = evidence.settings().topics;
-  check_domain(around, checks);
-  check_services(around, checks);
-  check_simulated_time(evidence, around, checks);
   const bool has_depth =
       check_topic("depth image", topics.depth, depth_type(topics), true, "--depth-topic", evidence, around, checks);
   if (has_depth) check_image("depth image", topics.depth, depth_type(topics), evidence, around, checks);
@@ -490,14 +532,78 @@ std::vector<DoctorCheck> checks_of(const BusEvidence& evidence, const BusSurroun
     checks.ok("camera info", topics.camera_info + ": for " + size_of(seen) + " pixels, frame " + quote(seen.frame_id));
     check_camera(evidence, checks);
   }
-  if (has_depth) {
-    check_depth_values(evidence, checks);
-    check_agreement(evidence, checks);
-    check_clock(evidence, checks);
-    check_tf(evidence, checks);
-    check_frames(evidence, checks);
+  if (!has_depth) return false;
+  check_depth_values(evidence, checks);
+  check_agreement(evidence, checks);
+  check_clock(evidence, checks);
+  check_tf(evidence, checks);
+  return true;
+}
+
+/// Between several cameras: which are used, whether their clocks are one, and whether their frames are.
+void check_together(std::span<const BusEvidence> cameras, Checks& checks) {
+  std::string used, unused;
+  for (const BusEvidence& evidence : cameras) {
+    std::string& list = evidence.frames() > 0 ? used : unused;
+    list += (list.empty() ? "" : ", ") + evidence.camera_name();
   }
-  check_buffer(evidence, around, checks);
+  if (used.empty())
+    checks.fail("cameras", "no camera gives frames that can be used: " + unused, "mend what is reported above");
+  else if (!unused.empty())
+    checks.warn("cameras", "frames of " + used + " can be used, those of " + unused + " can't",
+                "mend what is reported above: only the others would be tracked by");
+  else
+    checks.ok("cameras", "frames of all can be used: " + used);
+
+  const BusEvidence* first = nullptr;
+  double earliest = 0.0, latest = 0.0;
+  const BusEvidence *oldest = nullptr, *newest = nullptr;
+  for (const BusEvidence& evidence : cameras) {
+    const auto& ages = evidence.topics().at(evidence.settings().topics.depth).ages;
+    if (ages.empty()) continue;
+    const double age = core::upper_median(ages);
+    if (first == nullptr || age < earliest) earliest = age, newest = &evidence;
+    if (first == nullptr || age > latest) latest = age, oldest = &evidence;
+    if (first == nullptr) first = &evidence;
+  }
+  if (first == nullptr || oldest == newest) return;
+  const double apart = latest - earliest;
+  const std::string what = "stamps of " + oldest->camera_name() + " are " + fixed_text(1e3 * apart, 0) +
+                           " ms behind those of " + newest->camera_name() + " (medians, when they came)";
+  if (apart > first->settings().assembler.max_wait_s)
+    checks.warn("clocks", what + ": frames of " + oldest->camera_name() + " would come too late and not be used",
+                "set the clocks of the cameras' computers by one (NTP, PTP), or let frames wait longer for each other "
+                "(ros2 param set /prescene max_wait)");
+  else
+    checks.ok("clocks", what);
+}
+
+}  // namespace
+
+std::vector<DoctorCheck> checks_of(std::span<const BusEvidence> cameras, const BusSurroundings& around) {
+  std::vector<DoctorCheck> list;
+  Checks of_all(list);
+  const BusEvidence& first = cameras.front();
+  const bool has_several = cameras.size() > 1;
+  const bool is_usable = std::any_of(cameras.begin(), cameras.end(), [](const auto& e) { return e.frames() > 0; });
+  check_domain(around, of_all);
+  check_services(around, of_all);
+  check_simulated_time(first, around, of_all);
+  bool has_depth = false;
+  for (const BusEvidence& evidence : cameras) {
+    Checks checks(list, has_several ? evidence.camera_name() : "",
+                  has_several && is_usable ? CheckStatus::kWarning : CheckStatus::kError);
+    if (!check_one_camera(evidence, around, checks)) continue;
+    if (has_several) check_frames(evidence, checks);
+    has_depth = true;
+  }
+  if (has_depth) {
+    const auto usable = std::find_if(cameras.begin(), cameras.end(), [](const auto& e) { return e.frames() > 0; });
+    check_robot(usable == cameras.end() ? first : *usable, of_all);
+    if (!has_several) check_frames(first, of_all);
+  }
+  if (has_several) check_together(cameras, of_all);
+  check_buffer(cameras, around, of_all);
   return list;
 }
 

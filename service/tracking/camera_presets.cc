@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "prescene/interfaces/bytes/text.h"
+
 namespace prescene::service {
 namespace {
 
@@ -40,15 +42,17 @@ std::vector<DomainTopic> image_topics(std::span<const DomainTopic> topics) {
   return images;
 }
 
-std::string nothing_came_text(const InputTopics& topics, std::span<const DomainTopic> there, const std::string& where) {
-  std::string text = "no depth image on " + topics.depth;
+std::string nothing_came_text(const InputTopics& topics, std::span<const DomainTopic> there, const std::string& where,
+                              const std::string& camera) {
+  std::string text =
+      (camera.empty() ? "" : "camera " + interfaces::quote(camera) + ": ") + "no depth image on " + topics.depth;
   const auto offered = std::find_if(there.begin(), there.end(), [&](const DomainTopic& topic) {
     return topic.name == topics.depth && topic.writers > 0;
   });
   if (offered != there.end() && is_image_type(offered->type))
     return text + ": the topic is there (" + short_type(offered->type) +
-           "), but no message of it came that could be used; start what publishes it, or name another topic with "
-           "--depth-topic";
+           "), but no message of it came that could be used; start what publishes it, or name another topic " +
+           (camera.empty() ? "with --depth-topic" : "under the camera's 'topics' in the scene file");
   if (offered != there.end()) text += ", which is offered as " + offered->type;
   const std::vector<DomainTopic> images = image_topics(there);
   if (images.empty())
@@ -58,6 +62,7 @@ std::string nothing_came_text(const InputTopics& topics, std::span<const DomainT
   for (std::size_t i = 0; i < std::min(images.size(), kMostNamed); ++i)
     text += (i == 0 ? "" : ", ") + images[i].name + " (" + short_type(images[i].type) + ")";
   if (images.size() > kMostNamed) text += " and " + std::to_string(images.size() - kMostNamed) + " more";
+  if (!camera.empty()) return text + ": correct the camera's 'topics' (or 'preset' and 'namespace') in the scene file";
   for (const CameraPreset& preset : camera_presets()) {
     if (has(there, preset.depth) && preset.depth != topics.depth)
       return text + ": --camera " + std::string(preset.name) + " has these names";

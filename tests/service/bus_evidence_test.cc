@@ -235,6 +235,89 @@ TEST(Doctor, DoubtsCalibrationsAndClocks) {
   told(robot).expect_only("depth values", CheckStatus::kWarning, "0 % of the pixels have depth");
 }
 
+/// A camera of its own topics.
+InputTopics topics_of(const std::string& name) {
+  InputTopics topics;
+  topics.depth = "/" + name + "/depth";
+  topics.color = "/" + name + "/color";
+  topics.camera_info = "/" + name + "/info";
+  return topics;
+}
+
+/// Of what two robots' cameras, front and side, send.
+Told told_of_two(const Robot& front, const Robot& side) {
+  std::vector<BusEvidence> cameras;
+  BusSurroundings around = healthy();
+  around.topics.clear();
+  for (const auto& [name, robot] : {std::pair("front", front), {"side", side}}) {
+    TrackerSettings settings;
+    settings.topics = topics_of(name);
+    settings.assembler.doubts_X_WC = true;
+    settings.assembler.X_WC = geometry::Pose::from_translation({0.0, 0.0, 1.0});
+    Robot own = robot;
+    own.topics = settings.topics;
+    own.send(cameras.emplace_back(settings, nullptr, name));
+    const auto offered = healthy(settings.topics).topics;
+    around.topics.insert(around.topics.end(), offered.begin(), offered.end());
+  }
+  return {checks_of(cameras, around)};
+}
+
+TEST(Doctor, LooksAtEveryCamera) {
+  const Told both = told_of_two({}, {});
+  for (const DoctorCheck& check : both.checks)
+    EXPECT_EQ(check.status, CheckStatus::kOk) << check.camera << " " << check.name << ": " << check.what;
+  EXPECT_EQ(both.of("cameras").what, "frames of all can be used: front, side");
+  for (const char* name : {"depth image", "camera info", "intrinsics", "tf to the camera", "frames", "images agree"})
+    for (const char* camera : {"front", "side"})
+      EXPECT_EQ(std::count_if(both.checks.begin(), both.checks.end(),
+                              [&](const auto& check) { return check.name == name && check.camera == camera; }),
+                1)
+          << name << " of " << camera;
+}
+
+TEST(Doctor, SaysWhichCameraIsWrongAndWhereToMendIt) {
+  Robot wrong;
+  wrong.info_width = 160;
+  const Told sizes = told_of_two({}, wrong);
+  EXPECT_EQ(sizes.worst(), CheckStatus::kWarning) << "the other camera would track";
+  EXPECT_EQ(sizes.of("cameras").what, "frames of front can be used, those of side can't");
+  for (const DoctorCheck& check : sizes.checks) {
+    if (check.status != CheckStatus::kOk && check.name != "cameras") {
+      EXPECT_EQ(check.camera, "side") << check.name;
+    }
+  }
+  EXPECT_EQ(told_of_two(wrong, wrong).worst(), CheckStatus::kError);
+
+  wrong = {};
+  wrong.color_width = 100;
+  EXPECT_THAT(told_of_two(wrong, {}).of("images agree").remedy, HasSubstr("'topics.color' of the camera in the scene"));
+  wrong = {};
+  wrong.sends_tf = false;
+  const Told placed = told_of_two(wrong, {});
+  EXPECT_EQ(placed.of("tf to the camera").status, CheckStatus::kWarning);
+  EXPECT_THAT(placed.of("tf to the camera").what, HasSubstr("it is taken to be where the scene file says"));
+}
+
+TEST(Doctor, ComparesTheClocksOfCameras) {
+  Robot behind;
+  behind.clock_ahead_ns = -520 * kMs;
+  const Told clocks = told_of_two({}, behind);
+  EXPECT_EQ(clocks.of("clocks").status, CheckStatus::kWarning);
+  EXPECT_THAT(clocks.of("clocks").what, HasSubstr("stamps of side are 500 ms behind those of front"));
+  EXPECT_THAT(clocks.of("clocks").remedy, HasSubstr("NTP"));
+}
+
+TEST(Doctor, SaysWhichCameraSendsNothing) {
+  std::vector<BusEvidence> cameras;
+  TrackerSettings settings;
+  settings.topics = topics_of("front");
+  cameras.emplace_back(settings, nullptr, "front");
+  const Told none{checks_of(cameras, healthy())};
+  EXPECT_THAT(none.of("depth image").what, HasSubstr("camera 'front': no depth image on /front/depth"));
+  EXPECT_THAT(none.of("depth image").remedy, HasSubstr("'topics.depth' of the camera in the scene file"));
+}
+
 TEST(Doctor, RepeatsWhyMessagesAreRefused) {
   BusEvidence evidence({}, nullptr);
   const InputTopics topics;

@@ -32,7 +32,8 @@ enum class CheckStatus {
 const char* to_string(CheckStatus status);
 
 struct DoctorCheck {
-  std::string name;  ///< "depth image"
+  std::string name;    ///< "depth image"
+  std::string camera;  ///< Of several cameras the one that it is about; "" of all, or the only one.
   CheckStatus status = CheckStatus::kOk;
   std::string what;    ///< What was found.
   std::string remedy;  ///< "" if ok.
@@ -47,21 +48,23 @@ struct ExaminedTopic {
 
 struct DoctorOptions {
   interfaces::DdsOptions dds;
-  TrackerSettings tracker;
-  double seconds = 5.0;  ///< How long to listen.
+  TrackerSettings tracker;  ///< Cameras that the scene lists take precedence over its topics.
+  double seconds = 5.0;     ///< How long to listen.
 };
 
 struct Diagnosis {
   std::vector<DoctorCheck> checks;
   std::vector<ExaminedTopic> topics;
-  std::optional<belief::Observation> frame;  ///< The newest that the service would have used.
-  geometry::ColorImage overlay;              ///< That frame with the scene drawn over it; empty without frame or scene.
+  std::optional<belief::Observation> frame;  ///< The newest that the service would have used, of the first camera.
+  /// That frame with the scene drawn over it, of several cameras those of all, one below the other and named; empty
+  /// without frame or scene.
+  geometry::ColorImage overlay;
 
   /// Without errors.
   bool usable() const;
 };
-/// {"usable": .., "checks": [{"check", "status", "what", "remedy"}..], "topics": [{"topic", "type", "writers",
-/// "readers", "messages", "rate"}..]}
+/// {"usable": .., "checks": [{"check", "camera" (of several), "status", "what", "remedy"}..], "topics": [{"topic",
+/// "type", "writers", "readers", "messages", "rate"}..]}
 nlohmann::ordered_json to_json(const Diagnosis& diagnosis);
 
 /// Listens for the time that the options say. `scene` may be null: its checks are left out. Errors of

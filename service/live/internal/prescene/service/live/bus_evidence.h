@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,11 +39,11 @@ struct TopicEvidence {
   std::optional<double> rate() const;
 };
 
-/// Listens instead of the tracker, with the same frame assembler.
+/// Listens to one camera instead of the tracker, with the same frame assembler.
 class BusEvidence {
  public:
-  /// `scene` may be null.
-  BusEvidence(const TrackerSettings& settings, const belief::Scene* scene);
+  /// `scene` may be null. `camera`: its name if the scene file lists it, and so says what options say else.
+  BusEvidence(const TrackerSettings& settings, const belief::Scene* scene, std::string camera = "");
 
   /// A message of one of the input topics, with the wall time when it came.
   void add(const interfaces::ReceivedMessage& message, core::TimeNs wall_ns);
@@ -52,6 +53,7 @@ class BusEvidence {
   /// By topic; every input topic has an entry.
   const std::map<std::string, TopicEvidence>& topics() const { return topics_; }
   const TrackerSettings& settings() const { return settings_; }
+  const std::string& camera_name() const { return camera_name_; }
   /// Frames that the service would have used, with those of them that had colour, and why others were not used, with
   /// the number of frames.
   std::uint64_t frames() const { return frames_; }
@@ -82,6 +84,7 @@ class BusEvidence {
   void note_header(TopicEvidence& topic, const interfaces::RosHeader& header, core::TimeNs wall_ns);
   core::Status take_in(const interfaces::ReceivedMessage& message, TopicEvidence& topic, core::TimeNs wall_ns);
 
+  std::string camera_name_;
   TrackerSettings settings_;
   std::vector<std::string> robot_;
   FrameAssembler assembler_;
@@ -114,7 +117,11 @@ struct BusSurroundings {
   std::map<std::string, std::string> ros;  ///< Environment variables of ROS that keep its nodes to this machine.
 };
 
-/// The checks that need no scene, in the order in which they are told.
-std::vector<DoctorCheck> checks_of(const BusEvidence& evidence, const BusSurroundings& around);
+/// The checks that need no scene, in the order in which they are told. Of several cameras (at least one) those of one
+/// after the other, and what they have in common; what keeps one from being used is a warning while another one is.
+std::vector<DoctorCheck> checks_of(std::span<const BusEvidence> cameras, const BusSurroundings& around);
+inline std::vector<DoctorCheck> checks_of(const BusEvidence& evidence, const BusSurroundings& around) {
+  return checks_of(std::span(&evidence, 1), around);
+}
 
 }  // namespace prescene::service

@@ -27,8 +27,9 @@ std::string topics_text(const InputTopics& topics);
 /// Those that carry images or point clouds and are written by somebody.
 std::vector<interfaces::DomainTopic> image_topics(std::span<const interfaces::DomainTopic> topics);
 /// For a person, where nothing has come on the depth topic of `topics`: whether it is offered at all, what images there
-/// are `where` ("in DDS domain 0", "in the recording"), and the preset that fits them.
+/// are `where` ("in DDS domain 0", "in the recording"), and the preset that fits them. `camera`: as the scene file
+/// lists it, whose topics are named there; "" = options name them.
 std::string nothing_came_text(const InputTopics& topics, std::span<const interfaces::DomainTopic> there,
-                              const std::string& where);
+                              const std::string& where, const std::string& camera = "");
 
 }  // namespace prescene::service
