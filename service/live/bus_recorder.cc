@@ -36,22 +36,24 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
   }
   const std::string domain = "in DDS domain " + std::to_string(dds.domain);
   for (const CameraInput& camera : cameras)
-    core::log(log, core::LogLevel::kInfo, "recording " + domain + ": " + topics_text(camera.topics));
+    core::log(log, core::LogLevel::kInfo,
+              "recording " + domain + (camera.name.empty() ? "" : " camera " + camera.name) + ": " +
+                  topics_text(camera.topics));
   std::uint64_t messages = 0;
   core::TimeNs last_ns = 0;
-  std::vector<InputTopics> waits_for;  // those whose depth images have not come
-  for (const CameraInput& camera : cameras) waits_for.push_back(camera.topics);
+  std::vector<CameraInput> waits_for = cameras;  // those whose depth images have not come
   bool was_late = false;
   const core::Stopwatch watch;
   while (!cancellation.requested()) {
     if (!waits_for.empty() && watch.seconds() > kNothingCameAfter) {
-      core::log(log, core::LogLevel::kWarning, nothing_came_text(waits_for.front(), node->domain_topics(), domain));
+      core::log(log, core::LogLevel::kWarning,
+                nothing_came_text(waits_for.front().topics, node->domain_topics(), domain, waits_for.front().name));
       waits_for.erase(waits_for.begin());
     }
     for (interfaces::ReceivedMessage& message : inbox.take_all(std::chrono::steady_clock::now() + kWriteInterval)) {
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
-      std::erase_if(waits_for, [&](const InputTopics& topics) { return topics.depth == message.topic; });
+      std::erase_if(waits_for, [&](const CameraInput& camera) { return camera.topics.depth == message.topic; });
       PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
       ++messages;
     }

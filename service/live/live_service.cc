@@ -147,8 +147,9 @@ struct LiveService::Impl {
   void look_after_saves();
   /// What a service was called with, as if it had come on a topic: taken in and recorded.
   void put_text(const char* topic, const std::string& text);
-  /// Steps the belief if a frame is complete, records what was answered, publishes.
-  void look_after_frames();
+  /// Steps the belief if a frame is complete, records what was answered, publishes. Whether it made a step: another
+  /// camera's frame may be complete already.
+  bool look_after_frames();
   /// Counts and logs a message that the middleware did not take.
   void check_sent(const core::Status& status);
   void publish();
@@ -494,7 +495,7 @@ void LiveService::Impl::take_in(std::vector<ReceivedMessage> messages, const cor
   }
 }
 
-void LiveService::Impl::look_after_frames() {
+bool LiveService::Impl::look_after_frames() {
   std::vector<std::string> answers_given;
   {
     const std::lock_guard lock(answered_mutex);
@@ -506,8 +507,10 @@ void LiveService::Impl::look_after_frames() {
     const core::Status written = recording->write_due(now_ns);
     if (!written.ok()) give_up_recording(written);
   }
+  bool stepped = false;
   try {
     if (const auto step = tracker->step(now_ns)) {
+      stepped = true;
       record_step(step->record);  // first: whatever fails below, the step was made
       if (step->record.step == 1) worker->begin_session(step->record.stamp_ns);
       ++steps;
@@ -529,6 +532,7 @@ void LiveService::Impl::look_after_frames() {
   look_after_learned();
   look_after_saves();
   if (diagnostics_limit.due()) publish_diagnostics();
+  return stepped;
 }
 
 void LiveService::Impl::check_sent(const core::Status& status) {
@@ -580,9 +584,12 @@ std::optional<double> LiveService::Impl::seconds_since_frame() const {
 
 ServiceHealth LiveService::Impl::health() const {
   ServiceHealth health;
-  health.depth_topic = settings.tracker.topics.depth;
+  for (const CameraInput& camera : cameras)
+    health.depth_topic += (health.depth_topic.empty() ? "" : " and ") + camera.topics.depth;
+  health.cameras = tracker->cameras_text();
   if (!depth_has_come && since_start.seconds() > kNothingCameAfter)
-    health.nothing_came = nothing_came_text(settings.tracker.topics, node->domain_topics(), "in " + domain_text());
+    health.nothing_came =
+        nothing_came_text(settings.tracker.topics, node->domain_topics(), "in " + domain_text(), cameras.front().name);
   health.steps = steps;
   health.skipped_frames = tracker->skipped_count();
   health.refused_messages = refused;
@@ -673,14 +680,17 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     core::log(impl.log, core::LogLevel::kInfo,
               "listening in " + impl.domain_text() + (camera.name.empty() ? "" : " to camera " + camera.name) + ": " +
                   topics_text(camera.topics));
+  bool stepped = false;
   const auto turn = [&] {
     auto until = steady_clock::now() + kPollInterval;
-    if (const auto deadline = impl.tracker->next_deadline()) {
+    if (std::exchange(stepped, false) && impl.cameras.size() > 1) {
+      until = steady_clock::now();
+    } else if (const auto deadline = impl.tracker->next_deadline()) {
       until = std::min(
           until, steady_clock::now() + std::chrono::nanoseconds(std::max<core::TimeNs>(0, *deadline - impl.now())));
     }
     impl.take_in(impl.inbox.take_all(until), cancellation);
-    impl.look_after_frames();
+    stepped = impl.look_after_frames();
   };
   while (!cancellation.requested()) {
     try {

@@ -81,12 +81,13 @@ std::string joined(const std::vector<std::string>& words) {
 
 // Every member is bound to a name, so that one which is added does not compile until it is told of here.
 std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
-  const auto& [depth_topic, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox, image_topics,
-               lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten, tf_late,
-               waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services, is_recording,
-               recording_at_risk_s, recording_failure, keeps_learned, learned_failure, seconds_since_frame, clock_topic,
-               simulated_now_s, seconds_since_tick, last_step_seconds, not_simulated, physics_failure, steppers, lens,
-               degraded, last_skip, last_refusal, last_failure, last_failure_ns] = health;
+  const auto& [depth_topic, cameras, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox,
+               image_topics, lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten,
+               tf_late, waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services,
+               is_recording, recording_at_risk_s, recording_failure, keeps_learned, learned_failure,
+               seconds_since_frame, clock_topic, simulated_now_s, seconds_since_tick, last_step_seconds, not_simulated,
+               physics_failure, steppers, lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] =
+      health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   static_cast<void>(image_topics);         // says what of dropped_in_inbox is a loss
@@ -102,6 +103,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const bool question_is_newer = last_failure.empty() || question_failure_ns > last_failure_ns;
   return {{"steps", std::to_string(steps)},
           {"depth topic", depth_topic},
+          {"cameras", cameras},
           {"skipped frames", std::to_string(skipped_frames)},
           {"last skip", last_skip},
           {"refused messages", std::to_string(refused_messages)},

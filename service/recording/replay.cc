@@ -66,7 +66,7 @@ class Replay {
   }
 
   core::Status follow(const StepRecord& recorded) {
-    auto step = tracker_.step(recorded.now_ns);
+    auto step = tracker_.repeat(recorded);
     ++summary_.compared;
     if (!step || step->record.belief_hash != recorded.belief_hash || step->record.depth != recorded.depth) {
       ++summary_.different;

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -45,12 +47,6 @@ CameraInput settled(CameraInput input) {
 
 InputTopics first_topics(const TrackerSettings& settings, const belief::Scene& scene) {
   return camera_inputs(settings, scene).front().topics;
-}
-
-void take_first_camera(const belief::Scene& scene, TrackerSettings& settings) {
-  CameraInput first = camera_inputs(settings, scene).front();
-  settings.topics = std::move(first.topics);
-  settings.assembler = std::move(first.assembler);
 }
 
 bool PicturedFrames::has(const belief::Observation& observation) {
@@ -164,6 +160,7 @@ std::optional<AssembledFrame> CameraFrames::take(core::TimeNs now_ns) {
     if (frame && !doubt.empty()) frame->doubts.push_back(doubt);
     return frame;
   }
+  asked_ns_ = now_ns;
   std::optional<std::size_t> next;
   std::vector<std::optional<FrameAssembler::DepthTimes>> offers;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
@@ -175,30 +172,53 @@ std::optional<AssembledFrame> CameraFrames::take(core::TimeNs now_ns) {
     if (goes_first) next = i;
   }
   if (!next || waits_for_others(*next, *offers[*next], now_ns)) return std::nullopt;
-  return take_of(*next, now_ns, *offers[*next]);
+  std::optional<AssembledFrame> frame = cameras_[*next].assembler.take_ready(now_ns);
+  cameras_[*next].passed_over = 0;
+  cameras_[*next].offered_ns.reset();
+  if (frame) note_used(*next, *offers[*next], *frame);
+  return frame;
+}
+
+std::optional<AssembledFrame> CameraFrames::take_recorded(int camera, MessageIndex depth, core::TimeNs now_ns) {
+  if (cameras_.size() == 1) return take(now_ns);
+  const auto number = static_cast<std::size_t>(camera);
+  if (camera < 0 || number >= cameras_.size()) return std::nullopt;
+  const std::optional<FrameAssembler::DepthTimes> times = cameras_[number].assembler.waiting(depth);
+  std::optional<AssembledFrame> frame = cameras_[number].assembler.take_recorded(depth, now_ns);
+  if (frame) note_used(number, *times, *frame);
+  return frame;
 }
 
 std::optional<FrameAssembler::DepthTimes> CameraFrames::offer(std::size_t camera, core::TimeNs now_ns) {
   Camera& mine = cameras_[camera];
-  const std::optional<FrameAssembler::DepthTimes> ready = mine.assembler.ready(now_ns);
-  if (mine.offered_ns && (!ready || ready->stamp_ns != *mine.offered_ns)) ++mine.passed_over;
-  mine.offered_ns = ready ? std::optional(ready->stamp_ns) : std::nullopt;
-  if (!ready || !used_) return ready;
-  const std::string& other = cameras_[used_->camera].input.name;
-  if (is_of_other_clock(camera, *ready)) {
-    mine.assembler.skip_up_to(ready->stamp_ns, "its clock is not that of camera " + interfaces::quote(other) +
-                                                   ": set the clocks of the cameras' computers by one (NTP, PTP)");
+  for (;;) {
+    const std::optional<FrameAssembler::DepthTimes> ready = mine.assembler.ready(now_ns);
+    if (mine.offered_ns && (!ready || ready->stamp_ns != *mine.offered_ns)) ++mine.passed_over;
+    mine.offered_ns = ready ? std::optional(ready->stamp_ns) : std::nullopt;
+    if (ready) mine.complete_ns = ready->received_ns;
+    if (!ready || !used_) return ready;
+    const bool is_other_clock = is_of_other_clock(camera, *ready);
+    const bool is_late = ready->stamp_ns < used_->times.stamp_ns && agree(*ready, used_->times);
+    if (!is_other_clock && !is_late) return ready;
+    mine.assembler.skip_up_to(ready->stamp_ns, is_other_clock
+                                                   ? "its clock is not that of camera " +
+                                                         interfaces::quote(cameras_[used_->camera].input.name) +
+                                                         ": set the clocks of the cameras' computers by one (NTP, PTP)"
+                                                   : lateness(*ready));
     mine.offered_ns.reset();
-    return std::nullopt;
+    if (is_late) ++mine.passed_over;
   }
-  if (ready->stamp_ns < used_->times.stamp_ns && agree(*ready, used_->times)) {
-    mine.assembler.skip_up_to(ready->stamp_ns, "it came after a later frame of camera " + interfaces::quote(other) +
-                                                   " was used: let frames wait longer for each other (max_wait_s)");
-    mine.offered_ns.reset();
-    ++mine.passed_over;
-    return std::nullopt;
-  }
-  return ready;
+}
+
+std::string CameraFrames::lateness(const FrameAssembler::DepthTimes& times) const {
+  const std::string other = "camera " + interfaces::quote(cameras_[used_->camera].input.name);
+  const core::TimeNs behind_ns = offset_of(times) - offset_of(used_->times);
+  if (behind_ns > core::ns_of(max_wait_s_))
+    return "its stamps are " + core::fixed_text(core::seconds_of(behind_ns), 1) + " s behind those of " + other +
+           ": set the clocks of the cameras' computers by one (NTP, PTP), or let frames wait longer for each other "
+           "(the parameter max_wait)";
+  return "a later frame of " + other +
+         " was used before it was complete: let frames wait longer for each other (the parameter max_wait)";
 }
 
 bool CameraFrames::is_of_other_clock(std::size_t camera, const FrameAssembler::DepthTimes& times) const {
@@ -213,45 +233,45 @@ bool CameraFrames::is_of_other_clock(std::size_t camera, const FrameAssembler::D
 
 bool CameraFrames::waits_for_others(std::size_t camera, const FrameAssembler::DepthTimes& times,
                                     core::TimeNs now_ns) const {
-  if (cameras_[camera].passed_over > 0 || now_ns < times.received_ns ||
-      now_ns - times.received_ns >= core::ns_of(max_wait_s_))
-    return false;
+  const core::TimeNs until_ns = times.received_ns + core::ns_of(max_wait_s_);
+  if (cameras_[camera].passed_over > 0 || now_ns < times.received_ns || now_ns >= until_ns) return false;
+  // What is older than this is not used any more.
+  const core::TimeNs oldest_ns = used_ ? used_->times.stamp_ns : std::numeric_limits<core::TimeNs>::min();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const FrameAssembler& other = cameras_[i].assembler;
-    if (i == camera || !other.newest() || now_ns - other.newest()->received_ns > kSilentNs ||
-        !agree(*other.newest(), times))
-      continue;
-    if (other.waits_before(times.stamp_ns)) return true;
-    const auto next_ns = other.newest()->stamp_ns + core::ns_of(kEarly * core::seconds_of(other.period_ns()));
-    if (other.period_ns() > 0 && next_ns < times.stamp_ns) return true;
+    const auto& newest = other.newest();
+    if (i == camera || !newest || now_ns - newest->received_ns > kSilentNs || !agree(*newest, times)) continue;
+    if (began_ns_ && now_ns - std::max(cameras_[i].complete_ns.value_or(*began_ns_), *began_ns_) > kSilentNs) continue;
+    if (other.has_waiting(oldest_ns, times.stamp_ns)) return true;
+    if (other.period_ns() == 0) continue;
+    const core::TimeNs next_ns =
+        std::max(oldest_ns, newest->stamp_ns + core::ns_of(kEarly * core::seconds_of(other.period_ns())));
+    if (next_ns < times.stamp_ns && next_ns + offset_of(*newest) <= until_ns) return true;
   }
   return false;
 }
 
-std::optional<AssembledFrame> CameraFrames::take_of(std::size_t camera, core::TimeNs now_ns,
-                                                    FrameAssembler::DepthTimes times) {
+void CameraFrames::note_used(std::size_t camera, FrameAssembler::DepthTimes times, AssembledFrame& frame) {
   Camera& mine = cameras_[camera];
-  std::optional<AssembledFrame> frame = mine.assembler.take_ready(now_ns);
-  mine.passed_over = 0;
-  mine.offered_ns.reset();
-  if (!frame) return std::nullopt;
-  frame->observation.camera = static_cast<int>(camera);
-  for (std::string& doubt : frame->doubts) doubt.insert(0, mine.prefix);
-  if (!mine.rectified_doubt.empty()) frame->doubts.push_back(mine.rectified_doubt);
+  frame.observation.camera = static_cast<int>(camera);
+  for (std::string& doubt : frame.doubts) doubt.insert(0, mine.prefix);
+  if (!mine.rectified_doubt.empty()) frame.doubts.push_back(mine.rectified_doubt);
   // The clock of all of them went back: what the others have is of the time before.
   if (used_ && times.stamp_ns < used_->times.stamp_ns)
     for (std::size_t i = 0; i < cameras_.size(); ++i)
       if (i != camera) cameras_[i].assembler.clock_jumped_back();
   used_ = {camera, times};
-  mine.used_ns = times.received_ns;
+  mine.used_ns = mine.complete_ns = times.received_ns;
+  mine.last_skip.clear();
+  ++mine.used;
   if (!began_ns_) began_ns_ = times.received_ns;
-  return frame;
 }
 
 std::optional<core::TimeNs> CameraFrames::next_deadline() const {
+  // A frame that has waited long enough may still have to let an older one of another camera go first.
   std::optional<core::TimeNs> deadline;
   for (const Camera& camera : cameras_) {
-    const auto mine = camera.assembler.next_deadline();
+    const auto mine = camera.assembler.next_deadline(asked_ns_);
     if (mine) deadline = deadline ? std::min(*deadline, *mine) : *mine;
   }
   return deadline;
@@ -261,6 +281,7 @@ std::vector<SkippedFrame> CameraFrames::take_skipped() {
   std::vector<SkippedFrame> all;
   for (Camera& camera : cameras_) {
     std::vector<SkippedFrame> skipped = camera.assembler.take_skipped();
+    if (!skipped.empty()) camera.last_skip = skipped.back().reason;
     for (SkippedFrame& frame : skipped) frame.reason.insert(0, camera.prefix);
     std::ranges::move(skipped, std::back_inserter(all));
   }
@@ -270,9 +291,15 @@ std::vector<SkippedFrame> CameraFrames::take_skipped() {
 }
 
 std::string CameraFrames::last_skip() const {
-  for (const Camera& camera : cameras_)
-    if (const std::string reason = camera.assembler.last_skip(); !reason.empty()) return camera.prefix + reason;
-  return "";
+  std::string reason;
+  MessageIndex newest = 0;
+  for (const Camera& camera : cameras_) {
+    const std::optional<SkippedFrame> skipped = camera.assembler.last_skipped();
+    if (!skipped || (!reason.empty() && skipped->depth < newest)) continue;
+    newest = skipped->depth;
+    reason = camera.prefix + skipped->reason;
+  }
+  return reason;
 }
 
 std::uint64_t CameraFrames::skipped_count() const {
@@ -301,11 +328,23 @@ std::vector<std::string> CameraFrames::silent(core::TimeNs now_ns) const {
   for (const Camera& camera : cameras_) {
     const auto& newest = camera.assembler.newest();
     if (now_ns - (newest ? newest->received_ns : *began_ns_) > kSilentNs)
-      words.push_back(camera.prefix + (newest ? "it sends no more depth images" : "no depth image of it has come"));
+      words.push_back(camera.prefix + (newest ? "it sends no more depth images"
+                                              : "no depth image of it has come on " + camera.input.topics.depth +
+                                                    ": start its driver, or correct its topics in the scene file"));
     else if (now_ns - std::max(camera.used_ns.value_or(*began_ns_), *began_ns_) > kSilentNs)
-      words.push_back(camera.prefix + "none of its frames is used");
+      words.push_back(camera.prefix + "none of its frames is used" +
+                      (camera.last_skip.empty() ? "" : ": " + camera.last_skip));
   }
   return words;
+}
+
+std::string CameraFrames::counts_text() const {
+  if (cameras_.size() < 2) return "";
+  std::string text;
+  for (const Camera& camera : cameras_)
+    text += (text.empty() ? "" : "; ") + camera.input.name + ": " + std::to_string(camera.used) + " frames used, " +
+            std::to_string(camera.assembler.skipped_count()) + " not";
+  return text;
 }
 
 }  // namespace prescene::service

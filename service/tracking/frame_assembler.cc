@@ -303,6 +303,27 @@ std::optional<AssembledFrame> FrameAssembler::take_ready(core::TimeNs now_ns) {
   return finish(*picked, *std::move(frame));
 }
 
+std::optional<FrameAssembler::DepthTimes> FrameAssembler::waiting(MessageIndex depth) const {
+  for (const Waiting& waiting : waiting_)
+    if (waiting.index == depth) return DepthTimes{waiting.stamp_ns, waiting.received_ns};
+  return std::nullopt;
+}
+
+std::optional<AssembledFrame> FrameAssembler::take_recorded(MessageIndex depth, core::TimeNs now_ns) {
+  const auto found = std::find_if(waiting_.begin(), waiting_.end(),
+                                  [depth](const Waiting& waiting) { return waiting.index == depth; });
+  if (found == waiting_.end()) return std::nullopt;
+  Attempt attempt = assemble(*found, is_out_of_time(*found, now_ns));
+  if (!attempt.frame) return std::nullopt;
+  return finish(static_cast<std::size_t>(found - waiting_.begin()), *std::move(attempt.frame));
+}
+
+bool FrameAssembler::has_waiting(core::TimeNs from_ns, core::TimeNs before_ns) const {
+  return std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
+    return waiting.stamp_ns >= from_ns && waiting.stamp_ns < before_ns;
+  });
+}
+
 void FrameAssembler::skip_up_to(core::TimeNs stamp_ns, const std::string& reason) {
   while (!waiting_.empty() && waiting_.front().stamp_ns <= stamp_ns) {
     skip(waiting_.front(), reason);
@@ -324,10 +345,11 @@ std::optional<AssembledFrame> FrameAssembler::take(core::TimeNs now_ns) {
   return std::nullopt;
 }
 
-std::optional<core::TimeNs> FrameAssembler::next_deadline() const {
+std::optional<core::TimeNs> FrameAssembler::next_deadline(std::optional<core::TimeNs> asked_ns) const {
   std::optional<core::TimeNs> deadline;
   for (const Waiting& waiting : waiting_) {
     const core::TimeNs mine = waiting.received_ns + core::ns_of(settings_.max_wait_s);
+    if (asked_ns && mine <= *asked_ns) continue;
     deadline = deadline ? std::min(*deadline, mine) : mine;
   }
   return deadline;

@@ -122,14 +122,22 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
 }
 
 std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
-  const core::TimeNs time_ns = uses_simulated_time() ? simulated_now_ns_ : now_ns;
-  std::optional<AssembledFrame> frame = frames_.take(time_ns);
-  if (!frame) return std::nullopt;
+  std::optional<AssembledFrame> frame = frames_.take(time_at(now_ns));
+  return frame ? std::optional(step_with(*std::move(frame), now_ns)) : std::nullopt;
+}
+
+std::optional<TrackerStep> Tracker::repeat(const StepRecord& recorded) {
+  std::optional<AssembledFrame> frame =
+      frames_.take_recorded(recorded.camera, recorded.depth, time_at(recorded.now_ns));
+  return frame ? std::optional(step_with(*std::move(frame), recorded.now_ns)) : std::nullopt;
+}
+
+TrackerStep Tracker::step_with(AssembledFrame frame, core::TimeNs now_ns) {
   const core::Stopwatch watch;
-  const core::TimeNs stamp_ns = frame->observation.stamp_ns;
+  const core::TimeNs stamp_ns = frame.observation.stamp_ns;
   // Cameras that are triggered together take frames at one instant.
   const bool is_at_once = belief_->step > 0 && stamp_ns == belief_->stamp_ns && !belief_->cameras.empty() &&
-                          belief_->cameras[static_cast<std::size_t>(frame->observation.camera)].stamp_ns < stamp_ns;
+                          belief_->cameras[static_cast<std::size_t>(frame.observation.camera)].stamp_ns < stamp_ns;
   const bool clock_went_back = belief_->step > 0 && stamp_ns <= belief_->stamp_ns && !is_at_once;
   // What is known only changes at the end, all at once.
   std::shared_ptr<const belief::Belief> before = belief_;
@@ -144,7 +152,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   const bool predicts = before->step > 0 && stamp_ns > before->stamp_ns;
   const belief::Control control =
       predicts ? controls.due(before->stamp_ns, stamp_ns) : belief::Control{before->stamp_ns, stamp_ns, {}};
-  filter::StepResult result = filter_.step(*before, frame->observation, control);
+  filter::StepResult result = filter_.step(*before, frame.observation, control);
   if (predicts) controls.forget_due(stamp_ns);
   if (before->step == 0 && result.belief.step > 0) controls.begin_at(stamp_ns);
 
@@ -152,15 +160,15 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.record.after = last_index_;
   step.record.now_ns = now_ns;
   step.record.stamp_ns = stamp_ns;
-  step.record.camera = frame->observation.camera;
-  step.record.depth = frame->depth;
-  step.record.color = frame->color;
-  step.record.camera_info = frame->camera_info;
-  step.record.tf_until = frame->tf_until;
+  step.record.camera = frame.observation.camera;
+  step.record.depth = frame.depth;
+  step.record.color = frame.color;
+  step.record.camera_info = frame.camera_info;
+  step.record.tf_until = frame.tf_until;
   step.record.skipped = frames_.take_skipped();
   step.record.degraded = degraded_words(result);
-  std::ranges::move(frame->doubts, std::back_inserter(step.record.degraded));
-  std::ranges::move(frames_.silent(time_ns), std::back_inserter(step.record.degraded));
+  std::ranges::move(frame.doubts, std::back_inserter(step.record.degraded));
+  std::ranges::move(frames_.silent(time_at(now_ns)), std::back_inserter(step.record.degraded));
   if (clock_went_back) step.record.degraded.push_back("clock went back: started again");
   if (restarts) step.record.degraded.push_back("started again, as a control asked");
   if (const std::uint64_t dropped = controls.dropped() - controls_.dropped(); dropped > 0)
@@ -174,7 +182,7 @@ std::optional<TrackerStep> Tracker::step(core::TimeNs now_ns) {
   step.physics_failure = std::move(result.physics_failure);
   step.trace = std::move(result.trace);
   step.supports = std::move(result.supports);
-  step.observation = std::move(frame->observation);
+  step.observation = std::move(frame.observation);
   {
     auto next = std::make_shared<const belief::Belief>(std::move(result.belief));
     const std::lock_guard lock(mutex_);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -14,6 +15,7 @@
 namespace prescene::service::camera_frames_test {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -53,8 +55,9 @@ class CameraFramesTest : public testing::Test {
     ASSERT_TRUE(taken->ok()) << taken->message();
   }
 
-  void depth(const std::string& camera, core::TimeNs stamp_ms, core::TimeNs received_ms) {
-    const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ms * kMs), camera};
+  void depth(const std::string& camera, core::TimeNs stamp_ms, core::TimeNs received_ms,
+             const std::string& frame = "") {
+    const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ms * kMs), frame.empty() ? camera : frame};
     send("/" + camera + "/depth", "sensor_msgs/msg/Image",
          interfaces::encode_cdr(interfaces::to_ros_image_16uc1(geometry::DepthImage(8, 6, 0.75F), header)),
          received_ms * kMs);
@@ -109,7 +112,7 @@ TEST_F(CameraFramesTest, WaitNoLongerThanTold) {
   EXPECT_THAT(taken(1183), ElementsAre(Taken{0, 1132}));
   depth("side", 1109, 1184);
   EXPECT_THAT(taken(1184), ElementsAre());
-  EXPECT_THAT(skipped(), ElementsAre(HasSubstr("camera 'side': it came after a later frame of camera 'front'")));
+  EXPECT_THAT(skipped(), ElementsAre(HasSubstr("camera 'side': its stamps are 0.1 s behind those of camera 'front'")));
   EXPECT_EQ(frames_.skipped_count(), 1U);
 }
 
@@ -141,6 +144,72 @@ TEST_F(CameraFramesTest, LeavesOutACameraWithAClockOfItsOwn) {
   }
   EXPECT_THAT(skipped().back(), HasSubstr("camera 'side': its clock is not that of camera 'front'"));
   EXPECT_THAT(frames_.silent(2300 * kMs), ElementsAre(HasSubstr("camera 'side': none of its frames is used")));
+}
+
+TEST_F(CameraFramesTest, DoesNotWaitForOneWhoseTfIsMissing) {
+  for (int i = 0; i < 40; ++i) {
+    depth("side", 990 + 33 * i, 1000 + 33 * i, "nowhere");
+    depth("front", 1000 + 33 * i, 1001 + 33 * i);
+    const std::vector<Taken> at_once = taken(1001 + 33 * i);
+    if (i > 33) {
+      EXPECT_THAT(at_once, ElementsAre(Taken{0, 1000 + 33 * i})) << i;
+    }
+  }
+  skipped();
+  EXPECT_THAT(frames_.silent(2300 * kMs),
+              ElementsAre(AllOf(HasSubstr("camera 'side': none of its frames is used: "), HasSubstr("'nowhere'"))));
+  // Its tf comes: from then on it is used, and waited for.
+  interfaces::RosTfMessage tf{
+      {interfaces::to_ros_transform(interfaces::FrameTransform{"world", "nowhere", 0, geometry::Pose::identity()})}};
+  send("/tf_static", "tf2_msgs/msg/TFMessage", interfaces::encode_cdr(tf), 2320 * kMs);
+  depth("side", 2315, 2321, "nowhere");
+  EXPECT_THAT(taken(2321), ElementsAre(Taken{1, 2315}));
+  depth("front", 2350, 2351);
+  EXPECT_THAT(taken(2351), ElementsAre());
+  depth("side", 2348, 2360, "nowhere");
+  EXPECT_THAT(taken(2360), ElementsAre(Taken{1, 2348}, Taken{0, 2350}));
+  EXPECT_THAT(frames_.silent(2400 * kMs), ElementsAre());
+}
+
+TEST_F(CameraFramesTest, SaysWhichStampsAreBehindAndDoesNotWaitForThem) {
+  for (int i = 0; i < 60; ++i) {
+    depth("front", 1000 + 33 * i, 1001 + 33 * i);
+    if (i > 1) {
+      EXPECT_THAT(taken(1001 + 33 * i), ElementsAre(Taken{0, 1000 + 33 * i})) << i;
+    }
+    depth("side", 510 + 33 * i, 1011 + 33 * i);
+    taken(1012 + 33 * i);
+  }
+  EXPECT_THAT(skipped().back(),
+              AllOf(HasSubstr("camera 'side': its stamps are 0.5 s behind those of camera 'front'"), HasSubstr("NTP")));
+  EXPECT_THAT(frames_.silent(3000 * kMs), ElementsAre(HasSubstr("none of its frames is used: its stamps are 0.5 s")));
+}
+
+TEST_F(CameraFramesTest, SaysWhereImagesOfACameraWereToCome) {
+  for (int i = 0; i < 40; ++i) {
+    depth("front", 1000 + 33 * i, 1001 + 33 * i);
+    taken(1001 + 33 * i);
+  }
+  EXPECT_THAT(frames_.silent(2300 * kMs),
+              ElementsAre(AllOf(HasSubstr("camera 'side': no depth image of it has come on /side/depth"),
+                                HasSubstr("scene file"))));
+  EXPECT_EQ(frames_.counts_text(), "front: 40 frames used, 0 not; side: 0 frames used, 0 not");
+}
+
+TEST_F(CameraFramesTest, TakesTheFramesThatARecordingNames) {
+  depth("front", 1000, 1001);  // the numbers of these: 3, 4, 5
+  depth("side", 1010, 1011);
+  depth("front", 1033, 1034);
+  const auto taken_of = [&](int camera, MessageIndex number) {
+    const auto frame = frames_.take_recorded(camera, number, 1035 * kMs);
+    return frame ? std::optional(Taken{frame->observation.camera, frame->observation.stamp_ns / kMs}) : std::nullopt;
+  };
+  EXPECT_EQ(taken_of(1, 4), (Taken{1, 1010}));
+  EXPECT_EQ(taken_of(0, 5), (Taken{0, 1033}));
+  EXPECT_EQ(taken_of(0, 3), std::nullopt) << "it was passed over";
+  EXPECT_EQ(taken_of(1, 5), std::nullopt) << "it is another camera's";
+  EXPECT_EQ(taken_of(2, 5), std::nullopt);
+  EXPECT_THAT(skipped(), ElementsAre("camera 'front': a newer frame was ready"));
 }
 
 TEST_F(CameraFramesTest, FollowsWhenAllClocksAreSetBack) {

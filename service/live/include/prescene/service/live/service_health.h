@@ -19,7 +19,8 @@ namespace prescene::service {
 inline constexpr double kSilentAfter = 2.0;
 
 struct ServiceHealth {
-  std::string depth_topic;
+  std::string depth_topic;   ///< Of several cameras those of all.
+  std::string cameras;       ///< Of several cameras what was used of each; "" of one.
   std::string nothing_came;  ///< As nothing_came_text(), once none has for some seconds; "" = images come, or may yet.
   std::uint64_t steps = 0;
   std::uint64_t skipped_frames = 0;

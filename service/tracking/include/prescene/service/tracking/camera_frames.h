@@ -5,10 +5,14 @@
 // their stamps: a frame waits for those of other cameras that are older and have not come, or are not complete, but for
 // no longer than max_wait_s after it came; whether another camera's frame is still to come follows from the stamps of
 // its last two. What comes later than that is older than what was used, and is skipped, with the reason. Where the
-// caller can't keep up, cameras take turns. A camera that has sent nothing for a second is not waited for.
+// caller can't keep up, cameras take turns. Nobody waits for a camera that has sent nothing for a second, of which no
+// frame was complete for a second (tf or its camera info is missing), or whose stamps are so far behind that its frames
+// would come too late in any case.
 //
 // The cameras' stamps are by one clock. A camera whose clock differs by more than a second from that of the frames
 // which are used is not used while another one keeps that clock, and that is said.
+//
+// Which frame is taken also depends on when take() was called. A replay therefore takes those that a recording names.
 //
 //   CameraFrames frames(camera_inputs(settings, *scene), robot_names(*scene), settings.tf);
 //   if (auto taken = frames.take_in(message, index, received_ns)) return *taken;  // it was on one of the topics
@@ -38,8 +42,6 @@ struct CameraInput {
 std::vector<CameraInput> camera_inputs(const TrackerSettings& settings, const belief::Scene& scene);
 /// The topics of the first of them.
 InputTopics first_topics(const TrackerSettings& settings, const belief::Scene& scene);
-/// Settings for what looks at one camera only: the first that the scene lists, if it lists any.
-void take_first_camera(const belief::Scene& scene, TrackerSettings& settings);
 /// Whether the scene says under which topics its cameras' images come.
 bool names_topics(const belief::Scene& scene);
 /// Errors of validate(InputTopics), with the camera's name.
@@ -70,6 +72,9 @@ class CameraFrames {
                                       core::TimeNs received_ns);
   /// The next frame for the belief; doubts name the camera where there are several.
   std::optional<AssembledFrame> take(core::TimeNs now_ns);
+  /// The frame that a recording names, by its camera and depth image, at the time at which it was taken; empty if it
+  /// is not there. Of a single camera that is what take() does.
+  std::optional<AssembledFrame> take_recorded(int camera, MessageIndex depth, core::TimeNs now_ns);
   /// As of FrameAssembler, of all cameras; reasons name the camera where there are several.
   std::optional<core::TimeNs> next_deadline() const;
   std::vector<SkippedFrame> take_skipped();
@@ -81,34 +86,43 @@ class CameraFrames {
   std::uint64_t tf_late() const { return cameras_.front().assembler.tf_late(); }
 
   /// Of several cameras those that give nothing, a sentence each: they have sent nothing for a second, or what they
-  /// send is not used.
+  /// send is not used, and why.
   std::vector<std::string> silent(core::TimeNs now_ns) const;
+  /// Of several cameras what was used of each since the start, for a person; "" of a single one.
+  std::string counts_text() const;
 
  private:
   struct Camera {
     CameraInput input;
     FrameAssembler assembler;
-    std::string prefix;                           // of messages: "camera 'side': ", "" of the only one
-    std::string rectified_doubt;                  // rectified_doubt(), with the prefix
-    int passed_over = 0;                          // complete frames that were not used since the last one that was
-    std::optional<core::TimeNs> offered_ns = {};  // stamp of the complete frame that waits its turn
-    std::optional<core::TimeNs> used_ns = {};     // when the last one that was used had come
+    std::string prefix;                            // of messages: "camera 'side': ", "" of the only one
+    std::string rectified_doubt;                   // rectified_doubt(), with the prefix
+    int passed_over = 0;                           // complete frames that were not used since the last one that was
+    std::optional<core::TimeNs> offered_ns = {};   // stamp of the complete frame that waits its turn
+    std::optional<core::TimeNs> complete_ns = {};  // when the last one that was complete had come
+    std::optional<core::TimeNs> used_ns = {};      // when the last one that was used had come
+    std::uint64_t used = 0;
+    std::string last_skip = {};  // why the last one that was not used was not, until one is
   };
   /// The frame that was used last.
   struct Used {
     std::size_t camera = 0;
     FrameAssembler::DepthTimes times;
   };
-  std::optional<AssembledFrame> take_of(std::size_t camera, core::TimeNs now_ns, FrameAssembler::DepthTimes times);
+  /// Notes that a frame of the camera is used, and completes it.
+  void note_used(std::size_t camera, FrameAssembler::DepthTimes times, AssembledFrame& frame);
   /// What is ready of a camera and can be used; skips what can't.
   std::optional<FrameAssembler::DepthTimes> offer(std::size_t camera, core::TimeNs now_ns);
   bool is_of_other_clock(std::size_t camera, const FrameAssembler::DepthTimes& times) const;
+  /// Why a frame is not used that is older than what was used last.
+  std::string lateness(const FrameAssembler::DepthTimes& times) const;
   /// Whether a frame of another camera that comes before `times` may be still to come.
   bool waits_for_others(std::size_t camera, const FrameAssembler::DepthTimes& times, core::TimeNs now_ns) const;
 
   std::vector<Camera> cameras_;
   std::optional<Used> used_;
   std::optional<core::TimeNs> began_ns_;  // when the first frame that was used had come
+  std::optional<core::TimeNs> asked_ns_;  // of several cameras: the time of the last take()
   double max_wait_s_ = 0.0;
 };
 

@@ -109,10 +109,14 @@ class FrameAssembler {
   };
   std::optional<DepthTimes> ready(core::TimeNs now_ns);
   std::optional<AssembledFrame> take_ready(core::TimeNs now_ns);
+  /// A depth image that waits; empty = it does not.
+  std::optional<DepthTimes> waiting(MessageIndex depth) const;
+  /// Its frame, as a recording says; empty if it does not wait or is not complete.
+  std::optional<AssembledFrame> take_recorded(MessageIndex depth, core::TimeNs now_ns);
   /// Skips what waits with a stamp up to this one.
   void skip_up_to(core::TimeNs stamp_ns, const std::string& reason);
-  /// Whether a depth image with an earlier stamp waits for what completes it.
-  bool waits_before(core::TimeNs stamp_ns) const { return !waiting_.empty() && waiting_.front().stamp_ns < stamp_ns; }
+  /// Whether a depth image waits whose stamp is in [from_ns, before_ns).
+  bool has_waiting(core::TimeNs from_ns, core::TimeNs before_ns) const;
   /// The depth image that came last, used or not; empty = none has come.
   const std::optional<DepthTimes>& newest() const { return newest_; }
   /// Between the stamps of the last two depth images that came in order; 0 = there are no two.
@@ -120,11 +124,16 @@ class FrameAssembler {
   /// The sender's clock went back, as another camera's frames show.
   void clock_jumped_back();
 
-  /// When take() should be asked again although nothing has come in; empty if nothing waits.
-  std::optional<core::TimeNs> next_deadline() const;
+  /// When take() should be asked again although nothing has come in; empty if nothing waits. For whoever asked at
+  /// `asked_ns` already, later than that.
+  std::optional<core::TimeNs> next_deadline(std::optional<core::TimeNs> asked_ns = {}) const;
   /// What was skipped since the last call, oldest first; of more than a thousand, the newest.
   std::vector<SkippedFrame> take_skipped();
-  /// Why the newest of them was; "" if there are none.
+  /// The newest of them.
+  std::optional<SkippedFrame> last_skipped() const {
+    return skipped_.empty() ? std::nullopt : std::optional(skipped_.back());
+  }
+  /// Why it was; "" if there are none.
   std::string last_skip() const { return skipped_.empty() ? "" : skipped_.back().reason; }
   /// Since the start.
   std::uint64_t skipped_count() const { return skipped_count_; }

@@ -54,6 +54,8 @@ class Tracker {
   /// can act in, which is the second of a belief. Where it ends in an exception nothing is changed but that the frame
   /// is gone.
   std::optional<TrackerStep> step(core::TimeNs now_ns);
+  /// The step that a recording tells of, once the messages before it were taken in; empty where its frame is not there.
+  std::optional<TrackerStep> repeat(const StepRecord& recorded);
   /// When step() should be tried again although nothing came in. Simulated time goes on by messages only.
   std::optional<core::TimeNs> next_deadline() const {
     return uses_simulated_time() ? std::nullopt : frames_.next_deadline();
@@ -72,6 +74,8 @@ class Tracker {
   std::uint64_t tf_late() const { return frames_.tf_late(); }
   /// What is done about the lens, as FrameAssembler::lens_text().
   std::string lens_text() const { return frames_.lens_text(); }
+  /// As CameraFrames::counts_text().
+  std::string cameras_text() const { return frames_.counts_text(); }
   /// Actions of controls that wait for a frame, and those that were dropped since the start, as in WaitingControls.
   std::size_t waiting_controls() const { return controls_.count(); }
   std::uint64_t dropped_controls() const { return controls_.dropped(); }
@@ -86,6 +90,8 @@ class Tracker {
   Tracker(std::shared_ptr<const belief::Scene> scene, const TrackerSettings& settings, interfaces::LearnedFile learned,
           std::vector<belief::PhysicalBelief> physics, std::uint64_t seed, Backends& backends,
           std::unique_ptr<rendering::Renderer> renderer, std::unique_ptr<rendering::LikelihoodBatch> likelihood);
+  core::TimeNs time_at(core::TimeNs now_ns) const { return uses_simulated_time() ? simulated_now_ns_ : now_ns; }
+  TrackerStep step_with(AssembledFrame frame, core::TimeNs now_ns);
   /// The belief before any frame.
   belief::Belief start(std::uint64_t seed) const;
 
