@@ -163,6 +163,7 @@ void bind_frames(py::module_& module) {
                              })
       .def_property_readonly("skipped", [](const BoundFrame& bound) { return bound->record.skipped.size(); })
       .def_property_readonly("X_WC", [](const BoundFrame& bound) { return matrix_of(bound->X_WC); })
+      .def_property_readonly("camera", [](const BoundFrame& bound) { return bound->record.camera; })
       .def_property_readonly("objects", &estimates_of)
       .def("object", &object_named, py::arg("name"))
       .def_property_readonly(

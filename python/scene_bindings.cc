@@ -215,6 +215,7 @@ void bind_fixed_things(py::module_& module) {
                                return copy_of(matrix);
                              })
       .def_property_readonly("X_WC", [](const BoundCamera& camera) { return matrix_of(camera->X_WC); })
+      .def_property_readonly("is_placed", [](const BoundCamera& camera) { return camera->is_placed; })
       .def("__repr__", [](const BoundCamera& camera) { return python_text("<Camera '" + camera->name + "'>"); });
 }
 
@@ -283,6 +284,14 @@ void bind_scenes(py::module_& module) {
                              [](const BoundScene& bound) -> std::optional<BoundCamera> {
                                if (!bound.scene->camera) return std::nullopt;
                                return BoundCamera{bound.scene, &*bound.scene->camera};
+                             })
+      .def_property_readonly("cameras",
+                             [](const BoundScene& bound) {
+                               py::list cameras;
+                               for (int i = 0; i < belief::camera_count(*bound.scene); ++i)
+                                 if (const belief::SceneCamera* camera = belief::camera_at(*bound.scene, i))
+                                   cameras.append(BoundCamera{bound.scene, camera});
+                               return py::tuple(cameras);
                              })
       .def_property_readonly("gravity_W", [](const BoundScene& bound) { return vector_copy(bound.scene->gravity_W); })
       .def_property_readonly("duration", [](const BoundScene& bound) { return bound.scene->duration; })

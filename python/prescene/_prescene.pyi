@@ -124,7 +124,11 @@ class Camera:
     def K(self) -> NDArray[np.float64]:
         """(3, 3): focal lengths and principal point in pixels; the centre of the top-left pixel is (0, 0)."""
     @property
-    def X_WC(self) -> NDArray[np.float64]: ...
+    def X_WC(self) -> NDArray[np.float64]:
+        """The identity where is_placed is False."""
+    @property
+    def is_placed(self) -> bool:
+        """Whether the scene says where it is."""
 
 class SceneObject:
     """An object of a scene, and what is known of its start."""
@@ -165,7 +169,10 @@ class Scene:
     @property
     def objects(self) -> Tuple[SceneObject, ...]: ...
     @property
-    def camera(self) -> Optional[Camera]: ...
+    def camera(self) -> Optional[Camera]:
+        """The first of cameras."""
+    @property
+    def cameras(self) -> Tuple[Camera, ...]: ...
     @property
     def gravity_W(self) -> NDArray[np.float64]:
         """(3,) m/s^2"""
@@ -262,7 +269,10 @@ class Frame:
         """Frames that were not used since the step before."""
     @property
     def X_WC(self) -> NDArray[np.float64]:
-        """Of the camera, (4, 4)."""
+        """Of the camera that took the frame, (4, 4)."""
+    @property
+    def camera(self) -> int:
+        """Which of the scene's cameras took the frame."""
     @property
     def objects(self) -> Tuple[TrackedObject, ...]: ...
     def object(self, name: str) -> TrackedObject:

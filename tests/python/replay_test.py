@@ -67,6 +67,7 @@ class Replays(unittest.TestCase):
         depth, color = frame.depth, frame.color
         assert depth is not None
         self.assertEqual((depth.dtype, depth.shape), (np.float32, (120, 160)))
+        self.assertEqual(frame.camera, 0)
         self.assertFalse(depth.flags.writeable or depth.flags.owndata)
         self.assertTrue(color is None or (color.dtype, color.shape) == (np.uint8, (120, 160, 3)))
         objects = frame.objects

@@ -82,6 +82,16 @@ class Scenes(unittest.TestCase):
         assert scene.camera is not None
         focal_length = 160 / np.tan(np.radians(30))
         np.testing.assert_allclose(scene.camera.K[0, 0], focal_length, rtol=1e-9)
+        self.assertEqual([camera.name for camera in scene.cameras], ["camera"])
+
+    def test_several_cameras(self) -> None:
+        places = "look: {from: [1, 0, 1], at: [0, 0, 0]}"
+        listed = f"cameras:\n  - {{name: front, fov_deg: 60, {places}}}\n  - {{name: wrist, fov_deg: 40}}\n"
+        scene = prescene.Scene.from_yaml(FALLING + listed)
+        self.assertEqual([(camera.name, camera.is_placed) for camera in scene.cameras], [("front", True), ("wrist", False)])
+        assert scene.camera is not None
+        self.assertEqual(scene.camera.name, "front")
+        np.testing.assert_array_equal(scene.cameras[1].X_WC, np.eye(4))
 
     def test_meshes_are_read_only_views_that_keep_their_scene(self) -> None:
         scene = prescene.Scene.from_yaml(CUBE)
