@@ -47,13 +47,13 @@ void record(const std::string& scene_yaml, const std::function<void(const Receiv
 
 }  // namespace
 
-RobotOnBus::RobotOnBus(const std::string& scene_yaml, int domain) {
-  const service::InputTopics topics;
+RobotOnBus::RobotOnBus(const std::string& scene_yaml, int domain, service::InputTopics topics)
+    : topics_(std::move(topics)) {
   record(scene_yaml, [&](const ReceivedMessage& message) {
-    if (message.topic == topics.depth) depths_.push_back(decoded<interfaces::RosImage>(message));
-    if (message.topic == topics.color) colors_.push_back(decoded<interfaces::RosImage>(message));
-    if (message.topic == topics.camera_info) info_ = decoded<interfaces::RosCameraInfo>(message);
-    if (message.topic == topics.tf_static) camera_pose_ = decoded<interfaces::RosTfMessage>(message);
+    if (message.topic == topics_.depth) depths_.push_back(decoded<interfaces::RosImage>(message));
+    if (message.topic == topics_.color) colors_.push_back(decoded<interfaces::RosImage>(message));
+    if (message.topic == topics_.camera_info) info_ = decoded<interfaces::RosCameraInfo>(message);
+    if (message.topic == topics_.tf_static) camera_pose_ = decoded<interfaces::RosTfMessage>(message);
   });
   EXPECT_FALSE(depths_.empty());
   EXPECT_FALSE(camera_pose_.transforms.empty());
@@ -105,20 +105,19 @@ interfaces::DdsPublisher RobotOnBus::publisher(const std::string& topic, const s
 void RobotOnBus::count(const core::Status& sent) { unsent_ += sent.ok() ? 0 : 1; }
 
 void RobotOnBus::send_depth(const interfaces::RosImage& image) {
-  count(node_->publish(publisher(service::InputTopics().depth, "sensor_msgs/msg/Image", TopicQos::kImages), image));
+  count(node_->publish(publisher(topics_.depth, "sensor_msgs/msg/Image", TopicQos::kImages), image));
 }
 
 void RobotOnBus::send_color(const interfaces::RosImage& image) {
-  count(node_->publish(publisher(service::InputTopics().color, "sensor_msgs/msg/Image", TopicQos::kImages), image));
+  count(node_->publish(publisher(topics_.color, "sensor_msgs/msg/Image", TopicQos::kImages), image));
 }
 
 void RobotOnBus::send_camera_info(const interfaces::RosCameraInfo& info) {
-  count(node_->publish(publisher(service::InputTopics().camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kReliable),
-                       info));
+  count(node_->publish(publisher(topics_.camera_info, "sensor_msgs/msg/CameraInfo", TopicQos::kReliable), info));
 }
 
 void RobotOnBus::send_tf(const interfaces::RosTfMessage& tf) {
-  count(node_->publish(publisher(service::InputTopics().tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf), tf));
+  count(node_->publish(publisher(topics_.tf, "tf2_msgs/msg/TFMessage", TopicQos::kTf), tf));
 }
 
 void RobotOnBus::send_clock(core::TimeNs time_ns) {

@@ -16,6 +16,7 @@
 #include "prescene/belief/scene.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/service/tracking/topics.h"
 #include "tests/service/recorded_box.h"
 
 namespace prescene::tests {
@@ -25,8 +26,9 @@ inline const std::string kBoxScene = box_on_table("0.3", ", normal: {position: [
 
 class RobotOnBus {
  public:
-  /// Records `scene` and joins the bus. A failure is a test failure, and good() is false.
-  RobotOnBus(const std::string& scene_yaml, int domain);
+  /// Records `scene` and joins the bus with the camera of these topics. A failure is a test failure, and good() is
+  /// false.
+  RobotOnBus(const std::string& scene_yaml, int domain, service::InputTopics topics = {});
   ~RobotOnBus();
 
   bool good() const { return node_ != nullptr; }
@@ -74,6 +76,7 @@ class RobotOnBus {
   std::map<std::string, std::string> diagnostics_;
 
   std::uint64_t unsent_ = 0;
+  service::InputTopics topics_;
   std::vector<interfaces::RosImage> depths_, colors_;
   interfaces::RosCameraInfo info_;
   interfaces::RosTfMessage camera_pose_;
