@@ -85,6 +85,25 @@ std::vector<Pose> robot_poses(const Belief& belief, const belief::Observation& o
   return X_WG;
 }
 
+/// A frame of a camera that does not see what another one sees tells nothing of rest and motion: what would have begun
+/// to move, or come to rest, in the prediction to it goes on as it was.
+void keep_modes(const Belief& before, int camera, double dt, Belief& belief) {
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    ObjectBelief& object = belief.objects[i];
+    const std::vector<Particle>& were = before.objects[i].particles;
+    const bool is_believed = object.state == TrackState::kTracked || object.state == TrackState::kDoubtful;
+    if (!is_believed || !was_unseen_by(before.objects[i], camera) || object.particles.size() != were.size()) continue;
+    for (std::size_t j = 0; j < were.size(); ++j) {
+      Particle& particle = object.particles[j];
+      const bool woke = were[j].mode == belief::MotionMode::kResting && particle.mode == belief::MotionMode::kMoving;
+      const bool settled = were[j].mode == belief::MotionMode::kMoving && particle.mode == belief::MotionMode::kResting;
+      if (woke || settled) particle = were[j];
+      if (settled) particle.X_WO.translation += dt * particle.V_WO.linear;
+    }
+    belief::normalize(object.particles);
+  }
+}
+
 }  // namespace
 
 std::string degraded_text(std::uint32_t bits) {
@@ -323,6 +342,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
     result.counters.not_simulated = report.not_simulated;
     result.physics_failure = std::move(report.failure);
     if (report.not_simulated > 0) result.degraded |= kPhysicsFailed;
+    if (!belief.cameras.empty()) keep_modes(previous, observation.camera, dt, belief);
     hold_joints(belief);
   }
   belief.robot = X_WG;

@@ -40,7 +40,7 @@ core::Result<std::shared_ptr<const belief::Scene>> check_scene_file(const std::s
     return std::shared_ptr<const belief::Scene>();
   }
   check.what = file + ": " + counted((*scene)->objects.size(), "object") + ", " +
-               counted((*scene)->supports.size(), "support") + ", " + counted((*scene)->robot.size(), "body") +
+               counted((*scene)->supports.size(), "support") + ", " + counted((*scene)->robot.size(), "part") +
                " of the robot";
   if (!warnings.empty()) {
     check.status = CheckStatus::kWarning;

@@ -55,11 +55,11 @@ class CameraFramesTest : public testing::Test {
     ASSERT_TRUE(taken->ok()) << taken->message();
   }
 
-  void depth(const std::string& camera, core::TimeNs stamp_ms, core::TimeNs received_ms,
-             const std::string& frame = "") {
+  void depth(const std::string& camera, core::TimeNs stamp_ms, core::TimeNs received_ms, const std::string& frame = "",
+             float metres = 0.75F) {
     const interfaces::RosHeader header{interfaces::to_ros_time(stamp_ms * kMs), frame.empty() ? camera : frame};
     send("/" + camera + "/depth", "sensor_msgs/msg/Image",
-         interfaces::encode_cdr(interfaces::to_ros_image_16uc1(geometry::DepthImage(8, 6, 0.75F), header)),
+         interfaces::encode_cdr(interfaces::to_ros_image_16uc1(geometry::DepthImage(8, 6, metres), header)),
          received_ms * kMs);
   }
 
@@ -194,6 +194,15 @@ TEST_F(CameraFramesTest, SaysWhereImagesOfACameraWereToCome) {
               ElementsAre(AllOf(HasSubstr("camera 'side': no depth image of it has come on /side/depth"),
                                 HasSubstr("scene file"))));
   EXPECT_EQ(frames_.counts_text(), "front: 40 frames used, 0 not; side: 0 frames used, 0 not");
+}
+
+TEST_F(CameraFramesTest, SaysWhichCameraSeesNothingAtAll) {
+  depth("front", 1000, 1001);
+  depth("side", 1010, 1011, "side", 0.0F);
+  const auto front = frames_.take(1011 * kMs), side = frames_.take(1011 * kMs);
+  ASSERT_TRUE(front && side);
+  EXPECT_THAT(front->doubts, ElementsAre());
+  EXPECT_THAT(side->doubts, ElementsAre(HasSubstr("camera 'side': no pixel of its depth image is measured")));
 }
 
 TEST_F(CameraFramesTest, TakesTheFramesThatARecordingNames) {

@@ -168,6 +168,67 @@ TEST_F(SeveralCameras, KeepWhatOneOfThemSees) {
   EXPECT_EQ(std::count(front.states.begin(), front.states.end(), belief::TrackState::kTracked), 0);
 }
 
+/// Share of the instants at which it was tracked, and the median error at all of them.
+std::pair<double, double> share_and_error(const std::vector<Tracked>& runs) {
+  std::vector<double> errors;
+  double count = 0.0;
+  for (const Tracked& run : runs) {
+    errors.insert(errors.end(), run.errors_then.begin(), run.errors_then.end());
+    count += static_cast<double>(std::count(run.tracked_then.begin(), run.tracked_then.end(), true));
+  }
+  if (errors.empty()) return {0.0, 0.0};
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return {count / static_cast<double>(errors.size()), *middle};
+}
+
+/// A box is pushed, which nobody tells, from behind one board to behind another: at each instant one of two cameras
+/// sees it. PRESCENE_CAMERA_RUNS=8 repeats it at other speeds, and prints the figures of docs/studies/tracking.md.
+TEST_F(SeveralCameras, SeeWhatEachAloneMisses) {
+  const std::string front =
+      "  - {name: front, width: 160, height: 120, fov_deg: 50, look: {from: [0.8, 0, 0.35], at: [0, 0, 0.04]}}\n";
+  const std::string back =
+      "  - {name: back, width: 160, height: 120, fov_deg: 50, look: {from: [-0.8, 0, 0.35], at: [0, 0, 0.04]}}\n";
+  const auto scene = [](const std::string& cameras, double speed) {
+    return R"(name: two_boards
+duration: 3.4
+stop_at_rest: false
+models:
+  box: {box: [0.08, 0.06, 0.08], mass: 0.4, friction: 0.4}
+supports:
+  table: {box: [1.6, 1.6, 0.04], pose: {position: [0, 0, -0.02]}}
+  front_board: {box: [0.02, 0.34, 0.25], pose: {position: [0.2, -0.19, 0.125]}}
+  back_board: {box: [0.02, 0.34, 0.25], pose: {position: [-0.2, 0.19, 0.125]}}
+objects:
+  box: {model: box, pose: {position: [0, -0.17, 0.04]}}
+actions:
+  - {time: 0.2, push: {from: [0, -0.24, 0.03], to: [0, 0.12, 0.03], duration: )" +
+           std::to_string(0.36 / speed) + "}}\ncameras:\n" + cameras;
+  };
+  const char* asked = std::getenv("PRESCENE_CAMERA_RUNS");
+  const int runs = asked != nullptr ? std::max(1, std::atoi(asked)) : 1;
+  std::array<std::vector<Tracked>, 3> tracked;  // by the front, the back, both
+  for (int run = 0; run < runs; ++run) {
+    const double speed = 0.12 + 0.005 * run;  // m/s
+    const std::filesystem::path path = record(scene(front + back, speed), 10.0);
+    const std::array<std::string, 3> cameras = {front, back, front + back};
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      tracked.at(i).push_back(
+          track(path, scene(cameras.at(i), speed), 1,
+                [](const interfaces::ReceivedMessage& message) { return message.topic != kControlTopic; }));
+  }
+  const auto [front_share, front_error] = share_and_error(tracked[0]);
+  const auto [back_share, back_error] = share_and_error(tracked[1]);
+  const auto [both_share, both_error] = share_and_error(tracked[2]);
+  if (asked != nullptr)
+    for (const auto& of : tracked)
+      std::printf("tracked %.3f, median error %.1f mm\n", share_and_error(of).first, 1e3 * share_and_error(of).second);
+  EXPECT_LT(front_share, 0.6) << "it sees the box for half of the time";
+  EXPECT_LT(back_share, 0.6);
+  EXPECT_GT(both_share, std::max(front_share, back_share));
+  EXPECT_LT(both_error, std::max(front_error, back_error));
+}
+
 TEST_F(SeveralCameras, OneInAListIsAsOneByItself) {
   const std::string view = "width: 160, height: 120, fov_deg: 45, look: {from: [0.6, 0, 0.3], at: [0, 0, 0.04]}}\n";
   const std::string alone = sliding_box("", "camera: {" + view),
