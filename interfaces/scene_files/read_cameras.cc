@@ -154,6 +154,9 @@ belief::CameraTopics read_topics(Binder& binder, const belief::SceneCamera& came
   Problems& problems = binder.problems();
   std::string which;
   const LocatedValue* at = binder.one_of({"topics", "preset"}, "give 'topics' or 'preset'", true, &which);
+  if (const LocatedValue* space = which == "preset" ? nullptr : binder.find("namespace"))
+    problems.add(space->place, space->path, "it goes with 'preset', whose names it changes",
+                 "give 'preset' (realsense, zed, ...), or the whole names under 'topics'");
   belief::CameraTopics topics;
   if (at && which == "topics") {
     topics = read_named_topics(*at, problems);

@@ -229,6 +229,7 @@ TEST(SceneFile, SaysWhatIsWrongWithCameras) {
               AllOf(HasSubstr("cameras[1]: its topic /zed/zed_node/depth/depth_registered is named on line"),
                     HasSubstr("'namespace'")));
   EXPECT_THAT(error("  - {name: a, fx: 500, preset: kinect}\n"), HasSubstr("cameras[0].preset"));
+  EXPECT_THAT(error("  - {name: a, fx: 500, namespace: /a}\n"), HasSubstr("it goes with 'preset'"));
   EXPECT_THAT(error("  - {name: a-b, fx: 500}\n"), HasSubstr("no topics can be named after 'a-b'"));
   EXPECT_THAT(error("  - {name: a, fx: 500, topics: {depth: depth, camera_info: /info}}\n"),
               HasSubstr("topics.depth: 'depth' is no name of a topic: give letters"));
