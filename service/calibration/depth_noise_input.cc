@@ -9,6 +9,8 @@
 #include "prescene/service/calibration/depth_noise.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/recording/recording.h"
+#include "prescene/service/recording/replay_input.h"
+#include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
 namespace prescene::service {
@@ -33,13 +35,39 @@ core::Status add_folder(const std::filesystem::path& path, double metres_per_uni
   return core::ok_status();
 }
 
-core::Status add_recording(const std::filesystem::path& path, const core::ProgressSink& progress,
-                           const core::Cancellation& cancellation, DepthNoiseEstimator& estimator) {
+/// Those of the camera of this name, where the recording's scene lists its cameras.
+core::Status take_camera(const std::filesystem::path& path, const std::string& name, TrackerSettings& settings) {
+  ReplayInputOptions options;
+  options.path = path;
+  const auto input = ReplayInput::open(options, {});
+  std::vector<CameraInput> cameras;
+  if (input && names_topics(*input->scene())) cameras = camera_inputs(settings, *input->scene());
+  std::string names;
+  for (CameraInput& camera : cameras) {
+    if (camera.name == name || (cameras.size() == 1 && name.empty())) {
+      settings.topics = std::move(camera.topics);
+      settings.assembler = std::move(camera.assembler);
+      return core::ok_status();
+    }
+    names += (names.empty() ? "" : ", ") + camera.name;
+  }
+  if (!names.empty())
+    return core::invalid_input("the cameras of the recording's scene are " + names +
+                               ": name one of them with --of-camera");
+  if (!name.empty())
+    return core::invalid_input("--of-camera " + name + ": the recording's scene lists no cameras: leave it out");
+  return core::ok_status();
+}
+
+core::Status add_recording(const std::filesystem::path& path, const std::string& name,
+                           const core::ProgressSink& progress, const core::Cancellation& cancellation,
+                           DepthNoiseEstimator& estimator) {
   PRESCENE_TRY(const auto reader, RecordingReader::open(path));
   TrackerSettings settings;
   if (!reader->info().settings.empty()) {
     PRESCENE_TRY(settings, with_recorded({}, parse_or_discard(reader->info().settings)));
   }
+  PRESCENE_RETURN_IF_ERROR(take_camera(path, name, settings));
   const double total = static_cast<double>(reader->message_count().value_or(0));
   double done = 0.0;
   int images = 0;
@@ -83,10 +111,11 @@ core::Status add_recording(const std::filesystem::path& path, const core::Progre
 }  // namespace
 
 core::Result<DepthNoise> depth_noise_of(const std::filesystem::path& path, double metres_per_unit,
-                                        const core::ProgressSink& progress, const core::Cancellation& cancellation) {
+                                        const core::ProgressSink& progress, const core::Cancellation& cancellation,
+                                        const std::string& camera) {
   DepthNoiseEstimator estimator;
   const core::Status added = interfaces::is_bag(path)
-                                 ? add_recording(path, progress, cancellation, estimator)
+                                 ? add_recording(path, camera, progress, cancellation, estimator)
                                  : add_folder(path, metres_per_unit, progress, cancellation, estimator);
   if (!added.ok()) return added.at(path.string());
   auto noise = estimator.finish();

@@ -30,6 +30,7 @@ struct InspectOptions {
   RecordingInspection recording;
   std::string scene;
   bool depth_noise = false;
+  std::string camera;
   const CLI::App* verb = nullptr;
 };
 
@@ -42,7 +43,7 @@ std::vector<std::string> frame_options(const CLI::App& verb) {
       names.push_back("--" + option->get_lnames().front());
   return names;
 }
-constexpr const char* kOtherRecordingOptions[] = {"--depth-scale", "--depth-noise"};
+constexpr const char* kOtherRecordingOptions[] = {"--depth-scale", "--depth-noise", "--of-camera"};
 
 bool is_recording(const std::filesystem::path& path) {
   return path.extension() == ".mcap" || path.extension() == ".db3" || std::filesystem::is_directory(path);
@@ -179,8 +180,12 @@ core::Status run(InspectOptions& options, VerbContext& context) {
   if (options.depth_noise) {
     for (const std::string& name : of_frames)
       if (given(name)) return core::invalid_input(name + " does not go with --depth-noise: leave one of them out");
-    PRESCENE_TRY(const DepthNoise noise, depth_noise_of(options.file, options.recording.input.metres_per_unit,
-                                                        context.progress("reading"), context.cancellation()));
+    if (!options.camera.empty() && !interfaces::is_bag(options.file))
+      return core::invalid_input("--of-camera is for recordings of several cameras, and " + options.file +
+                                 " is a folder of images: leave it out");
+    PRESCENE_TRY(const DepthNoise noise,
+                 depth_noise_of(options.file, options.recording.input.metres_per_unit, context.progress("reading"),
+                                context.cancellation(), options.camera));
     context.print(to_json(noise), text_of(noise));
     return core::ok_status();
   }
@@ -226,6 +231,9 @@ Verb add_inspect_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_flag("--depth-noise", options->depth_noise,
                  "Of a recording in which nothing moves: the depth camera's noise, and the sensor model's settings");
+  verb->add_option("--of-camera", options->camera, "With --depth-noise: which of the cameras that the scene lists")
+      ->check(utf8_text())
+      ->needs("--depth-noise");
   verb->add_option("--overlay", options->recording.overlay,
                    "Of a recording: write a PNG of the camera's picture with the belief drawn over it")
       ->check(file_name());

@@ -69,12 +69,15 @@ class DepthNoiseEstimator {
 };
 
 /// Of a recording (.mcap) or a folder of images. Of a recording the depth images and the camera info are taken from the
-/// topics that its own settings name, or from the default ones if it has no settings. `metres_per_unit`: of the
+/// topics that its own settings name, or from the default ones if it has no settings; of several cameras that its scene
+/// lists, from those of `camera`. `metres_per_unit`: of the
 /// depth PNGs of a folder; not used for recordings. Fails as RecordingReader and interfaces::FrameFolder do for files
 /// that cannot be read, as DepthNoiseEstimator does, with kInvalidInput when a recording has no depth image or no
-/// camera info on its topic, and with kCancelled when asked to stop; texts begin with the path.
+/// camera info on its topic, or has several cameras and `camera` names none of them, and with kCancelled when asked to
+/// stop; texts begin with the path.
 core::Result<DepthNoise> depth_noise_of(const std::filesystem::path& path, double metres_per_unit,
-                                        const core::ProgressSink& progress, const core::Cancellation& cancellation);
+                                        const core::ProgressSink& progress, const core::Cancellation& cancellation,
+                                        const std::string& camera = "");
 
 nlohmann::ordered_json to_json(const DepthNoise& noise);
 
