@@ -23,8 +23,7 @@
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <dds/ddsrt/log.h>
-#include "bus_census.h"
-#include "graph_announcement.h"
+#include "dds_node_impl.h"
 #include "idl_messages.h"
 #include "prescene/core/check.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
@@ -32,13 +31,14 @@
 #include "topic_table.h"
 
 namespace prescene::interfaces {
-namespace {
 
 core::Status dds_status(dds_return_t code, const std::string& doing) {
   if (code >= 0) return core::ok_status();
   return core::unavailable(doing + ": " + dds_strretcode(-code) +
                            "; Cyclone DDS prints the cause above, CYCLONEDDS_URI sets it up");
 }
+
+namespace {
 
 // Ours first, so that the user's CYCLONEDDS_URI has the last word.
 std::string configuration(const DdsOptions& options) {
@@ -124,109 +124,6 @@ void check_buffer(const DdsOptions& options, const core::LogSink& log) {
 }
 
 }  // namespace
-
-namespace {
-
-/// Of a CDR message: its header, the client and its request's number, and the request's own fields. Nothing where it is
-/// none of ours.
-std::optional<ServiceRequest> parse_request(const std::vector<std::uint8_t>& cdr, ServiceForm form) {
-  constexpr std::size_t kHeader = 4, kIdentity = 16, kLongest = std::size_t{4} << 20;
-  if (cdr.size() < kHeader + kIdentity || cdr.size() > kLongest || cdr[0] != 0 || cdr[1] > 1) return std::nullopt;
-  const bool is_little = cdr[1] == 1;
-  const auto number_at = [&](std::size_t at) {
-    std::uint64_t number = 0;
-    for (std::size_t i = 0; i < 8; ++i) number = number << 8 | cdr[at + (is_little ? 7 - i : i)];
-    return number;
-  };
-  ServiceRequest request;
-  request.client = number_at(kHeader);
-  request.sequence = static_cast<std::int64_t>(number_at(kHeader + 8));
-  if (form == ServiceForm::kEmpty) return request;
-  // The fields are aligned to 16 bytes, so that they are a message of their own.
-  std::vector<std::uint8_t> body(cdr.begin(), cdr.begin() + kHeader);
-  body.insert(body.end(), cdr.begin() + kHeader + kIdentity, cdr.end());
-  if (form == ServiceForm::kFields) {
-    request.fields = std::move(body);
-    return request;
-  }
-  auto text = decode_cdr<RosString>(body, kSmallMessage);
-  if (!text) return std::nullopt;
-  request.text = std::move(text->data);
-  return request;
-}
-
-}  // namespace
-
-struct DdsNode::Impl {
-  struct Subscription {
-    std::string topic;
-    std::string type;
-    std::function<void(ReceivedMessage&&)> on_message;
-    dds_entity_t reader = 0;
-    std::atomic<std::uint64_t> arrived{0};   // samples that the middleware offered to the reader's history
-    std::uint64_t taken = 0;                 // of them, those that the node's thread took; touched by it alone
-    std::uint64_t reported_overwritten = 0;  // of them, those counted as dropped already
-    bool has_more = false;                   // something may wait; touched by the node's thread alone
-  };
-  struct Publication {
-    std::string topic;
-    std::string type;
-    dds_entity_t writer = 0;
-  };
-  struct Service {
-    std::string name;
-    const ServiceType* type = nullptr;
-    dds_entity_t requests = 0;   // reader
-    dds_entity_t replies = 0;    // writer
-    std::atomic<int> silent{0};  // clients that ask and read no replies; nobody waits for them
-  };
-
-  DdsOptions options;
-  dds_entity_t participant = 0;
-  dds_entity_t waitset = 0;
-  dds_entity_t stop = 0;
-  std::unique_ptr<GraphAnnouncement> graph;
-  BusCensus census;
-  std::string interfaces;    // as Cyclone names those that it uses, or ""
-  mutable std::mutex mutex;  // guards the three lists; their entries stay where they are
-  std::deque<Subscription> subscriptions;
-  std::deque<Publication> publications;
-  std::deque<Service> services;
-  std::atomic<std::uint64_t> dropped{0};
-  std::atomic<bool> stopping{false};
-  std::atomic<std::chrono::steady_clock::time_point> waits_from{};  // for the readers of clients; not before this
-  std::thread thread;
-
-  ~Impl() {
-    stop_receiving();
-    graph.reset();
-    if (participant > 0) dds_delete(participant);
-  }
-
-  void run();
-  void stop_receiving() {
-    if (!thread.joinable()) return;
-    stopping = true;
-    dds_set_guardcondition(stop, true);
-    thread.join();
-  }
-  /// Takes what waits, or a good part of it; has_more then says whether more may wait.
-  void take(Subscription& subscription);
-  void deliver(Subscription& subscription, const ddsi_serdata* sample, const dds_sample_info_t& info);
-  void count_losses(Subscription& subscription, std::uint64_t arrived);
-  core::Result<dds_entity_t> make_topic(const std::string& topic, const std::string& type) const;
-  /// Has `reader` listened to; the lock is held.
-  core::Status listen(const std::string& topic, const std::string& type, dds_entity_t topic_entity, const QosPtr& qos,
-                      std::function<void(ReceivedMessage&&)> on_message);
-  /// A service of ours, once the client of a request can read its reply, or 100 ms have passed. Waits once for a
-  /// client, and then not for 200 ms: others want their frames and replies.
-  const Service& service_for(const ServiceRequest& request);
-  template <class CType, class Message>
-  core::Status reply(const ServiceRequest& request, std::string_view type, const Message& message);
-  template <class CType, class Message>
-  core::Status write(DdsPublisher publisher, const std::string& type, const Message& message);
-  void announce();
-};
 
 void DdsNode::Impl::run() {
   std::array<dds_attach_t, 64> triggered{};
@@ -498,138 +395,6 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
   if (type == "visualization_msgs/msg/MarkerArray") return decoded(RosMarkerArray{});
   if (type == "diagnostic_msgs/msg/DiagnosticArray") return decoded(RosDiagnosticArray{});
   return core::unsupported("messages of type '" + type + "' can't be published from recordings");
-}
-
-core::Status DdsNode::offer_service(const std::string& name, const std::string& type,
-                                    std::function<void(ServiceRequest&&)> on_request) {
-  PRESCENE_TRY(const std::string dds_name, dds_topic_name(name));
-  const std::string rest = dds_name.substr(2);  // behind "rt"
-  const ServiceType* service_type = find_service_type(type);
-  if (service_type == nullptr)
-    return core::unsupported("service " + name + ": the type '" + type + "' is not one that this program speaks");
-  const auto topic_of = [&](const dds_topic_descriptor_t* descriptor, const std::string& topic) {
-    return dds_create_topic(impl_->participant, descriptor, topic.c_str(), nullptr, nullptr);
-  };
-  const dds_entity_t requests = topic_of(service_type->request, "rq" + rest + "Request");
-  PRESCENE_RETURN_IF_ERROR(dds_status(requests, "service " + name));
-  const dds_entity_t replies = topic_of(service_type->response, "rr" + rest + "Reply");
-  PRESCENE_RETURN_IF_ERROR(dds_status(replies, "service " + name));
-  const std::lock_guard lock(impl_->mutex);
-  // As rmw_cyclonedds_cpp numbers them: the participant's part of its GUID, and a count.
-  std::array<std::uint8_t, 16> id{};
-  dds_guid_t guid;
-  PRESCENE_RETURN_IF_ERROR(dds_status(dds_get_guid(impl_->participant, &guid), "service " + name));
-  std::copy_n(std::begin(guid.v), 12, id.begin());
-  const int index = static_cast<int>(impl_->services.size());
-  id[15] = static_cast<std::uint8_t>(index + 1);
-  const dds_entity_t writer =
-      dds_create_writer(impl_->participant, replies, make_service_qos(id, response_hash(*service_type)).get(), nullptr);
-  PRESCENE_RETURN_IF_ERROR(dds_status(writer, "writer of " + name));
-  Impl::Service& service = impl_->services.emplace_back();
-  service.name = name;
-  service.type = service_type;
-  service.replies = writer;
-  core::Status listens = impl_->listen(
-      name, type, requests, make_service_qos(id, request_hash(*service_type)),
-      [impl = impl_.get(), index, form = service_type->form, on_request = std::move(on_request)](auto&& message) {
-        std::optional<ServiceRequest> request = parse_request(message.cdr, form);
-        if (!request) {
-          impl->dropped.fetch_add(1, std::memory_order_relaxed);
-          return;
-        }
-        request->service = index;
-        on_request(*std::move(request));
-      });
-  if (!listens.ok()) {
-    impl_->services.pop_back();
-    dds_delete(writer);
-    return listens;
-  }
-  service.requests = impl_->subscriptions.back().reader;
-  return core::ok_status();
-}
-
-const DdsNode::Impl::Service& DdsNode::Impl::service_for(const ServiceRequest& request) {
-  Service* found = nullptr;
-  {
-    const std::lock_guard lock(mutex);
-    PRESCENE_CHECK(request.service >= 0 && request.service < static_cast<int>(services.size()));
-    found = &services[static_cast<std::size_t>(request.service)];
-  }
-  Service& service = *found;
-  // Each client writes requests and reads replies. Whoever's writer was found first has a reader soon, or never.
-  const auto without_reader = [&service] {
-    dds_subscription_matched_status_t clients{};
-    dds_publication_matched_status_t readers{};
-    if (dds_get_subscription_matched_status(service.requests, &clients) != DDS_RETCODE_OK ||
-        dds_get_publication_matched_status(service.replies, &readers) != DDS_RETCODE_OK)
-      return 0;
-    return std::max(0, static_cast<int>(clients.current_count) - static_cast<int>(readers.current_count));
-  };
-  using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::milliseconds kLook(2), kLongestWait(100);
-  int missing = without_reader();
-  if (missing < service.silent) service.silent = missing;  // some have left
-  const auto begin = Clock::now();
-  if (missing <= service.silent || begin < waits_from.load()) return service;
-  while (missing > service.silent && Clock::now() < begin + kLongestWait) {
-    std::this_thread::sleep_for(kLook);
-    missing = without_reader();
-  }
-  if (missing > service.silent) service.silent = missing;
-  waits_from = Clock::now() + std::chrono::milliseconds(200);
-  return service;
-}
-
-template <class CType, class Message>
-core::Status DdsNode::Impl::reply(const ServiceRequest& request, std::string_view type, const Message& message) {
-  const Service& service = service_for(request);
-  PRESCENE_CHECK(service.type->name == type);
-  SampleArena arena;
-  CType response{};
-  response.client_guid = request.client;
-  response.sequence_number = request.sequence;
-  fill(response, message, arena);
-  return dds_status(dds_write(service.replies, &response), "reply of " + service.name);
-}
-
-core::Status DdsNode::reply(const ServiceRequest& request, const RosListParametersResponse& response) {
-  return impl_->reply<rcl_interfaces_srv_dds__ListParameters_Response_>(request, "rcl_interfaces/srv/ListParameters",
-                                                                        response);
-}
-core::Status DdsNode::reply(const ServiceRequest& request, const RosGetParametersResponse& response) {
-  return impl_->reply<rcl_interfaces_srv_dds__GetParameters_Response_>(request, "rcl_interfaces/srv/GetParameters",
-                                                                       response);
-}
-core::Status DdsNode::reply(const ServiceRequest& request, const RosGetParameterTypesResponse& response) {
-  return impl_->reply<rcl_interfaces_srv_dds__GetParameterTypes_Response_>(
-      request, "rcl_interfaces/srv/GetParameterTypes", response);
-}
-core::Status DdsNode::reply(const ServiceRequest& request, const RosDescribeParametersResponse& response) {
-  return impl_->reply<rcl_interfaces_srv_dds__DescribeParameters_Response_>(
-      request, "rcl_interfaces/srv/DescribeParameters", response);
-}
-core::Status DdsNode::reply(const ServiceRequest& request, const RosSetParametersResponse& response) {
-  return impl_->reply<rcl_interfaces_srv_dds__SetParameters_Response_>(request, "rcl_interfaces/srv/SetParameters",
-                                                                       response);
-}
-core::Status DdsNode::reply(const ServiceRequest& request, const RosSetParametersAtomicallyResponse& response) {
-  return impl_->reply<rcl_interfaces_srv_dds__SetParametersAtomically_Response_>(
-      request, "rcl_interfaces/srv/SetParametersAtomically", response);
-}
-
-core::Status DdsNode::reply(const ServiceRequest& request, bool success, const std::string& text) {
-  const Impl::Service& service = impl_->service_for(request);
-  // A C struct borrows its texts.
-  char* borrowed = const_cast<char*>(text.c_str());
-  const std::string writing = "reply of " + service.name;
-  PRESCENE_CHECK(service.type->form != ServiceForm::kFields);
-  if (service.type->form == ServiceForm::kText) {
-    const prescene_msgs_srv_dds__Ask_Response_ response{request.client, request.sequence, success, borrowed};
-    return dds_status(dds_write(service.replies, &response), writing);
-  }
-  const std_srvs_srv_dds__Trigger_Response_ response{request.client, request.sequence, success, borrowed};
-  return dds_status(dds_write(service.replies, &response), writing);
 }
 
 void DdsNode::stop_receiving() { impl_->stop_receiving(); }
