@@ -10,14 +10,11 @@
 #include <vector>
 
 #include "prescene/core/check.h"
+#include "zstd_compressor.h"
 
 namespace prescene::interfaces {
 namespace {
 
-// Recording must keep up with cameras beside everything else that a robot computes. Of real 640 x 480 colour and depth
-// images, level 1 leaves 50 % at 250 to 270 MB/s, level -3 leaves 54 % at 460 MB/s, and LZ4 56 % at 580 MB/s, of depth
-// alone 19, 24 and 27 % (six frames, one core, zstd 1.5.4).
-constexpr int kZstdLevel = -3;
 constexpr std::size_t kMinCompressedBytes = 1024;
 constexpr std::size_t kInputStep = std::size_t{256} << 10;
 
@@ -124,16 +121,24 @@ std::optional<McapCompression> find_compression(std::string_view name) {
 
 struct Compressor::Impl {
   McapCompression compression = McapCompression::kNone;
-  std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> zstd{nullptr, &ZSTD_freeCCtx};
-  std::vector<std::uint8_t> out;
+  std::optional<ZstdCompressor> zstd;
+  std::vector<std::uint8_t> out;  // of LZ4
+
+  std::span<const std::uint8_t> compress_lz4(std::span<const std::uint8_t> bytes);
 };
+
+std::span<const std::uint8_t> Compressor::Impl::compress_lz4(std::span<const std::uint8_t> bytes) {
+  const std::size_t bound = LZ4F_compressFrameBound(bytes.size(), nullptr);
+  if (out.size() < bound) out.resize(bound);
+  const std::size_t size = LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr);
+  // The output is as large as it can get, so that only memory can be missing.
+  if (LZ4F_isError(size) != 0U) throw std::bad_alloc();
+  return std::span<const std::uint8_t>(out).first(size);
+}
 
 Compressor::Compressor(McapCompression compression) : impl_(std::make_unique<Impl>()) {
   impl_->compression = compression;
-  if (compression == McapCompression::kZstd) {
-    impl_->zstd.reset(ZSTD_createCCtx());
-    if (impl_->zstd == nullptr) throw std::bad_alloc();
-  }
+  if (compression == McapCompression::kZstd) impl_->zstd.emplace();
 }
 Compressor::Compressor(Compressor&&) noexcept = default;
 Compressor& Compressor::operator=(Compressor&&) noexcept = default;
@@ -141,17 +146,9 @@ Compressor::~Compressor() = default;
 
 std::optional<std::span<const std::uint8_t>> Compressor::compress(std::span<const std::uint8_t> bytes) {
   if (impl_->compression == McapCompression::kNone || bytes.size() < kMinCompressedBytes) return std::nullopt;
-  const bool zstd = impl_->compression == McapCompression::kZstd;
-  std::vector<std::uint8_t>& out = impl_->out;
-  const std::size_t bound = zstd ? ZSTD_compressBound(bytes.size()) : LZ4F_compressFrameBound(bytes.size(), nullptr);
-  if (out.size() < bound) out.resize(bound);
-  const std::size_t size =
-      zstd ? ZSTD_compressCCtx(impl_->zstd.get(), out.data(), out.size(), bytes.data(), bytes.size(), kZstdLevel)
-           : LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr);
-  // The output is as large as it can get, so that only memory can be missing.
-  if ((zstd ? ZSTD_isError(size) : LZ4F_isError(size)) != 0U) throw std::bad_alloc();
-  if (size > bytes.size() / 50 * 49) return std::nullopt;
-  return std::span<const std::uint8_t>(out).first(size);
+  const auto compressed = impl_->zstd ? impl_->zstd->compress(bytes) : impl_->compress_lz4(bytes);
+  if (!compressed || compressed->size() > bytes.size() / 50 * 49) return std::nullopt;
+  return compressed;
 }
 
 core::Result<Decompressed> decompress(McapCompression compression, const StoredBytes& stored, std::uint64_t stored_size,

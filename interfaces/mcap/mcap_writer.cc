@@ -296,7 +296,7 @@ Result<int> McapWriter::add_channel(const McapChannel& channel) {
   return static_cast<int>(impl.channels.size()) - 1;
 }
 
-Status McapWriter::write(const McapMessage& message) {
+Status McapWriter::write(const McapMessage& message, std::span<const std::uint8_t> data) {
   Impl& impl = *impl_;
   PRESCENE_CHECK(!impl.closed);
   PRESCENE_CHECK(message.channel >= 0 && message.channel < static_cast<int>(impl.channels.size()));
@@ -314,7 +314,7 @@ Status McapWriter::write(const McapMessage& message) {
   if (too_late) PRESCENE_RETURN_IF_ERROR(impl.end_chunk());
   const Impl::Mark mark = impl.mark(channel);
   try {
-    return impl.add_message(channel, head, message.data);
+    return impl.add_message(channel, head, data);
   } catch (...) {
     impl.go_back_to(mark, channel);
     throw;

@@ -71,5 +71,37 @@ TEST(McapLaws, LittleMemoryCostsTheOrderNotTheMessages) {
   }));
 }
 
+/// Stretches of noise and of a pattern, as the images of a camera are.
+tests::Bytes noise_and_pattern(core::RandomStream* stream, std::size_t size) {
+  tests::Bytes bytes;
+  while (bytes.size() < size) {
+    const bool is_noise = stream->uniform_below(2) == 0;
+    const std::size_t end = std::min(size, bytes.size() + 1 + stream->uniform_below(300'000));
+    while (bytes.size() < end)
+      bytes.push_back(static_cast<std::uint8_t>(is_noise ? stream->uniform_below(256) : bytes.size() / 7 % 31));
+  }
+  return bytes;
+}
+
+TEST(McapLaws, LargeMessagesComeBackWhateverOfThemShrinks) {
+  core::RandomStream stream(1, core::Purpose::kTest);
+  for (int round = 0; round < 5; ++round) {
+    std::vector<TopicMessage> messages;
+    std::size_t sum = 0;
+    for (int i = 0; i < 4; ++i) {
+      messages.push_back({"/1", 0, 10 * i, 10 * i, noise_and_pattern(&stream, stream.uniform_below(900'000))});
+      sum += messages.back().data.size();
+    }
+    // Half is noise, and nothing of it may grow.
+    messages.push_back({"/2", 0, 50, 50, tests::Bytes(1 << 20, 7)});
+    const auto bytes = tests::record(messages, {.compression = McapCompression::kZstd});
+    EXPECT_LT(bytes.size(), sum + 20'000);
+    auto reader = McapReader::open_bytes(bytes);
+    ASSERT_TRUE(reader.ok());
+    EXPECT_EQ(tests::read_all(reader->get()), messages) << round;
+    EXPECT_TRUE((*reader)->loss().nothing());
+  }
+}
+
 }  // namespace
 }  // namespace prescene::interfaces::mcap_laws_test

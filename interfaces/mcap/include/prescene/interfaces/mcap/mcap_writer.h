@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 
 #include "prescene/core/status.h"
 #include "prescene/interfaces/mcap/mcap.h"
@@ -44,7 +45,9 @@ class McapWriter {
   core::Result<int> add_channel(const McapChannel& channel);
   /// The message's channel is one that add_channel returned (checked). kInvalidInput for negative times.
   /// Where memory ends in the middle of it, the exception is passed on and the recording is as it was before.
-  core::Status write(const McapMessage& message);
+  core::Status write(const McapMessage& message) { return write(message, message.data); }
+  /// The same with the data from anywhere; those of `message` are not looked at.
+  core::Status write(const McapMessage& message, std::span<const std::uint8_t> data);
   core::Status write_metadata(const McapMetadata& metadata);
   /// A file to carry along; readers need none of it to read the messages. kInvalidInput for negative times.
   core::Status write_attachment(const McapAttachment& attachment);
