@@ -123,6 +123,25 @@ void check_buffer(const DdsOptions& options, const core::LogSink& log) {
           " KiB, so images may be lost: sysctl -w net.core.rmem_max=" + std::to_string(options.receive_buffer_bytes));
 }
 
+/// The bytes of a sample where Cyclone keeps them, for as long as this lives.
+class SerialisedBytes {
+ public:
+  SerialisedBytes(const ddsi_serdata* sample, std::size_t size)
+      : held_(ddsi_serdata_to_ser_ref(sample, 0, size, &bytes_)) {}
+  ~SerialisedBytes() { ddsi_serdata_to_ser_unref(held_, &bytes_); }
+  SerialisedBytes(const SerialisedBytes&) = delete;
+  SerialisedBytes& operator=(const SerialisedBytes&) = delete;
+
+  std::vector<std::uint8_t> copy() const {
+    const auto* begin = static_cast<const std::uint8_t*>(bytes_.iov_base);
+    return {begin, begin + bytes_.iov_len};
+  }
+
+ private:
+  ddsrt_iovec_t bytes_{};
+  ddsi_serdata* held_;
+};
+
 }  // namespace
 
 void DdsNode::Impl::run() {
@@ -185,10 +204,9 @@ void DdsNode::Impl::deliver(Subscription& subscription, const ddsi_serdata* samp
     dropped.fetch_add(1, std::memory_order_relaxed);
     return;
   }
-  ReceivedMessage message{subscription.topic, subscription.type, std::vector<std::uint8_t>(size), info.source_timestamp,
-                          core::steady_now_ns()};
-  ddsi_serdata_to_ser(sample, 0, size, message.cdr.data());
-  subscription.on_message(std::move(message));
+  const SerialisedBytes bytes(sample, size);
+  subscription.on_message(
+      {subscription.topic, subscription.type, bytes.copy(), info.source_timestamp, core::steady_now_ns()});
 }
 
 // Cyclone's own count of lost samples leaves out those that newer ones push out of the reader's history.

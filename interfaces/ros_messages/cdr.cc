@@ -11,6 +11,7 @@
 #include "prescene/core/check.h"
 #include "prescene/interfaces/bytes/byte_reader.h"
 #include "prescene/interfaces/bytes/text.h"
+#include "prescene/interfaces/ros_messages/image_view.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
 
 namespace prescene::interfaces {
@@ -117,12 +118,18 @@ class CdrReader {
   }
 
   void read(std::vector<std::uint8_t>* data) {
+    std::span<const std::uint8_t> raw;
+    read(&raw);
+    data->assign(raw.begin(), raw.end());
+  }
+
+  /// Where they are.
+  void read(std::span<const std::uint8_t>* data) {
     std::uint32_t count = 0;
     read(&count);
     if (!ok()) return;
     if (count > in_.remaining()) return fail_length("sequence", count, 1);
-    const std::span<const std::uint8_t> raw = in_.take(count);
-    data->assign(raw.begin(), raw.end());
+    *data = in_.take(count);
   }
 
   template <class T>
@@ -200,18 +207,8 @@ core::Status check_remedy(const core::Status& status, std::string_view type) {
   return core::Status(status.code(), text);
 }
 
-}  // namespace
-
 template <class Message>
-std::vector<std::uint8_t> encode_cdr(const Message& message) {
-  CdrWriter writer;
-  writer.write(message);
-  return writer.take();
-}
-
-template <class Message>
-core::Result<Message> decode_cdr(std::span<const std::uint8_t> bytes, const CdrLimits& limits) {
-  const std::string_view type = ros_type<Message>().name;
+core::Result<Message> decode(std::span<const std::uint8_t> bytes, const CdrLimits& limits, std::string_view type) {
   const std::string name(type);
   if (bytes.size() > limits.max_message_bytes) {
     return core::resource_exhausted(name + ": " + size_text(bytes.size()) + " are more than the limit of " +
@@ -236,6 +233,24 @@ core::Result<Message> decode_cdr(std::span<const std::uint8_t> bytes, const CdrL
         "name");
   }
   return message;
+}
+
+}  // namespace
+
+template <class Message>
+std::vector<std::uint8_t> encode_cdr(const Message& message) {
+  CdrWriter writer;
+  writer.write(message);
+  return writer.take();
+}
+
+template <class Message>
+core::Result<Message> decode_cdr(std::span<const std::uint8_t> bytes, const CdrLimits& limits) {
+  return decode<Message>(bytes, limits, ros_type<Message>().name);
+}
+
+core::Result<RosImageView> view_image_cdr(std::span<const std::uint8_t> bytes, const CdrLimits& limits) {
+  return decode<RosImageView>(bytes, limits, ros_type<RosImage>().name);
 }
 
 #define PRESCENE_INSTANTIATE(Message)                                     \

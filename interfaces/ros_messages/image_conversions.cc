@@ -9,6 +9,7 @@
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/images/raw_color.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/interfaces/ros_messages/image_view.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -51,7 +52,7 @@ constexpr std::array<Encoding, 23> kColorEncodings = {{{"rgb8", RawColor::kRgb},
                                                        {"nv21", RawColor::kNv21}}};
 
 /// `half_rows` are those that follow the image's rows, as the colours of YUV 4:2:0 do.
-Status check_layout(const RosImage& image, std::uint32_t bytes_per_pixel, const ImageRules& rules,
+Status check_layout(const RosImageView& image, std::uint32_t bytes_per_pixel, const ImageRules& rules,
                     std::uint32_t half_rows = 0) {
   const std::string encoding = quote(image.encoding);
   if (image.width == 0 || image.height == 0) {
@@ -96,12 +97,12 @@ Word swapped_bytes(Word value) {
   return value;
 }
 
-bool needs_swap(const RosImage& image) {
+bool needs_swap(const RosImageView& image) {
   return (image.is_bigendian == 1) != (std::endian::native == std::endian::big);
 }
 
 template <class Word>
-Word word_at(const RosImage& image, int x, int y, bool swap) {
+Word word_at(const RosImageView& image, int x, int y, bool swap) {
   Word value;
   std::memcpy(&value,
               image.data.data() + std::size_t{image.step} * static_cast<std::size_t>(y) +
@@ -121,12 +122,12 @@ float depth_of(float value, double metres_per_unit) {
 }
 
 /// Pixels between the samples that doubts are judged by: about 4096 of them in all.
-int sample_step(const RosImage& image) {
+int sample_step(const RosImageView& image) {
   return std::max(1, static_cast<int>(std::sqrt(static_cast<double>(image.width) * image.height / 4096.0)));
 }
 
 /// Real depth is smooth nearly everywhere; read in the wrong byte order it jumps from pixel to pixel.
-bool looks_swapped(const RosImage& image, std::uint16_t /*word*/, bool swap) {
+bool looks_swapped(const RosImageView& image, std::uint16_t /*word*/, bool swap) {
   double declared = 0.0;
   double other = 0.0;
   int pairs = 0;
@@ -144,7 +145,7 @@ bool looks_swapped(const RosImage& image, std::uint16_t /*word*/, bool swap) {
   return pairs >= 64 && declared > 8.0 * other + 8.0 * pairs;
 }
 
-bool looks_swapped(const RosImage& image, float /*word*/, bool swap) {
+bool looks_swapped(const RosImageView& image, float /*word*/, bool swap) {
   int declared = 0;
   int other = 0;
   int samples = 0;
@@ -174,17 +175,23 @@ double sampled_median(const DepthImage& depth, int step) {
   return static_cast<double>(*middle);
 }
 
+/// One row of `image`, in metres; how many of its pixels are measured.
 template <class Word>
-DepthImage read_depth(const RosImage& image, double metres_per_unit, DepthImageReport* report) {
+int read_row(const RosImageView& image, int y, double metres_per_unit, bool swap, std::span<float> row) {
+  int measured = 0;
+  for (std::size_t x = 0; x < row.size(); ++x) {
+    row[x] = depth_of(word_at<Word>(image, static_cast<int>(x), y, swap), metres_per_unit);
+    measured += row[x] > 0.0F ? 1 : 0;
+  }
+  return measured;
+}
+
+template <class Word>
+DepthImage read_depth(const RosImageView& image, double metres_per_unit, DepthImageReport* report) {
   const bool swap = needs_swap(image);
   DepthImage depth(static_cast<int>(image.width), static_cast<int>(image.height));
-  for (int y = 0; y < depth.height(); ++y) {
-    for (int x = 0; x < depth.width(); ++x) {
-      const float value = depth_of(word_at<Word>(image, x, y, swap), metres_per_unit);
-      depth(x, y) = value;
-      report->measured += value > 0.0F ? 1 : 0;
-    }
-  }
+  for (int y = 0; y < depth.height(); ++y)
+    report->measured += read_row<Word>(image, y, metres_per_unit, swap, {depth.view().row(y), image.width});
   report->missing = static_cast<std::int64_t>(depth.size()) - report->measured;
   report->median_depth = sampled_median(depth, sample_step(image));
   if (looks_swapped(image, Word{}, swap)) {
@@ -196,7 +203,19 @@ DepthImage read_depth(const RosImage& image, double metres_per_unit, DepthImageR
 
 }  // namespace
 
+RosImageView view_of(const RosImage& image) {
+  return {image.header, image.height, image.width, image.encoding, image.is_bigendian, image.step, image.data};
+}
+
 Result<DepthImage> to_depth_image(const RosImage& image, const ImageRules& rules, DepthImageReport* report) {
+  return to_depth_image(view_of(image), rules, report);
+}
+
+Result<ColorImage> to_color_image(const RosImage& image, const ImageRules& rules) {
+  return to_color_image(view_of(image), rules);
+}
+
+Result<DepthImage> to_depth_image(const RosImageView& image, const ImageRules& rules, DepthImageReport* report) {
   DepthImageReport own_report;
   if (report == nullptr) report = &own_report;
   *report = {};
@@ -226,7 +245,7 @@ Result<DepthImage> to_depth_image(const RosImage& image, const ImageRules& rules
   return core::unsupported("encoding: " + quote(image.encoding) + " is no depth image; " + remedy);
 }
 
-Result<ColorImage> to_color_image(const RosImage& image, const ImageRules& rules) {
+Result<ColorImage> to_color_image(const RosImageView& image, const ImageRules& rules) {
   const auto* encoding = std::find_if(kColorEncodings.begin(), kColorEncodings.end(),
                                       [&](const Encoding& e) { return e.name == image.encoding; });
   if (encoding == kColorEncodings.end()) {

@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "prescene/interfaces/ros_messages/image_view.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
 
@@ -53,6 +54,9 @@ PRESCENE_FIELDS(RosTfMessage, Field{"transforms", &M::transforms});
 PRESCENE_FIELDS(RosTwist, Field{"linear", &M::linear}, Field{"angular", &M::angular});
 PRESCENE_FIELDS(RosTwistStamped, Field{"header", &M::header}, Field{"twist", &M::twist});
 PRESCENE_FIELDS(RosImage, Field{"header", &M::header}, Field{"height", &M::height}, Field{"width", &M::width},
+                Field{"encoding", &M::encoding}, Field{"is_bigendian", &M::is_bigendian}, Field{"step", &M::step},
+                Field{"data", &M::data});
+PRESCENE_FIELDS(RosImageView, Field{"header", &M::header}, Field{"height", &M::height}, Field{"width", &M::width},
                 Field{"encoding", &M::encoding}, Field{"is_bigendian", &M::is_bigendian}, Field{"step", &M::step},
                 Field{"data", &M::data});
 PRESCENE_FIELDS(RosCompressedImage, Field{"header", &M::header}, Field{"format", &M::format}, Field{"data", &M::data});

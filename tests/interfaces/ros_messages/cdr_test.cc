@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <tuple>
+
+#include "prescene/interfaces/ros_messages/image_view.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -106,6 +109,23 @@ TEST(Cdr, KeepsToItsLimits) {
   EXPECT_THAT(status.message(), HasSubstr("longer than the limit of 4 bytes"));
   EXPECT_EQ(decode_status<RosString>(encode_cdr(RosString{"four"}), {.max_message_bytes = 8}).code(),
             StatusCode::kResourceExhausted);
+}
+
+TEST(Cdr, AnImageThatStaysWhereItIsIsTheSameAndHasTheSameErrors) {
+  const RosImage image{{{7, 9}, "camera"}, 2, 3, "mono8", 0, 4, {1, 2, 3, 4, 5, 6, 7}};
+  const std::vector<std::uint8_t> whole = encode_cdr(image);
+  const auto view = view_image_cdr(whole);
+  ASSERT_TRUE(view.ok()) << view.status().message();
+  EXPECT_EQ(view->header, image.header);
+  EXPECT_EQ(std::tuple(view->height, view->width, view->encoding, view->is_bigendian, view->step),
+            std::tuple(image.height, image.width, image.encoding, image.is_bigendian, image.step));
+  EXPECT_EQ(std::vector(view->data.begin(), view->data.end()), image.data);
+  EXPECT_GE(view->data.data(), whole.data());
+  EXPECT_LE(view->data.data() + view->data.size(), whole.data() + whole.size());
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const std::span cut(whole.data(), size);
+    ASSERT_EQ(view_image_cdr(cut).status(), decode_cdr<RosImage>(cut).status()) << size;
+  }
 }
 
 }  // namespace
