@@ -8,6 +8,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/pixel_rays.h"
 #include "prescene/geometry/polygon.h"
 
 namespace prescene::filter {
@@ -126,20 +127,36 @@ geometry::Plane fit_plane(std::span<const Vector3d> points) {
 
 namespace {
 
+/// Depths that count, as the numbers of single precision that lie in the range: no depth has to be widened to be told.
+struct DepthRange {
+  explicit DepthRange(const SegmentationOptions& options)
+      : least(static_cast<float>(options.min_depth)), most(static_cast<float>(options.max_depth)) {
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    if (static_cast<double>(least) < options.min_depth) least = std::nextafter(least, kFar);
+    if (static_cast<double>(most) > options.max_depth) most = std::nextafter(most, -kFar);
+  }
+  bool has(float z) const { return z >= least && z <= most; }
+
+  float least, most;
+};
+
 /// The measured pixel nearest to (x, y), at most `reach` away in either direction; nearest first, ties by row.
-std::optional<std::array<int, 2>> measured_near(const geometry::DepthImage& depth, int x, int y, int reach,
-                                                const SegmentationOptions& options) {
-  const auto in_range = [&](float z) { return z >= options.min_depth && z <= options.max_depth; };
-  if (in_range(depth(x, y))) return {{x, y}};
+std::optional<std::array<int, 2>> measured_near(const geometry::ImageView<const float>& depth, int x, int y, int reach,
+                                                const DepthRange& range) {
+  if (range.has(depth(x, y))) return {{x, y}};
   std::optional<std::array<int, 2>> found;
   int nearest = 2 * reach * reach + 1;
-  for (int v = std::max(0, y - reach); v <= std::min(depth.height() - 1, y + reach); ++v)
-    for (int u = std::max(0, x - reach); u <= std::min(depth.width() - 1, x + reach); ++u) {
+  const int left = std::max(0, x - reach), right = std::min(depth.width() - 1, x + reach);
+  for (int v = std::max(0, y - reach); v <= std::min(depth.height() - 1, y + reach); ++v) {
+    const float* row = depth.row(v);
+    for (int u = left; u <= right; ++u) {
+      if (!range.has(row[u])) continue;
       const int distance = (u - x) * (u - x) + (v - y) * (v - y);
-      if (!in_range(depth(u, v)) || distance >= nearest) continue;
+      if (distance >= nearest) continue;
       nearest = distance;
       found = {u, v};
     }
+  }
   return found;
 }
 
@@ -152,17 +169,20 @@ SampledDepth sample_depth(const geometry::DepthImage& depth, const geometry::Pin
   const int offset = step / 2;
   SampledDepth sampled;
   sampled.camera = camera.subsampled(step, offset);
-  sampled.depth = geometry::DepthImage(sampled.camera.width, sampled.camera.height);
+  const int width = sampled.camera.width, height = sampled.camera.height;
+  sampled.depth = geometry::DepthImage(width, height);
   sampled.points_C.assign(sampled.depth.size(), Vector3d::Zero());
-  for (int y = 0; y < sampled.camera.height; ++y)
-    for (int x = 0; x < sampled.camera.width; ++x) {
+  const geometry::PixelRays rays(camera);
+  const DepthRange range(options);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
       // Depth that was registered to a colour camera is full of single holes: a neighbour stands in, at its own place.
-      const auto pixel = measured_near(depth, offset + step * x, offset + step * y, step / 2, options);
+      const auto pixel = measured_near(depth.view(), offset + step * x, offset + step * y, step / 2, range);
       if (!pixel) continue;
-      const float z = depth((*pixel)[0], (*pixel)[1]);
+      const auto [u, v] = *pixel;
+      const float z = depth(u, v);
       sampled.depth(x, y) = z;
-      sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)] =
-          camera.unproject((*pixel)[0], (*pixel)[1], z);
+      sampled.points_C[static_cast<std::size_t>(y * width + x)] = rays.unproject(u, v, z);
     }
   return sampled;
 }

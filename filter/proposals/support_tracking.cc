@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <string_view>
 #include <vector>
+
+#include "prescene/geometry/pixel_rays.h"
 
 namespace prescene::filter {
 namespace {
@@ -42,21 +45,24 @@ double at_depth(double threshold, double z) { return threshold * std::max(1.0, k
 
 Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Pose& X_CF) {
   Candidates found;
+  found.points_C.reserve(sampled.points_C.size());
   const Pose X_FC = X_CF.inverse();
   const geometry::Matrix3d R_FC = X_FC.rotation.toRotationMatrix();
   const Vector3d normal = X_CF.rotation * Vector3d::UnitZ();
   const double offset = normal.dot(X_CF.translation);
+  const geometry::PixelRays rays(sampled.camera);
   for (int y = 0; y < sampled.camera.height; ++y)
     for (int x = 0; x < sampled.camera.width; ++x) {
       const double z = sampled.depth(x, y);
-      const Vector3d ray = sampled.camera.unproject(x, y, 1.0);
+      if (z <= 0.0) continue;
+      const Vector3d ray = rays.unproject(x, y, 1.0);
       const double along = normal.dot(ray);
-      if (z <= 0.0 || std::abs(along) < 1e-9) continue;
+      if (std::abs(along) < 1e-9) continue;
       const double expected = offset / along;
       if (expected <= 0.0) continue;
       const Vector3d foot = R_FC * (expected * ray) + X_FC.translation;
       if (std::abs(foot.x()) > face.half_x || std::abs(foot.y()) > face.half_y) continue;
-      const Vector3d p_C = sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)];
+      const Vector3d& p_C = sampled.points_C[static_cast<std::size_t>(y * sampled.camera.width + x)];
       const double above = normal.dot(p_C) - offset;
       const double gate = at_depth(kFaceGate, z);
       if (above > gate) continue;  // something stands on it, or before it
@@ -64,6 +70,17 @@ Candidates candidates_of(const SampledDepth& sampled, const Face& face, const Po
       if (above > -gate) found.points_C.push_back(p_C);
     }
   return found;
+}
+
+/// Those of the points that lie on the plane, put into `inliers`, which has room for all.
+std::span<const Vector3d> inliers_of(const geometry::Plane& plane_C, std::span<const Vector3d> points_C,
+                                     std::vector<Vector3d>& inliers) {
+  std::size_t count = 0;
+  for (const Vector3d& p : points_C) {
+    inliers[count] = p;
+    count += std::abs(plane_C.signed_distance(p)) < at_depth(kInlier, p.z()) ? 1 : 0;
+  }
+  return {inliers.data(), count};
 }
 
 }  // namespace
@@ -86,11 +103,10 @@ std::optional<SupportMeasurement> measure_support(const SampledDepth& sampled, c
   if (static_cast<int>(seen.points_C.size()) < kFewestFacePixels) return std::nullopt;
 
   geometry::Plane plane_C = fit_plane(seen.points_C);
-  std::vector<Vector3d> inliers;
+  std::vector<Vector3d> memory(seen.points_C.size());
+  std::span<const Vector3d> inliers;
   for (int round = 0; round < 3; ++round) {
-    inliers.clear();
-    for (const Vector3d& p : seen.points_C)
-      if (std::abs(plane_C.signed_distance(p)) < at_depth(kInlier, p.z())) inliers.push_back(p);
+    inliers = inliers_of(plane_C, seen.points_C, memory);
     if (static_cast<int>(inliers.size()) < kFewestFacePixels) return std::nullopt;
     plane_C = fit_plane(inliers);
   }

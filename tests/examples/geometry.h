@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "prescene/geometry/camera.h"
+#include "prescene/geometry/image.h"
 #include "prescene/geometry/polygon.h"
 #include "prescene/geometry/triangle_mesh.h"
 
@@ -15,6 +17,12 @@ extern const TriangleMesh mesh;
 namespace dense_solvers_h {
 extern const Eigen::MatrixXd covariance;
 }  // namespace dense_solvers_h
+
+namespace pixel_rays_h {
+extern const PinholeCamera camera;
+extern const DepthImage depth;
+extern const int x, y;
+}  // namespace pixel_rays_h
 
 namespace polygon_h {
 extern const std::vector<Vector2d> points;

@@ -6,6 +6,7 @@
 
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
+#include "prescene/geometry/pixel_rays.h"
 #include "tests/support/generators.h"
 #include "tests/support/matchers.h"
 
@@ -33,6 +34,13 @@ TEST(PinholeCamera, UnprojectingIsTheInverse) {
     RC_ASSERT(p_CQ.z() == depth);
     RC_ASSERT((kCamera.project(p_CQ) - Eigen::Vector2d(u, v)).norm() < 1e-10);
   }));
+}
+
+TEST(PinholeCamera, RaysOfAllPixelsHaveTheBitsOfUnprojecting) {
+  const PixelRays rays(kCamera);
+  for (int y = 0; y < kCamera.height; y += 7)
+    for (int x = 0; x < kCamera.width; ++x)
+      for (const double depth : {1.0, 0.73}) ASSERT_EQ(rays.unproject(x, y, depth), kCamera.unproject(x, y, depth));
 }
 
 TEST(PinholeCamera, SubsampledPixelsLookAlongTheOriginalOnes) {
