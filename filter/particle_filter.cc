@@ -45,10 +45,6 @@ double share_in(const Belief& belief, std::size_t object, int camera) {
   return number < seen.views.size() ? seen.views[number].visible_share : seen.visible_share;
 }
 
-void note(const char* stage, StepResult& result) {
-  result.trace.emplace_back(stage, belief::content_hash(result.belief));
-}
-
 /// Height of the lowest surface of a frame, against gravity from W's origin: that above which 98 % of the measured
 /// points lie, as some single ones are always wrong.
 std::optional<double> lowest_surface(const SampledDepth& sampled, const Pose& X_WC, const Vector3d& gravity_W) {
@@ -167,9 +163,11 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   if (const auto lowest = lowest_surface(sampled, observation.X_WC, belief.scene->gravity_W))
     belief.lowest_seen = std::min(*lowest, belief.lowest_seen.value_or(*lowest));
   for (std::size_t i = 0; i < belief.scene->supports.size(); ++i) {
+    const bool follows = is_found_support(belief.scene->supports[i].name);
+    if (!follows && !reports_supports_) continue;
     auto measured = measure_support(sampled, observation.X_WC, belief.scene->supports[i]);
     if (!measured) continue;
-    if (is_found_support(measured->support)) {
+    if (follows) {
       const double gain = std::max(1.0 / static_cast<double>(belief.step), kLeastSupportGain);
       auto scene = std::make_shared<belief::Scene>(*belief.scene);
       correct_support(*measured, gain, scene->supports[i]);
@@ -297,6 +295,10 @@ void ParticleFilter::look_for_more(FrameStep& step) {
   add_unknown_objects(step.frame, step.observation, known, options, settings_.initialise, tools_, stream, belief);
   step.result.counters.new_objects = static_cast<int>(belief.objects.size() - before);
   step.result.counters.forgotten_objects = forget_unknown_objects(belief);
+}
+
+void ParticleFilter::note(const char* stage, StepResult& result) const {
+  if (traces_stages_) result.trace.emplace_back(stage, belief::content_hash(result.belief));
 }
 
 StepResult ParticleFilter::step(const Belief& previous, const belief::Observation& observation,

@@ -257,6 +257,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   const std::uint64_t seed =
       context.options().seed_given ? context.options().seed : input.seed_or(context.options().seed);
   PRESCENE_TRY(const auto tracker, Tracker::create(input.scene(), settings, seed, backends));
+  tracker->report_supports(true);
   TrackingScore score(input.scene());
   SupportScore supports;
   FinalStates states;

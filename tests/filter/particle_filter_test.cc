@@ -242,12 +242,16 @@ TEST(ParticleFilter, SameBitsForAnyNumberOfThreadsAndForARepeatedStep) {
   for (const int threads : {1, 2, 3, 8}) {
     Backends backends(threads);
     ParticleFilter filter = backends.make_filter();
+    filter.trace_stages(true);
     Belief belief = filter.start(sequence.scene, 7);
     HashTrace trace;
     for (int frame = 0; frame < 4; ++frame) {
       const belief::Observation observation = sequence.observe(frame, *backends.renderer);
       const StepResult once = filter.step(belief, observation, {});
-      StepResult again = backends.make_filter().step(belief, observation, {});
+      ParticleFilter another = backends.make_filter();
+      another.trace_stages(true);
+      StepResult again = another.step(belief, observation, {});
+      EXPECT_FALSE(once.trace.empty());
       EXPECT_EQ(once.trace, again.trace);
       EXPECT_EQ(once.belief, again.belief);
       trace.insert(trace.end(), again.trace.begin(), again.trace.end());

@@ -48,6 +48,7 @@ Replayed replay(const std::filesystem::path& path, const std::shared_ptr<const b
     ADD_FAILURE() << tracker.status().message();
     return replayed;
   }
+  (*tracker)->trace_stages(true);
   service::TrackingScore score(scene);
   const service::StepSink on_step = [&](const service::TrackerStep& step, const service::Tracker& at) {
     const auto number = static_cast<std::int64_t>(step.record.step);

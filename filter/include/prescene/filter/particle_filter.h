@@ -118,8 +118,10 @@ struct StepResult {
   std::string learning_failure;    ///< Why an episode of motion could not be simulated; "" = all could.
   core::Status rendering_failure;  ///< Why the first of not_drawn failed; ok otherwise.
   StepCounters counters;
-  HashTrace trace;
-  std::vector<SupportMeasurement> supports;  ///< Those flat ones that the frame shows, against the belief before it.
+  HashTrace trace;  ///< Empty unless ParticleFilter::trace_stages() asks for it.
+  /// Flat supports that the frame shows, against the belief before it: those that were found in frames and follow them,
+  /// and the others if ParticleFilter::report_supports() asks for them.
+  std::vector<SupportMeasurement> supports;
 };
 
 class ParticleFilter {
@@ -132,6 +134,10 @@ class ParticleFilter {
   /// Whether the next steps look for things that the scene does not name (AugmentOptions::new_objects). Those that were
   /// found stay.
   void look_for_new_objects(bool looks) { settings_.augment.new_objects = looks; }
+  /// Whether StepResult::trace is made; it is not where nobody asks, as it takes five hashes of the whole belief.
+  void trace_stages(bool traces) { traces_stages_ = traces; }
+  /// Whether StepResult::supports holds all that the frame shows, or only those that follow the frames.
+  void report_supports(bool reports) { reports_supports_ = reports; }
   MeshCache& meshes() { return meshes_; }
 
   /// The belief before any frame: the scene's priors, step 0.
@@ -145,6 +151,7 @@ class ParticleFilter {
   /// What the operators of one step share.
   struct FrameStep;
 
+  void note(const char* stage, StepResult& result) const;
   void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result);
   void first_look(FrameStep& step, FindWhich which);
@@ -171,6 +178,8 @@ class ParticleFilter {
   std::vector<FrameCache> frame_caches_;  // by camera
   PrintCache prints_;
   TouchTest touch_;
+  bool traces_stages_ = false;
+  bool reports_supports_ = false;
 };
 
 /// Numbers the islands: objects whose surfaces are nearer than `gap` share the number of the first of them.

@@ -29,10 +29,10 @@ namespace prescene::service {
 struct TrackerStep {
   StepRecord record;
   filter::StepCounters counters;
-  std::string physics_failure;  ///< As in filter::StepResult.
-  IdleControls idle_controls;   ///< Also reported, in words, in record.degraded.
-  filter::HashTrace trace;
-  std::vector<filter::SupportMeasurement> supports;
+  std::string physics_failure;                       ///< As in filter::StepResult.
+  IdleControls idle_controls;                        ///< Also reported, in words, in record.degraded.
+  filter::HashTrace trace;                           ///< Empty unless Tracker::trace_stages() asks for it.
+  std::vector<filter::SupportMeasurement> supports;  ///< As in filter::StepResult.
   belief::Observation observation;
 };
 
@@ -65,6 +65,11 @@ class Tracker {
   bool uses_simulated_time() const { return !settings_.topics.clock.empty(); }
   /// What the newest message on it said; 0 = none has come.
   core::TimeNs simulated_now_ns() const { return simulated_now_ns_; }
+
+  /// As ParticleFilter::trace_stages().
+  void trace_stages(bool traces) { filter_.trace_stages(traces); }
+  /// As ParticleFilter::report_supports().
+  void report_supports(bool reports) { filter_.report_supports(reports); }
 
   /// Frames that were not used, since the start, and why the newest since the last step was not ("" = none was).
   std::uint64_t skipped_count() const { return frames_.skipped_count(); }
