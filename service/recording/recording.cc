@@ -103,7 +103,7 @@ core::Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std
 
 core::Status RecordingWriter::write(const std::string& topic, const std::string& type, const std::string& kind,
                                     std::uint32_t sequence, core::TimeNs log_ns, core::TimeNs publish_ns,
-                                    std::vector<std::uint8_t> data) {
+                                    std::span<const std::uint8_t> data) {
   auto found = channels_.find({topic, kind});
   if (found == channels_.end()) {
     interfaces::McapChannel channel = interfaces::ros_channel(topic, type);
@@ -112,7 +112,7 @@ core::Status RecordingWriter::write(const std::string& topic, const std::string&
     found = channels_.emplace(std::pair(topic, kind), number).first;
   }
   const auto clamped = [](core::TimeNs time_ns) { return std::clamp<core::TimeNs>(time_ns, 0, kLatestRecordedNs); };
-  return writer_->write({found->second, sequence, clamped(log_ns), clamped(publish_ns), std::move(data)});
+  return writer_->write({found->second, sequence, clamped(log_ns), clamped(publish_ns), {}}, data);
 }
 
 core::Result<MessageIndex> RecordingWriter::write(const interfaces::ReceivedMessage& message) {
@@ -132,8 +132,9 @@ core::Status RecordingWriter::write_json(const std::string& topic, const std::st
 }
 
 core::Status RecordingWriter::write_output(const std::string& topic, const std::string& type,
-                                           std::vector<std::uint8_t> cdr, core::TimeNs stamp_ns, core::TimeNs time_ns) {
-  return write(topic, type, kOutputKind, sequences_[topic]++, time_ns, stamp_ns, std::move(cdr));
+                                           std::span<const std::uint8_t> cdr, core::TimeNs stamp_ns,
+                                           core::TimeNs time_ns) {
+  return write(topic, type, kOutputKind, sequences_[topic]++, time_ns, stamp_ns, cdr);
 }
 
 core::Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::filesystem::path& path,

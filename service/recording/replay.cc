@@ -6,6 +6,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/recording/read_ahead.h"
 #include "prescene/service/tracking/camera_frames.h"
 
 namespace prescene::service {
@@ -38,10 +39,10 @@ class Replay {
     summary_.followed_step_records = follow;
   }
 
-  core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index) {
+  core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index, DecodedImages images = {}) {
     ++summary_.messages;
     note_image_topic(message);
-    const core::Status taken = tracker_.take_in(message, index);
+    const core::Status taken = tracker_.take_in(message, index, std::move(images));
     if (!taken.ok()) {
       if (summary_.refused++ == 0) summary_.first_refusal = taken.message();
     }
@@ -124,27 +125,30 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
   PRESCENE_TRY(const bool follow, has_step_records(path, options));
   const double total = static_cast<double>(reader->message_count().value_or(0));
   Replay replay(tracker, on_step, follow);
+  ReadAhead ahead(*reader, [&tracker](const auto& message) { return tracker.decode(message); });
   std::uint64_t entries = 0;
   for (;;) {
     if (cancellation.requested()) {
       replay.summary().cancelled = true;
       break;
     }
-    PRESCENE_TRY(const auto entry, reader->next());
+    PRESCENE_TRY(auto entry, ahead.next());
     if (!entry) break;
     if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
-    if (!entry->is_json) {
-      PRESCENE_RETURN_IF_ERROR(replay.take_in(entry->message, entry->index));
+    const RecordedEntry& recorded = entry->recorded;
+    if (!recorded.is_json) {
+      PRESCENE_RETURN_IF_ERROR(replay.take_in(recorded.message, recorded.index, std::move(entry->images)));
       continue;
     }
-    const std::string json(entry->message.cdr.begin(), entry->message.cdr.end());
-    if (follow && entry->message.topic == kStepTopic) {
-      PRESCENE_TRY(const StepRecord recorded, step_record_from_json(json));
-      PRESCENE_RETURN_IF_ERROR(replay.follow(recorded));
+    const std::string json(recorded.message.cdr.begin(), recorded.message.cdr.end());
+    if (follow && recorded.message.topic == kStepTopic) {
+      PRESCENE_TRY(const StepRecord step, step_record_from_json(json));
+      PRESCENE_RETURN_IF_ERROR(replay.follow(step));
     } else if (on_json) {
-      PRESCENE_RETURN_IF_ERROR(on_json(entry->message.topic, json, entry->message.received_ns));
+      PRESCENE_RETURN_IF_ERROR(on_json(recorded.message.topic, json, recorded.message.received_ns));
     }
   }
+  ahead.stop();
   if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
   replay.summary().loss = reader->loss_text();
   replay.summary().unchecked = reader->unchecked_text();

@@ -111,14 +111,30 @@ CameraFrames::CameraFrames(std::vector<CameraInput> cameras, const std::vector<s
   }
 }
 
+DecodedImages CameraFrames::decode(const interfaces::ReceivedMessage& message) const {
+  DecodedImages images;
+  for (const Camera& camera : cameras_) {
+    if (message.topic == camera.input.topics.depth) {
+      images.depth = decode_depth(message, camera.assembler.image_rules());
+      break;
+    }
+    if (message.topic == camera.input.topics.color) {
+      if (camera.assembler.uses_color()) images.color = decode_color_message(message);
+      break;
+    }
+  }
+  return images;
+}
+
 std::optional<core::Status> CameraFrames::take_in(const interfaces::ReceivedMessage& message, MessageIndex index,
-                                                  core::TimeNs received_ns) {
+                                                  core::TimeNs received_ns, DecodedImages images) {
+  if (!images.any()) images = decode(message);
   const auto named = [&](const std::string& topic) { return message.topic == topic; };
   for (Camera& camera : cameras_) {
     FrameAssembler& assembler = camera.assembler;
     const InputTopics& topics = camera.input.topics;
     if (named(topics.depth)) {
-      core::Result<DepthMessage> depth = decode_depth(message, assembler.image_rules());
+      core::Result<DepthMessage>& depth = *images.depth;
       if (depth && cameras_.size() > 1 && depth->report.measured == 0)
         depth->report.warnings.push_back(
             "no pixel of its depth image is measured: look whether it is covered, dazzled, or too near");
@@ -126,7 +142,7 @@ std::optional<core::Status> CameraFrames::take_in(const interfaces::ReceivedMess
     }
     if (named(topics.color)) {
       if (!assembler.uses_color()) return core::ok_status();
-      core::Result<ColorMessage> color = decode_color_message(message);
+      core::Result<ColorMessage>& color = *images.color;
       return color ? assembler.add_color(*std::move(color), index, received_ns) : color.status();
     }
     if (named(topics.camera_info)) {

@@ -91,7 +91,7 @@ std::shared_ptr<const belief::Belief> Tracker::belief() const {
   return belief_;
 }
 
-core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, MessageIndex index) {
+core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, MessageIndex index, DecodedImages images) {
   last_index_ = index;
   const InputTopics& topics = settings_.topics;
   const bool is_simulated = uses_simulated_time();
@@ -102,7 +102,8 @@ core::Status Tracker::take_in(const interfaces::ReceivedMessage& message, Messag
       PRESCENE_TRY(simulated_now_ns_, interfaces::to_stamp_ns(clock.clock));
       return core::ok_status();
     }
-    if (std::optional<core::Status> taken = frames_.take_in(message, index, received_ns)) return *std::move(taken);
+    if (std::optional<core::Status> taken = frames_.take_in(message, index, received_ns, std::move(images)))
+      return *std::move(taken);
     if (message.topic == kControlTopic) {
       PRESCENE_RETURN_IF_ERROR(check_type(message, "std_msgs/msg/String"));
       const auto newest_ns = belief_->step > 0 ? std::optional(belief_->stamp_ns) : std::nullopt;

@@ -7,6 +7,7 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/recording/frame_history.h"
+#include "prescene/service/recording/recording.h"
 #include "prescene/service/recording/replay_input.h"
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/tracker.h"
@@ -47,6 +48,11 @@ extern const Tracker tracker;
 extern const std::string json;
 extern const core::TimeNs time_ns;
 }  // namespace explained_again_h
+
+namespace read_ahead_h {
+extern const std::unique_ptr<RecordingReader> reader;
+extern const Tracker tracker;
+}  // namespace read_ahead_h
 
 namespace residuals_h {
 extern const belief::Scene scene;

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -69,7 +70,7 @@ class RecordingWriter {
   /// most_json_bytes().
   core::Status write_json(const std::string& topic, const std::string& json, core::TimeNs time_ns);
   /// What we make of the belief for other programs. A replay makes it anew, so RecordingReader passes over it.
-  core::Status write_output(const std::string& topic, const std::string& type, std::vector<std::uint8_t> cdr,
+  core::Status write_output(const std::string& topic, const std::string& type, std::span<const std::uint8_t> cdr,
                             core::TimeNs stamp_ns, core::TimeNs time_ns);
   core::Status flush() { return writer_->flush(); }
   /// To be called now and then with the time, by which messages are received: writes what was kept back for long
@@ -82,7 +83,7 @@ class RecordingWriter {
  private:
   explicit RecordingWriter(std::unique_ptr<interfaces::McapWriter> writer) : writer_(std::move(writer)) {}
   core::Status write(const std::string& topic, const std::string& type, const std::string& kind, std::uint32_t sequence,
-                     core::TimeNs log_ns, core::TimeNs publish_ns, std::vector<std::uint8_t> data);
+                     core::TimeNs log_ns, core::TimeNs publish_ns, std::span<const std::uint8_t> data);
 
   std::unique_ptr<interfaces::McapWriter> writer_;
   std::map<std::pair<std::string, std::string>, int> channels_;  // by topic and kind: /tf is the robot's and ours

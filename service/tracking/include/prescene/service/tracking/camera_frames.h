@@ -25,6 +25,7 @@
 
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/service/tracking/frame_assembler.h"
+#include "prescene/service/tracking/image_messages.h"
 #include "prescene/service/tracking/topics.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
@@ -68,8 +69,11 @@ class CameraFrames {
 
   /// Takes in a message on a topic of images, camera infos, tf or joint states; empty if it is on none of them. The
   /// status is not ok where it says something impossible.
+  /// Images that decode() made of it already are taken.
   std::optional<core::Status> take_in(const interfaces::ReceivedMessage& message, MessageIndex index,
-                                      core::TimeNs received_ns);
+                                      core::TimeNs received_ns, DecodedImages images = {});
+  /// The images of a message on a topic of images. From any thread: it depends on the settings alone.
+  DecodedImages decode(const interfaces::ReceivedMessage& message) const;
   /// The next frame for the belief; doubts name the camera where there are several.
   std::optional<AssembledFrame> take(core::TimeNs now_ns);
   /// The frame that a recording names, by its camera and depth image, at the time at which it was taken; empty if it

@@ -2,6 +2,8 @@
 // Depth and colour out of any message that carries them: sensor_msgs/Image, CompressedImage, PointCloud2.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 
 #include "prescene/core/status.h"
@@ -20,6 +22,15 @@ struct ColorMessage {
   interfaces::RosHeader header;
   geometry::ColorImage color;
   std::string form;  ///< "rgb8", "bgr8; jpeg compressed bgr8"
+};
+
+/// The images of one message where they were made before its turn; neither where there are none, or nobody made them.
+struct DecodedImages {
+  std::optional<core::Result<DepthMessage>> depth;
+  std::optional<core::Result<ColorMessage>> color;
+
+  bool any() const { return depth || color; }
+  std::size_t bytes() const;
 };
 
 /// Errors of decode_cdr and to_depth_image; kInvalidInput for a type that carries no depth.

@@ -47,7 +47,9 @@ class Tracker {
   /// Takes in one message of the robot, or one on kSettingsTopic, whose settings hold from the next step on; topics
   /// that nobody listens to are ignored. Numbers ascend. A message that says something impossible is refused, and named
   /// with its topic; nothing else is lost by it.
-  core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index);
+  core::Status take_in(const interfaces::ReceivedMessage& message, MessageIndex index, DecodedImages images = {});
+  /// As CameraFrames::decode(); from any thread.
+  DecodedImages decode(const interfaces::ReceivedMessage& message) const { return frames_.decode(message); }
   /// One belief step with the newest frame that is complete at `now_ns`, or in simulated time now; empty if there is
   /// none. Where the sender's
   /// clock went back (a recording is played again) the belief starts anew. Controls wait for the first step that they
